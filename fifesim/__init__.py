@@ -1,0 +1,1 @@
+"""Simulate what a satellite would have seen."""

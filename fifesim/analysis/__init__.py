@@ -1,0 +1,1 @@
+"""Analysis: vegetation indices and regression."""

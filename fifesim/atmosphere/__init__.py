@@ -1,0 +1,1 @@
+"""Atmosphere: gases, scattering and their coupling with the surface."""

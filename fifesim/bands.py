@@ -1,0 +1,128 @@
+"""Spectral bands: response-weighted means and solar irradiance."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+import pvlib
+
+
+@dataclass(frozen=True)
+class Band:
+    """
+    A spectral band.
+
+    Parameters
+    ----------
+    name : str
+        Name, such as ``"TM3"``.
+    wavelength : sequence of float, shape (n,)
+        Wavelengths of the response, increasing. [um]
+    response : sequence of float, shape (n,)
+        Relative spectral response, zero outside the wavelengths given. [1]
+
+    Raises
+    ------
+    ValueError
+        If the wavelengths do not increase, or the response is negative or zero throughout.
+    """
+
+    name: str
+    wavelength: tuple = field(repr=False)
+    response: tuple = field(repr=False)
+
+    def __post_init__(self):
+        wavelength, response = (tuple(float(v) for v in values) for values in (self.wavelength, self.response))
+        if len(wavelength) < 2 or len(wavelength) != len(response) or np.any(np.diff(wavelength) <= 0):
+            raise ValueError(f"band {self.name}: wavelengths must increase, one for each response")
+        if min(response) < 0 or max(response) == 0:
+            raise ValueError(f"band {self.name}: the response must not be negative, nor zero everywhere")
+        object.__setattr__(self, "wavelength", wavelength)
+        object.__setattr__(self, "response", response)
+
+    @property
+    def center(self):
+        """Response-weighted mean wavelength [um]."""
+        return float(self.mean(self.wavelength, self.wavelength))
+
+    def mean(self, values, wavelength, weight=1.0):
+        """
+        Mean of a spectrum over the response, by the trapezoidal rule on the union of both wavelength sets.
+
+        Parameters
+        ----------
+        values : array, shape (..., n)
+            Spectrum.
+        wavelength : array, shape (n,)
+            Its wavelengths, increasing and covering the band. [um]
+        weight : array, shape (n,), optional
+            Additional weight, such as the solar irradiance.
+
+        Returns
+        -------
+        mean : array, shape (...)
+
+        Raises
+        ------
+        ValueError
+            If the spectrum does not cover the band.
+        """
+        values, wavelength = np.asarray(values, float), np.asarray(wavelength, float)
+        nodes, response = self._nodes(wavelength)
+        weight = response * np.interp(nodes, wavelength, np.broadcast_to(weight, wavelength.shape))
+        index = np.clip(np.searchsorted(wavelength, nodes) - 1, 0, wavelength.size - 2)
+        share = (nodes - wavelength[index]) / (wavelength[index + 1] - wavelength[index])
+        spectrum = values[..., index] * (1 - share) + values[..., index + 1] * share
+        return np.trapezoid(spectrum * weight, nodes) / np.trapezoid(weight, nodes)
+
+    def _nodes(self, wavelength):
+        """Wavelengths of both the response and a spectrum inside the band, with the response there."""
+        used = np.flatnonzero(self.response)
+        low = self.wavelength[max(used[0] - 1, 0)]
+        high = self.wavelength[min(used[-1] + 1, len(self.wavelength) - 1)]
+        if wavelength[0] > low or wavelength[-1] < high:
+            raise ValueError(
+                f"band {self.name} spans {low:g} to {high:g} um, "
+                f"the spectrum only {wavelength[0]:g} to {wavelength[-1]:g} um"
+            )
+        inside = wavelength[(wavelength > low) & (wavelength < high)]
+        own = [w for w in self.wavelength if low <= w <= high]
+        nodes = np.union1d(inside, own)
+        return nodes, np.interp(nodes, self.wavelength, self.response)
+
+
+@lru_cache
+def solar_spectrum():
+    """
+    Extraterrestrial solar spectral irradiance at one astronomical unit.
+
+    Returns
+    -------
+    wavelength : array, shape (2002,)
+        0.28 to 4 um. [um]
+    irradiance : array, shape (2002,)
+        [W m-2 um-1]
+
+    References
+    ----------
+    ASTM G173-03, column "extraterrestrial", as distributed with pvlib
+    """
+    table = pvlib.spectrum.get_reference_spectra(standard="ASTM G173-03")
+    return table.index.to_numpy() / 1000, table["extraterrestrial"].to_numpy() * 1000
+
+
+def solar_irradiance(band):
+    """
+    Response-weighted solar irradiance of a band at one astronomical unit.
+
+    Parameters
+    ----------
+    band : Band
+
+    Returns
+    -------
+    irradiance : float
+        [W m-2 um-1]
+    """
+    wavelength, irradiance = solar_spectrum()
+    return float(band.mean(irradiance, wavelength))

@@ -1,0 +1,167 @@
+"""Directions of sun and sensor."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+import pvlib
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """
+    Directions of sun and sensor seen from the ground.
+
+    Azimuths point toward the sun and toward the sensor, clockwise from north.
+
+    Parameters
+    ----------
+    sza, saa : float
+        Solar zenith and azimuth angles. [degree]
+    vza, vaa : float, optional
+        Sensor zenith and azimuth angles; nadir by default. [degree]
+    earth_sun_distance : float, optional
+        [astronomical unit]
+
+    Raises
+    ------
+    ValueError
+        If the sun or the sensor is not above the horizon.
+    """
+
+    sza: float
+    saa: float
+    vza: float = 0.0
+    vaa: float = 0.0
+    earth_sun_distance: float = 1.0
+
+    def __post_init__(self):
+        if not 0 <= self.sza < 90:
+            raise ValueError(
+                f"sza must be in [0, 90) degrees, got {self.sza:g}: the sun is below the horizon; "
+                "check time, latitude and longitude"
+            )
+        if not 0 <= self.vza < 90:
+            raise ValueError(f"vza must be in [0, 90) degrees, got {self.vza:g}: the sensor looks down")
+        if not 0.9 < self.earth_sun_distance < 1.1:
+            raise ValueError(
+                f"earth_sun_distance is in astronomical units, 0.983 to 1.017, got {self.earth_sun_distance:g}"
+            )
+
+    @property
+    def raa(self):
+        """Relative azimuth folded to [0, 180]; 0 has sun and sensor on the same side. [degree]"""
+        return float(relative_azimuth(self.saa, self.vaa))
+
+    @property
+    def mu_s(self):
+        """Cosine of the solar zenith angle [1]."""
+        return float(np.cos(np.radians(self.sza)))
+
+    @property
+    def mu_v(self):
+        """Cosine of the sensor zenith angle [1]."""
+        return float(np.cos(np.radians(self.vza)))
+
+
+def relative_azimuth(saa, vaa):
+    """
+    Relative azimuth of sun and sensor.
+
+    Parameters
+    ----------
+    saa, vaa : array
+        Azimuths toward sun and sensor, clockwise from north. [degree]
+
+    Returns
+    -------
+    raa : array
+        Folded to [0, 180]; 0 is backscatter, with sun and sensor on the same side. [degree]
+
+    Examples
+    --------
+    >>> float(relative_azimuth(350.0, 10.0))
+    20.0
+    """
+    difference = np.abs(np.asarray(saa, float) - vaa) % 360
+    return np.where(difference > 180, 360 - difference, difference)
+
+
+def scattering_angle_cosine(sza, vza, raa):
+    r"""
+    Cosine of the angle through which a sunbeam is scattered to the sensor.
+
+    .. math:: \cos\Theta = -\mu_s \mu_v - \sin\theta_s \sin\theta_v \cos\varphi
+
+    Parameters
+    ----------
+    sza, vza, raa : array
+        [degree]
+
+    Returns
+    -------
+    cosine : array
+        -1 is backscatter. [1]
+
+    Examples
+    --------
+    >>> float(scattering_angle_cosine(0.0, 0.0, 0.0))
+    -1.0
+    """
+    sza, vza, raa = np.radians(sza), np.radians(vza), np.radians(raa)
+    return -np.cos(sza) * np.cos(vza) - np.sin(sza) * np.sin(vza) * np.cos(raa)
+
+
+def sun_position(time, latitude, longitude, altitude=0.0):
+    """
+    Geometry of the sun at a time and place, with a nadir view.
+
+    Parameters
+    ----------
+    time : str or datetime
+        Taken as UTC where it names no time zone.
+    latitude, longitude : float
+        [degree north, degree east]
+    altitude : float, optional
+        [m]
+
+    Returns
+    -------
+    geometry : Geometry
+
+    Raises
+    ------
+    ValueError
+        If the sun is below the horizon.
+
+    References
+    ----------
+    NREL solar position algorithm, as implemented in pvlib; true (not refracted) zenith
+    """
+    stamp = pd.Timestamp(time)
+    stamp = stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")
+    times = pd.DatetimeIndex([stamp])
+    sun = pvlib.solarposition.get_solarposition(times, latitude, longitude, altitude=altitude).iloc[0]
+    distance = float(pvlib.solarposition.nrel_earthsun_distance(times).iloc[0])
+    return Geometry(float(sun["zenith"]), float(sun["azimuth"]), earth_sun_distance=distance)
+
+
+# A hypothetical overpass: no Landsat passed the FIFE site on this day (WRS-2 cycle), but the paper simulates it.
+FIFE_TIME = "1987-06-06T16:35:00Z"
+FIFE_LATITUDE = 39.06
+FIFE_LONGITUDE = -96.54
+FIFE_ALTITUDE = 400.0
+
+
+@lru_cache
+def fife_geometry():
+    """
+    The paper's case: the sun of 6 June 1987, 16:35 UTC over the FIFE site, and a nadir view.
+
+    Returns
+    -------
+    geometry : Geometry
+        sza 28.5, saa 117.0, vza 0, vaa 0. [degree]
+    """
+    return sun_position(FIFE_TIME, FIFE_LATITUDE, FIFE_LONGITUDE, FIFE_ALTITUDE)

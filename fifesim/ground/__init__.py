@@ -1,0 +1,1 @@
+"""Ground scene: leaf area, canopy reflectance and absorption."""

@@ -1,0 +1,1 @@
+"""Sensor: spatial response, calibration and the instruments."""
