@@ -2,8 +2,8 @@
 Spatial response of a sensor: line spread functions and regularization onto a grid of pixels (Eq. 3).
 
 A line spread function (lsf) is any object with ``half_width`` [m], outside of which it is zero, and
-``cumulative(x)``, its integral from there up to the distance x [m] from the pixel centre, 0 to 1. The weight of
-a cell from a to b is then exactly ``cumulative(b) - cumulative(a)``, whatever the shape. The point spread is
+``cumulative(x)``, its integral from there up to the distance x [m] from the pixel centre, 0 to 1. The weight
+of a cell from a to b is then exactly ``cumulative(b) - cumulative(a)``, whatever the shape. The point spread is
 the product of one lsf per axis.
 """
 
@@ -150,7 +150,7 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
     .. math:: w_{ij} = C(x_{j+1} - X_i) - C(x_j - X_i)
 
     with :math:`X_i` the centre of pixel i, :math:`x_j` the edges of the cells and C the cumulative line
-    spread function. Sizes and offsets may have any ratio. Cells that the scene does not have lose their weight.
+    spread function. Sizes and offsets may have any ratio. Cells that the scene lacks lose their weight.
 
     Parameters
     ----------

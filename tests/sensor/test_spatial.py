@@ -38,9 +38,7 @@ def quadrature(low, high, width):
 def brute_force_weights(width, pixel, origin, n_pixels, n_cells, cell=CELL):
     """Dense weights by quadrature of each cell in each pixel."""
     centers = origin + (np.arange(n_pixels) + 0.5) * pixel
-    return np.array(
-        [[quadrature(j * cell - x, (j + 1) * cell - x, width) for j in range(n_cells)] for x in centers]
-    )
+    return np.array([[quadrature(j * cell - x, (j + 1) * cell - x, width) for j in range(n_cells)] for x in centers])
 
 
 def dense(operator, n_cells):
@@ -122,8 +120,8 @@ def test_sinusoid_is_reduced_by_the_mtf(wavelength, interval):
     """
     The Fourier transform of the line spread by quadrature, a route that knows no cells.
 
-    Cells hold the means of the sinusoid. What is lost lies in the two cells that the ends of the support cut: at
-    most w k cell^2 / 8 each, 4e-10 together for w = 0.02 m-1 and cells of 0.5 mm.
+    Cells hold the means of the sinusoid. What is lost lies in the two cells that the ends of the support cut:
+    at most w k cell^2 / 8 each, 4e-10 together for w = 0.02 m-1 and cells of 0.5 mm.
     """
     cell, n_cells, n_pixels, k = 5e-4, 200_000, 2, 2 * np.pi / wavelength
     edges = np.arange(n_cells + 1) * cell
@@ -142,9 +140,7 @@ def test_sinusoid_is_reduced_by_the_mtf(wavelength, interval):
     )
     mtf = quad(lambda x: density(x, TM_WIDTH) * np.cos(k * x), -TM_WIDTH / 2, TM_WIDTH / 2, epsabs=1e-13)[0]
     centers = 17.3 + (np.arange(n_pixels) + 0.5) * interval
-    np.testing.assert_allclose(
-        regularize(scene[None], row, columns), [mtf * np.cos(k * centers)], rtol=0, atol=1e-9
-    )
+    np.testing.assert_allclose(regularize(scene[None], row, columns), [mtf * np.cos(k * centers)], rtol=0, atol=1e-9)
     np.testing.assert_allclose(CosineSpread(TM_WIDTH).mtf(1 / wavelength), mtf, rtol=0, atol=1e-12)
 
 
