@@ -6,10 +6,12 @@ function of (seed, row, column) on an unbounded lattice. It is made in fixed lat
 of whole noise blocks, so that no tile depends on the window or the chunk that asks for it.
 """
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy import fft, optimize, special
+
+from fifesim.lattice import assemble
 
 # Noise block and field tile [cells]. 504 + 2 x 72 = 648 has small prime factors, as its successors do.
 BLOCK = 72
@@ -293,15 +295,7 @@ def streaming_field(seed, arp, row, column, shape):
         raise ValueError(
             f'arp must be at most {LARGEST_STREAMING_ARP} for the streaming field, got {arp:g}: use method="periodic"'
         )
-    height, width = shape
-    field = np.empty((height, width))
-    for tile_row in range(row // TILE, -(-(row + height) // TILE)):
-        for tile_column in range(column // TILE, -(-(column + width) // TILE)):
-            tile = _tile(seed, arp, tile_row, tile_column)
-            (into_rows, from_rows) = _overlap(tile_row * TILE, row, height)
-            (into_columns, from_columns) = _overlap(tile_column * TILE, column, width)
-            field[into_rows, into_columns] = tile[from_rows, from_columns]
-    return field
+    return assemble(partial(_tile, seed, arp), TILE, row, column, shape)
 
 
 def periodic_field(seed, arp, shape):
@@ -352,13 +346,6 @@ def check_seed(seed):
     """
     if isinstance(seed, bool) or int(seed) != seed or not 0 <= seed < 2**64:
         raise ValueError(f"seed must be a whole number from 0 to 2**64 - 1, got {seed!r}")
-
-
-def _overlap(tile_start, window_start, window_size):
-    """Slices that copy a tile into a window along one axis."""
-    start = max(tile_start, window_start)
-    stop = min(tile_start + TILE, window_start + window_size)
-    return slice(start - window_start, stop - window_start), slice(start - tile_start, stop - tile_start)
 
 
 def _tile(seed, arp, tile_row, tile_column):

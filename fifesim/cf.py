@@ -1,0 +1,207 @@
+"""Names, units and provenance of what fifesim makes, after the CF conventions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from fifesim.geometry import Geometry
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a variable is: units in CF spelling, CF standard name ("" where none exists), a long name and a comment."""
+
+    units: str
+    standard_name: str
+    long_name: str
+    comment: str = ""
+
+
+QUANTITIES = {
+    "lai": Quantity("1", "leaf_area_index", "leaf area index", "one-sided leaf area per ground area"),
+    "fpar": Quantity(
+        "1",
+        "fraction_of_surface_downwelling_photosynthetic_radiative_flux_absorbed_by_vegetation",
+        "fraction of absorbed photosynthetically active radiation",
+    ),
+    "surface_reflectance": Quantity(
+        "1", "surface_bidirectional_reflectance", "surface reflectance factor", "direct and diffuse light mixed"
+    ),
+    "toa_reflectance": Quantity(
+        "1",
+        "toa_bidirectional_reflectance",
+        "apparent reflectance at the top of the atmosphere",
+        "the cosine of the solar zenith angle is divided out",
+    ),
+    "toa_radiance": Quantity(
+        "W m-2 sr-1 um-1", "toa_outgoing_radiance_per_unit_wavelength", "radiance at the top of the atmosphere"
+    ),
+    "dn": Quantity("1", "", "digital number", "0 is no data; radiance = gain * dn + offset"),
+    "ndvi": Quantity("1", "normalized_difference_vegetation_index", "normalized difference vegetation index"),
+    "sza": Quantity("degree", "solar_zenith_angle", "solar zenith angle"),
+    "saa": Quantity("degree", "solar_azimuth_angle", "solar azimuth angle", "toward the sun, clockwise from north"),
+    "vza": Quantity("degree", "sensor_zenith_angle", "sensor zenith angle"),
+    "vaa": Quantity(
+        "degree", "sensor_azimuth_angle", "sensor azimuth angle", "toward the sensor, clockwise from north"
+    ),
+    "earth_sun_distance": Quantity("astronomical_unit", "", "distance of Earth and Sun"),
+    "wavelength": Quantity(
+        "um", "sensor_band_central_radiation_wavelength", "response-weighted wavelength of the band"
+    ),
+    "solar_irradiance": Quantity(
+        "W m-2 um-1", "solar_irradiance_per_unit_wavelength", "extraterrestrial solar irradiance of the band at 1 AU"
+    ),
+    "gain": Quantity("W m-2 sr-1 um-1", "", "radiance of one digital count"),
+    "offset": Quantity("W m-2 sr-1 um-1", "", "radiance of digital number 0"),
+}
+
+# What a result keeps of its inputs' attributes; everything else is replaced.
+PROVENANCE = (
+    "rng_seed",
+    "arp",
+    "lai_distribution",
+    "method",
+    "leaf_angles",
+    "background",
+    "atmosphere",
+    "instrument",
+    "references",
+)
+
+_GEOMETRY = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
+
+
+def attributes(name):
+    """
+    CF attributes of a quantity.
+
+    Parameters
+    ----------
+    name : str
+        A key of `QUANTITIES`.
+
+    Returns
+    -------
+    attributes : dict of str
+    """
+    quantity = QUANTITIES[name]
+    found = {
+        "standard_name": quantity.standard_name,
+        "long_name": quantity.long_name,
+        "units": quantity.units,
+        "comment": quantity.comment,
+    }
+    return {key: value for key, value in found.items() if value}
+
+
+def label(array, name, *, history, source=None, **provenance):
+    """
+    Name an array and replace its attributes.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    name : str
+        A key of `QUANTITIES`.
+    history : str
+        One line on the step just done.
+    source : xarray.DataArray, optional
+        Input whose history and provenance carry on.
+    **provenance : str or number
+        Further attributes; win over those of the source.
+
+    Returns
+    -------
+    array : xarray.DataArray
+        A new object.
+    """
+    attrs = attributes(name)
+    before = source.attrs if source is not None else {}
+    attrs |= {key: before[key] for key in PROVENANCE if key in before} | provenance
+    attrs["history"] = "\n".join(filter(None, [before.get("history", ""), history]))
+    array = array.rename(name)
+    array.attrs = attrs
+    return array
+
+
+def check_units(array, *names):
+    """
+    Refuse an array whose units are not those of any of some quantities; missing units are taken as right.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    *names : str
+        Keys of `QUANTITIES`.
+
+    Raises
+    ------
+    ValueError
+        If the units differ.
+    """
+    allowed = list(dict.fromkeys(QUANTITIES[name].units for name in names))
+    units = str(array.attrs.get("units", allowed[0])).strip()
+    if units not in allowed and not ("1" in allowed and units in ("", "m2 m-2", "dimensionless")):
+        wanted = " or ".join(repr(unit) for unit in allowed)
+        raise ValueError(
+            f"{array.name or 'the array'} has units {units!r}, {names[0]} needs {wanted}: "
+            "convert it, then set .attrs['units']"
+        )
+
+
+def with_geometry(array, geometry):
+    """
+    Carry the directions of sun and sensor as scalar coordinates.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    geometry : fifesim.geometry.Geometry
+
+    Returns
+    -------
+    array : xarray.DataArray
+    """
+    scalars = {name: xr.DataArray(getattr(geometry, name), attrs=attributes(name)) for name in _GEOMETRY}
+    return array.assign_coords(scalars)
+
+
+def geometry_of(array):
+    """
+    Directions of sun and sensor that an array carries.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+
+    Returns
+    -------
+    geometry : fifesim.geometry.Geometry or None
+        None where it carries no solar zenith angle.
+    """
+    if "sza" not in array.coords:
+        return None
+    found = {name: float(array.coords[name]) for name in _GEOMETRY if name in array.coords}
+    return Geometry(**({"saa": 0.0} | found))
+
+
+def band_coordinates(**values):
+    """
+    Coordinates along the band dimension.
+
+    Parameters
+    ----------
+    **values : sequence, shape (band,)
+        ``band`` for the names, and keys of `QUANTITIES`.
+
+    Returns
+    -------
+    coordinates : dict of str to xarray.DataArray
+    """
+    names = {"band": xr.DataArray(np.asarray(values.pop("band"), dtype=str), dims="band", attrs={"long_name": "band"})}
+    numbers = {
+        name: xr.DataArray(np.asarray(value, float), dims="band", attrs=attributes(name))
+        for name, value in values.items()
+    }
+    return names | numbers

@@ -1,0 +1,172 @@
+"""How a kernel of numpy arrays meets dask: by cell, by place, or from one grid onto another."""
+
+import dask.array as da
+import numpy as np
+import xarray as xr
+
+from fifesim import grid as grids
+
+
+def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
+    """
+    Apply a kernel cell by cell.
+
+    Parameters
+    ----------
+    kernel : callable
+        Takes numpy arrays that broadcast against each other, and the parameters.
+    *arrays : xarray.DataArray
+        Rasters on one grid, or arrays along ``band``.
+    bands : int, optional
+        The kernel makes a new leading axis of this many bands.
+    dtype : dtype, optional
+        Of the result.
+    **parameters
+        Passed to the kernel.
+
+    Returns
+    -------
+    array : xarray.DataArray
+        Lazy where an input is.
+
+    Raises
+    ------
+    ValueError
+        If the rasters differ in grid, or in a scalar coordinate such as sza.
+    """
+    _check_alignment(arrays)
+    core = {}
+    if bands is not None:
+        core = {
+            "output_core_dims": [["band"]],
+            "dask_gufunc_kwargs": {"output_sizes": {"band": bands}},
+        }
+
+    def call(*blocks):
+        out = kernel(*blocks, **parameters)
+        # apply_ufunc wants new axes last; the transpose below undoes this view.
+        return out if bands is None else np.moveaxis(out, 0, -1)
+
+    out = xr.apply_ufunc(
+        call, *arrays, join="exact", dask="parallelized", output_dtypes=[dtype], keep_attrs=True, **core
+    )
+    dims = [name for name in ("band", "y", "x") if name in out.dims]
+    return out.transpose(*dims)
+
+
+def tiles(kernel, grid, chunks=None):
+    """
+    Array of a kernel that makes its cells from their place alone.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(row, column, (rows, columns))`` gives the cells from a row and column of the grid on.
+    grid : odc.geo.geobox.GeoBox
+    chunks : mapping or int or "auto", optional
+        As xarray takes it, over y and x. Without it the whole array is made at once.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims (y, x)
+    """
+    if chunks is None:
+        return grids.place(xr.DataArray(kernel(0, 0, tuple(grid.shape)), dims=("y", "x")), grid)
+    normal = da.core.normalize_chunks(_chunk_tuple(chunks), shape=tuple(grid.shape), dtype=float)
+
+    def block(block_info=None):
+        (top, bottom), (left, right) = block_info[None]["array-location"]
+        return kernel(top, left, (bottom - top, right - left))
+
+    return grids.place(xr.DataArray(da.map_blocks(block, chunks=normal, dtype=float), dims=("y", "x")), grid)
+
+
+def resample(kernel, rows, columns, array, grid):
+    """
+    Carry a raster onto another grid by one operator for each axis.
+
+    Each output chunk reads the window of the input that it needs.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(block, rows, columns)`` applies the operators to a numpy block.
+    rows, columns : operator
+        Sliced as ``operator[first:last]``; ``operator.window`` is then the first and last-plus-one index of the
+        input that it reads, and ``operator.shifted(first)`` the same operator on an input that starts there.
+    array : xarray.DataArray, dims (..., y, x)
+    grid : odc.geo.geobox.GeoBox
+        The output's.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims (..., y, x)
+        Float, lazy where the input is.
+    """
+    array = array.transpose(..., "y", "x")
+    data = array.data
+
+    def window(row_range, column_range):
+        these, those = rows[slice(*row_range)], columns[slice(*column_range)]
+        (top, bottom), (left, right) = these.window, those.window
+        block = data[..., top:bottom, left:right]
+        return block, these.shifted(top), those.shifted(left)
+
+    if not isinstance(data, da.Array):
+        block, these, those = window((0, grid.shape.y), (0, grid.shape.x))
+        out = kernel(np.ascontiguousarray(block), these, those)
+    else:
+        out = _resample_lazily(kernel, window, data, rows, columns)
+    result = xr.DataArray(out, dims=array.dims, coords=_other_coordinates(array), name=array.name, attrs=array.attrs)
+    return grids.place(result, grid)
+
+
+def _resample_lazily(kernel, window, data, rows, columns):
+    """One task for each output chunk and band chunk, on the merged input window."""
+    blocks = []
+    for row_range in _output_ranges(rows, data.chunks[-2]):
+        line = []
+        for column_range in _output_ranges(columns, data.chunks[-1]):
+            block, these, those = window(row_range, column_range)
+            block = block.rechunk({block.ndim - 2: -1, block.ndim - 1: -1})
+            chunks = (*block.chunks[:-2], (row_range[1] - row_range[0],), (column_range[1] - column_range[0],))
+            line.append(block.map_blocks(kernel, these, those, dtype=float, chunks=chunks))
+        blocks.append(da.concatenate(line, axis=-1))
+    return da.concatenate(blocks, axis=-2)
+
+
+def _output_ranges(operator, chunks):
+    """Runs of outputs whose centres lie in one input chunk, so that a chunk is read by few others."""
+    edges = np.cumsum(chunks)
+    chunk = np.minimum(np.searchsorted(edges, operator.centers, side="right"), len(chunks) - 1)
+    starts = np.flatnonzero(np.diff(chunk, prepend=-1))
+    return list(zip(starts, [*starts[1:], len(chunk)], strict=True))
+
+
+def _other_coordinates(array):
+    return {name: value for name, value in array.coords.items() if not {"y", "x"} & set(value.dims)}
+
+
+def _chunk_tuple(chunks):
+    if isinstance(chunks, dict):
+        unknown = set(chunks) - {"y", "x"}
+        if unknown:
+            raise ValueError(f"chunks name the dimensions y and x, got {', '.join(map(str, sorted(unknown)))}")
+        return tuple(-1 if chunks.get(axis) is None else chunks[axis] for axis in ("y", "x"))
+    return (chunks, chunks)
+
+
+def _check_alignment(arrays):
+    """Rasters must share their cells and agree in their scalar coordinates."""
+    rasters = [array for array in arrays if isinstance(array, xr.DataArray) and {"y", "x"} <= set(array.dims)]
+    for other in rasters[1:]:
+        if not grids.same_grid(grids.geobox(rasters[0]), grids.geobox(other)):
+            raise ValueError(
+                f"{rasters[0].name!r} and {other.name!r} lie on different grids: bring one onto the other's first"
+            )
+        for name in set(rasters[0].coords) & set(other.coords):
+            one, two = rasters[0].coords[name], other.coords[name]
+            if one.ndim == 0 and name != "spatial_ref" and one.dtype.kind in "fiu" and float(one) != float(two):
+                raise ValueError(
+                    f"{name} is {float(one):g} in {rasters[0].name!r} and {float(two):g} in {other.name!r}"
+                )

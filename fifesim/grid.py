@@ -1,0 +1,350 @@
+"""Grids as odc GeoBoxes: the FIFE site, what a DataArray's grid is, and where cells and pixels lie."""
+
+import numpy as np
+import odc.geo.xr  # noqa: F401  registers the .odc accessor
+import xarray as xr
+from affine import Affine
+from odc.geo.geobox import GeoBox
+from odc.geo.xr import xr_coords
+
+# Origins and coordinates are rounded to this many decimals of a metre, so that the cells of a window and of the
+# whole carry the same numbers. Summed from different origins they differ by 1e-10 m, and xarray aligns exactly.
+_DECIMALS = 6
+
+FIFE_SIZE = 15000.0
+
+# FIFE's own corner in NAD27, and the nearest point of the 30 m lattice of today's NAD83 elevation models to the place
+# that a Helmert transformation (EPSG:1173, good to 7 m) gives it: 704968 E 4334211 N.
+_FIFE_CORNERS = {"NAD83": ("EPSG:26914", 704970.0, 4334220.0), "NAD27": ("EPSG:26714", 705000.0, 4334000.0)}
+
+
+def fife_site(cell, window=None, datum="NAD83"):
+    """
+    Grid of the FIFE site, 15 km x 15 km in UTM zone 14.
+
+    Parameters
+    ----------
+    cell : float
+        Cell size. [m]
+    window : ((int, int), (int, int)), optional
+        First and last-plus-one row, and column, of a part of the site. [cell]
+    datum : {"NAD83", "NAD27"}, optional
+        NAD83 has its corner at 704970 E 4334220 N, on the 30 m lattice of today's elevation models;
+        NAD27 is FIFE's own, with its corner at 705000 E 4334000 N, about 9 m from there.
+
+    Returns
+    -------
+    grid : odc.geo.geobox.GeoBox
+        As many whole cells as fit.
+
+    Raises
+    ------
+    ValueError
+        If cell, window or datum make no grid.
+
+    Examples
+    --------
+    >>> fife_site(30).shape
+    Shape2d(x=500, y=500)
+    """
+    if datum not in _FIFE_CORNERS:
+        raise ValueError(f"datum must be one of {', '.join(_FIFE_CORNERS)}, got {datum!r}")
+    if not 0 < cell <= FIFE_SIZE:
+        raise ValueError(f"cell must be in (0, {FIFE_SIZE:g}] m, got {cell:g}")
+    crs, west, north = _FIFE_CORNERS[datum]
+    size = int(FIFE_SIZE / cell + 1e-6)
+    site = GeoBox((size, size), Affine(cell, 0.0, west, 0.0, -cell, north), crs)
+    return site if window is None else _window(site, window)
+
+
+def grid_at(crs, west, north, width, height, cell):
+    """
+    North-up grid from its corner, size and cell.
+
+    Parameters
+    ----------
+    crs : str or int
+        A projected coordinate reference system in metres.
+    west, north : float
+        Upper left corner. [m]
+    width, height : float
+        Size; as many whole cells as fit. [m]
+    cell : float
+        [m]
+
+    Returns
+    -------
+    grid : odc.geo.geobox.GeoBox
+
+    Raises
+    ------
+    ValueError
+        If the CRS is not projected in metres, or the size holds no cell.
+    """
+    if not (cell > 0 and width >= cell and height >= cell):
+        raise ValueError(f"a grid of {width:g} x {height:g} m holds no cell of {cell:g} m")
+    shape = int(height / cell + 1e-6), int(width / cell + 1e-6)
+    return check_grid(GeoBox(shape, Affine(cell, 0.0, west, 0.0, -cell, north), crs))
+
+
+def check_grid(grid):
+    """
+    Refuse a grid on which distances are not metres.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    grid : odc.geo.geobox.GeoBox
+        The same.
+
+    Raises
+    ------
+    ValueError
+        If it has no CRS, a geographic one, one in other units, or is not north up.
+    TypeError
+        If it is no GeoBox.
+    """
+    if not isinstance(grid, GeoBox):
+        raise TypeError(f"a grid is an odc.geo.geobox.GeoBox, got {type(grid).__name__}: see fifesim.fife_site")
+    if grid.crs is None:
+        raise ValueError("the grid has no CRS: give one, for instance with .rio.write_crs('EPSG:26914')")
+    if grid.crs.geographic:
+        raise ValueError(
+            f"the grid is in a geographic CRS ({_crs_name(grid.crs)}), whose cells are degrees: "
+            "reproject it to a projected CRS in metres, for instance with .rio.reproject('EPSG:26914')"
+        )
+    if not all(unit in ("metre", "meter", "m") for unit in grid.crs.units):
+        raise ValueError(f"the CRS must be in metres, {_crs_name(grid.crs)} is in {grid.crs.units[0]}: reproject")
+    a = grid.affine
+    if a.b or a.d or a.a <= 0 or a.e >= 0:
+        raise ValueError(
+            f"the grid must be north up and not rotated, got the transform {tuple(a)[:6]}: "
+            "sort it with .sortby('y', ascending=False) or reproject it"
+        )
+    return grid
+
+
+def geobox(array):
+    """
+    Grid of a DataArray.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+        With dimensions (..., y, x), coordinates of cell centres, and a CRS.
+
+    Returns
+    -------
+    grid : odc.geo.geobox.GeoBox
+        Its origin is rounded to 1e-6 m.
+
+    Raises
+    ------
+    ValueError
+        If there is no CRS, or the grid is not one that `check_grid` passes.
+    """
+    missing = {"y", "x"} - set(array.dims)
+    if missing:
+        raise ValueError(f"a raster has dimensions y and x, got {array.dims}: rename its dimensions")
+    if "spatial_ref" not in array.coords and array.odc.crs is None:
+        raise ValueError("the raster has no CRS: give it one, for instance with .rio.write_crs('EPSG:26914')")
+    found = array.odc.geobox
+    if found is None:
+        raise ValueError("the raster's x and y are not the centres of a regular grid")
+    a = found.affine
+    cell_x, cell_y = _exact_cell(array, a.a, a.e)
+    west, north = round(a.c, _DECIMALS), round(a.f, _DECIMALS)
+    return check_grid(GeoBox(found.shape, Affine(cell_x, a.b, west, a.d, cell_y, north), found.crs))
+
+
+def coordinates(grid):
+    """
+    Coordinates of a grid: cell centres and the CRS.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    coordinates : dict of str to xarray.DataArray
+        ``y``, ``x`` [m] and ``spatial_ref`` with a GeoTransform that fits.
+    """
+    snapped = _snapped(grid)
+    found = xr_coords(snapped)
+    a = snapped.affine
+    centres = {
+        "y": a.f + (np.arange(snapped.shape.y) + 0.5) * a.e,
+        "x": a.c + (np.arange(snapped.shape.x) + 0.5) * a.a,
+    }
+    out = {}
+    for axis, values in centres.items():
+        attrs = {
+            "standard_name": f"projection_{axis}_coordinate",
+            "long_name": f"{axis} coordinate of projection",
+            "units": "m",
+            "axis": axis.upper(),
+        }
+        out[axis] = xr.DataArray(np.round(values, _DECIMALS), dims=axis, attrs=attrs)
+    out["spatial_ref"] = found["spatial_ref"]
+    return out
+
+
+def place(array, grid):
+    """
+    Put an array on a grid: coordinates, CRS and transform afresh.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+        With dimensions (..., y, x) of the grid's shape.
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    array : xarray.DataArray
+        A new object; other coordinates stay.
+    """
+    array = array.drop_vars(["y", "x", "spatial_ref"], errors="ignore").assign_coords(coordinates(grid))
+    array.encoding = {"grid_mapping": "spatial_ref"}
+    return array
+
+
+def same_grid(one, other):
+    """
+    Whether two grids have the same cells, within a thousandth of one.
+
+    Parameters
+    ----------
+    one, other : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    same : bool
+    """
+    if one.shape != other.shape or one.crs != other.crs:
+        return False
+    tolerance = 1e-3 * min(abs(one.affine.a), abs(one.affine.e))
+    corners = (
+        np.array([transform_points(grid.affine, *corner) for corner in ((0, 0), grid.shape.xy)])
+        for grid in (one, other)
+    )
+    return bool(np.allclose(*corners, rtol=0, atol=tolerance))
+
+
+def aligned(grid, pixel):
+    """
+    Coarser grid whose upper left corner is that of a fine one.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+    pixel : float or (float, float)
+        Pixel size, down and across. [m]
+
+    Returns
+    -------
+    coarse : odc.geo.geobox.GeoBox
+        As many whole pixels as fit.
+
+    Raises
+    ------
+    ValueError
+        If none fits.
+    """
+    down, across = np.broadcast_to(np.asarray(pixel, float), 2)
+    a = grid.affine
+    height, width = -a.e * grid.shape.y, a.a * grid.shape.x
+    shape = int(height / down + 1e-6), int(width / across + 1e-6)
+    if not (down > 0 and across > 0 and min(shape) > 0):
+        raise ValueError(f"no pixel of {down:g} x {across:g} m fits into a scene of {height:g} x {width:g} m")
+    return GeoBox(shape, Affine(across, 0.0, a.c, 0.0, -down, a.f), grid.crs)
+
+
+def lattice_position(grid):
+    """
+    Row and column of a grid's first cell, counted in its own cells from the origin of its CRS, southward and eastward.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    row, column : int
+    """
+    a = grid.affine
+    return round(a.f / a.e), round(a.c / a.a)
+
+
+def cell_size(grid):
+    """
+    Cell size of a grid.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    down, across : float
+        [m]
+    """
+    return -grid.affine.e, grid.affine.a
+
+
+def transform_points(affine, columns, rows):
+    """
+    Apply an affine transform to many points.
+
+    Parameters
+    ----------
+    affine : affine.Affine
+    columns, rows : array
+        Positions across and down.
+
+    Returns
+    -------
+    x, y : array
+    """
+    columns, rows = np.asarray(columns, float), np.asarray(rows, float)
+    return (
+        affine.a * columns + affine.b * rows + affine.c,
+        affine.d * columns + affine.e * rows + affine.f,
+    )
+
+
+def _window(site, window):
+    try:
+        (top, bottom), (left, right) = window
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"window must be ((first row, last row), (first column, last column)), got {window!r}"
+        ) from None
+    rows, columns = site.shape
+    if not (0 <= top < bottom <= rows and 0 <= left < right <= columns):
+        raise ValueError(f"window must lie within {rows} rows and {columns} columns, got {window!r}")
+    return site[top:bottom, left:right]
+
+
+def _snapped(grid):
+    a = grid.affine
+    affine = Affine(a.a, a.b, round(a.c, _DECIMALS), a.d, a.e, round(a.f, _DECIMALS))
+    return GeoBox(grid.shape, affine, grid.crs)
+
+
+def _exact_cell(array, cell_x, cell_y):
+    """Cell size from the GeoTransform, which keeps its digits, where the coordinates agree with it."""
+    transform = array.coords["spatial_ref"].attrs.get("GeoTransform") if "spatial_ref" in array.coords else None
+    if transform:
+        numbers = [float(number) for number in transform.split()]
+        if np.allclose((numbers[1], numbers[5]), (cell_x, cell_y), rtol=1e-6):
+            return numbers[1], numbers[5]
+    return cell_x, cell_y
+
+
+def _crs_name(crs):
+    return f"EPSG:{crs.epsg}" if crs.epsg else str(crs)[:60]
