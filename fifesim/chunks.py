@@ -18,7 +18,7 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     *arrays : xarray.DataArray
         Rasters on one grid, or arrays along ``band``.
     bands : int, optional
-        The kernel makes a new leading axis of this many bands.
+        The kernel makes a new leading axis of this many bands, and gets inputs along ``band`` with it as last axis.
     dtype : dtype, optional
         Of the result.
     **parameters
@@ -38,6 +38,7 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     core = {}
     if bands is not None:
         core = {
+            "input_core_dims": [["band"] if "band" in array.dims else [] for array in arrays],
             "output_core_dims": [["band"]],
             "dask_gufunc_kwargs": {"output_sizes": {"band": bands}},
         }
@@ -90,10 +91,9 @@ def resample(kernel, rows, columns, array, grid):
     Parameters
     ----------
     kernel : callable
-        ``kernel(block, rows, columns)`` applies the operators to a numpy block.
-    rows, columns : operator
-        Sliced as ``operator[first:last]``; ``operator.window`` is then the first and last-plus-one index of the
-        input that it reads, and ``operator.shifted(first)`` the same operator on an input that starts there.
+        ``kernel(block, rows, columns)`` applies the operators to a numpy block, the cells of their windows.
+    rows, columns : fifesim.footprints.AxisOperator
+        Cut as ``operator[first:last]``, with the cells they read in ``window``.
     array : xarray.DataArray, dims (..., y, x)
     grid : odc.geo.geobox.GeoBox
         The output's.
@@ -105,42 +105,35 @@ def resample(kernel, rows, columns, array, grid):
     """
     array = array.transpose(..., "y", "x")
     data = array.data
-
-    def window(row_range, column_range):
-        these, those = rows[slice(*row_range)], columns[slice(*column_range)]
-        (top, bottom), (left, right) = these.window, those.window
-        block = data[..., top:bottom, left:right]
-        return block, these.shifted(top), those.shifted(left)
-
-    if not isinstance(data, da.Array):
-        block, these, those = window((0, grid.shape.y), (0, grid.shape.x))
-        out = kernel(np.ascontiguousarray(block), these, those)
+    if isinstance(data, da.Array):
+        out = _resample_lazily(kernel, rows, columns, data)
     else:
-        out = _resample_lazily(kernel, window, data, rows, columns)
+        these, those = rows[:], columns[:]
+        out = kernel(data[..., these.window, those.window], these, those)
     result = xr.DataArray(out, dims=array.dims, coords=_other_coordinates(array), name=array.name, attrs=array.attrs)
     return grids.place(result, grid)
 
 
-def _resample_lazily(kernel, window, data, rows, columns):
+def _resample_lazily(kernel, rows, columns, data):
     """One task for each output chunk and band chunk, on the merged input window."""
     blocks = []
     for row_range in _output_ranges(rows, data.chunks[-2]):
         line = []
         for column_range in _output_ranges(columns, data.chunks[-1]):
-            block, these, those = window(row_range, column_range)
-            block = block.rechunk({block.ndim - 2: -1, block.ndim - 1: -1})
-            chunks = (*block.chunks[:-2], (row_range[1] - row_range[0],), (column_range[1] - column_range[0],))
+            these, those = rows[row_range], columns[column_range]
+            block = data[..., these.window, those.window].rechunk({data.ndim - 2: -1, data.ndim - 1: -1})
+            chunks = (*block.chunks[:-2], (len(these),), (len(those),))
             line.append(block.map_blocks(kernel, these, those, dtype=float, chunks=chunks))
         blocks.append(da.concatenate(line, axis=-1))
     return da.concatenate(blocks, axis=-2)
 
 
 def _output_ranges(operator, chunks):
-    """Runs of outputs whose centres lie in one input chunk, so that a chunk is read by few others."""
-    edges = np.cumsum(chunks)
-    chunk = np.minimum(np.searchsorted(edges, operator.centers, side="right"), len(chunks) - 1)
+    """Runs of outputs whose footprints are centred in one input chunk, so that few chunks are read twice."""
+    centers = operator.start + operator.count // 2
+    chunk = np.minimum(np.searchsorted(np.cumsum(chunks), centers, side="right"), len(chunks) - 1)
     starts = np.flatnonzero(np.diff(chunk, prepend=-1))
-    return list(zip(starts, [*starts[1:], len(chunk)], strict=True))
+    return [slice(int(first), int(last)) for first, last in zip(starts, [*starts[1:], len(chunk)], strict=True)]
 
 
 def _other_coordinates(array):

@@ -280,6 +280,34 @@ def lattice_position(grid):
     return round(a.f / a.e), round(a.c / a.a)
 
 
+def lattice_offset(one, other):
+    """
+    Rows and columns from the first cell of one grid to that of another with the same cells.
+
+    Parameters
+    ----------
+    one, other : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    rows, columns : int
+
+    Raises
+    ------
+    ValueError
+        If CRS, cell size or the position of the cell edges differ.
+    """
+    a, b = one.affine, other.affine
+    same_cell = np.allclose((a.a, a.e), (b.a, b.e), rtol=1e-6)
+    rows, columns = (b.f - a.f) / a.e, (b.c - a.c) / a.a
+    if one.crs != other.crs or not same_cell or max(abs(rows - round(rows)), abs(columns - round(columns))) > 1e-3:
+        raise ValueError(
+            f"the rasters lie on different lattices, cells of {-a.e:g} x {a.a:g} m from {a.c:.3f} E {a.f:.3f} N and of "
+            f'{-b.e:g} x {b.a:g} m from {b.c:.3f} E {b.f:.3f} N: bring one onto the other, or use pair="index"'
+        )
+    return round(rows), round(columns)
+
+
 def cell_size(grid):
     """
     Cell size of a grid.

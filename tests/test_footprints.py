@@ -1,4 +1,4 @@
-"""Line spread and regularization against quadrature, Fourier transform and symmetry."""
+"""Footprints of the paper's line spread against quadrature, Fourier transform and symmetry."""
 
 import pickle
 from itertools import pairwise
@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fifesim.sensor.spatial import AxisOperator, CosineSpread, axis_operator, regularize
+from fifesim.footprints import AxisOperator, axis_operator, regularize
+from fifesim.sensor.spatial import CosineSpread
 
 CELL = 30 / 9
 TM_WIDTH = 9 * 4.778e-6 * 705e3

@@ -1,0 +1,183 @@
+"""Analysis on labelled rasters: true means, vegetation indices and their regression."""
+
+from functools import partial
+
+import dask
+import dask.array as da
+import numpy as np
+
+from fifesim import cf, chunks
+from fifesim import grid as grids
+from fifesim.analysis import indices, regression
+from fifesim.footprints import Boxcar, axis_operator, regularize
+
+# The red chlorophyll absorption and the near infrared plateau: where a band must lie, and the best place. [um]
+_RED = (0.60, 0.70, 0.66)
+_NIR = (0.75, 1.00, 0.84)
+
+
+def aggregate(array, pixel=30.0, *, min_valid=0.98):
+    """
+    Means over square blocks of ground: the truth that a pixel is compared with.
+
+    Parameters
+    ----------
+    array : xarray.DataArray, dims (..., y, x)
+    pixel : float, optional
+        Size of the blocks, any multiple of the cell or not. [m]
+    min_valid : float, optional
+        Share of its area that a block needs on valid cells; below it is NaN. [1]
+
+    Returns
+    -------
+    means : xarray.DataArray, dims (..., y, x)
+        On the grid of whole blocks from the upper left corner.
+
+    Raises
+    ------
+    ValueError
+        If the array has no grid, or no block fits.
+
+    See Also
+    --------
+    fifesim.footprints.regularize
+    """
+    scene = grids.geobox(array)
+    blocks = grids.aligned(scene, pixel)
+    (down, across), a, b = grids.cell_size(blocks), scene.affine, blocks.affine
+    rows = axis_operator(
+        Boxcar(down), cell_origin=a.f, cell_size=a.e, n_cells=scene.shape.y, pixel_origin=b.f, pixel_size=b.e,
+        n_pixels=blocks.shape.y,
+    )  # fmt: skip
+    columns = axis_operator(
+        Boxcar(across), cell_origin=a.c, cell_size=a.a, n_cells=scene.shape.x, pixel_origin=b.c, pixel_size=b.a,
+        n_pixels=blocks.shape.x,
+    )  # fmt: skip
+    means = chunks.resample(partial(regularize, min_valid=min_valid), rows, columns, array, blocks)
+    means.attrs = dict(array.attrs) | {
+        "history": "\n".join(filter(None, [array.attrs.get("history", ""), f"aggregate: means over {pixel:g} m"]))
+    }
+    return means
+
+
+def ndvi(reflectance):
+    """
+    Normalized difference vegetation index.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        With a coordinate ``wavelength`` along band, which tells red (0.60-0.70 um) and near infrared (0.75-1.00 um).
+
+    Returns
+    -------
+    ndvi : xarray.DataArray, dims (y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no red or no near infrared band, or the units are not those of a reflectance.
+
+    References
+    ----------
+    [Rouse1974]_; [Friedl1995]_
+
+    See Also
+    --------
+    fifesim.analysis.indices.normalized_difference
+    """
+    cf.check_units(reflectance, "toa_reflectance")
+    red, nir = _nearest_band(reflectance, "red", *_RED), _nearest_band(reflectance, "near infrared", *_NIR)
+    grid = grids.geobox(reflectance)
+    per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
+    plain = [reflectance.isel(band=index).drop_vars([*per_band, "band"], errors="ignore") for index in (nir, red)]
+    out = grids.place(chunks.pointwise(indices.normalized_difference, *plain), grid)
+    return cf.label(out, "ndvi", source=reflectance, history="ndvi")
+
+
+def regress(y, x, *, pair="coordinates"):
+    """
+    Least-squares line of one raster on another; computes.
+
+    Parameters
+    ----------
+    y, x : xarray.DataArray, dims (y, x)
+        The dependent and the independent variable; pairs with NaN are left out.
+    pair : {"coordinates", "index"}, optional
+        Match pixels that lie in the same place, or that have the same row and column.
+
+    Returns
+    -------
+    regression : fifesim.analysis.regression.Regression
+        The same to the bit under any chunking.
+
+    Raises
+    ------
+    ValueError
+        If the rasters do not match, or fewer than three pairs are left.
+
+    See Also
+    --------
+    fifesim.analysis.regression.fit
+    """
+    if pair not in ("coordinates", "index"):
+        raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
+    for array in (y, x):
+        if set(array.dims) != {"y", "x"}:
+            raise ValueError(f"regress takes rasters over (y, x), got {array.dims}: select one band first")
+    y, x = (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
+    origins = _origins(y, x)
+    sums = _lazy_row_sums(y, x, *origins) if da.Array in (type(y.data), type(x.data)) else _row_sums(y, x, *origins)
+    return regression.fit(sums, *origins)
+
+
+def _nearest_band(reflectance, what, low, high, best):
+    if "wavelength" not in reflectance.coords or "band" not in reflectance.dims:
+        raise ValueError("the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords")
+    wavelength = np.atleast_1d(reflectance["wavelength"].values)
+    inside = np.flatnonzero((wavelength >= low) & (wavelength <= high))
+    if not inside.size:
+        found = ", ".join(f"{value:.3f}" for value in wavelength)
+        raise ValueError(f"no {what} band between {low:g} and {high:g} um: the raster has {found} um")
+    return int(inside[np.argmin(np.abs(wavelength[inside] - best))])
+
+
+def _common_index(y, x):
+    rows, columns = min(y.sizes["y"], x.sizes["y"]), min(y.sizes["x"], x.sizes["x"])
+    return y.isel(y=slice(rows), x=slice(columns)), x.isel(y=slice(rows), x=slice(columns))
+
+
+def _common_place(y, x):
+    """Both cut to the ground that they share."""
+    one, two = grids.geobox(y), grids.geobox(x)
+    rows, columns = grids.lattice_offset(one, two)
+    cut_y, cut_x = {}, {}
+    for axis, shift in (("y", rows), ("x", columns)):
+        start, stop = max(0, shift), min(y.sizes[axis], shift + x.sizes[axis])
+        if stop <= start:
+            raise ValueError("the rasters do not overlap")
+        cut_y[axis], cut_x[axis] = slice(start, stop), slice(start - shift, stop - shift)
+    return y.isel(cut_y), x.isel(cut_x)
+
+
+def _origins(y, x):
+    """Values near the means that leave digits to the sums; the first rows hold one unless they are empty."""
+    first = dask.compute(y.isel(y=slice(1)).data, x.isel(y=slice(1)).data)
+    return tuple(float(np.nan_to_num(row[np.isfinite(row)].mean())) if np.isfinite(row).any() else 0.0 for row in first)
+
+
+def _row_sums(y, x, y_origin, x_origin):
+    return regression.row_sums(
+        np.ascontiguousarray(y.values, float), np.ascontiguousarray(x.values, float), y_origin, x_origin
+    )
+
+
+def _lazy_row_sums(y, x, y_origin, x_origin):
+    """Sums of whole rows, so that the chunks do not change their rounding."""
+    rows = da.core.normalize_chunks("auto", shape=y.shape, dtype=float, previous_chunks=None)[0]
+    arrays = (da.asarray(array.data).astype(float).rechunk((rows, -1)) for array in (y, x))
+    sums = da.map_blocks(
+        regression.row_sums, *arrays, y_origin=y_origin, x_origin=x_origin, dtype=float, chunks=(rows, (6,))
+    )
+    return sums.compute()

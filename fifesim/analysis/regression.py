@@ -1,0 +1,174 @@
+"""Linear regression from sums, so that the data need not be in memory."""
+
+import math
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from scipy import stats
+
+
+@dataclass(frozen=True)
+class Regression:
+    """
+    Least-squares line y = intercept + slope x, with what its intervals need.
+
+    Attributes
+    ----------
+    slope, intercept : float
+        Of the line.
+    r2 : float
+        Share of the variance of y that the line explains. [1]
+    n : int
+        Pairs used.
+    residual_deviation : float
+        Standard deviation of y about the line, with n - 2 degrees of freedom.
+    x_mean, x_sum_of_squares : float
+        Mean of x, and the sum of its squared deviations.
+    """
+
+    slope: float
+    intercept: float
+    r2: float
+    n: int
+    residual_deviation: float
+    x_mean: float
+    x_sum_of_squares: float
+
+    def predict(self, x):
+        """
+        Value of the line.
+
+        Parameters
+        ----------
+        x : array
+
+        Returns
+        -------
+        y : array
+        """
+        return self.intercept + self.slope * x
+
+    def confidence_interval(self, x, level=0.95):
+        """
+        Interval that holds the mean of y at x.
+
+        Parameters
+        ----------
+        x : array
+        level : float, optional
+            Confidence. [1]
+
+        Returns
+        -------
+        low, high : array, shape of x
+
+        References
+        ----------
+        [Draper1998]_, Section 3.1
+        """
+        return self._interval(x, level, 0.0)
+
+    def prediction_interval(self, x, level=0.95):
+        """
+        Interval that holds one new y at x.
+
+        Parameters
+        ----------
+        x : array
+        level : float, optional
+            Confidence. [1]
+
+        Returns
+        -------
+        low, high : array, shape of x
+
+        References
+        ----------
+        [Draper1998]_, Section 3.1
+        """
+        return self._interval(x, level, 1.0)
+
+    def _interval(self, x, level, own_scatter):
+        x = np.asarray(x, float)
+        leverage = own_scatter + 1.0 / self.n + (x - self.x_mean) ** 2 / self.x_sum_of_squares
+        half = stats.t.ppf(0.5 + level / 2, self.n - 2) * self.residual_deviation * np.sqrt(leverage)
+        return self.predict(x) - half, self.predict(x) + half
+
+
+@numba.njit(nogil=True, cache=True)
+def row_sums(y, x, y_origin, x_origin):
+    """
+    Sums of each row over the pairs in which both values are there.
+
+    Parameters
+    ----------
+    y, x : array, shape (rows, columns)
+        NaN where missing.
+    y_origin, x_origin : float
+        Values near the means, subtracted first so that no digits cancel.
+
+    Returns
+    -------
+    sums : array, shape (rows, 6)
+        Of 1, x, y, xx, xy, yy.
+    """
+    sums = np.zeros((y.shape[0], 6))
+    for i in range(y.shape[0]):
+        for j in range(y.shape[1]):
+            a, b = x[i, j] - x_origin, y[i, j] - y_origin
+            if a == a and b == b:
+                sums[i, 0] += 1.0
+                sums[i, 1] += a
+                sums[i, 2] += b
+                sums[i, 3] += a * a
+                sums[i, 4] += a * b
+                sums[i, 5] += b * b
+    return sums
+
+
+def fit(sums, y_origin=0.0, x_origin=0.0):
+    """
+    Least-squares line from the sums of its data.
+
+    Parameters
+    ----------
+    sums : array, shape (rows, 6)
+        From `row_sums`; added up without rounding.
+    y_origin, x_origin : float, optional
+        As given to `row_sums`.
+
+    Returns
+    -------
+    regression : Regression
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than three pairs, or x does not vary.
+
+    Examples
+    --------
+    >>> x = np.array([[0.0, 1.0, 2.0]])
+    >>> line = fit(row_sums(1 + 2 * x, x, 0.0, 0.0))
+    >>> line.intercept, line.slope, line.r2
+    (1.0, 2.0, 1.0)
+    """
+    n, x, y, xx, xy, yy = (math.fsum(column) for column in np.asarray(sums).T)
+    if n < 3:
+        raise ValueError(f"a regression needs at least 3 pairs of values, got {n:.0f}: do the rasters overlap?")
+    sxx, sxy, syy = xx - x * x / n, xy - x * y / n, yy - y * y / n
+    if not sxx > 0:
+        raise ValueError(f"all {n:.0f} values of x are {x_origin + x / n:g}: a regression needs x to vary")
+    slope = sxy / sxx
+    residual = max(syy - slope * sxy, 0.0)
+    x_mean, y_mean = x_origin + x / n, y_origin + y / n
+    return Regression(
+        slope=slope,
+        intercept=y_mean - slope * x_mean,
+        r2=1.0 - residual / syy if syy > 0 else 0.0,
+        n=int(n),
+        residual_deviation=math.sqrt(residual / (n - 2)),
+        x_mean=x_mean,
+        x_sum_of_squares=sxx,
+    )

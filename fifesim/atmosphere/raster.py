@@ -1,0 +1,93 @@
+"""The atmosphere on labelled rasters: surface reflectance to the top of the atmosphere, and back."""
+
+import xarray as xr
+
+from fifesim import cf, chunks
+from fifesim import grid as grids
+from fifesim.atmosphere import five_s
+
+_REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
+
+
+def to_toa(reflectance, atmosphere, bands, geometry):
+    """
+    Apparent reflectance at the top of the atmosphere, over a surface that is locally uniform.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Surface reflectance factor. [1]
+    atmosphere : fifesim.atmosphere.models.Atmosphere
+    bands : sequence of fifesim.bands.Band
+        One for each band of the raster.
+    geometry : fifesim.geometry.Geometry
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If the units are wrong, or sun or sensor stand lower than the model holds.
+
+    See Also
+    --------
+    fifesim.atmosphere.five_s.apparent_reflectance
+    """
+    cf.check_units(reflectance, "surface_reflectance")
+    step = (five_s.apparent_reflectance, "toa_reflectance", "to_toa")
+    return _carry(*step, reflectance, atmosphere, bands, geometry)
+
+
+def to_surface(reflectance, atmosphere, bands, geometry):
+    """
+    Surface reflectance from that at the top of the atmosphere; the exact inverse of `to_toa`.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        At the top of the atmosphere. [1]
+    atmosphere : fifesim.atmosphere.models.Atmosphere
+    bands : sequence of fifesim.bands.Band
+    geometry : fifesim.geometry.Geometry
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Negative where noise or a wrong atmosphere makes it so. [1]
+
+    Raises
+    ------
+    ValueError
+        If the units are wrong, or sun or sensor stand lower than the model holds.
+
+    See Also
+    --------
+    fifesim.atmosphere.five_s.surface_reflectance
+    """
+    cf.check_units(reflectance, "toa_reflectance")
+    step = (five_s.surface_reflectance, "surface_reflectance", "to_surface")
+    return _carry(*step, reflectance, atmosphere, bands, geometry)
+
+
+def _carry(kernel, name, verb, reflectance, atmosphere, bands, geometry):
+    terms = five_s.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
+    per_band = [
+        xr.DataArray(getattr(terms, term), dims="band")
+        for term in (
+            "path_reflectance",
+            "transmittance_down",
+            "transmittance_up",
+            "spherical_albedo",
+            "gas_transmittance",
+        )
+    ]
+    plain = reflectance.drop_vars("band", errors="ignore")
+    out = chunks.pointwise(kernel, plain, *per_band)
+    if "band" in reflectance.coords:
+        out = out.assign_coords(band=reflectance["band"])
+    out = cf.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)
+    said = {"history": f"{verb}: 5S, {atmosphere}", "atmosphere": str(atmosphere), "references": _REFERENCE}
+    return cf.label(out, name, source=reflectance, **said)
