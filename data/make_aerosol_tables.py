@@ -104,12 +104,16 @@ def main():
         "# made by make_aerosol_tables.py. "
     )
     write(
-        "aerosol_optics.csv", pd.concat(optics), source + "wavelength [um], extinction relative to 0.55 um [1],\n"
-        "# single scattering albedo [1], asymmetry parameter [1]\n"
+        "aerosol_optics.csv",
+        pd.concat(optics),
+        source + "wavelength [um], extinction relative to 0.55 um [1],\n"
+        "# single scattering albedo [1], asymmetry parameter [1]\n",
     )
     write(
-        "aerosol_phase.csv", pd.concat(phases), source + "Phase function, whose mean over the sphere is 1 [1],\n"
-        "# by scattering angle [degree] (rows) and wavelength [um] (columns)\n"
+        "aerosol_phase.csv",
+        pd.concat(phases),
+        source + "Phase function, whose mean over the sphere is 1 [1],\n"
+        "# by scattering angle [degree] (rows) and wavelength [um] (columns)\n",
     )
 
 

@@ -197,7 +197,7 @@ def profile_above(profile, altitude):
 
     Examples
     --------
-    >>> float(profile_above("midlatitude-summer", 0.0).pressure[0])
+    >>> round(float(profile_above("midlatitude-summer", 0.0).pressure[0]), 9)
     1013.0
     """
     table = datasets.table("atmosphere_profiles.csv").query("profile == @profile")

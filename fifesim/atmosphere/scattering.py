@@ -41,8 +41,8 @@ def sobolev_conservative_reflectance(tau, phase, mu_s, mu_v):
 
     Notes
     -----
-    Scalar, without polarization: 1 to 6 % low at 0.66 to 0.44 um with the sun within 30 degrees of the zenith, up to
-    11 % at 0.44 um with the sun at 60.
+    Scalar, without polarization. Beside scalar successive orders it is 5.5, 2.1 and 0.9 % low at 0.44, 0.66 and
+    0.84 um with the sun at 28 degrees and a nadir view; 11, 5 and 2 % with the sun at 60 and the view at 40.
 
     References
     ----------
@@ -82,7 +82,7 @@ def conservative_transmittance(tau, mu):
 
     Examples
     --------
-    >>> float(conservative_transmittance(0.0, 0.5))
+    >>> round(float(conservative_transmittance(0.0, 0.5)), 12)
     1.0
     """
     return ((2 / 3 + mu) + (2 / 3 - mu) * np.exp(-tau / mu)) / (4 / 3 + tau)
@@ -145,12 +145,13 @@ def delta_eddington(tau, single_scattering_albedo, asymmetry, mu):
 
     References
     ----------
-    [Joseph1976]_, Eqs. 5, 13 and 20; [Zdunkowski1980]_
+    [Joseph1976]_, Eqs. 5, 13 and 14; [Zdunkowski1980]_
 
     Examples
     --------
-    >>> [round(float(value), 12) for value in delta_eddington(0.0, 0.9, 0.6, 0.7)]
-    [0.0, 1.0]
+    >>> albedo, transmittance = delta_eddington(0.0, 0.9, 0.6, 0.7)
+    >>> abs(float(albedo)) < 1e-12, round(float(transmittance), 12)
+    (True, 1.0)
     """
     peak = asymmetry**2
     scattered = np.minimum(single_scattering_albedo, 1 - _POLE)
@@ -159,9 +160,9 @@ def delta_eddington(tau, single_scattering_albedo, asymmetry, mu):
     field = _eddington_field(depth, albedo, asymmetry / (1 + asymmetry), mu)
     top = field.ratio * (field.growing * np.exp(-field.rate * depth) - field.decaying) + field.net_direct
     bottom = field.ratio * (field.growing - field.decaying * np.exp(-field.rate * depth))
-    bottom = bottom + field.net_direct * np.exp(-depth / mu)
+    beam = np.exp(-depth / field.mu_s)
     # The incident flux is pi mu and the net flux 4 pi H.
-    return 4 * top / mu, np.exp(-depth / mu) - 4 * bottom / mu
+    return 4 * top / mu, beam - 4 * (bottom + field.net_direct * beam) / mu
 
 
 def spherical_albedo(tau, single_scattering_albedo, asymmetry):
@@ -186,8 +187,8 @@ def spherical_albedo(tau, single_scattering_albedo, asymmetry):
 
     Examples
     --------
-    >>> float(spherical_albedo(0.0, 0.9, 0.6))
-    0.0
+    >>> abs(float(spherical_albedo(0.0, 0.9, 0.6))) < 1e-12
+    True
     """
     layer = (np.asarray(value, float)[..., None] for value in (tau, single_scattering_albedo, asymmetry))
     albedo, _ = delta_eddington(*layer, _MU)
@@ -230,8 +231,8 @@ def sobolev_reflectance(tau, single_scattering_albedo, asymmetry, phase, mu_s, m
 
     Examples
     --------
-    >>> float(sobolev_reflectance(0.0, 0.9, 0.6, 0.3, 0.8, 0.9))
-    0.0
+    >>> abs(float(sobolev_reflectance(0.0, 0.9, 0.6, 0.3, 0.8, 0.9))) < 1e-12
+    True
     """
     albedo = np.minimum(single_scattering_albedo, 1 - _POLE)
     field = _eddington_field(tau, albedo, asymmetry, mu_s)
@@ -241,7 +242,8 @@ def sobolev_reflectance(tau, single_scattering_albedo, asymmetry, phase, mu_s, m
     difference = np.where(np.abs(difference) < _POLE, _POLE, difference)
     upward = (np.exp(-field.rate * tau) - np.exp(-tau / mu_v)) / difference
     downward = -np.expm1(-tau * (1 / mu_v + field.rate)) / (1 / mu_v + field.rate)
-    beam = -np.expm1(-tau * (1 / mu_v + 1 / mu_s)) / (1 / mu_v + 1 / mu_s)
+    slant = 1 / mu_v + 1 / field.mu_s
+    beam = -np.expm1(-tau * slant) / slant
     source = (
         field.growing * (albedo + coupling * field.ratio) * upward
         + field.decaying * (albedo - coupling * field.ratio) * downward
@@ -259,6 +261,7 @@ class _Field(NamedTuple):
     ratio: np.ndarray  # of H to J: +k / a in the growing term, -k / a in the decaying one
     mean_direct: np.ndarray  # D
     net_direct: np.ndarray  # the term of H beside D
+    mu_s: np.ndarray  # moved off the pole k mu_s = 1
 
 
 def _eddington_field(tau, albedo, asymmetry, mu_s):
@@ -283,4 +286,4 @@ def _eddington_field(tau, albedo, asymmetry, mu_s):
     determinant = inward**2 - outward**2
     growing = (inward * top - outward * bottom) / determinant
     decaying = (inward * bottom - outward * top) / determinant
-    return _Field(growing, decaying, rate, ratio, mean_direct, net_direct)
+    return _Field(growing, decaying, rate, ratio, mean_direct, net_direct, mu_s)
