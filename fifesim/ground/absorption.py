@@ -4,6 +4,9 @@ import numpy as np
 
 from fifesim.ground.leaf_angles import leaf_angle_classes, leaf_projection
 
+FPAR_INF = 0.94
+"""FPAR of an infinitely thick canopy [1]; Friedl et al. (1995), below Eq. 6."""
+
 
 def extinction_coefficient(sza, leaf_angles="spherical"):
     r"""
@@ -43,7 +46,7 @@ def extinction_coefficient(sza, leaf_angles="spherical"):
     return projection @ np.asarray(leaf_angles.fraction) / mu_s
 
 
-def fpar(lai, extinction, fpar_inf=0.94):
+def fpar(lai, extinction, fpar_inf=FPAR_INF):
     r"""
     Fraction of photosynthetically active radiation that a canopy absorbs, by Beer's law.
 
