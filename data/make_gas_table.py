@@ -2,7 +2,7 @@
 Make gas_absorption.csv: fit the band models of `fifesim.atmosphere.gases` to monochromatic runs of 6SV1.1.
 
 Needs the engine (``pip install fifesim[sixs]``); fifesim itself does not. Run as ``python data/make_gas_table.py``:
-6,728 runs of 15 ms and 1,487 fits, about three minutes. It prints the largest error of each gas.
+6,728 runs of 15 ms and 1,487 fits, about a minute and a half. It prints the largest error of each gas.
 """
 
 import re

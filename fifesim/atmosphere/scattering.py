@@ -141,7 +141,7 @@ def delta_eddington(tau, single_scattering_albedo, asymmetry, mu):
     Notes
     -----
     An :math:`\omega` above :math:`1 - 10^{-6}` is computed as that, where the solution is nearly singular.
-    Within .01 of the transmittance of 6S for continental aerosol, visibility 23 km and more, zenith angle to 60.
+    Within .002 of the transmittance of 6S for continental aerosol, visibility 23 km and more, sun within 45 degrees.
 
     References
     ----------
@@ -222,8 +222,9 @@ def sobolev_reflectance(tau, single_scattering_albedo, asymmetry, phase, mu_s, m
 
     Notes
     -----
-    5 to 13 % low beside scalar successive orders for continental aerosol of visibility 23 km and more, less than
-    .003 in reflectance.
+    Beside scalar successive orders, for continental aerosol, visibility 23 km and more and sun within 45 degrees:
+    within 6 % (.0007) at scattering angles above 150 degrees, 1 to 21 % low (.007) at 80 to 150, where the second
+    order of the forward peak counts.
 
     References
     ----------

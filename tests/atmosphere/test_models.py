@@ -72,7 +72,10 @@ def test_text_reads_well():
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        ({"profile": "midlat_summer"}, r"profile must be one of .*, got 'midlat_summer': type profile='midlatitude-sum"),
+        (
+            {"profile": "midlat_summer"},
+            r"profile must be one of .*, got 'midlat_summer': type profile='midlatitude-sum",
+        ),
         ({"aerosol": "continentl"}, r"aerosol must be one of .*, got 'continentl': type aerosol='continental'"),
         ({"visibility": 3}, r"visibility must be from 5 to 100 km, got 3: type visibility=5"),
         ({"visibility": float("nan")}, r"visibility must be from 5 to 100 km, got nan"),

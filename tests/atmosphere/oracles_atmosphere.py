@@ -1,0 +1,37 @@
+"""Slow reference for the scattering formulas: the Eddington equations integrated numerically."""
+
+import numpy as np
+from scipy.integrate import quad, solve_bvp
+
+
+def eddington_intensities(tau, albedo, asymmetry, mu_s):
+    """Mean J and net upward H diffuse intensity as functions of depth, sun of flux pi, black surface. [1]"""
+
+    def slopes(depth, state):
+        mean, net = state
+        beam = albedo / 4 * np.exp(-depth / mu_s)
+        return np.stack([3 * (1 - albedo * asymmetry) * net + 3 * asymmetry * mu_s * beam, (1 - albedo) * mean - beam])
+
+    def edges(top, bottom):
+        return np.array([top[0] - 2 * top[1], bottom[0] + 2 * bottom[1]])
+
+    depths = np.linspace(0, tau, 41)
+    return solve_bvp(slopes, edges, depths, np.zeros((2, 41)), tol=1e-9).sol
+
+
+def sobolev_reflectance(tau, albedo, asymmetry, phase, mu_s, mu_v):
+    """Source function of the Eddington field, with single scattering exact, integrated along the view. [1]"""
+    field = eddington_intensities(tau, albedo, asymmetry, mu_s)
+
+    def emitted(depth):
+        mean, net = field(depth)
+        once = albedo / 4 * phase * np.exp(-depth / mu_s)
+        return (albedo * mean + 3 * albedo * asymmetry * mu_v * net + once) * np.exp(-depth / mu_v) / mu_v
+
+    return quad(emitted, 0, tau, epsabs=1e-12, epsrel=1e-10)[0] / mu_s
+
+
+def eddington_flux(tau, albedo, asymmetry, mu_s):
+    """Plane albedo and total transmittance of the flux. [1]"""
+    field = eddington_intensities(tau, albedo, asymmetry, mu_s)
+    return 4 * field(0)[1] / mu_s, np.exp(-tau / mu_s) - 4 * field(tau)[1] / mu_s
