@@ -1,1 +1,64 @@
-"""Simulate what a satellite would have seen."""
+"""
+Simulate what a satellite would have seen.
+
+Ground scene, canopy reflectance, atmosphere and sensor on georeferenced rasters, after Friedl, Davis, Michaelsen and
+Moritz (1995). Importing this package registers the ``.fifesim`` accessor of xarray.
+"""
+
+from importlib import import_module
+from importlib.metadata import version
+
+from fifesim import accessor  # noqa: F401  registers .fifesim
+
+__version__ = version("fifesim")
+
+# Where each public name lives. They are imported when first used, so that the command line answers at once.
+_PUBLIC = {
+    "Atmosphere": "atmosphere.models",
+    "Band": "bands",
+    "Geometry": "geometry",
+    "Instrument": "sensor.instruments",
+    "Regression": "analysis.regression",
+    "Scenario": "scenario",
+    "aggregate": "analysis.raster",
+    "arp_for_length": "ground.random_field",
+    "correlation_length": "ground.random_field",
+    "fife_geometry": "geometry",
+    "fife_site": "grid",
+    "fpar": "ground.raster",
+    "grid_at": "grid",
+    "instrument": "sensor.instruments",
+    "instrument_names": "sensor.instruments",
+    "lai_distribution": "ground.distribution",
+    "lai_scene": "ground.raster",
+    "ndvi": "chain",
+    "open_image": "export",
+    "open_lai": "ground.raster",
+    "read_instrument": "sensor.instruments",
+    "read_scenario": "scenario",
+    "regress": "analysis.raster",
+    "sense": "sensor.raster",
+    "simulate": "chain",
+    "sun_position": "geometry",
+    "surface_reflectance": "chain",
+    "to_geotiff": "export",
+    "to_radiance": "sensor.raster",
+    "to_reflectance": "sensor.raster",
+    "to_surface": "chain",
+    "to_toa": "chain",
+    "treatments": "ground.distribution",
+}
+
+__all__ = ["__version__", *_PUBLIC]
+
+
+def __getattr__(name):
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'fifesim' has no attribute {name!r}")
+    found = getattr(import_module(f"fifesim.{_PUBLIC[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__():
+    return __all__

@@ -1,14 +1,16 @@
 """Grids as odc GeoBoxes: the FIFE site, what a DataArray's grid is, and where cells and pixels lie."""
 
 import numpy as np
-import odc.geo.xr  # noqa: F401  registers the .odc accessor
+import odc.geo.xr  # noqa: F401  registers .odc
+import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
 from odc.geo.xr import xr_coords
 
-# Origins and coordinates are rounded to this many decimals of a metre, so that the cells of a window and of the
-# whole carry the same numbers. Summed from different origins they differ by 1e-10 m, and xarray aligns exactly.
+# A grid's origin is a whole number of cells from the origin of its CRS, plus an offset rounded to this many decimals
+# of a metre. Coordinates counted from the CRS origin are the same to the bit in a window and in the whole; summed from
+# each grid's own origin they differ by 1e-10 m, and xarray aligns exactly.
 _DECIMALS = 6
 
 FIFE_SIZE = 15000.0
@@ -139,7 +141,7 @@ def geobox(array):
     Returns
     -------
     grid : odc.geo.geobox.GeoBox
-        Its origin is rounded to 1e-6 m.
+        Its distance from the lattice of cells is rounded to 1e-6 m.
 
     Raises
     ------
@@ -156,8 +158,7 @@ def geobox(array):
         raise ValueError("the raster's x and y are not the centres of a regular grid")
     a = found.affine
     cell_x, cell_y = _exact_cell(array, a.a, a.e)
-    west, north = round(a.c, _DECIMALS), round(a.f, _DECIMALS)
-    return check_grid(GeoBox(found.shape, Affine(cell_x, a.b, west, a.d, cell_y, north), found.crs))
+    return check_grid(_snapped(GeoBox(found.shape, Affine(cell_x, a.b, a.c, a.d, cell_y, a.f), found.crs)))
 
 
 def coordinates(grid):
@@ -173,13 +174,8 @@ def coordinates(grid):
     coordinates : dict of str to xarray.DataArray
         ``y``, ``x`` [m] and ``spatial_ref`` with a GeoTransform that fits.
     """
-    snapped = _snapped(grid)
-    found = xr_coords(snapped)
-    a = snapped.affine
-    centres = {
-        "y": a.f + (np.arange(snapped.shape.y) + 0.5) * a.e,
-        "x": a.c + (np.arange(snapped.shape.x) + 0.5) * a.a,
-    }
+    a = grid.affine
+    centres = {"y": _centres(a.f, a.e, grid.shape.y), "x": _centres(a.c, a.a, grid.shape.x)}
     out = {}
     for axis, values in centres.items():
         attrs = {
@@ -188,8 +184,8 @@ def coordinates(grid):
             "units": "m",
             "axis": axis.upper(),
         }
-        out[axis] = xr.DataArray(np.round(values, _DECIMALS), dims=axis, attrs=attrs)
-    out["spatial_ref"] = found["spatial_ref"]
+        out[axis] = xr.DataArray(values, dims=axis, attrs=attrs)
+    out["spatial_ref"] = xr_coords(_snapped(grid))["spatial_ref"]
     return out
 
 
@@ -277,7 +273,7 @@ def lattice_position(grid):
     row, column : int
     """
     a = grid.affine
-    return round(a.f / a.e), round(a.c / a.a)
+    return _lattice(a.f, a.e)[0], _lattice(a.c, a.a)[0]
 
 
 def lattice_offset(one, other):
@@ -358,10 +354,24 @@ def _window(site, window):
     return site[top:bottom, left:right]
 
 
+def _lattice(origin, cell):
+    """Whole cells from the origin of the CRS, and what is left over [m]."""
+    index = round(origin / cell)
+    return index, round(origin - index * cell, _DECIMALS)
+
+
+def _centres(origin, cell, size):
+    index, offset = _lattice(origin, cell)
+    return (index + np.arange(size) + 0.5) * cell + offset
+
+
 def _snapped(grid):
+    """The grid with its origin on the lattice, and its CRS by authority where that says the same."""
     a = grid.affine
-    affine = Affine(a.a, a.b, round(a.c, _DECIMALS), a.d, a.e, round(a.f, _DECIMALS))
-    return GeoBox(grid.shape, affine, grid.crs)
+    (column, x_offset), (row, y_offset) = _lattice(a.c, a.a), _lattice(a.f, a.e)
+    west, north = column * a.a + x_offset, row * a.e + y_offset
+    crs = f"EPSG:{grid.crs.epsg}" if grid.crs and grid.crs.epsg else grid.crs
+    return GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), crs)
 
 
 def _exact_cell(array, cell_x, cell_y):

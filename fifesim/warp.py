@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pyproj
 import rasterio
+import rasterio.errors
 import rasterio.windows
 from affine import Affine
 from odc.geo.geobox import GeoBox
 from pyproj.aoi import AreaOfInterest
+from pyproj.database import query_utm_crs_info
 from pyproj.transformer import TransformerGroup
 from rasterio.enums import Resampling
 from rasterio.warp import reproject
@@ -99,11 +101,7 @@ def file_onto_grid(path, grid, chunks=None):
         If the file is missing, has no CRS, lies elsewhere, or needs a change of datum of unknown accuracy.
     """
     grids.check_grid(grid)
-    if not Path(path).exists():
-        raise ValueError(f"no raster file at {str(path)!r}")
-    with rasterio.open(path) as source:
-        if source.crs is None:
-            raise ValueError(f"{path} has no CRS: give it one, for instance with gdal_edit.py -a_srs EPSG:26914")
+    with _opened(path) as source:
         area = _area(grid)
         pipeline, _ = operation(source.crs, grid.crs.to_wkt(), area)
         back, _ = operation(grid.crs.to_wkt(), source.crs, area)
@@ -115,7 +113,66 @@ def file_onto_grid(path, grid, chunks=None):
     def kernel(first_row, first_column, shape):
         return assemble(make_tile, _TILE, row + first_row, column + first_column, shape)
 
-    return chunking.tiles(kernel, grid, chunks)
+    return chunking.tiles(kernel, grid, chunks, tile=_TILE)
+
+
+def covering_grid(path, cell, pixel):
+    """
+    Grid that covers a raster file, from and to whole pixels of its CRS.
+
+    Parameters
+    ----------
+    path : str or path
+    cell : float
+        [m]
+    pixel : float
+        Size that the corners are multiples of. [m]
+
+    Returns
+    -------
+    grid : odc.geo.geobox.GeoBox
+        In the file's CRS where that is projected, else in its UTM zone.
+
+    Raises
+    ------
+    ValueError
+        If the file is missing, has no CRS, or lies in a CRS that is not in metres.
+    """
+    with _opened(path) as source:
+        crs = pyproj.CRS.from_user_input(source.crs)
+        outline = [np.linspace(0, size, 17) for size in (source.width, source.height)]
+        columns, rows = (values.ravel() for values in np.meshgrid(*outline))
+        x, y = grids.transform_points(source.transform, columns, rows)
+    if crs.is_geographic:
+        target = _utm(crs, x, y)
+        pipeline, _ = operation(crs, target, (x.min(), y.min(), x.max(), y.max()))
+        north_first = crs.axis_info[0].direction == "north"
+        x, y = pyproj.Transformer.from_pipeline(pipeline).transform(*((y, x) if north_first else (x, y)))
+        crs = target
+    west, north = np.floor(np.min(x) / pixel) * pixel, np.ceil(np.max(y) / pixel) * pixel
+    width, height = (np.ceil(size / pixel) * pixel for size in (np.max(x) - west, north - np.min(y)))
+    name = f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else crs.to_wkt()
+    return grids.grid_at(name, float(west), float(north), float(width), float(height), cell)
+
+
+def _utm(crs, longitude, latitude):
+    """UTM zone of the middle of some places, in their own datum where it is NAD83, else in WGS 84."""
+    datum = "NAD83" if crs.datum is not None and crs.datum.name == "North American Datum 1983" else "WGS 84"
+    middle = AreaOfInterest(*(float(np.mean(values)) for values in (longitude, latitude) * 2))
+    return pyproj.CRS.from_epsg(query_utm_crs_info(datum_name=datum, area_of_interest=middle)[0].code)
+
+
+def _opened(path):
+    if not Path(path).exists():
+        raise ValueError(f"no raster file at {str(path)!r}")
+    try:
+        source = rasterio.open(path)
+    except rasterio.errors.RasterioIOError as error:
+        raise ValueError(f"cannot read {path} as a raster: {error}") from None
+    if source.crs is None:
+        source.close()
+        raise ValueError(f"{path} has no CRS: give it one, for instance with gdal_edit.py -a_srs EPSG:26914")
+    return source
 
 
 def _best(source, target, area):

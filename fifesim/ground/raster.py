@@ -13,6 +13,7 @@ from fifesim.geometry import fife_geometry
 from fifesim.ground import absorption, random_field
 from fifesim.ground.distribution import lai_distribution, quantile_map, quantile_table, rank_map
 from fifesim.ground.leaf_angles import leaf_angle_classes
+from fifesim.ground.optics import check_lai
 from fifesim.ground.reflectance_table import canopy_reflectance
 
 FIELD_METHODS = ("streaming", "periodic")
@@ -249,7 +250,7 @@ def _streaming_scene(grid, density, arp, seed, chunks):
 
     # A first window raises what streaming_field refuses before anything lazy is built.
     cells(0, 0, (0, 0))
-    return chunking.tiles(cells, grid, chunks)
+    return chunking.tiles(cells, grid, chunks, tile=random_field.TILE)
 
 
 def _periodic_scene(grid, density, arp, seed, chunks):
@@ -271,14 +272,7 @@ def _distribution_name(source):
 
 
 def _checked(lai):
-    """LAI as float64, once it is sure that no cell is negative or infinite."""
-    lai = np.asarray(lai, float)
-    wrong = lai[(lai < 0) | np.isinf(lai)]
-    if wrong.size:
-        raise ValueError(
-            f"leaf area index must be at least 0 and finite, got {wrong[0]:g} in {wrong.size} of {lai.size} cells: "
-            "mask what is no data as NaN, and clip the rest with .clip(0)"
-        )
+    check_lai(lai)
     return lai
 
 
@@ -286,7 +280,7 @@ def _reflectance(lai, background_raster=None, *, background=None, **parameters):
     if background is None:
         # apply_ufunc hands the bands over as the last axis.
         background = np.moveaxis(background_raster, -1, 0)
-    return canopy_reflectance(_checked(lai), background=background, **parameters)
+    return canopy_reflectance(lai, background=background, **parameters)
 
 
 def _fpar(lai, **parameters):

@@ -1,0 +1,313 @@
+"""Figure 1 end to end: the one place that knows all stages, and hands to each what it needs of another."""
+
+import numpy as np
+import xarray as xr
+
+from fifesim import cf
+from fifesim import grid as grids
+from fifesim.analysis import raster as analysis
+from fifesim.atmosphere import five_s
+from fifesim.atmosphere import raster as atmosphere_raster
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.bands import Band
+from fifesim.geometry import fife_geometry
+from fifesim.ground import optics
+from fifesim.ground import raster as ground
+from fifesim.sensor import raster as sensor
+from fifesim.sensor.instruments import instrument as find_instrument
+
+# Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
+# tables. [um]
+_NARROW = 0.0025
+
+
+def surface_reflectance(
+    lai,
+    instrument="TM",
+    *,
+    bands=None,
+    dem=None,
+    atmosphere=None,
+    geometry=None,
+    leaf_optics=None,
+    background=None,
+    leaf_angles="spherical",
+    hotspot=0.0,
+    exact=False,
+):
+    """
+    Reflectance factor of the ground in the bands of an instrument.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x)
+        Leaf area index. [m2 m-2]
+    instrument : str or Instrument, optional
+        Whose bands are simulated.
+    bands : sequence of str, optional
+        Names of its bands; all by default.
+    dem : None
+        Flat ground.
+    atmosphere : Atmosphere, optional
+        Decides the share of skylight; by default midlatitude summer, continental aerosol, 45 km visibility, 0.4 km
+        above the sea. It travels on with the result.
+    geometry : Geometry, optional
+        Of sun and sensor; by default that of ``lai``, else the paper's.
+    leaf_optics : mapping of str to (float, float), optional
+        Reflectance and transmittance of a leaf by band name; by default the table of `ground.optics`. [1]
+    background : number, mapping of str to number, or xarray.DataArray, optional
+        Reflectance below the canopy: one, by band name, or a raster over ([band], y, x). [1]
+    leaf_angles : optional
+        A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
+    hotspot : float, optional
+        Leaf size over canopy height; 0 is none, as in the paper. [1]
+    exact : bool, optional
+        Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Lazy where ``lai`` is. [1]
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of its range; on lazy data, a negative LAI when it computes.
+
+    References
+    ----------
+    [Verhoef1984]_; [Friedl1995]_, Fig. 1
+
+    See Also
+    --------
+    fifesim.ground.canopy.sail, fifesim.ground.raster.surface_reflectance
+    """
+    if dem is not None:
+        raise ValueError("dem must be None, which is flat ground: terrain is not part of this version")
+    atmosphere = Atmosphere() if atmosphere is None else atmosphere
+    geometry = geometry or cf.geometry_of(lai) or fife_geometry()
+    description = find_instrument(instrument)
+    selected = description.select(bands)
+    names = [band.name for band in selected]
+    terms = five_s.band_terms(
+        atmosphere, tuple(band.response for band in selected), geometry.sza, geometry.vza, geometry.raa
+    )
+    leaf_reflectance, leaf_transmittance = optics.leaf_optics(names, leaf_optics)
+    return ground.surface_reflectance(
+        lai,
+        bands=names,
+        wavelengths=[band.wavelength for band in selected],
+        leaf_reflectance=leaf_reflectance,
+        leaf_transmittance=leaf_transmittance,
+        background=background if isinstance(background, xr.DataArray) else optics.background(names, background),
+        diffuse_fraction=terms.diffuse_fraction,
+        geometry=geometry,
+        leaf_angles=leaf_angles,
+        hotspot=hotspot,
+        exact=exact,
+        atmosphere=str(atmosphere),
+        instrument=description.name,
+    )
+
+
+def to_toa(reflectance, atmosphere=None, *, geometry=None, instrument=None):
+    """
+    Apparent reflectance at the top of the atmosphere, by the 5S equations.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Surface reflectance factor, with band names of an instrument or a coordinate ``wavelength`` [um] along band. [1]
+    atmosphere : Atmosphere, optional
+        By default that which the array carries, else midlatitude summer, continental aerosol, 45 km visibility.
+    geometry : Geometry, optional
+        By default that which the array carries, else the paper's.
+    instrument : str or Instrument, optional
+        Whose spectral response the bands have; by default that which the array carries. Without one, each band is as
+        narrow as the gas tables, 2.5 nm.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Lazy where the input is. [1]
+
+    Raises
+    ------
+    ValueError
+        If the array was made for another atmosphere, or units, bands or angles are not usable.
+
+    References
+    ----------
+    [Tanre1990]_
+
+    See Also
+    --------
+    fifesim.atmosphere.five_s.apparent_reflectance
+    """
+    return atmosphere_raster.to_toa(reflectance, *_light(reflectance, atmosphere, geometry, instrument))
+
+
+def to_surface(reflectance, atmosphere=None, *, geometry=None, instrument=None):
+    """
+    Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Reflectance at the top of the atmosphere; radiance and digital numbers are converted first.
+    atmosphere, geometry, instrument : optional
+        As in `to_toa`.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Negative values are kept. [1]
+
+    Raises
+    ------
+    ValueError
+        As in `to_toa`.
+
+    See Also
+    --------
+    fifesim.atmosphere.five_s.surface_reflectance
+    """
+    reflectance = planetary_reflectance(reflectance)
+    return atmosphere_raster.to_surface(reflectance, *_light(reflectance, atmosphere, geometry, instrument))
+
+
+def ndvi(image):
+    """
+    Normalized difference vegetation index, from planetary reflectance as in the paper.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+        Digital numbers, radiance or reflectance, with a coordinate ``wavelength`` [um] along band.
+
+    Returns
+    -------
+    ndvi : xarray.DataArray, dims (y, x)
+        NaN where there are no data. [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no red or no near infrared band, or no calibration.
+
+    See Also
+    --------
+    fifesim.analysis.raster.ndvi
+    """
+    return analysis.ndvi(planetary_reflectance(image))
+
+
+def planetary_reflectance(image):
+    """
+    Reflectance of an image, converted where it holds digital numbers or radiance.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If it carries no calibration.
+    """
+    is_radiance = image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
+    return sensor.to_reflectance(image) if "gain" in image.coords or is_radiance else image
+
+
+def simulate(scenario, chunks="auto"):
+    """
+    Scene, image and truth of a scenario.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.Scenario
+    chunks : mapping or int, optional
+        Of the scene; by default whole tiles of the random field.
+
+    Returns
+    -------
+    run : xarray.DataTree
+        Lazy. ``scene`` holds ``lai`` by cells, ``image`` the digital numbers ``dn`` and their ``ndvi``, ``truth`` the
+        means of ``lai`` and ``fpar`` over the ground of the pixels.
+
+    Raises
+    ------
+    ValueError
+        If the scenario asks for what cannot be.
+    """
+    grid, geometry, atmosphere = scenario.geobox(), scenario.sun_and_view(), scenario.model_atmosphere()
+    land, instrument = scenario.ground, find_instrument(scenario.sensor.instrument)
+    if land.lai_file:
+        lai = ground.open_lai(land.lai_file, grid, chunks=chunks)
+    else:
+        lai = ground.lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+    reflectance = surface_reflectance(
+        lai,
+        instrument,
+        bands=scenario.sensor.bands,
+        atmosphere=atmosphere,
+        geometry=geometry,
+        leaf_optics=land.leaf_optics(),
+        background=land.background or None,
+        leaf_angles=land.leaf_angles,
+        hotspot=land.hotspot,
+    )
+    pixels = grids.aligned(grid, scenario.sensor.pixel or instrument.gsd)
+    image = sensor.sense(to_toa(reflectance), instrument, onto=pixels, min_valid=scenario.sensor.min_valid)
+    fpar = ground.fpar(lai, geometry=geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
+    pixel, min_valid = grids.cell_size(pixels)[0], scenario.sensor.min_valid
+    truth = {
+        name: analysis.aggregate(array, pixel, min_valid=min_valid) for name, array in (("lai", lai), ("fpar", fpar))
+    }
+    products = {"dn": image} | ({"ndvi": ndvi(image)} if _has_ndvi(image) else {})
+    return xr.DataTree.from_dict(
+        {"scene": xr.Dataset({"lai": lai}), "image": xr.Dataset(products), "truth": xr.Dataset(truth)}
+    )
+
+
+def _has_ndvi(image):
+    wavelength = image["wavelength"].values
+    return bool(
+        np.any((wavelength >= 0.6) & (wavelength <= 0.7)) and np.any((wavelength >= 0.75) & (wavelength <= 1.0))
+    )
+
+
+def _light(array, atmosphere, geometry, instrument):
+    """Atmosphere, spectral bands and geometry: as given, else as the array carries them, else the paper's."""
+    carried = array.attrs.get("atmosphere")
+    if carried is not None:
+        carried = Atmosphere.parse(carried)
+        if atmosphere is not None and atmosphere != carried:
+            raise ValueError(
+                f"the reflectance was made for another atmosphere ({carried}) than the one given ({atmosphere}): "
+                "give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
+            )
+    return (
+        atmosphere or carried or Atmosphere(),
+        _responses(array, instrument or array.attrs.get("instrument")),
+        geometry or cf.geometry_of(array) or fife_geometry(),
+    )
+
+
+def _responses(array, instrument):
+    if instrument is not None:
+        return tuple(band.response for band in sensor.matching_bands(array, find_instrument(instrument)))
+    if "wavelength" not in array.coords:
+        raise ValueError(
+            "the raster has neither an instrument nor a wavelength: give instrument=, or assign a coordinate "
+            "'wavelength' [um] along band"
+        )
+    centres = np.atleast_1d(array["wavelength"].values).astype(float)
+    return tuple(
+        Band(f"{centre:g} um", (centre - _NARROW, centre, centre + _NARROW), (0.0, 1.0, 0.0)) for centre in centres
+    )

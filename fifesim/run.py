@@ -1,0 +1,136 @@
+"""A run: a scenario simulated into a folder of files."""
+
+import importlib.metadata
+import os
+import platform
+import shutil
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import dask
+
+from fifesim import chain, report
+from fifesim import grid as grids
+from fifesim.analysis.raster import regress
+from fifesim.export import to_geotiff
+from fifesim.progress import ProgressBar
+from fifesim.scenario import write_scenario
+
+FILES = ("image.tif", "truth.tif", "quicklook.png", "report.html", "scenario.toml")
+
+# The report shows cells of the scene's middle, this many pixels across: enough to see what a pixel averages. [pixel]
+_DETAIL = 40
+
+_VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "dask", "numba", "rasterio", "odc-geo", "pvlib", "pyrsr")
+
+
+def run(scenario, folder, *, overwrite=False):
+    """
+    Simulate a scenario into a folder: image.tif, truth.tif, quicklook.png, report.html and scenario.toml.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.Scenario
+    folder : str or path
+        Made where it does not exist.
+    overwrite : bool, optional
+        Replace these files where the folder holds something; other files stay.
+
+    Returns
+    -------
+    files : list of pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        If the scenario cannot be simulated, or the folder holds something; nothing is written then.
+    OSError
+        If a file cannot be written; no half-written file is left.
+    """
+    folder = Path(folder)
+    check_folder(folder, overwrite)
+    complete = scenario.complete()
+    tree = chain.simulate(complete)
+    with ProgressBar("simulating"):
+        image, truth, detail = dask.compute(tree["image"].to_dataset(), tree["truth"].to_dataset(), _detail(tree))
+    with _whole_files(folder) as partial:
+        to_geotiff(image["dn"], partial / "image.tif")
+        to_geotiff(truth, partial / "truth.tif")
+        report.quicklook(partial / "quicklook.png", image, truth, detail)
+        fits = _fits(image, truth)
+        page = report.page(complete, image, truth, detail, fits, _versions())
+        (partial / "report.html").write_text(page, encoding="utf-8")
+        (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
+    return [folder / name for name in FILES]
+
+
+def check_folder(folder, overwrite):
+    """
+    Refuse an output folder that is in use.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+    overwrite : bool
+
+    Raises
+    ------
+    ValueError
+        If it is a file, or holds something and ``overwrite`` is off.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"the output folder {str(folder)!r} is a file: name another with -o")
+    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
+        raise ValueError(f"the output folder {str(folder)!r} is not empty: name another with -o, or add --overwrite")
+
+
+def _detail(tree):
+    """LAI of the cells below some pixels in the middle of the image."""
+    lai, pixels = tree["scene"]["lai"], grids.geobox(tree["image"]["dn"])
+    cells = grids.geobox(lai)
+    (cell_down, cell_across), (pixel_down, pixel_across) = grids.cell_size(cells), grids.cell_size(pixels)
+    cut = {}
+    for axis, count, pixel, cell in (
+        ("y", pixels.shape.y, pixel_down, cell_down),
+        ("x", pixels.shape.x, pixel_across, cell_across),
+    ):
+        shown = min(count, _DETAIL)
+        first = (count - shown) // 2
+        cut[axis] = slice(round(first * pixel / cell), round((first + shown) * pixel / cell))
+    return lai.isel(cut)
+
+
+def _fits(image, truth):
+    """Regressions of the true means on NDVI; none where there is no NDVI or nothing to fit."""
+    if "ndvi" not in image:
+        return {}
+    fits = {}
+    for name in truth.data_vars:
+        valid = (truth[name].notnull() & image["ndvi"].notnull()).sum()
+        if valid > 2 and float(image["ndvi"].std()) > 0:
+            fits[name] = regress(truth[name], image["ndvi"])
+    return fits
+
+
+def _versions():
+    versions = {name: importlib.metadata.version(name) for name in _VERSIONS}
+    return {"python": platform.python_version()} | versions
+
+
+@contextmanager
+def _whole_files(folder):
+    """A hidden folder whose files move into place when all of them are written."""
+    existed = folder.is_dir()
+    folder.mkdir(parents=True, exist_ok=True)
+    partial = Path(tempfile.mkdtemp(prefix=".partial-", dir=folder))
+    try:
+        yield partial
+        for path in sorted(partial.iterdir()):
+            os.replace(path, folder / path.name)
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True)
+        if not existed:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    partial.rmdir()

@@ -1,0 +1,359 @@
+"""The scenario of a run: every number with its unit and range, read from and written to TOML."""
+
+import re
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from fifesim import geometry, warp
+from fifesim import grid as grids
+from fifesim.atmosphere import aerosols, models
+from fifesim.ground import optics
+from fifesim.ground.distribution import lai_distribution
+from fifesim.ground.leaf_angles import leaf_angle_classes
+from fifesim.ground.random_field import LARGEST_STREAMING_ARP
+from fifesim.sensor.instruments import instrument
+
+_QUANTITY = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+
+
+def _number(default, unit, text, **limits):
+    """A number with its unit; None is a number that need not be given."""
+    return Field(default, description=text, json_schema_extra={"unit": unit}, allow_inf_nan=False, **limits)
+
+
+def _text(default, text):
+    return Field(default, description=text, json_schema_extra={"unit": ""})
+
+
+class _Section(BaseModel):
+    """A table of the scenario. A number may be written with its unit, ``"45 km"``; another unit is a mistake."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _strip_units(cls, values):
+        if not isinstance(values, dict):
+            raise ValueError(f"expected a table of keys, got {values!r}")
+        return {key: cls._in_unit(key, value) for key, value in values.items()}
+
+    @classmethod
+    def _in_unit(cls, key, value):
+        known = cls.model_fields.get(key)
+        unit = (known.json_schema_extra or {}).get("unit") if known else None
+        if not unit or not isinstance(value, str):
+            return value
+        match = _QUANTITY.fullmatch(value)
+        if match is None or match[2] not in ("", unit):
+            raise ValueError(f"{key} = {value!r}: {key} is in {unit}; write a number, or a number and {unit!r}")
+        return float(match[1])
+
+
+class Grid(_Section):
+    """Ground cells. Without any key but cell, a scene that reads a LAI file covers that file."""
+
+    crs: str = _text("EPSG:26914", "projected coordinate reference system in metres")
+    west: float = _number(704970.0, "m", "easting of the upper left corner")
+    north: float = _number(4334220.0, "m", "northing of the upper left corner")
+    width: float = _number(15000.0, "m", "west to east", gt=0)
+    height: float = _number(15000.0, "m", "north to south", gt=0)
+    cell: float = _number(30 / 9, "m", "size of a cell", gt=0)
+
+
+class Ground(_Section):
+    """Leaf area, leaves and what lies below them."""
+
+    distribution: str = _text("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples")
+    arp: float = _number(0.15, "1", "autoregressive parameter; larger is smoother", ge=0, lt=0.25)
+    seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = Field(
+        7, description="of the random field, a whole number"
+    )
+    method: Literal["streaming", "periodic"] = _text("streaming", "streaming, or the paper's periodic (in memory)")
+    lai_file: str | None = _text(None, "a LAI map to use instead of a random field")
+    leaf_angles: str = _text("spherical", "leaf angle distribution")
+    hotspot: float = _number(0.0, "1", "leaf size over canopy height", ge=0)
+    fpar_inf: float = _number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
+    leaf_reflectance: dict[str, float] = Field({}, description="by band [1]; all bands or none")
+    leaf_transmittance: dict[str, float] = Field({}, description="by band [1]; all bands or none")
+    background: dict[str, float] = Field({}, description="reflectance below the canopy by band [1]; all bands or none")
+
+    @field_validator("distribution")
+    @classmethod
+    def _known_distribution(cls, value):
+        if not value.lower().endswith(".csv"):
+            lai_distribution(value)
+        return value
+
+    @field_validator("leaf_angles")
+    @classmethod
+    def _known_leaf_angles(cls, value):
+        leaf_angle_classes(value)
+        return value
+
+    @model_validator(mode="after")
+    def _streaming_limit(self):
+        if self.method == "streaming" and self.arp > LARGEST_STREAMING_ARP:
+            raise ValueError(
+                f'arp = {self.arp:g}: at most {LARGEST_STREAMING_ARP} when streaming; or method = "periodic"'
+            )
+        return self
+
+    def leaf_optics(self):
+        """Leaf reflectance and transmittance by band, or None for the table's."""
+        if set(self.leaf_reflectance) != set(self.leaf_transmittance):
+            raise ValueError("ground.leaf_reflectance and ground.leaf_transmittance must name the same bands")
+        return {band: (value, self.leaf_transmittance[band]) for band, value in self.leaf_reflectance.items()} or None
+
+
+class SunAndView(_Section):
+    """Directions; the sun's from time and place, or given by sza and saa."""
+
+    time: str = _text(geometry.FIFE_TIME, "UTC; a hypothetical overpass by default")
+    latitude: float = _number(geometry.FIFE_LATITUDE, "degree", "north", ge=-90, le=90)
+    longitude: float = _number(geometry.FIFE_LONGITUDE, "degree", "east", ge=-180, le=360)
+    sza: float | None = _number(None, "degree", "solar zenith, instead of time and place", ge=0, lt=90)
+    saa: float | None = _number(None, "degree", "solar azimuth, clockwise from north")
+    vza: float = _number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=70)
+    vaa: float = _number(0.0, "degree", "azimuth toward the sensor, clockwise from north")
+
+
+class Air(_Section):
+    """The atmosphere."""
+
+    profile: str = _text("midlatitude-summer", "of pressure, temperature, water vapour and ozone")
+    aerosol: str = _text("continental", "aerosol model")
+    visibility: float = _number(45.0, "km", "meteorological range", ge=5, le=100)
+    altitude: float = _number(0.4, "km", "of the ground above the sea", ge=0, le=4)
+
+    @field_validator("profile", "aerosol")
+    @classmethod
+    def _known_model(cls, value, info):
+        allowed = models.PROFILES if info.field_name == "profile" else aerosols.MODELS
+        if value not in allowed:
+            raise ValueError(f"must be one of {', '.join(allowed)}, got {value!r}")
+        return value
+
+
+class Sensor(_Section):
+    """The instrument."""
+
+    instrument: str = _text("TM", "see: fifesim sensors")
+    bands: list[str] = Field(["TM3", "TM4"], description="names of bands")
+    pixel: float | None = _number(None, "m", "size of a pixel; by default the instrument's gridded product", gt=0)
+    min_valid: float = _number(0.98, "1", "share of its footprint that a pixel needs on valid cells", ge=0, le=1)
+
+    @field_validator("bands")
+    @classmethod
+    def _some_bands(cls, value):
+        if not value:
+            raise ValueError("name at least one band")
+        return value
+
+    @model_validator(mode="after")
+    def _known_bands(self):
+        instrument(self.instrument).select(self.bands)
+        return self
+
+
+class Scenario(_Section):
+    """
+    What a run simulates; the defaults are the paper's case on the whole FIFE site.
+
+    Parameters
+    ----------
+    grid : Grid
+    ground : Ground
+    geometry : SunAndView
+    atmosphere : Air
+    sensor : Sensor
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If a key is unknown or a value not allowed; `read_scenario` turns it into one line a mistake.
+    """
+
+    grid: Grid = Grid()
+    ground: Ground = Ground()
+    geometry: SunAndView = SunAndView()
+    atmosphere: Air = Air()
+    sensor: Sensor = Sensor()
+
+    def geobox(self):
+        """Grid of the ground cells, an `odc.geo.geobox.GeoBox`."""
+        if self.ground.lai_file and not self.grid.model_fields_set - {"cell"}:
+            return warp.covering_grid(self.ground.lai_file, self.grid.cell, self._pixel())
+        grid = self.grid
+        return grids.grid_at(grid.crs, grid.west, grid.north, grid.width, grid.height, grid.cell)
+
+    def sun_and_view(self):
+        """Directions of sun and sensor, a `fifesim.geometry.Geometry`."""
+        place = self.geometry
+        sun = (
+            geometry.sun_position(place.time, place.latitude, place.longitude, 1000 * self.atmosphere.altitude)
+            if (place.sza is None)
+            else geometry.Geometry(place.sza, place.saa or 0.0)
+        )
+        return geometry.Geometry(sun.sza, sun.saa, place.vza, place.vaa, sun.earth_sun_distance)
+
+    def model_atmosphere(self):
+        """The atmosphere, a `fifesim.atmosphere.models.Atmosphere`."""
+        return models.Atmosphere(**self.atmosphere.model_dump())
+
+    def complete(self):
+        """The same scenario with every default that a run decides written out."""
+        box, names = self.geobox(), self.sensor.bands
+        a = box.affine
+        grid = Grid(
+            crs=f"EPSG:{box.crs.epsg}" if box.crs.epsg else box.crs.to_wkt(),
+            west=a.c,
+            north=a.f,
+            width=a.a * box.shape.x,
+            height=-a.e * box.shape.y,
+            cell=a.a,
+        )
+        leaf_reflectance, leaf_transmittance = optics.leaf_optics(names, self.ground.leaf_optics())
+        background = optics.background(names, self.ground.background or None)
+        ground = self.ground.model_copy(
+            update={
+                "leaf_reflectance": _by_band(names, leaf_reflectance),
+                "leaf_transmittance": _by_band(names, leaf_transmittance),
+                "background": _by_band(names, background),
+            }
+        )
+        sensor = self.sensor.model_copy(update={"pixel": self._pixel()})
+        return self.model_copy(update={"grid": grid, "ground": ground, "sensor": sensor})
+
+    def _pixel(self):
+        return self.sensor.pixel or instrument(self.sensor.instrument).gsd
+
+
+def read_scenario(path):
+    """
+    Scenario of a TOML file.
+
+    Parameters
+    ----------
+    path : str or path
+        Files that it names lie relative to it.
+
+    Returns
+    -------
+    scenario : Scenario
+
+    Raises
+    ------
+    ValueError
+        If it is missing or not TOML, or a key or value is wrong: one line a mistake, with the key, the value and what
+        is allowed.
+    """
+    path = Path(path)
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"cannot read the scenario {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path.name} is not valid TOML: {error}") from None
+    ground = values.get("ground")
+    if isinstance(ground, dict):
+        for key in ("lai_file", "distribution"):
+            name = ground.get(key)
+            if isinstance(name, str) and (key == "lai_file" or name.lower().endswith(".csv")):
+                ground[key] = str((path.parent / name).resolve())
+    return parse_scenario(values)
+
+
+def parse_scenario(values):
+    """
+    Scenario of nested mappings.
+
+    Parameters
+    ----------
+    values : mapping
+        As TOML gives it.
+
+    Returns
+    -------
+    scenario : Scenario
+
+    Raises
+    ------
+    ValueError
+        One line a mistake.
+
+    Examples
+    --------
+    >>> parse_scenario({"atmosphere": {"visibility": "23 km"}}).atmosphere.visibility
+    23.0
+    """
+    try:
+        return Scenario.model_validate(values)
+    except ValidationError as error:
+        raise ValueError("\n".join(_explain(item) for item in error.errors())) from None
+
+
+def write_scenario(scenario):
+    """
+    TOML text of a scenario, every key with its unit and meaning.
+
+    Parameters
+    ----------
+    scenario : Scenario
+
+    Returns
+    -------
+    text : str
+        Reading it gives the same scenario.
+    """
+    lines = ["# Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
+    for name in Scenario.model_fields:
+        section = getattr(scenario, name)
+        lines += ["", f"[{name}]  # {type(section).__doc__.splitlines()[0]}"]
+        tables = []
+        for key, known in type(section).model_fields.items():
+            value, unit = getattr(section, key), (known.json_schema_extra or {}).get("unit", "")
+            meaning = f"{unit}; {known.description}" if unit else known.description
+            if isinstance(value, dict):
+                tables += [
+                    "",
+                    f"[{name}.{key}]  # {meaning}",
+                    *(f"{band} = {number!r}" for band, number in value.items()),
+                ]
+            elif value is None:
+                lines.append(f"# {key} =   # {meaning}")
+            else:
+                lines.append(f"{key} = {_toml(value)}  # {meaning}")
+        lines += tables
+    return "\n".join(lines) + "\n"
+
+
+def _by_band(names, values):
+    return {name: float(value) for name, value in zip(names, values, strict=True)}
+
+
+def _toml(value):
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return repr(value)
+
+
+def _explain(error):
+    """One line that names the key, the value and what is allowed."""
+    key = ".".join(str(part) for part in error["loc"])
+    if error["type"] == "extra_forbidden":
+        known = list(Scenario.model_fields)
+        if len(error["loc"]) > 1 and error["loc"][0] in Scenario.model_fields:
+            known = list(Scenario.model_fields[error["loc"][0]].annotation.model_fields)
+        near = get_close_matches(str(error["loc"][-1]), known, n=1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        return f"unknown key {key} = {error['input']!r}: {hint}allowed are {', '.join(known)}"
+    message = str(error["ctx"]["error"]) if error["type"] == "value_error" else error["msg"]
+    if isinstance(error["input"], dict):
+        return f"{key}: {message}"
+    return f"{key} = {error['input']!r}: {message}"
