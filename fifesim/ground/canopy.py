@@ -99,7 +99,8 @@ def sail(
     -----
     A slab's Green function turns the solution into sums of positive `exponential_chain` terms, which hold for
     conservative and black leaves, at grazing angles and where an extinction coefficient equals the
-    eigenvalue. Beside exact radiative transfer SAIL is within 3 % at nadir.
+    eigenvalue. Leaves are Lambertian, with random azimuth and the same optics on both sides. Beside exact radiative
+    transfer in a canopy of spherical leaves up to LAI 5, SAIL is within 3 % at nadir.
 
     References
     ----------

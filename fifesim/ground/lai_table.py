@@ -130,9 +130,7 @@ def interpolate_over(table, lai, background):
     bands = table.coefficients.shape[1] // 4
     background = np.broadcast_to(np.asarray(background, float), (bands, *lai.shape)).reshape(bands, -1)
     values = np.empty((bands, lai.size))
-    _interpolate_over(
-        np.ascontiguousarray(lai).ravel(), background, table.coefficients, table.rate, table.step, values
-    )
+    _interpolate_over(np.ascontiguousarray(lai).ravel(), background, table.coefficients, table.rate, table.step, values)
     return values.reshape(-1, *lai.shape)
 
 

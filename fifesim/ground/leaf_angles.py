@@ -124,7 +124,7 @@ def leaf_angle_classes(distribution="spherical", classes=90):
 
 
 def _centres(classes):
-    return tuple((np.arange(classes) + 0.5) * (90 / classes))
+    return tuple(90 * (np.arange(classes) + 0.5) / classes)
 
 
 def _parsed(text):
