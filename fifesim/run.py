@@ -8,7 +8,7 @@ import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
-import dask
+import xarray as xr
 
 from fifesim import chain, report
 from fifesim import grid as grids
@@ -52,8 +52,11 @@ def run(scenario, folder, *, overwrite=False):
     check_folder(folder, overwrite)
     complete = scenario.complete()
     tree = chain.simulate(complete)
+    wanted = {"image": tree["image"].to_dataset(), "truth": tree["truth"].to_dataset(), "detail": _detail(tree)}
     with ProgressBar("simulating"):
-        image, truth, detail = dask.compute(tree["image"].to_dataset(), tree["truth"].to_dataset(), _detail(tree))
+        # One pass for all: the cells are made once.
+        done = xr.DataTree.from_dict(wanted).compute()
+    image, truth, detail = done["image"].to_dataset(), done["truth"].to_dataset(), done["detail"]["lai"]
     with _whole_files(folder) as partial:
         to_geotiff(image["dn"], partial / "image.tif")
         to_geotiff(truth, partial / "truth.tif")
@@ -98,7 +101,7 @@ def _detail(tree):
         shown = min(count, _DETAIL)
         first = (count - shown) // 2
         cut[axis] = slice(round(first * pixel / cell), round((first + shown) * pixel / cell))
-    return lai.isel(cut)
+    return xr.Dataset({"lai": lai.isel(cut)})
 
 
 def _fits(image, truth):

@@ -262,7 +262,7 @@ def instrument(name):
     return name if isinstance(name, Instrument) else _lookup(name, _catalogue(), "instrument")
 
 
-def instruments():
+def instrument_names():
     """
     Names of the instruments.
 
@@ -273,7 +273,7 @@ def instruments():
 
     Examples
     --------
-    >>> "TM" in instruments()
+    >>> "TM" in instrument_names()
     True
     """
     return tuple(sorted(item.name for item in _catalogue().values()))

@@ -1,0 +1,80 @@
+"""The command line. Everything slow to import is imported by the command that needs it, so that --help is instant."""
+
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    help="Simulate what a satellite would have seen.", no_args_is_help=True, add_completion=False, rich_markup_mode=None
+)
+
+
+class Exit(IntEnum):
+    """Exit codes: what was asked cannot be done, and what could be done failed."""
+
+    MISTAKE = 2
+    FAILURE = 1
+
+
+def _version(asked: bool):
+    if asked:
+        from fifesim import __version__
+
+        typer.echo(f"fifesim {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+):
+    pass
+
+
+@app.command()
+def simulate(
+    scenario: Annotated[Path | None, typer.Argument(help="TOML file; the whole FIFE site by default.")] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("fife"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+):
+    """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
+    from fifesim.run import check_folder, run
+    from fifesim.scenario import Scenario, read_scenario
+
+    try:
+        check_folder(output, overwrite)
+        found = Scenario() if scenario is None else read_scenario(scenario)
+        files = run(found, output, overwrite=overwrite)
+    except ValueError as error:
+        _stop(error, Exit.MISTAKE)
+    except (OSError, MemoryError) as error:
+        _stop(error, Exit.FAILURE)
+    for path in files:
+        typer.echo(path)
+
+
+@app.command()
+def scenario():
+    """Print the default scenario, every key with its unit, to edit."""
+    from fifesim.scenario import Scenario, write_scenario
+
+    typer.echo(write_scenario(Scenario().complete()), nl=False)
+
+
+@app.command()
+def sensors():
+    """List the instruments: bands, sampling, point spread, radiometry, source."""
+    from fifesim.sensor.instruments import instrument, instrument_names
+    from fifesim.sensor.listing import describe
+
+    for name in instrument_names():
+        typer.echo(describe(instrument(name)))
+
+
+def _stop(error, code):
+    typer.echo(f"fifesim: {error}", err=True)
+    raise typer.Exit(code) from None

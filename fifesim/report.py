@@ -1,0 +1,285 @@
+"""Pictures and the HTML page of a run."""
+
+import base64
+import io
+from pathlib import Path
+
+import jinja2
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from fifesim import grid as grids
+from fifesim.scenario import Scenario
+
+_TEMPLATE = "report.html.j2"
+_DPI = 130
+_NO_DATA = (0.85, 0.85, 0.85)
+_LINE, _BAND = "#b2182b", "#f4a582"
+
+# Where the colours of a composite lie, and the wavelength that serves each best. [um]
+_COMPOSITE = {"near infrared": (0.75, 1.0, 0.84), "red": (0.6, 0.7, 0.66), "green": (0.5, 0.6, 0.56)}
+
+_NAMES = {"lai": "leaf area index", "fpar": "FPAR", "ndvi": "NDVI"}
+
+
+def quicklook(path, image, truth, detail):
+    """
+    Picture of the scene and of its image.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        PNG file.
+    image : xarray.Dataset
+        ``dn`` and perhaps ``ndvi``, in memory.
+    truth : xarray.Dataset
+        ``lai`` and ``fpar`` over the ground of the pixels.
+    detail : xarray.DataArray, dims (y, x)
+        LAI of the cells in the middle.
+    """
+    figure = _detail_figure(image, truth, detail)
+    figure.savefig(path, dpi=_DPI, metadata={"Software": None})
+
+
+def page(scenario, image, truth, detail, fits, versions):
+    """
+    One self-contained HTML page on a run.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.Scenario
+    image, truth : xarray.Dataset
+        As `quicklook` takes them.
+    detail : xarray.DataArray
+    fits : mapping of str to fifesim.analysis.regression.Regression
+        Of the true means on NDVI.
+    versions : mapping of str to str
+
+    Returns
+    -------
+    html : str
+    """
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string((Path(__file__).parent / _TEMPLATE).read_text(encoding="utf-8"))
+    figures = {
+        "detail": _detail_figure(image, truth, detail),
+        "maps": _map_figure(image, truth),
+        "histograms": _histogram_figure(image, truth, detail),
+    }
+    if fits:
+        figures["fits"] = _fit_figure(image, truth, fits)
+    return template.render(
+        title=_title(scenario),
+        summary=_summary(scenario, image, truth, fits),
+        figures={name: _png(figure) for name, figure in figures.items()},
+        fits=[(_NAMES[name], fit) for name, fit in fits.items()],
+        parameters=_parameters(scenario),
+        history=image["dn"].attrs.get("history", "").splitlines(),
+        versions=versions,
+    )
+
+
+def _title(scenario):
+    ground = scenario.ground
+    scene = Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
+    return f"{scene}, seen by {scenario.sensor.instrument}"
+
+
+def _summary(scenario, image, truth, fits):
+    """Rows of a small table: what a reader wants to know first."""
+    grid, pixels = scenario.grid, image["dn"]
+    valid = float((pixels != 0).all("band").mean())
+    size = f"{pixels.sizes['y']} x {pixels.sizes['x']}"
+    rows = [
+        ("Scene", f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m, {grid.crs}"),
+        ("Image", f"{size} pixels of {scenario.sensor.pixel:g} m, {100 * valid:.1f} % of them with data"),
+        ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
+    ]
+    for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
+        label = f"{_NAMES[name]}, mean and standard deviation of the pixels"
+        rows.append((label[0].upper() + label[1:], f"{float(values.mean()):.3f}, {float(values.std()):.3f}"))
+    return rows + [(f"R² of {_NAMES[name]} on NDVI", f"{fit.r2:.3f}") for name, fit in fits.items()]
+
+
+def _parameters(scenario):
+    """Key, value, unit and meaning of every parameter, by section."""
+    sections = []
+    for name in Scenario.model_fields:
+        section = getattr(scenario, name)
+        rows = []
+        for key, known in type(section).model_fields.items():
+            value, unit = getattr(section, key), (known.json_schema_extra or {}).get("unit", "")
+            if isinstance(value, dict):
+                value = ", ".join(f"{band} {number:g}" for band, number in value.items())
+            elif isinstance(value, list):
+                value = ", ".join(value)
+            elif isinstance(value, float):
+                value = f"{value:.10g}"
+            rows.append((key, "not given" if value is None else value, unit, known.description))
+        sections.append((name, rows))
+    return sections
+
+
+def _detail_figure(image, truth, detail):
+    """Cells, the pixels that average them, and where in the image they lie."""
+    figure = Figure(figsize=(11, 4.1), layout="constrained")
+    axes = figure.subplots(1, 3)
+    high = max(float(detail.quantile(0.995)) if detail.notnull().any() else 1.0, 1e-6)
+    cells = _map(axes[0], detail, cmap="YlGn", vmin=0, vmax=high)
+    size = grids.cell_size(grids.geobox(detail))[1]
+    axes[0].set_title(f"Leaf area index, cells of {size:.2f} m")
+    figure.colorbar(cells, ax=axes[0], shrink=0.8, label="LAI [m² m⁻²]")
+    box = grids.geobox(detail).boundingbox
+    part = image["dn"].sel(x=slice(box.left, box.right), y=slice(box.top, box.bottom))
+    stretch = _stretch(image["dn"])
+    _composite(axes[1], part, stretch)
+    pixel = grids.cell_size(grids.geobox(image["dn"]))[1]
+    axes[1].set_title(f"The same ground in pixels of {pixel:g} m")
+    _composite(axes[2], image["dn"], stretch)
+    axes[2].add_patch(
+        Rectangle((box.left / 1000, box.bottom / 1000), (box.right - box.left) / 1000, (box.top - box.bottom) / 1000,
+                  fill=False, edgecolor="black", linewidth=1.2)
+    )  # fmt: skip
+    axes[2].set_title(f"Whole image: {_composite_name(image['dn'])}")
+    return figure
+
+
+def _map_figure(image, truth):
+    maps = [
+        (truth["lai"], "YlGn", "True leaf area index", "LAI [m² m⁻²]"),
+        (truth["fpar"], "YlGn", "True FPAR", "FPAR"),
+    ]
+    if "ndvi" in image:
+        maps.append((image["ndvi"], "YlGn", "NDVI of the image", "NDVI"))
+    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    for axis, (array, cmap, title, label) in zip(figure.subplots(1, len(maps), squeeze=False)[0], maps, strict=True):
+        drawn = _map(axis, array, cmap=cmap, **_limits(array))
+        axis.set_title(title)
+        figure.colorbar(drawn, ax=axis, shrink=0.8, label=label)
+    return figure
+
+
+def _histogram_figure(image, truth, detail):
+    figure = Figure(figsize=(11, 3.2), layout="constrained")
+    axes = figure.subplots(1, 3)
+    top = float(np.nanmax(detail)) if detail.notnull().any() else 1.0
+    bins = np.linspace(0, max(top, 1e-6), 60)
+    for values, label, color in (
+        (detail, "cells in the middle", "#a6d96a"),
+        (truth["lai"], "means over pixels", "#1a9850"),
+    ):
+        axes[0].hist(_finite(values), bins=bins, density=True, alpha=0.7, label=label, color=color)
+    axes[0].set(xlabel="LAI [m² m⁻²]", ylabel="density", title="Leaf area index")
+    axes[0].legend(frameon=False)
+    axes[1].hist(_finite(truth["fpar"]), bins=60, density=True, color="#1a9850")
+    axes[1].set(xlabel="FPAR", ylabel="density", title="True FPAR of the pixels")
+    for band, color in zip(image["dn"]["band"].values, _colors(image["dn"].sizes["band"]), strict=True):
+        counts = image["dn"].sel(band=band).values
+        dn, number = np.unique(counts[counts > 0], return_counts=True)
+        axes[2].step(dn, number / max(number.sum(), 1), where="mid", label=str(band), color=color)
+    axes[2].set(xlabel="digital number", ylabel="share of pixels", title="Image")
+    axes[2].legend(frameon=False)
+    return figure
+
+
+def _fit_figure(image, truth, fits):
+    figure = Figure(figsize=(11, 4.4), layout="constrained")
+    for axis, (name, fit) in zip(figure.subplots(1, len(fits), squeeze=False)[0], fits.items(), strict=True):
+        x, y = image["ndvi"].values.ravel(), truth[name].values.ravel()
+        valid = np.isfinite(x) & np.isfinite(y)
+        points = axis.hexbin(x[valid], y[valid], gridsize=70, mincnt=1, bins="log", cmap="Greys", linewidths=0.1)
+        figure.colorbar(points, ax=axis, shrink=0.8, label="pixels")
+        line = np.linspace(x[valid].min(), x[valid].max(), 50)
+        axis.fill_between(
+            line, *fit.prediction_interval(line), color=_BAND, alpha=0.3, label="95 % prediction interval"
+        )
+        axis.plot(line, fit.predict(line), color=_LINE, linewidth=2, label="least-squares line")
+        sign = "+" if fit.slope >= 0 else "−"
+        axis.set(
+            xlabel="NDVI at the top of the atmosphere",
+            ylabel=f"True {_NAMES[name]}",
+            title=f"{fit.intercept:.3f} {sign} {abs(fit.slope):.3f} NDVI,  R² = {fit.r2:.3f},  n = {fit.n}",
+        )
+        axis.legend(frameon=False, loc="upper left")
+    return figure
+
+
+def _map(axis, array, **style):
+    """A raster as a map with axes in km; no data is grey."""
+    axis.set_facecolor(_NO_DATA)
+    drawn = axis.imshow(array.values, extent=_extent(array), interpolation="nearest", **style)
+    _map_axes(axis)
+    return drawn
+
+
+def _composite(axis, dn, stretch):
+    axis.set_facecolor(_NO_DATA)
+    bands = [(dn.sel(band=name).values.astype(float) - low) / max(high - low, 1.0) for name, low, high in stretch]
+    valid = (dn != 0).all("band").values
+    color = np.dstack([np.clip(band, 0, 1) for band in bands] + [valid.astype(float)])
+    axis.imshow(color, extent=_extent(dn), interpolation="nearest")
+    _map_axes(axis)
+
+
+def _stretch(dn):
+    """Bands for red, green and blue, with the digital numbers that become dark and bright."""
+    chosen = _composite_bands(dn)
+    names = ([*chosen.values(), *[list(chosen.values())[-1]] * 2])[:3]
+    limits = []
+    for name in names:
+        values = dn.sel(band=name).values
+        values = values[values > 0]
+        low, high = np.percentile(values, (1, 99)) if values.size else (0, 1)
+        limits.append((name, float(low), float(high)))
+    return limits
+
+
+def _composite_bands(dn):
+    """Names of the bands of a colour infrared composite, as far as there are any; else the first band."""
+    found = {}
+    for color, (low, high, best) in _COMPOSITE.items():
+        inside = [band for band in dn["band"].values if low <= float(dn["wavelength"].sel(band=band)) <= high]
+        if inside:
+            found[color] = min(inside, key=lambda band: abs(float(dn["wavelength"].sel(band=band)) - best))
+    return found or {"grey": dn["band"].values[0]}
+
+
+def _composite_name(dn):
+    chosen = _composite_bands(dn)
+    return (
+        f"{', '.join(chosen.values())} as red, green, blue" if len(chosen) == 3 else f"{' and '.join(chosen.values())}"
+    )
+
+
+def _map_axes(axis):
+    axis.set(xlabel="easting [km]", ylabel="northing [km]")
+    axis.ticklabel_format(useOffset=False, style="plain")
+    axis.locator_params(nbins=5)
+    axis.tick_params(labelsize=8)
+
+
+def _extent(array):
+    box = grids.geobox(array).boundingbox
+    return [edge / 1000 for edge in (box.left, box.right, box.bottom, box.top)]
+
+
+def _limits(array):
+    values = _finite(array)
+    low, high = np.percentile(values, (0.5, 99.5)) if values.size else (0.0, 1.0)
+    return {"vmin": float(low), "vmax": float(high)}
+
+
+def _finite(array):
+    values = np.asarray(array.values, float).ravel()
+    return values[np.isfinite(values)]
+
+
+def _colors(count):
+    return [("#2166ac", "#b2182b", "#1a9850", "#762a83", "#e08214", "#35978f")[index % 6] for index in range(count)]
+
+
+def _png(figure):
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+    return base64.b64encode(buffer.getvalue()).decode("ascii")
