@@ -1,0 +1,36 @@
+"""What tests of rasters share."""
+
+import numpy as np
+import pytest
+from lazy import CHUNKS, ODD_CHUNKS, in_chunks
+
+import fifesim
+
+
+@pytest.fixture(params=[None, CHUNKS, ODD_CHUNKS], ids=["numpy", "chunked", "odd-chunks"])
+def array_type(request):
+    """A function that puts a raster into numpy, into chunks, or into odd chunks."""
+    return lambda raster: raster if request.param is None else in_chunks(raster, request.param)
+
+
+@pytest.fixture(scope="session")
+def site():
+    """45 x 54 cells inside the FIFE site: 5 x 6 pixels of 30 m."""
+    return fifesim.fife_site(30 / 9, window=((90, 135), (180, 234)))
+
+
+@pytest.fixture(scope="session")
+def lai_values(site):
+    """LAI of the streaming scene on these cells, made once; tests take copies."""
+    return fifesim.lai_scene(site, "burned-grazed", arp=0.15, seed=7)
+
+
+@pytest.fixture
+def lai(lai_values):
+    return lai_values.copy(deep=True)
+
+
+@pytest.fixture
+def lai_with_hole(lai):
+    lai[20:24, 30:33] = np.nan
+    return lai

@@ -1,0 +1,67 @@
+"""What every raster function owes, whatever it computes."""
+
+from contextlib import contextmanager
+
+import dask
+import numpy as np
+import xarray as xr
+from affine import Affine
+
+from fifesim import cf
+from fifesim import grid as grids
+
+# Fewer cells than a pixel has, more than one chunk, and no common factor with pixels of 9 cells.
+ODD_CHUNKS = {"y": 7, "x": 11}
+CHUNKS = {"y": 27, "x": 36}
+
+
+@contextmanager
+def no_compute():
+    """Fail where something is computed."""
+
+    def refuse(graph, keys, **options):
+        raise AssertionError("computed before it was asked to")
+
+    with dask.config.set(scheduler=refuse):
+        yield
+
+
+def in_chunks(array, chunks):
+    """The array in chunks along those of its dimensions that they name."""
+    return array.chunk({name: size for name, size in chunks.items() if name in array.dims})
+
+
+def check_raster_function(function, *rasters, quantity):
+    """
+    Result of a raster function, once it has been seen to keep its word.
+
+    Inputs stay as they are; chunks give the same bits and nothing early; labels are those of the quantity, and
+    coordinates, CRS and transform say the same.
+    """
+    before = [raster.copy(deep=True) for raster in rasters]
+    result = function(*rasters)
+    for chunks in (CHUNKS, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}):
+        with no_compute():
+            lazy = function(*(in_chunks(raster, chunks) for raster in rasters))
+        assert lazy.chunks is not None
+        xr.testing.assert_identical(lazy.compute(), result)
+    for raster, copy in zip(rasters, before, strict=True):
+        xr.testing.assert_identical(raster, copy)
+    assert result.name == quantity
+    assert cf.attributes(quantity).items() <= result.attrs.items()
+    assert all(isinstance(value, str | int | float | np.number) for value in result.attrs.values())
+    check_place(result, grids.geobox(rasters[0]).crs)
+    return result
+
+
+def check_place(raster, crs):
+    """Dimensions, CRS, transform and coordinates of a raster agree with each other."""
+    assert raster.dims[-2:] == ("y", "x")
+    assert raster.rio.crs == crs
+    assert raster.encoding["grid_mapping"] == "spatial_ref"
+    x, y = raster["x"].values, raster["y"].values
+    transform = Affine.from_gdal(*map(float, raster["spatial_ref"].attrs["GeoTransform"].split()))
+    columns, rows = np.arange(x.size) + 0.5, np.arange(y.size) + 0.5
+    np.testing.assert_allclose(x, transform.c + columns * transform.a, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(y, transform.f + rows * transform.e, rtol=0, atol=1e-6)
+    assert transform.a > 0 > transform.e
