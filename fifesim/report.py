@@ -97,8 +97,8 @@ def _summary(scenario, image, truth, fits):
         ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
     ]
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
-        label = f"{_NAMES[name]}, mean and standard deviation of the pixels"
-        rows.append((label[0].upper() + label[1:], f"{float(values.mean()):.3f}, {float(values.std()):.3f}"))
+        label = f"{_NAMES[name][0].upper()}{_NAMES[name][1:]} of the pixels"
+        rows.append((label, f"mean {float(values.mean()):.3f}, standard deviation {float(values.std()):.3f}"))
     return rows + [(f"R² of {_NAMES[name]} on NDVI", f"{fit.r2:.3f}") for name, fit in fits.items()]
 
 
@@ -123,7 +123,7 @@ def _parameters(scenario):
 
 def _detail_figure(image, truth, detail):
     """Cells, the pixels that average them, and where in the image they lie."""
-    figure = Figure(figsize=(11, 4.1), layout="constrained")
+    figure = Figure(figsize=(11, _height(image["dn"])), layout="constrained")
     axes = figure.subplots(1, 3)
     high = max(float(detail.quantile(0.995)) if detail.notnull().any() else 1.0, 1e-6)
     cells = _map(axes[0], detail, cmap="YlGn", vmin=0, vmax=high)
@@ -152,7 +152,7 @@ def _map_figure(image, truth):
     ]
     if "ndvi" in image:
         maps.append((image["ndvi"], "YlGn", "NDVI of the image", "NDVI"))
-    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    figure = Figure(figsize=(11, _height(image["dn"])), layout="constrained")
     for axis, (array, cmap, title, label) in zip(figure.subplots(1, len(maps), squeeze=False)[0], maps, strict=True):
         drawn = _map(axis, array, cmap=cmap, **_limits(array))
         axis.set_title(title)
@@ -217,8 +217,10 @@ def _composite(axis, dn, stretch):
     axis.set_facecolor(_NO_DATA)
     bands = [(dn.sel(band=name).values.astype(float) - low) / max(high - low, 1.0) for name, low, high in stretch]
     valid = (dn != 0).all("band").values
-    color = np.dstack([np.clip(band, 0, 1) for band in bands] + [valid.astype(float)])
-    axis.imshow(color, extent=_extent(dn), interpolation="nearest")
+    color = np.clip(np.dstack(bands), 0, 1)
+    # A little of the mean in each colour: with two bands alone the composite is red and cyan.
+    color = 0.75 * color + 0.25 * color.mean(axis=-1, keepdims=True)
+    axis.imshow(np.dstack([color, valid]), extent=_extent(dn), interpolation="nearest")
     _map_axes(axis)
 
 
@@ -257,6 +259,12 @@ def _map_axes(axis):
     axis.ticklabel_format(useOffset=False, style="plain")
     axis.locator_params(nbins=5)
     axis.tick_params(labelsize=8)
+
+
+def _height(array):
+    """Height of three maps side by side [inch]."""
+    rows, columns = array.sizes["y"], array.sizes["x"]
+    return float(np.clip(0.7 + 2.9 * rows / columns, 2.2, 7.0))
 
 
 def _extent(array):

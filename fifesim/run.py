@@ -19,8 +19,8 @@ from fifesim.scenario import write_scenario
 
 FILES = ("image.tif", "truth.tif", "quicklook.png", "report.html", "scenario.toml")
 
-# The report shows cells of the scene's middle, this many pixels across: enough to see what a pixel averages. [pixel]
-_DETAIL = 40
+# The report shows the cells below this many pixels across, in the middle: enough to see what a pixel averages. [pixel]
+_DETAIL = 16
 
 _VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "dask", "numba", "rasterio", "odc-geo", "pvlib", "pyrsr")
 
