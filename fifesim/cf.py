@@ -119,10 +119,11 @@ def label(array, name, *, history, source=None, **provenance):
     attrs = attributes(name)
     before = source.attrs if source is not None else {}
     attrs |= {key: before[key] for key in PROVENANCE if key in before} | provenance
-    sources = [before.get("references", ""), provenance.get("references", "")]
-    attrs |= {"references": "; ".join(filter(None, sources))} if any(sources) else {}
+    cited = [*before.get("references", "").split("; "), *provenance.get("references", "").split("; ")]
+    attrs |= {"references": "; ".join(dict.fromkeys(filter(None, cited)))} if any(cited) else {}
     attrs["history"] = "\n".join(filter(None, [before.get("history", ""), history]))
-    array = array.rename(name)
+    # A renamed array shares its attributes with the one it came from, a copy does not.
+    array = array.copy(deep=False).rename(name)
     array.attrs = attrs
     return array
 

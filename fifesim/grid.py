@@ -157,8 +157,9 @@ def geobox(array):
     if found is None:
         raise ValueError("the raster's x and y are not the centres of a regular grid")
     a = found.affine
-    cell_x, cell_y = _exact_cell(array, a.a, a.e)
-    return check_grid(_snapped(GeoBox(found.shape, Affine(cell_x, a.b, a.c, a.d, cell_y, a.f), found.crs)))
+    (west, cell_x), (north, cell_y) = _axis(array, "x", a.c, a.a), _axis(array, "y", a.f, a.e)
+    cell_x, cell_y = _exact_cell(array, cell_x, cell_y)
+    return check_grid(_snapped(GeoBox(found.shape, Affine(cell_x, a.b, west, a.d, cell_y, north), found.crs)))
 
 
 def coordinates(grid):
@@ -223,12 +224,8 @@ def same_grid(one, other):
     """
     if one.shape != other.shape or one.crs != other.crs:
         return False
-    tolerance = 1e-3 * min(abs(one.affine.a), abs(one.affine.e))
-    corners = (
-        np.array([transform_points(grid.affine, *corner) for corner in ((0, 0), grid.shape.xy)])
-        for grid in (one, other)
-    )
-    return bool(np.allclose(*corners, rtol=0, atol=tolerance))
+    corners = ([transform_points(grid.affine, *corner) for corner in ((0, 0), grid.shape.xy)] for grid in (one, other))
+    return bool(np.allclose(*corners, rtol=0, atol=1e-3 * min(abs(one.affine.a), abs(one.affine.e))))
 
 
 def aligned(grid, pixel):
@@ -372,6 +369,18 @@ def _snapped(grid):
     west, north = column * a.a + x_offset, row * a.e + y_offset
     crs = f"EPSG:{grid.crs.epsg}" if grid.crs and grid.crs.epsg else grid.crs
     return GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), crs)
+
+
+def _axis(array, name, edge, cell):
+    """Outer edge and cell along an axis, from all coordinates; odc-geo, whose these are, looks at two."""
+    if name not in array.coords or array.sizes[name] < 2:
+        return edge, cell
+    centres = array.coords[name].values.astype(float)
+    even, cell = np.linspace(centres[0], centres[-1], centres.size, retstep=True)
+    # Single precision resolves half a metre of a northing, a sixtieth of a 30 m cell.
+    if not np.allclose(centres, even, rtol=0, atol=abs(cell) / 60):
+        raise ValueError(f"the raster's {name} is not evenly spaced: interpolate it onto a regular grid with .interp")
+    return float(centres[0] - cell / 2), float(cell)
 
 
 def _exact_cell(array, cell_x, cell_y):

@@ -29,6 +29,8 @@ def assemble(make_tile, tile, row, column, shape):
     """
     height, width = shape
     window = np.empty(shape)
+    if not window.size:
+        return window
     for tile_row in range(row // tile, -(-(row + height) // tile)):
         into_rows, from_rows = _overlap(tile, tile_row, row, height)
         for tile_column in range(column // tile, -(-(column + width) // tile)):

@@ -125,7 +125,7 @@ def test_files_are_shorter_than_400_lines(name):
 
 
 def public_functions():
-    """Functions of modules and methods of classes, by a readable name; those of the command line document a terminal."""
+    """Functions of modules and methods of classes, by a readable name; the command line's speak to a terminal."""
     for name, tree in TREES.items():
         if name == "cli":
             continue
