@@ -9,7 +9,7 @@ import pytest
 
 from fifesim import datasets
 from fifesim.bands import solar_irradiance
-from fifesim.sensor.instruments import Instrument, instrument, instruments, read_instrument
+from fifesim.sensor.instruments import Instrument, instrument, instrument_names, read_instrument
 
 TM_FILE = datasets.path("instruments/tm.toml")
 
@@ -48,7 +48,7 @@ def test_footprint_of_tm_on_the_ground():
     assert tm.gsd == 30.0
 
 
-@pytest.mark.parametrize("name", instruments())
+@pytest.mark.parametrize("name", instrument_names())
 def test_every_number_of_every_band_is_present_and_has_a_source(name):
     item = instrument(name)
     for number in ("altitude", "gsd", "interval", "bits", "lsf"):
@@ -111,7 +111,7 @@ def test_names_are_found_in_any_case_and_instruments_pass_through():
     tm = instrument("tm")
     assert tm is instrument("TM")
     assert instrument(tm) is tm
-    assert "TM" in instruments()
+    assert "TM" in instrument_names()
 
 
 def test_unknown_names_list_the_nearest_and_all():
@@ -162,4 +162,4 @@ def test_mistakes_in_a_file_name_the_key_and_the_value(changed, old, new, messag
 def test_every_file_is_listed_under_the_name_it_gives():
     for path in TM_FILE.parent.glob("*.toml"):
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-        assert content["name"] in instruments()
+        assert content["name"] in instrument_names()

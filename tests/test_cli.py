@@ -1,0 +1,149 @@
+"""The command line as a user meets it: files, exit codes, and one line for a mistake."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import rasterio
+from typer.testing import CliRunner
+
+from fifesim.cli import app
+from fifesim.run import FILES
+from fifesim.scenario import read_scenario, write_scenario
+
+SMALL = """
+[grid]
+width = 900
+height = 600
+
+[ground]
+arp = 0.24
+seed = 3
+"""
+
+
+@pytest.fixture
+def invoke(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        return CliRunner().invoke(app, list(map(str, arguments)))
+
+    return call
+
+
+@pytest.fixture
+def small(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL)
+    return path
+
+
+def test_simulate_writes_its_five_files_and_names_them(invoke, small, tmp_path):
+    result = invoke("simulate", small, "-o", "out")
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(FILES)
+    assert all(name in result.output for name in FILES)
+
+
+def test_image_lies_where_the_scenario_says(invoke, small, tmp_path):
+    invoke("simulate", small, "-o", "out")
+    with rasterio.open(tmp_path / "out" / "image.tif") as image:
+        assert image.crs.to_epsg() == 26914
+        assert tuple(image.bounds) == (704970.0, 4333620.0, 705870.0, 4334220.0)
+        assert image.descriptions == ("TM3", "TM4")
+        assert image.read().min() > 0
+
+
+def test_running_the_written_scenario_gives_the_same_files(invoke, small, tmp_path):
+    invoke("simulate", small, "-o", "out")
+    assert invoke("simulate", "out/scenario.toml", "-o", "again").exit_code == 0
+    for name in FILES:
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "again" / name).read_bytes(), name
+
+
+def test_printed_scenario_is_the_default_one(invoke, tmp_path):
+    printed = invoke("scenario").stdout
+    (tmp_path / "default.toml").write_text(printed)
+    assert write_scenario(read_scenario(tmp_path / "default.toml")) == printed
+
+
+def test_sensors_lists_bands_with_their_radiances(invoke):
+    printed = invoke("sensors").stdout
+    assert "TM4" in printed
+    assert "206.20" in printed
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[atmosphere]\nvisibilty = 23\n", "did you mean 'visibility'"),
+        ('[atmosphere]\nvisibility = "23 mi"\n', "visibility is in km"),
+        ("[atmosphere]\nvisibility = 2\n", "greater than or equal to 5"),
+        ("[ground]\narp = 0.3\n", "less than 0.25"),
+        ('[ground]\ndistribution = "burnt-grazed"\n', "burned-grazed"),
+        ('[sensor]\ninstrument = "TN"\n', "did you mean TM"),
+        ('[sensor]\nbands = ["TM8"]\n', "TM7"),
+        ('[grid]\ncrs = "EPSG:4326"\n', "geographic"),
+        ('[geometry]\ntime = "1987-06-06T05:00:00Z"\n', "below the horizon"),
+        ('[ground]\nlai_file = "missing.tif"\n', "missing.tif"),
+        (
+            "[ground.leaf_reflectance]\nTM3 = 0.6\nTM4 = 0.6\n[ground.leaf_transmittance]\nTM3 = 0.5\nTM4 = 0.1\n",
+            "add up",
+        ),
+        ("[ground\n", "not valid TOML"),
+    ],
+)
+def test_a_mistake_is_named_with_exit_code_2_and_nothing_is_written(invoke, tmp_path, text, said):
+    (tmp_path / "wrong.toml").write_text(text)
+    result = invoke("simulate", "wrong.toml", "-o", "out")
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.output + result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_in_use_is_not_touched_without_overwrite(invoke, small, tmp_path):
+    kept = tmp_path / "out" / "notes.txt"
+    kept.parent.mkdir()
+    kept.write_text("mine")
+    refused = invoke("simulate", small, "-o", "out")
+    assert refused.exit_code == 2
+    assert "--overwrite" in refused.stderr
+    assert [path.name for path in kept.parent.iterdir()] == ["notes.txt"]
+    assert invoke("simulate", small, "-o", "out", "--overwrite").exit_code == 0
+    assert kept.read_text() == "mine"
+    assert (tmp_path / "out" / "image.tif").exists()
+
+
+def test_negative_lai_leaves_no_output_behind(invoke, tmp_path):
+    profile = {"driver": "GTiff", "width": 30, "height": 30, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
+    transform = rasterio.transform.from_origin(705000, 4334100, 30, 30)
+    with rasterio.open(tmp_path / "lai.tif", "w", **profile, transform=transform) as sink:
+        sink.write(np.full((30, 30), -1.0, "float32"), 1)
+    (tmp_path / "wrong.toml").write_text('[ground]\nlai_file = "lai.tif"\n')
+    result = invoke("simulate", "wrong.toml", "-o", "out")
+    assert result.exit_code == 2
+    assert "negative" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_full_or_unwritable_place_is_a_failure_that_leaves_nothing(invoke, small, tmp_path, monkeypatch):
+    def full(*arguments, **keywords):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("fifesim.run.report.quicklook", full)
+    result = invoke("simulate", small, "-o", "out")
+    assert result.exit_code == 1
+    assert "No space left" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_help_does_not_import_what_is_slow():
+    slow = ("numba", "pvlib", "matplotlib", "scipy")
+    code = f"import sys; from fifesim.cli import app; print([name for name in {slow} if name in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
+    assert found.stdout.strip() == "[]"

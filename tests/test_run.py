@@ -1,0 +1,69 @@
+"""The report of a run says what its rasters say."""
+
+import re
+
+import numpy as np
+import pytest
+import rasterio
+
+import fifesim
+from fifesim.run import run
+from fifesim.scenario import parse_scenario
+
+SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "small"
+    run(parse_scenario(SMALL), folder)
+    return folder
+
+
+def test_truth_holds_the_means_of_the_scene(folder):
+    grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
+    lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=3)
+    with rasterio.open(folder / "truth.tif") as truth:
+        assert truth.descriptions == ("lai", "fpar")
+        np.testing.assert_array_equal(truth.read(1), lai.fifesim.aggregate(30).values)
+        np.testing.assert_array_equal(truth.read(2), lai.fifesim.fpar().fifesim.aggregate(30).values)
+
+
+def test_image_is_that_of_the_chain(folder):
+    grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
+    lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=3)
+    image = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM")
+    np.testing.assert_array_equal(fifesim.open_image(folder / "image.tif").values, image.values)
+
+
+def test_report_gives_the_regressions_of_its_files(folder):
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    ndvi = fifesim.open_image(folder / "image.tif").fifesim.ndvi()
+    truth = fifesim.open_image(folder / "truth.tif")
+    for name in ("lai", "fpar"):
+        fit = fifesim.regress(truth.sel(band=name, drop=True), ndvi)
+        assert f"{fit.slope:.4f}" in page
+        assert f"{fit.r2:.4f}" in page
+
+
+def test_report_is_self_contained(folder):
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert page.count("data:image/png;base64,") == 4
+
+
+def test_report_names_every_parameter_with_its_unit(folder):
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for key, unit in (("visibility", "km"), ("cell", "m"), ("vza", "degree"), ("arp", "1")):
+        assert re.search(rf"<code>{key}</code>.*?<td>{unit}</td>", page)
+
+
+def test_all_bands_of_an_instrument_make_a_report(tmp_path):
+    bands = ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
+    files = run(parse_scenario(SMALL | {"sensor": {"bands": bands}}), tmp_path / "all")
+    assert all(path.stat().st_size > 0 for path in files)
+
+
+def test_a_single_band_has_no_ndvi_and_still_a_report(tmp_path):
+    run(parse_scenario(SMALL | {"sensor": {"bands": ["TM5"]}}), tmp_path / "one")
+    assert "What NDVI tells" not in (tmp_path / "one" / "report.html").read_text(encoding="utf-8")
