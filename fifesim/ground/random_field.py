@@ -327,7 +327,7 @@ def periodic_field(seed, arp, shape):
     """
     check_arp(arp)
     check_seed(seed)
-    noise = np.random.Generator(np.random.Philox(key=[seed, 1])).standard_normal(shape)
+    noise = np.random.Generator(np.random.Philox(key=_key(seed, 1))).standard_normal(shape)
     return _filter(noise, _half_response(arp, tuple(shape)))
 
 
@@ -367,7 +367,12 @@ def _tile(seed, arp, tile_row, tile_column):
 def _noise_block(seed, block_row, block_column):
     """White noise of one lattice block: the block's place is the upper half of the Philox counter."""
     counter = np.array([0, 0, block_row % 2**64, block_column % 2**64], dtype=np.uint64)
-    return np.random.Generator(np.random.Philox(counter=counter, key=[seed, 0])).standard_normal((BLOCK, BLOCK))
+    return np.random.Generator(np.random.Philox(counter=counter, key=_key(seed, 0))).standard_normal((BLOCK, BLOCK))
+
+
+def _key(seed, method):
+    """Philox key; a list of numbers from 2**63 up would go through floating point, and neighbours be the same."""
+    return np.array([seed, method], dtype=np.uint64)
 
 
 def _filter(noise, half_response):
