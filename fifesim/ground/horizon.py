@@ -1,0 +1,214 @@
+"""Horizons: how far up from the horizontal the terrain around a cell reaches, in every direction."""
+
+import numpy as np
+from numba import njit
+
+# A ray is sampled where it crosses each line of cells up to this many of them, and from there on at steps of one part
+# in so many of the distance. On Kings Creek at 10 m that moves sky factors by 1e-5 rms.
+_FINENESS = 32
+
+
+def azimuths(count):
+    """
+    Evenly spaced directions.
+
+    Parameters
+    ----------
+    count : int
+        At least 16.
+
+    Returns
+    -------
+    azimuths : array, shape (count,)
+        From north, clockwise. [degree]
+
+    Raises
+    ------
+    ValueError
+        If they are too few: between them the horizon is interpolated.
+
+    Examples
+    --------
+    >>> azimuths(16)[:3].tolist()
+    [0.0, 22.5, 45.0]
+    """
+    if not (count >= 16 and count == int(count)):
+        raise ValueError(f"directions must be a whole number from 16 up, got {count}: a horizon is interpolated between")
+    return np.arange(int(count)) * (360 / int(count))
+
+
+def horizon_margin(cell_y, cell_x, reach):
+    """
+    Cells around that a horizon depends on.
+
+    Parameters
+    ----------
+    cell_y, cell_x : float
+        [m]
+    reach : float
+        Greatest distance of terrain that is looked at. [m]
+
+    Returns
+    -------
+    rows, columns : int
+
+    Raises
+    ------
+    ValueError
+        If the reach is not a cell.
+
+    Examples
+    --------
+    >>> horizon_margin(30, 60, 300)
+    (11, 6)
+    """
+    if not max(cell_y, cell_x) <= reach < np.inf:
+        raise ValueError(f"reach must be at least one cell of {cell_y:g} x {cell_x:g} m, got {reach:g} m")
+    return int(reach / cell_y) + 1, int(reach / cell_x) + 1
+
+
+def horizon_zenith(dem, cell_y, cell_x, directions, reach):
+    r"""
+    Zenith angle of the horizon.
+
+    .. math::
+
+        H(\phi) = \operatorname{arccot} \max\left(0, \max_{0 < r \le R}
+            \frac{z(\mathbf{x} + r \mathbf{e}_\phi) - z(\mathbf{x})}{r}\right)
+
+    Parameters
+    ----------
+    dem : array, shape (rows + 2 m, columns + 2 n)
+        Elevation with the margin m, n of `horizon_margin`; north up. NaN is open. [m]
+    cell_y, cell_x : float
+        [m]
+    directions : array, shape (direction,)
+        Azimuths, clockwise from north. [degree]
+    reach : float
+        R. [m]
+
+    Returns
+    -------
+    horizon : array, shape (direction, rows, columns)
+        90 is level and open. [degree]
+
+    Notes
+    -----
+    A ray is sampled where it crosses the lines of cells of the axis that it follows more closely, between two cells by
+    linear interpolation, so that a plane is exact. Beyond 32 cells the samples lie 1/32 of the distance apart. The
+    curvature of the Earth, 8 m at 10 km, is left out.
+
+    References
+    ----------
+    [DozierFrew1990]_
+
+    Examples
+    --------
+    The top of a wall that stands as far away as it is high, to the east, and nothing to the north:
+
+    >>> land = np.zeros((5, 5))
+    >>> land[:, 3:] = 10
+    >>> horizon_zenith(land, 10, 10, [0, 90], 10)[:, 0, 0].tolist()
+    [90.0, 45.0]
+    """
+    return zenith(horizon_tangent(dem, cell_y, cell_x, directions, reach))
+
+
+def horizon_tangent(dem, cell_y, cell_x, directions, reach):
+    """
+    Tangent of the elevation of the horizon, cot H.
+
+    Parameters
+    ----------
+    dem, cell_y, cell_x, directions, reach
+        As in `horizon_zenith`.
+
+    Returns
+    -------
+    tangent : array, shape (direction, rows, columns)
+        0 is level and open. [1]
+    """
+    dem = np.ascontiguousarray(dem, float)
+    rows, columns = horizon_margin(cell_y, cell_x, reach)
+    samples = [_samples(azimuth, cell_y, cell_x, reach) for azimuth in np.radians(np.asarray(directions, float))]
+    ends = np.cumsum([0, *(len(part) for part in samples)])
+    table = np.concatenate(samples)
+    out = np.zeros((len(samples), dem.shape[0] - 2 * rows, dem.shape[1] - 2 * columns))
+    _march(dem, rows, columns, ends, table[:, :4].astype(np.int64), table[:, 4], table[:, 5], out)
+    return out
+
+
+def zenith(tangent):
+    """
+    Zenith angle of a horizon from its tangent.
+
+    Parameters
+    ----------
+    tangent : array
+        Of its elevation. [1]
+
+    Returns
+    -------
+    zenith : array
+        [degree]
+    """
+    return 90 - np.degrees(np.arctan(tangent))
+
+
+def tangent(zenith):
+    """
+    Tangent of the elevation of a horizon.
+
+    Parameters
+    ----------
+    zenith : array
+        Zenith angle H; NaN is open. [degree]
+
+    Returns
+    -------
+    tangent : array
+        cot H, 0 where the horizon lies below the horizontal. [1]
+
+    Examples
+    --------
+    >>> tangent([45.0, np.nan, 90.0]).round(12).tolist()
+    [1.0, 0.0, 0.0]
+    """
+    return np.tan(np.radians(np.fmax(90 - np.asarray(zenith, float), 0.0)))
+
+
+def _samples(azimuth, cell_y, cell_x, reach):
+    """
+    Where a ray is sampled: two cells (rows, columns away), the weight of the second, and 1 / distance [1/m].
+    """
+    down, right = -np.cos(azimuth) / cell_y, np.sin(azimuth) / cell_x
+    along_columns = abs(right) >= abs(down)
+    major = max(abs(right), abs(down))
+    steps = [1]
+    while steps[-1] + max(1, steps[-1] // _FINENESS) <= reach * major + 1e-9:
+        steps.append(steps[-1] + max(1, steps[-1] // _FINENESS))
+    k = np.array(steps, float)
+    # Rounded, so that a ray along an axis or a diagonal meets cells and not their neighbours by 1e-17.
+    minor = np.round(k * ((down if along_columns else right) / major), 9)
+    low = np.floor(minor)
+    high = np.ceil(minor)
+    main = k * np.sign(right if along_columns else down)
+    cells = [low, main, high, main] if along_columns else [main, low, main, high]
+    return np.stack([*cells, minor - low, major / k], axis=1)
+
+
+@njit(nogil=True, cache=True)
+def _march(dem, top, left, ends, cells, share, inverse, out):
+    columns = out.shape[2]
+    for direction in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            line = out[direction, i]
+            here = dem[top + i, left : left + columns]
+            for n in range(ends[direction], ends[direction + 1]):
+                first = dem[top + i + cells[n, 0], left + cells[n, 1] : left + cells[n, 1] + columns]
+                second = dem[top + i + cells[n, 2], left + cells[n, 3] : left + cells[n, 3] + columns]
+                weight, per_metre = share[n], inverse[n]
+                for j in range(columns):
+                    rise = (first[j] + weight * (second[j] - first[j]) - here[j]) * per_metre
+                    # False for NaN: what is not known is open.
+                    line[j] = rise if rise > line[j] else line[j]
