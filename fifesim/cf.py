@@ -28,6 +28,22 @@ QUANTITIES = {
     "surface_reflectance": Quantity(
         "1", "surface_bidirectional_reflectance", "surface reflectance factor", "direct and diffuse light mixed"
     ),
+    "dem": Quantity("m", "surface_altitude", "elevation of the ground"),
+    "slope": Quantity("degree", "ground_slope_angle", "slope of the ground"),
+    "aspect": Quantity(
+        "degree",
+        "ground_slope_direction",
+        "aspect of the ground",
+        "down the slope, clockwise from north; 0 where level",
+    ),
+    "horizon": Quantity(
+        "degree", "", "zenith angle of the horizon", "of the land around, 90 where open; direction clockwise from north"
+    ),
+    "sky_view": Quantity("1", "", "sky view factor", "diffuse light over that on an open plain"),
+    "terrain_view": Quantity("1", "", "terrain configuration factor"),
+    "illumination": Quantity("1", "", "cosine of the solar zenith angle on the slope", "0 in shadow"),
+    "shadow": Quantity("1", "", "shadow", "1 where the sun does not reach the slope"),
+    "kt": Quantity("1", "", "topographic correction factor", "irradiance on the slope over that on level ground"),
     "toa_reflectance": Quantity(
         "1",
         "toa_bidirectional_reflectance",
@@ -67,6 +83,11 @@ PROVENANCE = (
     "atmosphere",
     "instrument",
     "references",
+)
+
+# Other spellings of units.
+_SAME_UNITS = dict.fromkeys(("", "m2 m-2", "dimensionless"), "1") | dict.fromkeys(
+    ("metre", "metres", "meter", "meters"), "m"
 )
 
 _GEOMETRY = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
@@ -145,7 +166,7 @@ def check_units(array, *names):
     """
     allowed = list(dict.fromkeys(QUANTITIES[name].units for name in names))
     units = str(array.attrs.get("units", allowed[0])).strip()
-    if units not in allowed and not ("1" in allowed and units in ("", "m2 m-2", "dimensionless")):
+    if not {units, _SAME_UNITS.get(units)} & set(allowed):
         wanted = " or ".join(repr(unit) for unit in allowed)
         raise ValueError(
             f"{array.name or 'the array'} has units {units!r}, {names[0]} needs {wanted}: "

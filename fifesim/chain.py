@@ -13,6 +13,7 @@ from fifesim.bands import Band
 from fifesim.geometry import fife_geometry
 from fifesim.ground import optics
 from fifesim.ground import raster as ground
+from fifesim.ground import terrain_raster as terrain
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.instruments import instrument as find_instrument
 
@@ -27,6 +28,8 @@ def surface_reflectance(
     *,
     bands=None,
     dem=None,
+    horizon=None,
+    upwelling=True,
     atmosphere=None,
     geometry=None,
     leaf_optics=None,
@@ -46,8 +49,13 @@ def surface_reflectance(
         Whose bands are simulated.
     bands : sequence of str, optional
         Names of its bands; all by default.
-    dem : None
-        Flat ground.
+    dem : xarray.DataArray, dims (y, x), optional
+        Elevation on the cells of ``lai``, or on more of them, whose horizons then count; without it the ground is
+        level. The reflectance is that of level ground times Kt (Eq. 4) and the view's cosine (Eq. 5). [m]
+    horizon : xarray.DataArray, dims (direction, y, x), optional
+        Of an elevation model that reaches further than ``dem``, from `horizon`. [degree]
+    upwelling : bool, optional
+        Whether with the view's cosine on slopes, Eq. 5.
     atmosphere : Atmosphere, optional
         Decides the share of skylight; by default midlatitude summer, continental aerosol, 45 km visibility, 0.4 km
         above the sea. It travels on with the result.
@@ -72,18 +80,20 @@ def surface_reflectance(
     Raises
     ------
     ValueError
-        If an argument is out of its range; on lazy data, a negative LAI when it computes.
+        If an argument is out of its range; on lazy data, a negative LAI when it computes. If the dem is not in metres,
+        does not cover ``lai``, or lies on other cells.
 
     References
     ----------
-    [Verhoef1984]_; [Friedl1995]_, Fig. 1
+    [Verhoef1984]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5
 
     See Also
     --------
-    fifesim.ground.canopy.sail, fifesim.ground.raster.surface_reflectance
+    fifesim.ground.canopy.sail, fifesim.ground.raster.surface_reflectance,
+    fifesim.ground.terrain_raster.terrain_reflectance
     """
-    if dem is not None:
-        raise ValueError("dem must be None, which is flat ground: terrain is not part of this version")
+    if dem is None and horizon is not None:
+        raise ValueError("a horizon stands around a dem: give dem= too")
     atmosphere = Atmosphere() if atmosphere is None else atmosphere
     geometry = geometry or cf.geometry_of(lai) or fife_geometry()
     description = find_instrument(instrument)
@@ -93,7 +103,7 @@ def surface_reflectance(
         atmosphere, tuple(band.response for band in selected), geometry.sza, geometry.vza, geometry.raa
     )
     leaf_reflectance, leaf_transmittance = optics.leaf_optics(names, leaf_optics)
-    return ground.surface_reflectance(
+    level = ground.surface_reflectance(
         lai,
         bands=names,
         wavelengths=[band.wavelength for band in selected],
@@ -108,6 +118,48 @@ def surface_reflectance(
         atmosphere=str(atmosphere),
         instrument=description.name,
     )
+    if dem is None:
+        return level
+    light = _sunlight(terms) | {"geometry": geometry, "horizon": horizon}
+    return terrain.terrain_reflectance(level, dem, upwelling=upwelling, **light)
+
+
+def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instrument=None):
+    """
+    Topographic correction factor Kt: what terrain does to the irradiance in each band.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Of level ground, from `surface_reflectance` without a dem. [1]
+    dem : xarray.DataArray, dims (y, x)
+        As in `surface_reflectance`. [m]
+    horizon : xarray.DataArray, dims (direction, y, x), optional
+        As in `surface_reflectance`. [degree]
+    atmosphere, geometry, instrument : optional
+        As in `to_toa`.
+
+    Returns
+    -------
+    kt : xarray.DataArray, dims (band, y, x)
+        Lazy where an input is. [1]
+
+    Raises
+    ------
+    ValueError
+        As in `surface_reflectance`.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 4; [Dubayah1992]_
+
+    See Also
+    --------
+    fifesim.ground.illumination.kt
+    """
+    atmosphere, bands, geometry = _light(reflectance, atmosphere, geometry, instrument)
+    terms = five_s.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
+    return terrain.kt(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
 
 
 def to_toa(reflectance, atmosphere=None, *, geometry=None, instrument=None):
@@ -280,6 +332,14 @@ def _has_ndvi(image):
     return bool(
         np.any((wavelength >= 0.6) & (wavelength <= 0.7)) and np.any((wavelength >= 0.75) & (wavelength <= 1.0))
     )
+
+
+def _sunlight(terms):
+    """What Kt needs of the atmosphere."""
+    return {
+        "direct_transmittance": terms.direct_transmittance_down,
+        "transmittance_down": terms.transmittance_down,
+    }
 
 
 def _light(array, atmosphere, geometry, instrument):

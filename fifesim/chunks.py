@@ -1,5 +1,8 @@
 """How a kernel of numpy arrays meets dask: by cell, by place, or from one grid onto another."""
 
+from functools import partial
+from typing import NamedTuple
+
 import dask.array as da
 import numpy as np
 import xarray as xr
@@ -122,6 +125,170 @@ def resample(kernel, rows, columns, array, grid):
     return grids.place(result, grid)
 
 
+class Reads(NamedTuple):
+    """What each cell of a result reads of an array: from its row ``rows[0]`` up to ``rows[1]``, and so its columns."""
+
+    array: np.ndarray | da.Array  # shape (..., y, x)
+    rows: tuple[np.ndarray, np.ndarray]
+    columns: tuple[np.ndarray, np.ndarray]
+
+    def window(self, rows, columns):
+        """
+        Slices that a block of the result reads.
+
+        Parameters
+        ----------
+        rows, columns : slice
+            Of the result.
+
+        Returns
+        -------
+        rows, columns : slice
+        """
+        return tuple(
+            slice(int(start[block.start]), int(stop[block.stop - 1]))
+            for (start, stop), block in ((self.rows, rows), (self.columns, columns))
+        )
+
+
+def margin_reads(array, rows, columns=None, offset=(0, 0), shape=None):
+    """
+    Reads of cells that need a margin around them; beyond the array it is NaN.
+
+    Parameters
+    ----------
+    array : numpy.ndarray or dask.array.Array, shape (..., y, x)
+    rows : int
+        Margin. [cell]
+    columns : int, optional
+        The same by default. [cell]
+    offset : (int, int), optional
+        Row and column of the array that the first cell of the result lies on.
+    shape : (int, int), optional
+        Of the result; as far as the array goes by default.
+
+    Returns
+    -------
+    reads : Reads
+    """
+    columns = rows if columns is None else columns
+    depths = [(0, 0)] * (array.ndim - 2) + [(rows, rows), (columns, columns)]
+    if rows or columns:
+        pad = da.pad if isinstance(array, da.Array) else np.pad
+        array = pad(array, depths, mode="constant", constant_values=np.nan)
+    if shape is None:
+        shape = array.shape[-2] - 2 * rows - offset[0], array.shape[-1] - 2 * columns - offset[1]
+    starts = [first + np.arange(size) for first, size in zip(offset, shape, strict=True)]
+    return Reads(array, *((start, start + 1 + 2 * depth) for start, depth in zip(starts, (rows, columns), strict=True)))
+
+
+def windows(kernel, reads, shape, chunks=None):
+    """
+    Array whose every block is made from windows of others.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(rows, columns, *blocks)`` gives the cells of two slices of the result from the windows that they read.
+    reads : sequence of Reads
+    shape : (..., int, int)
+        Of the result; its last axes are y and x.
+    chunks : (tuple of int, tuple of int), optional
+        Of a lazy result over y and x. Without them all is made at once.
+
+    Returns
+    -------
+    array : numpy.ndarray or dask.array.Array
+    """
+    if chunks is None:
+        whole = [slice(0, size) for size in shape[-2:]]
+        return kernel(*whole, *(each.array[(..., *each.window(*whole))] for each in reads))
+    lines = [
+        da.concatenate([_window_block(kernel, reads, shape, rows, columns) for columns in _slices(chunks[1])], axis=-1)
+        for rows in _slices(chunks[0])
+    ]
+    return da.concatenate(lines, axis=-2)
+
+
+def neighbourhood(kernel, array, depth, bands=0):
+    """
+    Apply a kernel that needs cells around each.
+
+    Parameters
+    ----------
+    kernel : callable
+        Takes a block with a margin, NaN beyond the raster, and returns it without.
+    array : xarray.DataArray, dims (y, x)
+    depth : int
+        Margin. [cell]
+    bands : int, optional
+        The kernel makes a new leading axis ``band`` of this many.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims ([band], y, x)
+        Lazy, in the same chunks, where the input is; the same bits whatever these are.
+    """
+    array = array.transpose("y", "x")
+    chunks = array.chunks
+    shape = (bands,) * bool(bands) + array.shape
+    data = windows(lambda rows, columns, block: kernel(block), [margin_reads(array.data, depth)], shape, chunks)
+    dims = ("band",) * bool(bands) + ("y", "x")
+    return xr.DataArray(data, dims=dims, coords=_other_coordinates(array))
+
+
+def runs(cells, chunks):
+    """
+    Chunks of a sorted selection of cells, so that each selects from one chunk of all.
+
+    Parameters
+    ----------
+    cells : array of int, shape (n,)
+    chunks : sequence of int
+        Sizes of the chunks of all cells.
+
+    Returns
+    -------
+    sizes : tuple of int
+        Of runs in the selection; they sum to n.
+
+    Examples
+    --------
+    >>> runs(np.array([1, 4, 7, 10]), (5, 3, 4))
+    (2, 1, 1)
+    """
+    chunk = np.minimum(np.searchsorted(np.cumsum(chunks), cells, side="right"), len(chunks) - 1)
+    starts = np.flatnonzero(np.diff(chunk, prepend=-1))
+    return tuple(np.diff([*starts, len(chunk)]).tolist())
+
+
+def _window_block(kernel, reads, shape, rows, columns):
+    """One block of a result, of one task."""
+    arguments = []
+    axes = len(shape)
+    for each in reads:
+        block = each.array[(..., *each.window(rows, columns))]
+        if isinstance(block, da.Array):
+            block = block.rechunk(-1)
+        arguments += [block, tuple(range(axes, axes + block.ndim))]
+        axes += block.ndim
+    sizes = (*shape[:-2], rows.stop - rows.start, columns.stop - columns.start)
+    return da.blockwise(
+        partial(kernel, rows, columns),
+        tuple(range(len(shape))),
+        *arguments,
+        new_axes=dict(enumerate(sizes)),
+        concatenate=True,
+        dtype=float,
+        meta=np.empty((0,) * len(shape)),
+    )
+
+
+def _slices(sizes):
+    ends = np.cumsum(sizes).tolist()
+    return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
+
+
 def _resample_lazily(kernel, rows, columns, data):
     """One task for each output chunk and band chunk, on the merged input window."""
     blocks = []
@@ -138,10 +305,7 @@ def _resample_lazily(kernel, rows, columns, data):
 
 def _output_ranges(operator, chunks):
     """Runs of outputs whose footprints are centred in one input chunk, so that few chunks are read twice."""
-    centers = operator.start + operator.count // 2
-    chunk = np.minimum(np.searchsorted(np.cumsum(chunks), centers, side="right"), len(chunks) - 1)
-    starts = np.flatnonzero(np.diff(chunk, prepend=-1))
-    return [slice(int(first), int(last)) for first, last in zip(starts, [*starts[1:], len(chunk)], strict=True)]
+    return _slices(runs(operator.start + operator.count // 2, chunks))
 
 
 def _other_coordinates(array):

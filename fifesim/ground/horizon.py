@@ -33,7 +33,7 @@ def azimuths(count):
     [0.0, 22.5, 45.0]
     """
     if not (count >= 16 and count == int(count)):
-        raise ValueError(f"directions must be a whole number from 16 up, got {count}: a horizon is interpolated between")
+        raise ValueError(f"directions must be a whole number from 16 up, got {count}: the horizon is interpolated")
     return np.arange(int(count)) * (360 / int(count))
 
 

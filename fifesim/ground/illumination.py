@@ -130,7 +130,11 @@ def kt(sky_view, terrain_view, reflectance, mu_s_local, mu_s, direct_transmittan
     >>> float(kt(1.0, 0.0, 0.3, 0.8, 0.8, 0.6, 0.9))
     1.0
     """
-    return sky_view + terrain_view * reflectance + direct_transmittance / transmittance_down * (mu_s_local / mu_s - sky_view)
+    return (
+        sky_view
+        + terrain_view * reflectance
+        + direct_transmittance / transmittance_down * (mu_s_local / mu_s - sky_view)
+    )
 
 
 def upwelling_factor(mu_v_local, vza):

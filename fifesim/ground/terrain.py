@@ -6,7 +6,7 @@ from numba import njit
 from fifesim.ground.horizon import tangent
 
 
-def gradient(dem, cell_y, cell_x):
+def gradient(dem, cell_y, cell_x, rows=None, columns=None):
     r"""
     Rise of the ground eastward and northward.
 
@@ -21,6 +21,8 @@ def gradient(dem, cell_y, cell_x):
         Elevation, north up, with a margin of one cell. [m]
     cell_y, cell_x : float
         [m]
+    rows, columns : array of int, optional
+        Where it is wanted, counted with the margin; at all cells inside of it by default.
 
     Returns
     -------
@@ -32,10 +34,12 @@ def gradient(dem, cell_y, cell_x):
     Where a neighbour is NaN the difference is one-sided, as if the ground went on straight; a NaN cell gives NaN.
     """
     dem = np.asarray(dem, float)
-    here = dem[1:-1, 1:-1]
+    i = np.arange(1, dem.shape[0] - 1) if rows is None else rows
+    j = np.arange(1, dem.shape[1] - 1) if columns is None else columns
+    here = dem[np.ix_(i, j)]
     return (
-        _difference(dem[1:-1, :-2], here, dem[1:-1, 2:]) / (2 * cell_x),
-        _difference(dem[2:, 1:-1], here, dem[:-2, 1:-1]) / (2 * cell_y),
+        _difference(dem[np.ix_(i, j - 1)], here, dem[np.ix_(i, j + 1)]) / (2 * cell_x),
+        _difference(dem[np.ix_(i + 1, j)], here, dem[np.ix_(i - 1, j)]) / (2 * cell_y),
     )
 
 
