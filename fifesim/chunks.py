@@ -6,6 +6,7 @@ from typing import NamedTuple
 import dask.array as da
 import numpy as np
 import xarray as xr
+from dask.base import tokenize
 
 from fifesim import grid as grids
 
@@ -203,8 +204,12 @@ def windows(kernel, reads, shape, chunks=None):
     if chunks is None:
         whole = [slice(0, size) for size in shape[-2:]]
         return kernel(*whole, *(each.array[(..., *each.window(*whole))] for each in reads))
+    # Once for all blocks: dask would pickle the kernel for each.
+    token = tokenize(kernel, reads, shape)
     lines = [
-        da.concatenate([_window_block(kernel, reads, shape, rows, columns) for columns in _slices(chunks[1])], axis=-1)
+        da.concatenate(
+            [_window_block(kernel, reads, shape, rows, columns, token) for columns in _slices(chunks[1])], axis=-1
+        )
         for rows in _slices(chunks[0])
     ]
     return da.concatenate(lines, axis=-2)
@@ -262,7 +267,7 @@ def runs(cells, chunks):
     return tuple(np.diff([*starts, len(chunk)]).tolist())
 
 
-def _window_block(kernel, reads, shape, rows, columns):
+def _window_block(kernel, reads, shape, rows, columns, token):
     """One block of a result, of one task."""
     arguments = []
     axes = len(shape)
@@ -278,6 +283,7 @@ def _window_block(kernel, reads, shape, rows, columns):
         tuple(range(len(shape))),
         *arguments,
         new_axes=dict(enumerate(sizes)),
+        name=f"windows-{token}-{rows.start}-{columns.start}",
         concatenate=True,
         dtype=float,
         meta=np.empty((0,) * len(shape)),

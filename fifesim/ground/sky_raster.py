@@ -85,21 +85,19 @@ class _Places(NamedTuple):
         return tuple(np.clip(np.round(at), 0, size - 1).astype(int) for at, size in zip(self[:2], shape, strict=True))
 
 
-class Sky(NamedTuple):
-    """
-    Sky vector and the horizon toward the sun at some places, and where the elevation's cells lie between them.
-    """
+class Between(NamedTuple):
+    """For each row and each column of the elevation, the place before it and the share of that after it."""
 
-    data: np.ndarray | da.Array  # (4, y, x)
     rows: tuple[np.ndarray, np.ndarray]
     columns: tuple[np.ndarray, np.ndarray]
 
-    def reads(self, offset, shape):
+    def reads(self, layers, offset, shape):
         """
-        What cells of the elevation read of it.
+        What cells of the elevation read of values at the places.
 
         Parameters
         ----------
+        layers : numpy.ndarray or dask.array.Array, shape (..., y, x)
         offset : (int, int)
             Row and column of the elevation that the first cell lies on.
         shape : (int, int)
@@ -110,21 +108,19 @@ class Sky(NamedTuple):
         reads : fifesim.chunks.Reads
         """
         spans = []
-        for (before, _), first, size, length in zip(
-            (self.rows, self.columns), offset, shape, self.data.shape[1:], strict=True
-        ):
+        for (before, _), first, size, length in zip(self, offset, shape, layers.shape[-2:], strict=True):
             low = before[first : first + size]
             spans.append((low, np.minimum(low + 2, length)))
-        return chunking.Reads(self.data, *spans)
+        return chunking.Reads(layers, *spans)
 
-    def between(self, rows, columns, offset):
+    def block(self, rows, columns, offset):
         """
-        Where cells lie between the places, as `illumination.slope_light` takes it.
+        The same for a block of cells and of what it reads, as `illumination.slope_light` takes it.
 
         Parameters
         ----------
         rows, columns : slice
-            Block of cells.
+            Of cells.
         offset : (int, int)
             As in `reads`.
 
@@ -133,8 +129,8 @@ class Sky(NamedTuple):
         rows, columns : (array of int, array)
         """
         found = []
-        for (before, share), block, first in zip((self.rows, self.columns), (rows, columns), offset, strict=True):
-            cells = slice(block.start + first, block.stop + first)
+        for (before, share), part, first in zip(self, (rows, columns), offset, strict=True):
+            cells = slice(part.start + first, part.stop + first)
             found.append((before[cells] - before[cells.start], share[cells]))
         return found
 
@@ -160,7 +156,10 @@ def sky_above(data, grid, resolution, horizon, geometry, check=True):
 
     Returns
     -------
-    sky : Sky
+    layers : numpy.ndarray or dask.array.Array, shape (4, y, x)
+        Vector of `terrain.sky_vector` and tangent of the horizon toward the sun, at some places. [1]
+    between : Between
+        Where the cells lie between them.
 
     Raises
     ------
@@ -189,7 +188,7 @@ def sky_above(data, grid, resolution, horizon, geometry, check=True):
     layers = chunking.windows(kernel, reads, (4, *samples.shape[1:]), chunks)
     if check and not isinstance(layers, da.Array):
         _check_sun(samples[1:], layers[3], geometry)
-    return Sky(layers, *(_between(at, size) for at, size in zip(places[:2], data.shape, strict=True)))
+    return layers, Between(*(_between(at, size) for at, size in zip(places[:2], data.shape, strict=True)))
 
 
 def _samples(data, grid, places):

@@ -286,13 +286,15 @@ def _light(dem, horizon, geometry, name, pick):
     used = geometry or fife_geometry()
     dem = dem.transpose("y", "x")
     data, horizon = _lazy_together(dem.data, horizon)
-    sky = sky_raster.sky_above(data, grid, sky_raster.source_resolution(dem), horizon, used, check=geometry is not None)
+    sky, between = sky_raster.sky_above(
+        data, grid, sky_raster.source_resolution(dem), horizon, used, check=geometry is not None
+    )
     cell, shape = grids.cell_size(grid), data.shape
 
     def kernel(rows, columns, block, layers):
-        return pick(lights.slope_light(block, layers, *sky.between(rows, columns, (0, 0)), *cell, used))
+        return pick(lights.slope_light(block, layers, *between.block(rows, columns, (0, 0)), *cell, used))
 
-    reads = [chunking.margin_reads(data, 1), sky.reads((0, 0), shape)]
+    reads = [chunking.margin_reads(data, 1), between.reads(sky, (0, 0), shape)]
     out = grids.place(xr.DataArray(chunking.windows(kernel, reads, shape, _chunks(data)), dims=("y", "x")), grid)
     out = out if geometry is None else cf.with_geometry(out, geometry)
     said = name if geometry is None else f"{name}: sza {geometry.sza:.2f}, saa {geometry.saa:.2f}"
@@ -305,16 +307,16 @@ def _on_slopes(kernel, reflectance, dem, geometry, horizon, name, said):
     offset = _offset(dem_grid, grid)
     reflectance, dem = reflectance.transpose("band", "y", "x"), dem.transpose("y", "x")
     rho, data, horizon = _lazy_together(reflectance.data, dem.data, horizon)
-    sky = sky_raster.sky_above(data, dem_grid, sky_raster.source_resolution(dem), horizon, geometry)
+    sky, between = sky_raster.sky_above(data, dem_grid, sky_raster.source_resolution(dem), horizon, geometry)
     cell, shape = grids.cell_size(grid), rho.shape
 
     def block_kernel(rows, columns, block, elevation, layers):
-        return kernel(block, elevation, layers, *sky.between(rows, columns, offset), *cell)
+        return kernel(block, elevation, layers, *between.block(rows, columns, offset), *cell)
 
     reads = [
         chunking.margin_reads(rho, 0),
         chunking.margin_reads(data, 1, offset=offset, shape=shape[1:]),
-        sky.reads(offset, shape[1:]),
+        between.reads(sky, offset, shape[1:]),
     ]
     out = chunking.windows(block_kernel, reads, shape, _chunks(rho))
     out = grids.place(reflectance.copy(data=out), grid)
