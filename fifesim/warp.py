@@ -76,6 +76,32 @@ def operation(source, target, area=None):
     )
 
 
+def carry(pipeline, source, target, x, y):
+    """
+    Apply a coordinate operation to points.
+
+    Parameters
+    ----------
+    pipeline : str or None
+        From `operation`.
+    source, target : CRS or str
+        The same as there.
+    x, y : array
+        Easting or longitude, northing or latitude.
+
+    Returns
+    -------
+    x, y : array
+    """
+    if pipeline is None:
+        return x, y
+    swap_in, swap_out = (
+        pyproj.CRS.from_user_input(each).axis_info[0].direction == "north" for each in (source, target)
+    )
+    first, second = pyproj.Transformer.from_pipeline(pipeline).transform(*((y, x) if swap_in else (x, y)))
+    return (second, first) if swap_out else (first, second)
+
+
 def file_onto_grid(path, grid, chunks=None):
     """
     One band of a raster file on a grid.
@@ -102,7 +128,7 @@ def file_onto_grid(path, grid, chunks=None):
     """
     grids.check_grid(grid)
     with _opened(path) as source:
-        area = _area(grid)
+        area = degrees(grid)
         pipeline, _ = operation(source.crs, grid.crs.to_wkt(), area)
         back, _ = operation(grid.crs.to_wkt(), source.crs, area)
         if not _meets(source, grid, back):
@@ -199,8 +225,19 @@ def _name(crs):
     return f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else crs.name
 
 
-def _area(grid):
-    """Bounds in degrees, which pick the regional operation; a datum does not matter to that."""
+def degrees(grid):
+    """
+    Bounds of a grid in degrees, which pick the regional operation; a datum does not matter to that.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    area : (float, float, float, float)
+        West, south, east, north. [degree]
+    """
     to_degrees = pyproj.Transformer.from_crs(grid.crs.to_wkt(), 4326, always_xy=True)
     return to_degrees.transform_bounds(*grid.boundingbox.bbox)
 
@@ -215,13 +252,7 @@ def _source_points(grid, crs, back, source_crs):
     share = np.linspace(0, 1, 17)
     columns, rows = (values.ravel() for values in np.meshgrid(share * grid.shape.x, share * grid.shape.y))
     x, y = grids.transform_points(grid.affine, columns, rows)
-    if back is None:
-        return x, y
-    swap_in, swap_out = (
-        pyproj.CRS.from_user_input(each).axis_info[0].direction == "north" for each in (crs, source_crs)
-    )
-    first, second = pyproj.Transformer.from_pipeline(back).transform(*((y, x) if swap_in else (x, y)))
-    return (second, first) if swap_out else (first, second)
+    return carry(back, crs, source_crs, x, y)
 
 
 def _source_window(source, grid, back):
