@@ -160,12 +160,15 @@ class _Model:
     def window(self, rows, columns):
         """First row and column, and size, of the source cells that positions need, in whole blocks."""
         found = []
-        for positions, count, fill in zip((rows, columns), self.blocks, self.fill, strict=True):
+        parts = zip((rows, columns), self.blocks, self.fill, self.source.shape, strict=True)
+        for positions, count, fill, size in parts:
             low, high = ((edge + 0.5) / count - 0.5 for edge in (positions.min(), positions.max()))
             # A hole, and the cells around it that shape what fills it, must be seen whole.
             around = kernels.MARGIN + int(np.ceil((2 * fill + 6) / count) if fill else 0)
-            first, last = int(np.floor(low)) - 2 - around, int(np.floor(high)) + 4 + around
-            found.append((first * count, (last - first) * count))
+            # Beyond its margin the model says nothing.
+            first = max(int(np.floor(low)) - 2, -around) - around
+            last = min(int(np.floor(high)) + 4, -(-size // count) + around) + around
+            found.append((first * count, max(last - first, 0) * count))
         (top, height), (left, width) = found
         return top, left, height, width
 
@@ -183,6 +186,12 @@ class _Model:
         known = np.isfinite(values)
         if not known.any():
             return np.full((TILE, TILE), np.nan)
+        found = _looked_up(known, rows - top, columns - left)
+        # Places past the window are unknown; they are moved into it to be passed over.
+        rows, columns = (
+            rows.clip(top + 3 * down, top + height - 4 * down),
+            columns.clip(left + 3 * across, left + width - 4 * across),
+        )
         if down > 1 or across > 1:
             values = kernels.block_means(kernels.extend(values, 2 * max(self.blocks), rest=False), down, across)
         coefficients = kernels.spline_coefficients(kernels.extend(values, kernels.MARGIN))
@@ -191,9 +200,7 @@ class _Model:
             out = kernels.spline_grid(coefficients, *(axis.ravel() for axis in in_blocks))
         else:
             out = kernels.spline_points(coefficients, *in_blocks)
-        # A place is known where the source cell is in which it lies.
-        nearest = (np.rint(rows).astype(int) - top, np.rint(columns).astype(int) - left)
-        return np.where(known[nearest], out, np.nan)
+        return np.where(found, out, np.nan)
 
 
 def _known_cells(model, make_tile, first_row, first_column, shape):
@@ -260,11 +267,19 @@ def _check_cover(model, grid):
     for first in range(0, looks[0].size, _STRIP):
         rows, columns = model.place.positions(looks[0][first : first + _STRIP], looks[1])
         top, left, height, width = model.window(rows, columns)
-        known = np.isfinite(model.read(top, left, height, width))
-        unknown.append(~known[np.rint(rows).astype(int) - top, np.rint(columns).astype(int) - left])
+        unknown.append(~_looked_up(np.isfinite(model.read(top, left, height, width)), rows - top, columns - left))
     unknown = np.concatenate(unknown)
     if unknown.any():
         _raise_for_gaps(model, grid, unknown, *looks)
+
+
+def _looked_up(known, rows, columns):
+    """Whether the cells are known in which places lie; those beyond all are not."""
+    if not known.size:
+        return np.zeros(np.broadcast_shapes(rows.shape, columns.shape), bool)
+    row, column = np.rint(rows).astype(int), np.rint(columns).astype(int)
+    inside = (row >= 0) & (row < known.shape[0]) & (column >= 0) & (column < known.shape[1])
+    return inside & known[row.clip(0, known.shape[0] - 1), column.clip(0, known.shape[1] - 1)]
 
 
 def _raise_for_gaps(model, grid, unknown, rows, columns):

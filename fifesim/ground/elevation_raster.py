@@ -213,7 +213,7 @@ class Placement:
     def _source_cells(self, x, y):
         if self.pipeline is not None:
             x, y = warp.carry(self.pipeline, self.grid.crs.to_wkt(), self.source.crs, x, y)
-        return ~self.source.affine * (x, y)
+        return grids.transform_points(~self.source.affine, x, y)
 
 
 def placement(source, grid):
