@@ -61,10 +61,12 @@ def horizon(dem, *, directions=DIRECTIONS, reach=REACH, resolution=None):
     data = dem.transpose("y", "x").data
     samples, chunks = _samples(data, grid, places)
     cell = _cell(grid, places)
-    reads = chunking.margin_reads(samples[0], *horizons.horizon_margin(*cell, reach))
+    horizons.horizon_margin(*cell, reach)
+    useful = _useful_reach(reach, cell, samples.shape[1:])
+    reads = chunking.margin_reads(samples[0], *horizons.horizon_margin(*cell, useful))
 
     def kernel(rows, columns, block):
-        return horizons.horizon_zenith(block, *cell, azimuths, reach)
+        return horizons.horizon_zenith(block, *cell, azimuths, useful)
 
     out = chunking.windows(kernel, [reads], (len(azimuths), *samples.shape[1:]), chunks)
     names = {"direction": xr.DataArray(azimuths, dims="direction", attrs={"units": "degree", "long_name": "azimuth"})}
@@ -171,8 +173,7 @@ def sky_above(data, grid, resolution, horizon, geometry, check=True):
     reads = [chunking.margin_reads(samples[1:], 0)]
     if horizon is None:
         cell, directions = _cell(grid, places), horizons.azimuths(DIRECTIONS)
-        # A reach below a cell happens where cells are kilometres wide.
-        reach = max(REACH, *cell)
+        reach = _useful_reach(REACH, cell, samples.shape[1:])
         reads.append(chunking.margin_reads(samples[0], *horizons.horizon_margin(*cell, reach)))
         find = partial(horizons.horizon_tangent, cell_y=cell[0], cell_x=cell[1], directions=directions, reach=reach)
     else:
@@ -220,6 +221,12 @@ def _places(grid, resolution):
 
 def _cell(grid, places):
     return tuple(step * cell for step, cell in zip(places.step, grids.cell_size(grid), strict=True))
+
+
+def _useful_reach(reach, cell, shape):
+    """No further than the raster's diagonal, beyond which all is open, and no less than a cell."""
+    diagonal = np.hypot(*(size * length for size, length in zip(shape, cell, strict=True)))
+    return max(min(reach, float(diagonal)), *cell)
 
 
 def _coarse_grid(grid, places):

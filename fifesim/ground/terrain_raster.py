@@ -254,8 +254,9 @@ def terrain_reflectance(
     Notes
     -----
     Slopes, the sun's and the view's local cosines are those of each cell. The horizon, and the sky that it leaves, are
-    found at the resolution of the elevation's source and interpolated. On Kings Creek at 3.33 m from 10 m data, that
-    moves Vd by 0.0005 and Kt by 0.0003 rms from all at 3.33 m.
+    found at the resolution of the elevation's source and interpolated. Beside all at 3.33 m, on Kings Creek
+    interpolated from 10 m, this moves Vd by 0.0003 rms and Kt of the red and near infrared by 0.0001 (sza 28.5); with
+    30 m instead of 10 m, by 0.0016 and 0.0003, 0.01 at worst; where the edge of a shadow falls, by all of the beam.
 
     See Also
     --------
