@@ -90,7 +90,9 @@ def tiles(kernel, grid, chunks=None, *, tile):
         (top, bottom), (left, right) = block_info[None]["array-location"]
         return kernel(top, left, (bottom - top, right - left))
 
-    return grids.place(xr.DataArray(da.map_blocks(block, chunks=normal, dtype=float), dims=("y", "x")), grid)
+    lazy = xr.DataArray(da.map_blocks(block, chunks=normal, dtype=float), dims=("y", "x"))
+    # xarray would take over dask's name.
+    return grids.place(lazy.rename(None), grid)
 
 
 def resample(kernel, rows, columns, array, grid):
