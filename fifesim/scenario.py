@@ -103,7 +103,19 @@ class Ground(_Section):
         return self
 
     def leaf_optics(self):
-        """Leaf reflectance and transmittance by band, or None for the table's."""
+        """
+        Leaf optics by band.
+
+        Returns
+        -------
+        optics : dict of str to (float, float), or None
+            Reflectance and transmittance; None for the table's. [1]
+
+        Raises
+        ------
+        ValueError
+            If only one of the two is given for a band.
+        """
         if set(self.leaf_reflectance) != set(self.leaf_transmittance):
             raise ValueError("ground.leaf_reflectance and ground.leaf_transmittance must name the same bands")
         return {band: (value, self.leaf_transmittance[band]) for band, value in self.leaf_reflectance.items()} or None

@@ -50,7 +50,18 @@ class CosineResponse:
     count: Annotated[int, Field(strict=True, gt=0)]
 
     def spread(self, altitude):
-        """Line spread function on the ground from an altitude [m]."""
+        """
+        Line spread function on the ground.
+
+        Parameters
+        ----------
+        altitude : float
+            Of the instrument. [m]
+
+        Returns
+        -------
+        lsf : fifesim.sensor.spatial.CosineSpread
+        """
         return CosineSpread(self.count * self.step * altitude)
 
 
