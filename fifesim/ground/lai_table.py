@@ -98,7 +98,7 @@ def interpolate(table, lai):
 
     Returns
     -------
-    values : array, shape (column, *lai.shape)
+    values : array, shape (column,) + lai.shape
     """
     lai = np.asarray(lai, float)
     values = np.empty((table.coefficients.shape[1], lai.size))
@@ -118,12 +118,12 @@ def interpolate_over(table, lai, background):
         Columns A, B, C, D of each band in turn; D is the layer's rdd.
     lai : array
         NaN, and all outside 0 to `LIMIT`, gives NaN. [m2 m-2]
-    background : array, shape (band, *lai.shape) or broadcastable
+    background : array, shape (band,) + lai.shape or broadcastable
         Reflectance :math:`r` of the background. [1]
 
     Returns
     -------
-    reflectance : array, shape (band, *lai.shape)
+    reflectance : array, shape (band,) + lai.shape
         [1]
     """
     lai = np.asarray(lai, float)

@@ -38,7 +38,7 @@ def canopy_reflectance(
         Leaf area index. NaN gives NaN. [m2 m-2]
     leaf_reflectance, leaf_transmittance : array, shape (band,)
         [1]
-    background : float, or array of shape (band,), (band, *lai.shape) or broadcastable
+    background : float, or array of shape (band,), (band,) + lai.shape or broadcastable
         One dimension is bands, more are cells; NaN gives NaN. [1]
     sza, vza, raa : float
         [degree]
@@ -53,7 +53,7 @@ def canopy_reflectance(
 
     Returns
     -------
-    reflectance : array, shape (band, *lai.shape)
+    reflectance : array, shape (band,) + lai.shape
         Within 1e-6 of the exact values. [1]
 
     Raises

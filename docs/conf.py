@@ -1,0 +1,64 @@
+"""Sphinx configuration. Build with: sphinx-build -W -b html docs docs/_build/html"""
+
+import warnings
+
+from docutils import nodes
+from sphinx.addnodes import pending_xref
+
+import fifesim
+
+project = "fifesim"
+author = "the fifesim developers"
+copyright = "the fifesim developers"
+version = release = fifesim.__version__
+
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["_build", "gallery_src", "gallery/**/*.ipynb", "gallery/*.ipynb"]
+templates_path = ["_templates"]
+default_role = "py:obj"
+
+html_theme = "furo"
+html_title = f"fifesim {version}"
+html_static_path = ["_static"]
+html_copy_source = False
+
+myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
+myst_heading_anchors = 3
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": "gallery_src",
+    "gallery_dirs": "gallery",
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "show_memory": False,
+    "show_signature": False,
+    "min_reported_time": 1000,
+    "default_thumb_file": None,
+}
+
+# A gallery script that warns prints the place of a file; a reader has no use for it.
+warnings.filterwarnings("ignore", category=UserWarning, message="FigureCanvasAgg is non-interactive")
+
+
+def _cite(name, rawtext, text, lineno, inliner, options=None, content=None):
+    """A citation from Markdown: {cite}`Tanre1990` does what [Tanre1990]_ does in a docstring."""
+    shown = nodes.inline(rawtext, f"[{text}]")
+    reference = pending_xref(rawtext, shown, refdomain="citation", reftype="ref", reftarget=text, refwarn=True)
+    return [reference], []
+
+
+def setup(app):
+    app.add_role("cite", _cite)
