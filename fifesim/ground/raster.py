@@ -165,6 +165,8 @@ def surface_reflectance(
     --------
     fifesim.ground.canopy.sail
     """
+    if not 0 <= hotspot < np.inf:
+        raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
     angles = leaf_angle_classes(leaf_angles)
     parameters = {
         "leaf_reflectance": tuple(map(float, leaf_reflectance)),
@@ -179,6 +181,7 @@ def surface_reflectance(
     }
     cf.check_units(lai, "lai")
     if isinstance(background, xr.DataArray):
+        cf.check_units(background, "surface_reflectance")
         rasters = (lai, _background_bands(background, bands))
         described = "raster"
     else:

@@ -123,6 +123,11 @@ def test_background_may_be_a_raster(lai):
         reflectance(lai, by_band.sel(band=["TM3"]))
 
 
+def test_background_in_percent_is_refused(lai):
+    with pytest.raises(ValueError, match="units '%', surface_reflectance needs '1'"):
+        reflectance(lai, xr.full_like(lai, 20.0).assign_attrs(units="%"))
+
+
 def test_hole_in_the_background_is_a_hole_in_the_reflectance(lai):
     soil = xr.full_like(lai, 0.2)
     soil.attrs = {}
@@ -161,9 +166,9 @@ def test_wrong_units_raise(lai, function):
 @pytest.mark.parametrize("function", [reflectance, fifesim.fpar])
 def test_negative_leaf_area_raises_when_it_computes(lai, function):
     lai[1, 1] = -0.1
-    with pytest.raises(ValueError, match="negative|at least 0"):
+    with pytest.raises(ValueError, match=r"negative|at least 0"):
         function(lai)
     with no_compute():
         lazy = function(in_chunks(lai, ODD_CHUNKS))
-    with pytest.raises(ValueError, match="negative|at least 0"):
+    with pytest.raises(ValueError, match=r"negative|at least 0"):
         lazy.compute()
