@@ -159,7 +159,7 @@ def surface_reflectance(
     Raises
     ------
     ValueError
-        If the optics are not possible, or LAI is negative.
+        If the optics or the hotspot are not possible, or LAI is negative.
 
     See Also
     --------
