@@ -1,9 +1,8 @@
 """Sphinx configuration. Build with: sphinx-build -W -b html docs docs/_build/html"""
 
-import warnings
-
 from docutils import nodes
 from sphinx.addnodes import pending_xref
+from sphinx.ext import autosummary
 
 import fifesim
 
@@ -27,6 +26,7 @@ default_role = "py:obj"
 
 html_theme = "furo"
 html_title = f"fifesim {version}"
+html_theme_options = {name: {"code-font-size": "75%"} for name in ("light_css_variables", "dark_css_variables")}
 html_static_path = ["_static"]
 html_copy_source = False
 
@@ -43,14 +43,15 @@ sphinx_gallery_conf = {
     "gallery_dirs": "gallery",
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
+    "capture_repr": (),
     "show_memory": False,
     "show_signature": False,
     "min_reported_time": 1000,
     "default_thumb_file": None,
 }
 
-# A gallery script that warns prints the place of a file; a reader has no use for it.
-warnings.filterwarnings("ignore", category=UserWarning, message="FigureCanvasAgg is non-interactive")
+# A summary is a first sentence, and these do not end one.
+autosummary.WELL_KNOWN_ABBREVIATIONS += ("Fig.", "Eq.", "Sect.")
 
 
 def _cite(name, rawtext, text, lineno, inliner, options=None, content=None):
@@ -60,5 +61,12 @@ def _cite(name, rawtext, text, lineno, inliner, options=None, content=None):
     return [reference], []
 
 
+def _skip(app, what, name, obj, skip, options):
+    """Leave out what a class has by its making: unexplained tuple fields, a model's configuration."""
+    made = name == "model_config" or str(getattr(obj, "__doc__", "")).startswith("Alias for field number")
+    return True if made else None
+
+
 def setup(app):
     app.add_role("cite", _cite)
+    app.connect("autodoc-skip-member", _skip)

@@ -54,7 +54,9 @@ for axis, (name, true) in zip(axes, truth.items(), strict=True):
     fit = fifesim.regress(true, ndvi)
     line = np.linspace(float(ndvi.min()), float(ndvi.max()), 50)
     axis.scatter(ndvi, true, s=2, color="0.45", linewidths=0)
-    axis.fill_between(line, *fit.prediction_interval(line), color="#f4a582", alpha=0.4, label="95 % prediction interval")
+    axis.fill_between(
+        line, *fit.prediction_interval(line), color="#f4a582", alpha=0.4, label="95 % prediction interval"
+    )
     axis.plot(line, fit.predict(line), color="#b2182b", label=f"{fit.slope:.2f} NDVI − {-fit.intercept:.2f}")
     axis.set(xlabel="NDVI at the top of the atmosphere", ylabel=f"true {name}", title=f"R² = {fit.r2:.2f}, n = {fit.n}")
     axis.legend(frameon=False, loc="upper left")

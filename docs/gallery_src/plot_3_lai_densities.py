@@ -26,7 +26,9 @@ axes[0].set(title="Densities, mean ± standard deviation", xlim=(0, 3.6))
 lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 1800), (0, 1800))), "burned-grazed", arp=0.15, seed=7)
 bins = np.linspace(0, 2.4, 61)
 axes[1].hist(lai.values.ravel(), bins, density=True, color="#a6d8c7", label="cells of 3.33 m")
-axes[1].hist(lai.fifesim.aggregate(30).values.ravel(), bins, density=True, color="#1b9e77", alpha=0.8, label="30 m means")
+axes[1].hist(
+    lai.fifesim.aggregate(30).values.ravel(), bins, density=True, color="#1b9e77", alpha=0.8, label="30 m means"
+)
 axes[1].plot(x, fifesim.lai_distribution("burned-grazed").pdf(x), color="black", linewidth=1.5, label="density")
 axes[1].set(title="A burned-grazed scene at arp 0.15", xlim=(0, 2.4))
 for axis in axes:

@@ -23,7 +23,13 @@ frequency = np.linspace(0, 0.06, 400)
 axes[1].plot(1000 * frequency, spread.mtf(frequency), color="#2166ac", label="line spread")
 axes[1].plot(1000 * frequency, np.sinc(30 * frequency), color="0.6", label="mean over 30 m")
 axes[1].axvline(1000 / 60, color="#e08214", linestyle=":", label="Nyquist, 30 m")
-axes[1].set(xlabel="spatial frequency [cycles km⁻¹]", ylabel="modulation transfer", title="Modulation transfer", xlim=(0, 60), ylim=(-0.25, 1))
+axes[1].set(
+    xlabel="spatial frequency [cycles km⁻¹]",
+    ylabel="modulation transfer",
+    title="Modulation transfer",
+    xlim=(0, 60),
+    ylim=(-0.25, 1),
+)
 for axis in axes:
     axis.legend(frameon=False)
 
@@ -71,4 +77,4 @@ for arp, published in paper.items():
         aligned.append(fifesim.regress(truth, toa.fifesim.sense("TM").fifesim.ndvi()).r2)
         ndvi = toa.fifesim.sense("TM", onto=own).fifesim.ndvi()
         drifting.append(fifesim.regress(truth, ndvi, pair="index").r2)
-    print(f"arp {arp:.2f}              {np.mean(aligned):.2f}      {np.mean(drifting):.2f}                 {published:.2f}")
+    print(f"arp {arp:.2f} {np.mean(aligned):19.2f} {np.mean(drifting):9.2f} {published:20.2f}")
