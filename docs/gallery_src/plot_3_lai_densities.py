@@ -6,6 +6,9 @@ The three grassland treatments of FIFE in early June 1987. Their means and devia
 Table 2, because the measurements are not public: see :doc:`/physics`.
 """
 
+import tempfile
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy import stats
@@ -39,10 +42,12 @@ for axis in axes:
 # Own samples become a kernel density, reflected at zero; any frozen distribution of scipy serves too.
 
 samples = stats.gamma(4, scale=0.4).rvs(60, random_state=1)
-with open("own_samples.csv", "w") as file:
-    file.write("lai\n" + "\n".join(f"{value:.3f}" for value in samples))
+with tempfile.TemporaryDirectory() as folder:
+    path = Path(folder) / "own_samples.csv"
+    np.savetxt(path, samples, header="lai", comments="")
+    density = fifesim.lai_distribution(path)
 own = {
-    "60 own samples": fifesim.lai_distribution("own_samples.csv"),
+    "60 own samples": density,
     "gamma, as drawn from": fifesim.lai_distribution(stats.gamma(4, scale=0.4)),
 }
 
