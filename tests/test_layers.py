@@ -82,6 +82,7 @@ ORDINARY = sorted(set(FILES) - {"__init__", "accessor"})
 
 @pytest.mark.parametrize("name", ORDINARY)
 def test_imports_lead_down(name):
+    assert tier(name) >= 0
     for other in own_imports(name):
         same_physics = is_physics(name) and is_physics(other) and stage(name) == stage(other)
         assert tier(other) < tier(name) or same_physics, f"{name} imports {other}, which is not below it"
@@ -105,6 +106,13 @@ def test_imports_have_no_circle():
 
 def test_only_the_package_imports_the_accessor():
     assert [name for name in FILES if "accessor" in own_imports(name)] == ["__init__"]
+
+
+@pytest.mark.parametrize("name", sorted(set(FILES) - {"cli"}))
+def test_imports_stand_at_the_top(name):
+    """Only the command line imports late, so that its help is instant."""
+    inside = [node for each in ast.walk(TREES[name]) if isinstance(each, ast.FunctionDef) for node in ast.walk(each)]
+    assert not any(isinstance(node, ast.Import | ast.ImportFrom) for node in inside)
 
 
 def test_only_the_front_doors_import_by_name():
