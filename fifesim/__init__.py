@@ -24,7 +24,7 @@ _PUBLIC = {
     "arp_for_length": "ground.random_field",
     "correlation_length": "ground.random_field",
     "fife_geometry": "geometry",
-    "fife_site": "grid",
+    "fife_site": "sites",
     "fpar": "ground.raster",
     "grid_at": "grid",
     "instrument": "sensor.instruments",

@@ -128,6 +128,37 @@ def label(array, name, *, history, source=None, **provenance):
     return array
 
 
+def check_quantity(array, *names):
+    """
+    Refuse an array that says it is something else than what is needed; what it does not say is taken as right.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    *names : str
+        Keys of `QUANTITIES`.
+
+    Raises
+    ------
+    ValueError
+        If the units or the standard name differ, or it holds digital numbers.
+    """
+    check_units(array, *names)
+    if "gain" in array.coords and "dn" not in names:
+        raise ValueError(
+            f"{array.name or 'the array'} holds digital numbers, where {QUANTITIES[names[0]].long_name} is needed: "
+            "convert it with .fifesim.to_reflectance()"
+        )
+    says = array.attrs.get("standard_name")
+    known = {quantity.standard_name: quantity.long_name for quantity in QUANTITIES.values() if quantity.standard_name}
+    if says in known and says not in {QUANTITIES[name].standard_name for name in names}:
+        raise ValueError(
+            f"{array.name or 'the array'} is {known[says]} by its standard_name, where "
+            f"{QUANTITIES[names[0]].long_name} is needed: take the step between, or drop .attrs['standard_name'] "
+            "if it is mistaken"
+        )
+
+
 def check_units(array, *names):
     """
     Refuse an array whose units are not those of any of some quantities; missing units are taken as right.

@@ -10,9 +10,10 @@ from fifesim.atmosphere import five_s
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.bands import Band
-from fifesim.geometry import fife_geometry
+from fifesim.geometry import Geometry, fife_geometry
 from fifesim.ground import optics
 from fifesim.ground import raster as ground
+from fifesim.scenario import Scenario
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.instruments import instrument as find_instrument
 
@@ -84,6 +85,7 @@ def surface_reflectance(
     """
     if dem is not None:
         raise ValueError("dem must be None, which is flat ground: terrain is not part of this version")
+    _check_kinds(atmosphere, geometry)
     atmosphere = Atmosphere() if atmosphere is None else atmosphere
     geometry = geometry or cf.geometry_of(lai) or fife_geometry()
     description = find_instrument(instrument)
@@ -245,6 +247,8 @@ def simulate(scenario, chunks="auto"):
     ValueError
         If the scenario asks for what cannot be.
     """
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, geometry, atmosphere = scenario.geobox(), scenario.sun_and_view(), scenario.model_atmosphere()
     land, instrument = scenario.ground, find_instrument(scenario.sensor.instrument)
     if land.lai_file:
@@ -284,6 +288,7 @@ def _has_ndvi(image):
 
 def _light(array, atmosphere, geometry, instrument):
     """Atmosphere, spectral bands and geometry: as given, else as the array carries them, else the paper's."""
+    _check_kinds(atmosphere, geometry)
     carried = array.attrs.get("atmosphere")
     if carried is not None:
         carried = Atmosphere.parse(carried)
@@ -297,6 +302,12 @@ def _light(array, atmosphere, geometry, instrument):
         _responses(array, instrument or array.attrs.get("instrument")),
         geometry or cf.geometry_of(array) or fife_geometry(),
     )
+
+
+def _check_kinds(atmosphere, geometry):
+    for name, value, kind in (("atmosphere", atmosphere, Atmosphere), ("geometry", geometry, Geometry)):
+        if value is not None and not isinstance(value, kind):
+            raise TypeError(f"{name} must be a fifesim.{kind.__name__}, got {value!r}: see fifesim.{kind.__name__}")
 
 
 def _responses(array, instrument):

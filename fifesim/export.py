@@ -129,7 +129,7 @@ def _stacked(dataset):
     )
     histories = [dataset[name].attrs.get("history", "") for name in names]
     array.attrs = {"history": histories[0], "long_name": ", ".join(names)}
-    return array.rename("truth" if set(names) == {"lai", "fpar"} else "variables")
+    return array
 
 
 @contextmanager

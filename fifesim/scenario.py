@@ -127,10 +127,16 @@ class SunAndView(_Section):
     time: str = _text(geometry.FIFE_TIME, "UTC; a hypothetical overpass by default")
     latitude: float = _number(geometry.FIFE_LATITUDE, "degree", "north", ge=-90, le=90)
     longitude: float = _number(geometry.FIFE_LONGITUDE, "degree", "east", ge=-180, le=360)
-    sza: float | None = _number(None, "degree", "solar zenith, instead of time and place", ge=0, lt=90)
+    sza: float | None = _number(None, "degree", "solar zenith, instead of that of time and place", ge=0, lt=90)
     saa: float | None = _number(None, "degree", "solar azimuth, clockwise from north")
     vza: float = _number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=70)
     vaa: float = _number(0.0, "degree", "azimuth toward the sensor, clockwise from north")
+
+    @model_validator(mode="after")
+    def _whole_sun(self):
+        if (self.sza is None) != (self.saa is None):
+            raise ValueError("sza and saa go together: give both, or neither to have the sun of time and place")
+        return self
 
 
 class Air(_Section):
@@ -205,12 +211,12 @@ class Scenario(_Section):
     def sun_and_view(self):
         """Directions of sun and sensor, a `fifesim.geometry.Geometry`."""
         place = self.geometry
-        sun = (
-            geometry.sun_position(place.time, place.latitude, place.longitude, 1000 * self.atmosphere.altitude)
-            if (place.sza is None)
-            else geometry.Geometry(place.sza, place.saa or 0.0)
-        )
-        return geometry.Geometry(sun.sza, sun.saa, place.vza, place.vaa, sun.earth_sun_distance)
+        distance = geometry.earth_sun_distance(place.time)
+        if place.sza is not None:
+            return geometry.Geometry(place.sza, place.saa, place.vza, place.vaa, distance)
+        altitude = 1000 * self.atmosphere.altitude
+        sun = geometry.sun_position(place.time, place.latitude, place.longitude, altitude)
+        return geometry.Geometry(sun.sza, sun.saa, place.vza, place.vaa, distance)
 
     def model_atmosphere(self):
         """The atmosphere, a `fifesim.atmosphere.models.Atmosphere`."""

@@ -15,6 +15,7 @@ from pyproj.aoi import AreaOfInterest
 from pyproj.database import query_utm_crs_info
 from pyproj.transformer import TransformerGroup
 from rasterio.enums import Resampling
+from rasterio.errors import NotGeoreferencedWarning
 from rasterio.warp import reproject
 
 from fifesim import chunks as chunking
@@ -247,8 +248,7 @@ def _warp_tile(path, grid, pipeline, back, tile_row, tile_column):
     row, column = grids.lattice_position(grid)
     a = grid.affine
     west, north = grids.transform_points(a, tile_column * _TILE - column, tile_row * _TILE - row)
-    affine = Affine(a.a, 0.0, west, 0.0, a.e, north)
-    tile = GeoBox((_TILE, _TILE), affine, grid.crs)
+    tile = GeoBox((_TILE, _TILE), Affine(a.a, 0.0, west, 0.0, a.e, north), grid.crs)
     out = np.full((_TILE, _TILE), np.nan)
     with rasterio.open(path) as source:
         window = _source_window(source, tile, back)
@@ -256,20 +256,24 @@ def _warp_tile(path, grid, pipeline, back, tile_row, tile_column):
             return out
         values = source.read(1, window=window, masked=True).astype(float).filled(np.nan)
         down, across = _cells_per_cell(source, grid, back)
+        resampling = Resampling.average if max(down, across) > 1.01 else Resampling.bilinear
         for first in range(0, _TILE, _STRIP):
             strip = np.full((_TILE, _STRIP), np.nan)
-            reproject(
-                values,
-                strip,
-                src_transform=source.window_transform(window),
-                src_crs=source.crs,
-                src_nodata=np.nan,
-                dst_transform=affine * Affine.translation(first, 0),
-                dst_crs=rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
-                dst_nodata=np.nan,
-                resampling=Resampling.average if max(down, across) > 1.01 else Resampling.bilinear,
-                **({"COORDINATE_OPERATION": pipeline} if pipeline else {}),
-            )
+            with warnings.catch_warnings():
+                # rasterio speaks of its own array in memory, whose transform it is given here.
+                warnings.simplefilter("ignore", NotGeoreferencedWarning)
+                reproject(
+                    values,
+                    strip,
+                    src_transform=source.window_transform(window),
+                    src_crs=source.crs,
+                    src_nodata=np.nan,
+                    dst_transform=Affine(a.a, 0.0, west + first * a.a, 0.0, a.e, north),
+                    dst_crs=rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
+                    dst_nodata=np.nan,
+                    resampling=resampling,
+                    **({"COORDINATE_OPERATION": pipeline} if pipeline else {}),
+                )
             out[:, first : first + _STRIP] = strip
     return out
 

@@ -9,7 +9,7 @@ import fifesim
 from fifesim import cf, chain
 from fifesim import grid as grids
 from fifesim.atmosphere import five_s
-from fifesim.geometry import Geometry
+from fifesim.geometry import FIFE_TIME, Geometry, earth_sun_distance
 from fifesim.ground import optics
 from fifesim.sensor.instruments import instrument
 
@@ -272,5 +272,5 @@ def test_scenario_options_reach_their_stages():
     assert "ndvi" not in tree["image"]
     assert image["band"].values.tolist() == ["TM5"]
     assert grids.cell_size(grids.geobox(image)) == (50.0, 50.0)
-    assert cf.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0)
+    assert cf.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(FIFE_TIME))
     assert fifesim.Atmosphere.parse(image.attrs["atmosphere"]).visibility == 23

@@ -92,7 +92,7 @@ def box(crs, affine=CORNER):
     "grid, message",
     [
         (box("EPSG:4326", Affine(0.1, 0, -96, 0, -0.1, 39)), "geographic CRS .EPSG:4326.*reproject"),
-        (box(None), "no CRS.*write_crs"),
+        (box(None), "no CRS.*grid_at"),
         (box("EPSG:2277"), "must be in metres.*US survey foot"),
         (box("EPSG:26914", Affine(30, 0, 705000, 0, 30, 4334000)), "north up"),
         (box("EPSG:26914", Affine(30, 1, 705000, 1, -30, 4334000)), "not rotated"),

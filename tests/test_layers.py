@@ -15,14 +15,15 @@ LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 
 # From the bottom up: a file imports only files of lower tiers. Physics of one stage may import each other.
 TIERS = (
-    {"datasets", "footprints", "geometry", "lattice", "progress"},
+    {"datasets", "footprints", "geometry", "lattice", "progress", "sites"},
     {"bands"},
     {"cf", "grid"},
     {"chunks"},
     {"warp"},
     {"physics"},
     {"raster"},
-    {"chain", "export", "scenario"},
+    {"export", "scenario"},
+    {"chain"},
     {"report"},
     {"run"},
     {"cli"},

@@ -10,6 +10,7 @@ from affine import Affine
 
 import fifesim
 from fifesim import grid as grids
+from fifesim.geometry import FIFE_TIME, earth_sun_distance
 from fifesim.scenario import Scenario, parse_scenario, write_scenario
 
 SMALL = {"grid": {"width": 300.0, "height": 150.0}}
@@ -133,7 +134,7 @@ def test_files_lie_beside_the_scenario(tmp_path):
 
 def test_sun_may_be_given_instead_of_time_and_place():
     sun = parse_scenario({"geometry": {"sza": "40 degree", "saa": 100}}).sun_and_view()
-    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, 1.0)
+    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, earth_sun_distance(FIFE_TIME))
     night = parse_scenario({"geometry": {"time": "1987-06-06T06:00:00Z"}})
     with pytest.raises(ValueError, match="the sun is below the horizon"):
         night.sun_and_view()

@@ -87,7 +87,7 @@ def ndvi(reflectance):
     --------
     fifesim.analysis.indices.normalized_difference
     """
-    cf.check_units(reflectance, "toa_reflectance")
+    cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
     red, nir = _nearest_band(reflectance, "red", *_RED), _nearest_band(reflectance, "near infrared", *_NIR)
     grid = grids.geobox(reflectance)
     per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
@@ -133,7 +133,9 @@ def regress(y, x, *, pair="coordinates"):
 
 
 def _nearest_band(reflectance, what, low, high, best):
-    if "wavelength" not in reflectance.coords or "band" not in reflectance.dims:
+    if "band" not in reflectance.dims:
+        raise ValueError("ndvi needs a red and a near infrared band along band, got a raster of one band")
+    if "wavelength" not in reflectance.coords:
         raise ValueError("the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords")
     wavelength = np.atleast_1d(reflectance["wavelength"].values)
     inside = np.flatnonzero((wavelength >= low) & (wavelength <= high))

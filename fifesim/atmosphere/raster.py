@@ -36,7 +36,7 @@ def to_toa(reflectance, atmosphere, bands, geometry):
     --------
     fifesim.atmosphere.five_s.apparent_reflectance
     """
-    cf.check_units(reflectance, "surface_reflectance")
+    cf.check_quantity(reflectance, "surface_reflectance")
     step = (five_s.apparent_reflectance, "toa_reflectance", "to_toa")
     return _carry(*step, reflectance, atmosphere, bands, geometry)
 
@@ -67,7 +67,7 @@ def to_surface(reflectance, atmosphere, bands, geometry):
     --------
     fifesim.atmosphere.five_s.surface_reflectance
     """
-    cf.check_units(reflectance, "toa_reflectance")
+    cf.check_quantity(reflectance, "toa_reflectance")
     step = (five_s.surface_reflectance, "surface_reflectance", "to_surface")
     return _carry(*step, reflectance, atmosphere, bands, geometry)
 

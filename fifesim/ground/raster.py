@@ -179,7 +179,7 @@ def surface_reflectance(
         "diffuse_fraction": tuple(map(float, diffuse_fraction)),
         "exact": exact,
     }
-    cf.check_units(lai, "lai")
+    _check_scene(lai)
     if isinstance(background, xr.DataArray):
         cf.check_units(background, "surface_reflectance")
         rasters = (lai, _background_bands(background, bands))
@@ -237,10 +237,16 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     """
     geometry = geometry or cf.geometry_of(lai) or fife_geometry()
     extinction = float(absorption.extinction_coefficient(geometry.sza, leaf_angles))
-    cf.check_units(lai, "lai")
+    _check_scene(lai)
     out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
     out = grids.place(out, grids.geobox(lai))
     return cf.label(out, "fpar", source=lai, history=f"fpar: Beer's law, K {extinction:.4f}, limit {fpar_inf:g}")
+
+
+def _check_scene(lai):
+    cf.check_quantity(lai, "lai")
+    if set(lai.dims) != {"y", "x"}:
+        raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
 
 
 def _streaming_scene(grid, density, arp, seed, chunks):
