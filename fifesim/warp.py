@@ -3,6 +3,7 @@
 import warnings
 from functools import lru_cache, partial
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 import pyproj
@@ -15,7 +16,6 @@ from pyproj.aoi import AreaOfInterest
 from pyproj.database import query_utm_crs_info
 from pyproj.transformer import TransformerGroup
 from rasterio.enums import Resampling
-from rasterio.errors import NotGeoreferencedWarning
 from rasterio.warp import reproject
 
 from fifesim import chunks as chunking
@@ -28,6 +28,9 @@ _TILE = 512
 # The warper takes positions as linear along a row, up to an eighth of a file's cell. Over so few cells that leaves
 # millimetres for cells of 10 m, a centimetre for 30 m.
 _STRIP = 32
+
+# rasterio silences a warning of its own around each call, in a way that is not safe among threads.
+_ONE_AT_A_TIME = Lock()
 
 # Bilinear interpolation reads one source cell around; an average as many as fit into a target cell.
 _SOURCE_MARGIN = 4
@@ -259,9 +262,7 @@ def _warp_tile(path, grid, pipeline, back, tile_row, tile_column):
         resampling = Resampling.average if max(down, across) > 1.01 else Resampling.bilinear
         for first in range(0, _TILE, _STRIP):
             strip = np.full((_TILE, _STRIP), np.nan)
-            with warnings.catch_warnings():
-                # rasterio speaks of its own array in memory, whose transform it is given here.
-                warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            with _ONE_AT_A_TIME:
                 reproject(
                     values,
                     strip,
