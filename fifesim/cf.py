@@ -213,9 +213,17 @@ def geometry_of(array):
     -------
     geometry : fifesim.geometry.Geometry or None
         None where it carries no solar zenith angle.
+
+    Raises
+    ------
+    ValueError
+        If an angle varies over the raster.
     """
     if "sza" not in array.coords:
         return None
+    rasters = [name for name in _GEOMETRY if name in array.coords and array.coords[name].ndim]
+    if rasters:
+        raise ValueError(f"{', '.join(rasters)} must be one number for the raster: drop or average it first")
     found = {name: float(array.coords[name]) for name in _GEOMETRY if name in array.coords}
     return Geometry(**({"saa": 0.0} | found))
 

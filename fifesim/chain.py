@@ -16,6 +16,7 @@ from fifesim.ground import raster as ground
 from fifesim.scenario import Scenario
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.instruments import instrument as find_instrument
+from fifesim.sensor.instruments import instrument_names
 
 # Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
 # tables. [um]
@@ -299,7 +300,7 @@ def _light(array, atmosphere, geometry, instrument):
             )
     return (
         atmosphere or carried or Atmosphere(),
-        _responses(array, instrument or array.attrs.get("instrument")),
+        _responses(array, instrument),
         geometry or cf.geometry_of(array) or fife_geometry(),
     )
 
@@ -311,14 +312,27 @@ def _check_kinds(atmosphere, geometry):
 
 
 def _responses(array, instrument):
+    """Spectral responses of an instrument that is given, or carried by name and with the same wavelengths."""
+    carried = array.attrs.get("instrument")
     if instrument is not None:
         return tuple(band.response for band in sensor.matching_bands(array, find_instrument(instrument)))
+    if carried is not None:
+        bands = sensor.matching_bands(array, find_instrument(carried)) if carried in instrument_names() else ()
+        centres = [band.wavelength for band in bands]
+        if not bands or ("wavelength" in array.coords and not np.allclose(array["wavelength"], centres, rtol=1e-6)):
+            raise ValueError(
+                f"the raster was made for an instrument {carried!r} of your own, whose response it does not carry: "
+                "give it as instrument="
+            )
+        return tuple(band.response for band in bands)
     if "wavelength" not in array.coords:
         raise ValueError(
             "the raster has neither an instrument nor a wavelength: give instrument=, or assign a coordinate "
             "'wavelength' [um] along band"
         )
     centres = np.atleast_1d(array["wavelength"].values).astype(float)
+    if np.max(centres) > 100:
+        raise ValueError(f"wavelengths are in um, got {np.max(centres):g}: divide nanometres by 1000")
     return tuple(
         Band(f"{centre:g} um", (centre - _NARROW, centre, centre + _NARROW), (0.0, 1.0, 0.0)) for centre in centres
     )

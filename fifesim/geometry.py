@@ -37,6 +37,8 @@ class Geometry:
     earth_sun_distance: float = 1.0
 
     def __post_init__(self):
+        if not np.all(np.isfinite([self.saa, self.vaa])):
+            raise ValueError(f"saa and vaa must be finite degrees, got {self.saa} and {self.vaa}")
         if not 0 <= self.sza < 90:
             raise ValueError(
                 f"sza must be in [0, 90) degrees, got {self.sza:g}: the sun is below the horizon; "

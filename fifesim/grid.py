@@ -317,7 +317,8 @@ def transform_points(affine, columns, rows):
 
 def _lattice(origin, cell):
     """Whole cells from the origin of the CRS, and what is left over [m]."""
-    index = round(origin / cell)
+    # The floor, not the nearest: halves rounded to even would move a window of a lattice at half cells by two cells.
+    index = int(np.floor(origin / cell + 1e-6))
     return index, round(origin - index * cell, _DECIMALS)
 
 

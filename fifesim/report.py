@@ -117,6 +117,8 @@ def _parameters(scenario):
                 value = ", ".join(value)
             elif isinstance(value, float):
                 value = f"{value:.10g}"
+            elif key in ("lai_file", "distribution") and value:
+                value = Path(value).name
             rows.append((key, "not given" if value is None else value, unit, known.description))
         sections.append((name, rows))
     return sections

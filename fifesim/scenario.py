@@ -224,7 +224,8 @@ class Scenario(_Section):
 
     def complete(self):
         """The same scenario with every default that a run decides written out."""
-        box, names = self.geobox(), self.sensor.bands
+        box = self.geobox()
+        names = [band.name for band in instrument(self.sensor.instrument).select(self.sensor.bands)]
         a = box.affine
         grid = Grid(
             crs=f"EPSG:{box.crs.epsg}" if box.crs.epsg else box.crs.to_wkt(),
@@ -241,9 +242,11 @@ class Scenario(_Section):
                 "leaf_reflectance": _by_band(names, leaf_reflectance),
                 "leaf_transmittance": _by_band(names, leaf_transmittance),
                 "background": _by_band(names, background),
+                "lai_file": self.ground.lai_file and str(Path(self.ground.lai_file).resolve()),
+                "distribution": _resolved(self.ground.distribution),
             }
         )
-        sensor = self.sensor.model_copy(update={"pixel": self._pixel()})
+        sensor = self.sensor.model_copy(update={"pixel": self._pixel(), "bands": names})
         return self.model_copy(update={"grid": grid, "ground": ground, "sensor": sensor})
 
     def _pixel(self):
@@ -347,6 +350,11 @@ def write_scenario(scenario):
                 lines.append(f"{key} = {_toml(value)}  # {meaning}")
         lines += tables
     return "\n".join(lines) + "\n"
+
+
+def _resolved(distribution):
+    """A file of samples by its full path, so that the scenario can be run from elsewhere."""
+    return str(Path(distribution).resolve()) if distribution.lower().endswith(".csv") else distribution
 
 
 def _by_band(names, values):

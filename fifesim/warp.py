@@ -115,7 +115,9 @@ def file_onto_grid(path, grid, chunks=None):
         back, _ = operation(grid.crs.to_wkt(), source.crs, area)
         if not _meets(source, grid, back):
             raise ValueError(f"{path} does not overlap the grid, which spans {_extent(grid)}")
-    make_tile = lru_cache(maxsize=4)(partial(_warp_tile, str(path), grid, pipeline, back))
+    # A file that has changed is another file to the cache.
+    state = Path(path).stat().st_mtime_ns
+    make_tile = partial(_warp_tile, str(path), state, grid, pipeline, back)
     row, column = grids.lattice_position(grid)
 
     def kernel(first_row, first_column, shape):
@@ -246,8 +248,9 @@ def _meets(source, grid, back):
     return _source_window(source, grid, back) is not None
 
 
-def _warp_tile(path, grid, pipeline, back, tile_row, tile_column):
-    """One lattice tile of the file's first band."""
+@lru_cache(maxsize=16)
+def _warp_tile(path, state, grid, pipeline, back, tile_row, tile_column):
+    """One lattice tile of the file's first band, in its physical unit."""
     row, column = grids.lattice_position(grid)
     a = grid.affine
     west, north = grids.transform_points(a, tile_column * _TILE - column, tile_row * _TILE - row)
@@ -258,6 +261,7 @@ def _warp_tile(path, grid, pipeline, back, tile_row, tile_column):
         if window is None:
             return out
         values = source.read(1, window=window, masked=True).astype(float).filled(np.nan)
+        values = values * source.scales[0] + source.offsets[0]
         down, across = _cells_per_cell(source, grid, back)
         resampling = Resampling.average if max(down, across) > 1.01 else Resampling.bilinear
         for first in range(0, _TILE, _STRIP):

@@ -1,5 +1,7 @@
 """Figure 1 end to end: what its users write, eagerly and lazily, and what one stage hands to another."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -274,3 +276,80 @@ def test_scenario_options_reach_their_stages():
     assert grids.cell_size(grids.geobox(image)) == (50.0, 50.0)
     assert cf.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(FIFE_TIME))
     assert fifesim.Atmosphere.parse(image.attrs["atmosphere"]).visibility == 23
+
+
+def test_every_key_of_a_scenario_reaches_its_stage():
+    """Each key differs from its default, so that one that is left out changes the bits."""
+    bands = ["TM3", "TM4"]
+    leaf, back = {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)}, {"TM3": 0.1, "TM4": 0.2}
+    options = {
+        "grid": SMALL["grid"],
+        "ground": {
+            "distribution": "burned-ungrazed",
+            "arp": 0.2,
+            "seed": 11,
+            "method": "periodic",
+            "leaf_angles": "planophile",
+            "hotspot": 0.2,
+            "fpar_inf": 0.9,
+            "leaf_reflectance": {band: optics[0] for band, optics in leaf.items()},
+            "leaf_transmittance": {band: optics[1] for band, optics in leaf.items()},
+            "background": back,
+        },
+        "geometry": {"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
+        "atmosphere": {"visibility": 23, "altitude": 1.0},
+        "sensor": {"bands": bands, "pixel": 50.0, "min_valid": 1.0},
+    }
+    tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
+    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(FIFE_TIME))
+    grid = grids.grid_at("EPSG:26914", *SMALL["grid"].values(), 30 / 9)
+    lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
+    rho = fifesim.surface_reflectance(
+        lai,
+        bands=bands,
+        atmosphere=fifesim.Atmosphere(visibility=23, altitude=1.0),
+        geometry=sun,
+        leaf_optics=leaf,
+        background=back,
+        leaf_angles="planophile",
+        hotspot=0.2,
+    )
+    image = fifesim.sense(fifesim.to_toa(rho), onto=grids.aligned(grid, 50.0), min_valid=1.0)
+    fpar = fifesim.fpar(lai, geometry=sun, leaf_angles="planophile", fpar_inf=0.9)
+    np.testing.assert_array_equal(tree["image"]["dn"], image)
+    np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))
+    np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fpar, 50.0, min_valid=1.0))
+
+
+def own_instrument(name, tm3):
+    """The Thematic Mapper with another name, or the response of another band in TM3."""
+    tm = instrument("TM")
+    bands = tuple(
+        dataclasses.replace(band, srf=tm.select(tm3)[0].srf) if band.name == "TM3" else band for band in tm.bands
+    )
+    return dataclasses.replace(tm, name=name, bands=bands)
+
+
+@pytest.mark.parametrize("mine", [own_instrument("MINE", "TM3"), own_instrument("TM", "TM1")])
+def test_the_response_of_ones_own_instrument_is_never_guessed(lai, mine):
+    rho = fifesim.surface_reflectance(lai, mine, bands=["TM3", "TM4"])
+    with pytest.raises(ValueError, match="give it as instrument="):
+        fifesim.to_toa(rho)
+    fifesim.to_toa(rho, instrument=mine)
+
+
+def test_one_band_goes_through_the_chain(lai):
+    rho = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])
+    both = fifesim.sense(fifesim.to_toa(rho))
+    one = fifesim.sense(fifesim.to_toa(rho.sel(band="TM4")))
+    np.testing.assert_array_equal(one.squeeze("band"), both.sel(band="TM4"))
+
+
+@pytest.mark.parametrize(
+    "step", [lambda image: image.fifesim.aggregate(60), lambda image: image[0].fifesim.regress(image[1])]
+)
+def test_digital_numbers_are_no_values_to_average(lai, step):
+    """Their 0 is no data and would be taken for dark ground."""
+    image = fifesim.sense(fifesim.to_toa(fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])))
+    with pytest.raises(ValueError, match="digital numbers"):
+        step(image)

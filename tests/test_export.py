@@ -123,6 +123,7 @@ def test_file_of_others_is_read_by_what_gdal_knows(image, tmp_path):
     with rasterio.open(ours) as source, rasterio.open(plain, "w", **(source.profile | {"driver": "GTiff"})) as sink:
         sink.write(source.read())
         sink.descriptions, sink.scales, sink.offsets = source.descriptions, source.scales, source.offsets
+        sink.units = source.units
         for number in source.indexes:
             sink.update_tags(number, ns="IMAGERY", **source.tags(number, ns="IMAGERY"))
     again = fifesim.open_image(plain)
@@ -218,3 +219,31 @@ def test_tag_is_json_that_others_can_read(image, tmp_path):
         kept = json.loads(source.tags()[export._TAG])
     assert kept["dims"] == ["band", "y", "x"]
     assert kept["coords"]["solar_irradiance"]["values"] == image["solar_irradiance"].values.tolist()
+
+
+@pytest.mark.parametrize(
+    ("dtype", "stored", "nodata", "scale", "value"),
+    [("float32", 0.25, -9999, 1.0, 0.25), ("uint16", 2500, 65535, 1e-4, 0.25), ("int16", 2500, None, 1e-4, 0.25)],
+)
+def test_values_of_others_are_masked_and_in_their_unit(tmp_path, dtype, stored, nodata, scale, value):
+    """Reflectance as agencies store it: taken as it is, -9999 or a count would go through the chain as reflectance."""
+    path = tmp_path / "theirs.tif"
+    profile = {"driver": "GTiff", "width": 4, "height": 3, "count": 1, "dtype": dtype, "crs": "EPSG:26914"}
+    transform = rasterio.transform.from_origin(705000, 4334100, 30, 30)
+    values = np.full((3, 4), stored, dtype)
+    if nodata is not None:
+        values[0, 0] = nodata
+    with rasterio.open(path, "w", **profile, nodata=nodata, transform=transform) as sink:
+        sink.write(values, 1)
+        sink.scales = [scale]
+    for chunks in (None, {}):
+        found = fifesim.open_image(path, chunks=chunks)
+        assert (found.chunks is not None) == (chunks is not None)
+        np.testing.assert_allclose(found[0, 1], value, rtol=1e-7)
+        assert np.isnan(found[0, 0, 0]) == (nodata is not None)
+        assert "gain" not in found.coords
+
+
+def test_a_time_comes_back_as_a_time(image, tmp_path):
+    dated = image.assign_coords(time=np.datetime64("1987-06-06T16:35:00", "ns"))
+    xr.testing.assert_identical(fifesim.open_image(fifesim.to_geotiff(dated, tmp_path / "dated.tif")), dated)

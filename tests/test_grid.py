@@ -12,6 +12,7 @@ from odc.geo.geobox import GeoBox
 
 import fifesim
 from fifesim import grid as grids
+from fifesim import sites
 
 CELL = 30 / 9
 
@@ -202,3 +203,13 @@ def test_coarser_grid_shares_the_corner():
     assert grids.cell_size(grids.aligned(scene, (20, 40))) == (20.0, 40.0)
     with pytest.raises(ValueError, match="no pixel of 500 x 500 m fits"):
         grids.aligned(scene, 500)
+
+
+@pytest.mark.parametrize("cell", [10.0, 12.0, 20.0, 30 / 9, 60.0])
+def test_position_moves_by_as_many_cells_as_the_window(cell):
+    """At 20 m the site's corner lies half a cell off the lattice, where rounding to even would move by two or none."""
+    whole = sites.fife_site(cell)
+    first = grids.lattice_position(whole)
+    for shift in range(1, 6):
+        moved = grids.lattice_position(whole[shift:, shift:])
+        assert moved == (first[0] + shift, first[1] + shift)

@@ -42,6 +42,7 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98):
     --------
     fifesim.footprints.regularize
     """
+    _check_no_counts(array)
     scene = grids.geobox(array)
     blocks = grids.aligned(scene, pixel)
     (down, across), a, b = grids.cell_size(blocks), scene.affine, blocks.affine
@@ -124,12 +125,22 @@ def regress(y, x, *, pair="coordinates"):
     if pair not in ("coordinates", "index"):
         raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
     for array in (y, x):
+        _check_no_counts(array)
         if set(array.dims) != {"y", "x"}:
             raise ValueError(f"regress takes rasters over (y, x), got {array.dims}: select one band first")
     y, x = (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
     origins = _origins(y, x)
     sums = _lazy_row_sums(y, x, *origins) if da.Array in (type(y.data), type(x.data)) else _row_sums(y, x, *origins)
     return regression.fit(sums, *origins)
+
+
+def _check_no_counts(array):
+    """Digital numbers hold 0 for no data, which would be taken for dark ground."""
+    if "gain" in array.coords:
+        raise ValueError(
+            f"{array.name or 'the array'} holds digital numbers, whose 0 is no data: convert it with "
+            ".fifesim.to_reflectance() or .fifesim.to_radiance() first"
+        )
 
 
 def _nearest_band(reflectance, what, low, high, best):

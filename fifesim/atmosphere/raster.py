@@ -73,6 +73,10 @@ def to_surface(reflectance, atmosphere, bands, geometry):
 
 
 def _carry(kernel, name, verb, reflectance, atmosphere, bands, geometry):
+    if "band" not in reflectance.dims:
+        reflectance = reflectance.expand_dims("band")
+    if set(reflectance.dims) != {"band", "y", "x"}:
+        raise ValueError(f"a reflectance has dimensions (band, y, x), got {reflectance.dims}: select one layer first")
     terms = five_s.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
     per_band = [
         xr.DataArray(getattr(terms, term), dims="band")

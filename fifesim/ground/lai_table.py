@@ -6,8 +6,10 @@ import numba
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-LIMIT = 100.0
-"""Largest leaf area index in a table; denser canopies are computed exactly."""
+from fifesim.ground.optics import LARGEST_LAI
+
+LIMIT = LARGEST_LAI
+"""Largest leaf area index in a table."""
 
 _COARSEST = 32
 _FINEST = 2**16

@@ -235,6 +235,8 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     --------
     fifesim.ground.absorption.fpar
     """
+    if not 0 < fpar_inf <= 1:
+        raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
     geometry = geometry or cf.geometry_of(lai) or fife_geometry()
     extinction = float(absorption.extinction_coefficient(geometry.sza, leaf_angles))
     _check_scene(lai)

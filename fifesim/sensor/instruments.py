@@ -218,7 +218,12 @@ class Instrument:
         """
         known = {band.name.lower(): band for band in self.bands}
         names = known if bands is None else [bands] if isinstance(bands, str) else bands
-        return tuple(_lookup(name, known, f"band of {self.name}") for name in names)
+        found = tuple(_lookup(name, known, f"band of {self.name}") for name in names)
+        if not found or len(set(found)) < len(found):
+            raise ValueError(
+                f"bands of {self.name} must be at least one, each once, got {', '.join(map(str, names)) or 'none'}"
+            )
+        return found
 
     def source(self, number, band=None):
         """

@@ -176,7 +176,8 @@ def matching_bands(array, instrument):
     if names and {name.lower() for name in names} <= known:
         return instrument.select(names)
     if "wavelength" in array.coords:
-        return tuple(_band_at(float(value), instrument) for value in np.atleast_1d(array["wavelength"].values))
+        wavelengths = np.atleast_1d(array["wavelength"].values).astype(float)
+        return instrument.select([_band_at(value, instrument).name for value in wavelengths])
     if names:
         return instrument.select(names)
     raise ValueError(

@@ -25,3 +25,8 @@ def test_limits(nir, red, ndvi):
 @pytest.mark.parametrize("nir, red", [(0.0, 0.0), (0.1, -0.1), (np.nan, 0.1), (0.1, np.nan)])
 def test_index_of_nothing_is_missing(nir, red):
     assert np.isnan(normalized_difference(nir, red))
+
+
+def test_unsigned_integers_do_not_wrap():
+    ndvi = normalized_difference(np.array([1000, 65000], "uint16"), np.array([2000, 65000], "uint16"))
+    np.testing.assert_allclose(ndvi, [-1 / 3, 0.0], rtol=1e-12)
