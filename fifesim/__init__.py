@@ -25,7 +25,7 @@ _PUBLIC = {
     "aspect": "ground.terrain_raster",
     "correlation_length": "ground.random_field",
     "fife_geometry": "geometry",
-    "fife_site": "grid",
+    "fife_site": "sites",
     "fine_dem": "ground.dem_raster",
     "fpar": "ground.raster",
     "grid_at": "grid",

@@ -149,6 +149,37 @@ def label(array, name, *, history, source=None, **provenance):
     return array
 
 
+def check_quantity(array, *names):
+    """
+    Refuse an array that says it is something else than what is needed; what it does not say is taken as right.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    *names : str
+        Keys of `QUANTITIES`.
+
+    Raises
+    ------
+    ValueError
+        If the units or the standard name differ, or it holds digital numbers.
+    """
+    check_units(array, *names)
+    if "gain" in array.coords and "dn" not in names:
+        raise ValueError(
+            f"{array.name or 'the array'} holds digital numbers, where {QUANTITIES[names[0]].long_name} is needed: "
+            "convert it with .fifesim.to_reflectance()"
+        )
+    says = array.attrs.get("standard_name")
+    known = {quantity.standard_name: quantity.long_name for quantity in QUANTITIES.values() if quantity.standard_name}
+    if says in known and says not in {QUANTITIES[name].standard_name for name in names}:
+        raise ValueError(
+            f"{array.name or 'the array'} is {known[says]} by its standard_name, where "
+            f"{QUANTITIES[names[0]].long_name} is needed: take the step between, or drop .attrs['standard_name'] "
+            "if it is mistaken"
+        )
+
+
 def check_units(array, *names):
     """
     Refuse an array whose units are not those of any of some quantities; missing units are taken as right.
@@ -203,9 +234,17 @@ def geometry_of(array):
     -------
     geometry : fifesim.geometry.Geometry or None
         None where it carries no solar zenith angle.
+
+    Raises
+    ------
+    ValueError
+        If an angle varies over the raster.
     """
     if "sza" not in array.coords:
         return None
+    rasters = [name for name in _GEOMETRY if name in array.coords and array.coords[name].ndim]
+    if rasters:
+        raise ValueError(f"{', '.join(rasters)} must be one number for the raster: drop or average it first")
     found = {name: float(array.coords[name]) for name in _GEOMETRY if name in array.coords}
     return Geometry(**({"saa": 0.0} | found))
 

@@ -10,12 +10,14 @@ from fifesim.atmosphere import five_s
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.bands import Band
-from fifesim.geometry import fife_geometry
+from fifesim.geometry import Geometry, fife_geometry
 from fifesim.ground import optics
 from fifesim.ground import raster as ground
 from fifesim.ground import terrain_raster as terrain
+from fifesim.scenario import Scenario
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.instruments import instrument as find_instrument
+from fifesim.sensor.instruments import instrument_names
 
 # Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
 # tables. [um]
@@ -94,6 +96,7 @@ def surface_reflectance(
     """
     if dem is None and horizon is not None:
         raise ValueError("a horizon stands around a dem: give dem= too")
+    _check_kinds(atmosphere, geometry)
     atmosphere = Atmosphere() if atmosphere is None else atmosphere
     geometry = geometry or cf.geometry_of(lai) or fife_geometry()
     description = find_instrument(instrument)
@@ -297,6 +300,8 @@ def simulate(scenario, chunks="auto"):
     ValueError
         If the scenario asks for what cannot be.
     """
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, geometry, atmosphere = scenario.geobox(), scenario.sun_and_view(), scenario.model_atmosphere()
     land, instrument = scenario.ground, find_instrument(scenario.sensor.instrument)
     if land.lai_file:
@@ -344,6 +349,7 @@ def _sunlight(terms):
 
 def _light(array, atmosphere, geometry, instrument):
     """Atmosphere, spectral bands and geometry: as given, else as the array carries them, else the paper's."""
+    _check_kinds(atmosphere, geometry)
     carried = array.attrs.get("atmosphere")
     if carried is not None:
         carried = Atmosphere.parse(carried)
@@ -354,20 +360,39 @@ def _light(array, atmosphere, geometry, instrument):
             )
     return (
         atmosphere or carried or Atmosphere(),
-        _responses(array, instrument or array.attrs.get("instrument")),
+        _responses(array, instrument),
         geometry or cf.geometry_of(array) or fife_geometry(),
     )
 
 
+def _check_kinds(atmosphere, geometry):
+    for name, value, kind in (("atmosphere", atmosphere, Atmosphere), ("geometry", geometry, Geometry)):
+        if value is not None and not isinstance(value, kind):
+            raise TypeError(f"{name} must be a fifesim.{kind.__name__}, got {value!r}: see fifesim.{kind.__name__}")
+
+
 def _responses(array, instrument):
+    """Spectral responses of an instrument that is given, or carried by name and with the same wavelengths."""
+    carried = array.attrs.get("instrument")
     if instrument is not None:
         return tuple(band.response for band in sensor.matching_bands(array, find_instrument(instrument)))
+    if carried is not None:
+        bands = sensor.matching_bands(array, find_instrument(carried)) if carried in instrument_names() else ()
+        centres = [band.wavelength for band in bands]
+        if not bands or ("wavelength" in array.coords and not np.allclose(array["wavelength"], centres, rtol=1e-6)):
+            raise ValueError(
+                f"the raster was made for an instrument {carried!r} of your own, whose response it does not carry: "
+                "give it as instrument="
+            )
+        return tuple(band.response for band in bands)
     if "wavelength" not in array.coords:
         raise ValueError(
             "the raster has neither an instrument nor a wavelength: give instrument=, or assign a coordinate "
             "'wavelength' [um] along band"
         )
     centres = np.atleast_1d(array["wavelength"].values).astype(float)
+    if np.max(centres) > 100:
+        raise ValueError(f"wavelengths are in um, got {np.max(centres):g}: divide nanometres by 1000")
     return tuple(
         Band(f"{centre:g} um", (centre - _NARROW, centre, centre + _NARROW), (0.0, 1.0, 0.0)) for centre in centres
     )

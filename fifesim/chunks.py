@@ -1,6 +1,7 @@
 """How a kernel of numpy arrays meets dask: by cell, by place, or from one grid onto another."""
 
 from functools import partial
+from itertools import combinations
 from typing import NamedTuple
 
 import dask.array as da
@@ -38,17 +39,18 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     ValueError
         If the rasters differ in grid, or in a scalar coordinate such as sza.
     """
-    _check_alignment(arrays)
+    arrays = _aligned(arrays)
     core = {}
     if bands is not None:
         core = {
             "input_core_dims": [["band"] if "band" in array.dims else [] for array in arrays],
             "output_core_dims": [["band"]],
-            "dask_gufunc_kwargs": {"output_sizes": {"band": bands}},
+            # A file opened lazily has one band a chunk, and the kernel wants all.
+            "dask_gufunc_kwargs": {"output_sizes": {"band": bands}, "allow_rechunk": True},
         }
 
     def call(*blocks):
-        out = kernel(*blocks, **parameters)
+        out = np.asarray(kernel(*blocks, **parameters), dtype)
         # apply_ufunc wants new axes last; the transpose below undoes this view.
         return out if bands is None else np.moveaxis(out, 0, -1)
 
@@ -91,7 +93,9 @@ def tiles(kernel, grid, chunks=None, *, tile):
         (top, bottom), (left, right) = block_info[None]["array-location"]
         return kernel(top, left, (bottom - top, right - left))
 
-    return grids.place(xr.DataArray(da.map_blocks(block, chunks=normal, dtype=float), dims=("y", "x")), grid)
+    lazy = xr.DataArray(da.map_blocks(block, chunks=normal, dtype=float), dims=("y", "x"))
+    # xarray would take over dask's name.
+    return grids.place(lazy.rename(None), grid)
 
 
 def resample(kernel, rows, columns, array, grid):
@@ -297,6 +301,8 @@ def _slices(sizes):
 
 def _resample_lazily(kernel, rows, columns, data):
     """One task for each output chunk and band chunk, on the merged input window."""
+    # What regularize makes of it.
+    dtype = np.float32 if data.dtype == np.float32 else np.float64
     blocks = []
     for row_range in _output_ranges(rows, data.chunks[-2]):
         line = []
@@ -304,7 +310,7 @@ def _resample_lazily(kernel, rows, columns, data):
             these, those = rows[row_range], columns[column_range]
             block = data[..., these.window, those.window].rechunk({data.ndim - 2: -1, data.ndim - 1: -1})
             chunks = (*block.chunks[:-2], (len(these),), (len(those),))
-            line.append(block.map_blocks(kernel, these, those, dtype=float, chunks=chunks))
+            line.append(block.map_blocks(kernel, these, those, dtype=dtype, chunks=chunks))
         blocks.append(da.concatenate(line, axis=-1))
     return da.concatenate(blocks, axis=-2)
 
@@ -337,17 +343,19 @@ def _chunk_tuple(chunks):
     return (chunks, chunks)
 
 
-def _check_alignment(arrays):
-    """Rasters must share their cells and agree in their scalar coordinates."""
+def _aligned(arrays):
+    """The same with the coordinates of one raster on all; they must share their cells and their scalar coordinates."""
     rasters = [array for array in arrays if isinstance(array, xr.DataArray) and {"y", "x"} <= set(array.dims)]
-    for other in rasters[1:]:
-        if not grids.same_grid(grids.geobox(rasters[0]), grids.geobox(other)):
+    for one, other in combinations(rasters, 2):
+        if not grids.same_grid(grids.geobox(one), grids.geobox(other)):
             raise ValueError(
-                f"{rasters[0].name!r} and {other.name!r} lie on different grids: bring one onto the other's first"
+                f"{one.name!r} and {other.name!r} lie on different grids, {grids.describe(grids.geobox(one))} and "
+                f"{grids.describe(grids.geobox(other))}: bring one onto the other's first"
             )
-        for name in set(rasters[0].coords) & set(other.coords):
-            one, two = rasters[0].coords[name], other.coords[name]
-            if one.ndim == 0 and name != "spatial_ref" and one.dtype.kind in "fiu" and float(one) != float(two):
-                raise ValueError(
-                    f"{name} is {float(one):g} in {rasters[0].name!r} and {float(two):g} in {other.name!r}"
-                )
+        for name in set(one.coords) & set(other.coords) - {"spatial_ref"}:
+            a, b = one.coords[name], other.coords[name]
+            if a.ndim == 0 and a.dtype.kind in "fiu" and not np.array_equal(a, b, equal_nan=True):
+                raise ValueError(f"{name} is {float(a):g} in {one.name!r} and {float(b):g} in {other.name!r}")
+    # xarray aligns to the bit, and coordinates from elsewhere differ by rounding.
+    place = {axis: rasters[0].coords[axis].variable for axis in ("y", "x")} if rasters[1:] else {}
+    return [array.assign_coords(place) if any(array is each for each in rasters[1:]) else array for array in arrays]

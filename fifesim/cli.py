@@ -42,13 +42,13 @@ def simulate(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
 ):
     """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
-    from fifesim.run import check_folder, run
+    from fifesim.run import check_folder, simulate_to_folder
     from fifesim.scenario import Scenario, read_scenario
 
     try:
         check_folder(output, overwrite)
         found = Scenario() if scenario is None else read_scenario(scenario)
-        files = run(found, output, overwrite=overwrite)
+        files = simulate_to_folder(found, output, overwrite=overwrite)
     except ValueError as error:
         _stop(error, Exit.MISTAKE)
     except (OSError, MemoryError) as error:

@@ -13,6 +13,8 @@ import rasterio
 import rasterio.shutil
 import rioxarray
 import xarray as xr
+from dask.utils import SerializableLock
+from distributed import Lock, get_client
 from rasterio.windows import Window
 
 from fifesim import cf
@@ -88,7 +90,8 @@ def open_image(path, chunks=None):
     Returns
     -------
     raster : xarray.DataArray, dims ([band], y, x)
-        As it was written. Digital numbers are not masked: 0 is no data.
+        As it was written. Digital numbers are not masked: 0 is no data. Of other files, values in their physical unit,
+        NaN where there are no data; digital numbers only where the file says that they scale to radiance.
 
     Raises
     ------
@@ -103,16 +106,18 @@ def open_image(path, chunks=None):
             # rioxarray has one scale and offset for all bands; here they are coordinates along band.
             warnings.filterwarnings("ignore", "(Scales|Offsets) differ across bands")
             opened = rioxarray.open_rasterio(path, chunks=chunks, mask_and_scale=False)
-            plain = opened if chunks else opened.load()
+            plain = opened.load() if chunks is None else opened
     except rasterio.errors.RasterioIOError as error:
         raise ValueError(f"cannot read {path} as a raster: {error}") from None
-    description = kept or fallback
+    description = kept or fallback["description"]
     grid = grids.geobox(plain)
     array = xr.DataArray(plain.data, dims=("band", "y", "x"), name=description["name"])
+    if kept is None:
+        array = _physical(array, **fallback["storage"])
     coords = {name: _variable(item) for name, item in description["coords"].items()}
     array = grids.place(array.assign_coords(coords), grid)
     array.attrs = dict(description["attrs"])
-    if array.dtype.kind == "u":
+    if "gain" in array.coords:
         array.attrs["_FillValue"] = array.dtype.type(0)
     return array if "band" in description["dims"] else array.isel(band=0, drop=True)
 
@@ -129,7 +134,7 @@ def _stacked(dataset):
     )
     histories = [dataset[name].attrs.get("history", "") for name in names]
     array.attrs = {"history": histories[0], "long_name": ", ".join(names)}
-    return array.rename("truth" if set(names) == {"lai", "fpar"} else "variables")
+    return array
 
 
 @contextmanager
@@ -162,19 +167,32 @@ def _stream(array, grid, path, described):
     }
     with rasterio.open(path, "w", **profile) as sink:
         _describe(sink, array, described)
-        da.store(da.asarray(array.data), _Sink(sink), lock=True, compute=True)
+        if not isinstance(array.data, da.Array):
+            sink.write(array.values)
+    if isinstance(array.data, da.Array):
+        da.store(array.data, _Sink(str(path)), lock=_lock(str(path)), compute=True)
 
 
 class _Sink:
-    """A rasterio dataset that takes assignments to slices, as dask stores them."""
+    """A raster file that takes assignments to slices, as dask stores them, in whichever process that happens."""
 
-    def __init__(self, dataset):
-        self._dataset = dataset
+    def __init__(self, path):
+        self._path = path
 
     def __setitem__(self, index, block):
         bands, rows, columns = index
         window = Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
-        self._dataset.write(block, indexes=list(range(bands.start + 1, bands.stop + 1)), window=window)
+        with rasterio.open(self._path, "r+") as sink:
+            sink.write(block, indexes=list(range(bands.start + 1, bands.stop + 1)), window=window)
+
+
+def _lock(name):
+    """One writer at a time: among the workers of a cluster where there is one, else among threads."""
+    try:
+        get_client()
+    except ValueError:
+        return SerializableLock()
+    return Lock(name)
 
 
 def _describe(sink, array, described):
@@ -184,7 +202,12 @@ def _describe(sink, array, described):
         "dims": [str(dim) for dim in described.dims],
         "attrs": {key: _plain(value) for key, value in array.attrs.items() if key != "_FillValue"},
         "coords": {
-            name: {"dims": list(value.dims), "values": _plain(value.values), "attrs": dict(value.attrs)}
+            name: {
+                "dims": list(value.dims),
+                "values": _plain(value.values),
+                "dtype": value.dtype.str,
+                "attrs": dict(value.attrs),
+            }
             for name, value in array.coords.items()
             if not {"y", "x"} & set(value.dims) and name != "spatial_ref"
         },
@@ -214,24 +237,41 @@ def _describe_band(sink, number, band):
 
 def _plain(value):
     """Numbers and text as JSON has them."""
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+    if isinstance(value, np.generic | np.ndarray):
+        return value.astype(str).tolist() if value.dtype.kind in "mM" else value.tolist()
+    return value
 
 
 def _variable(item):
-    return xr.DataArray(item["values"], dims=item["dims"], attrs=item["attrs"])
+    return xr.DataArray(np.array(item["values"], item.get("dtype")), dims=item["dims"], attrs=item["attrs"])
+
+
+def _physical(array, scales, offsets, nodata):
+    """Values of another program's file: masked, scaled, shifted; digital numbers of radiance with 0 for no data."""
+    missing = xr.zeros_like(array, dtype=bool) if nodata is None else array == nodata
+    if scales is None:
+        return array.where(~missing, array.dtype.type(0))
+    if nodata is None and all(scale == 1 for scale in scales) and not any(offsets):
+        return array
+    gain, offset = (xr.DataArray(list(values), dims="band") for values in (scales, offsets))
+    return array.where(~missing) * gain + offset
 
 
 def _gdal_description(source):
-    """Names, calibration and wavelengths of a file that fifesim did not write."""
+    """Names, calibration and wavelengths of a file that fifesim did not write, and how its values are stored."""
     names = [name or f"band{number}" for number, name in enumerate(source.descriptions, 1)]
     coords = {"band": {"dims": ["band"], "values": names, "attrs": {}}}
     wavelengths = [source.tags(number, ns="IMAGERY").get("CENTRAL_WAVELENGTH_UM") for number in source.indexes]
     values = {"wavelength": [float(value) for value in wavelengths] if all(wavelengths) else None}
-    if any(scale != 1 for scale in source.scales):
+    counts = np.dtype(source.dtypes[0]).kind == "u" and set(source.units) == {cf.QUANTITIES["toa_radiance"].units}
+    if counts:
         values |= {"gain": list(source.scales), "offset": list(source.offsets)}
     coords |= {
         name: {"dims": ["band"], "values": value, "attrs": cf.attributes(name)}
         for name, value in values.items()
         if value
     }
-    return {"name": "image", "dims": ["band", "y", "x"], "attrs": {}, "coords": coords}
+    units = {} if counts or not source.units[0] else {"units": source.units[0]}
+    storage = {"scales": None if counts else source.scales, "offsets": source.offsets, "nodata": source.nodata}
+    description = {"name": "image", "dims": ["band", "y", "x"], "attrs": units, "coords": coords}
+    return {"description": description, "storage": storage}

@@ -37,6 +37,8 @@ class Geometry:
     earth_sun_distance: float = 1.0
 
     def __post_init__(self):
+        if not np.all(np.isfinite([self.saa, self.vaa])):
+            raise ValueError(f"saa and vaa must be finite degrees, got {self.saa} and {self.vaa}")
         if not 0 <= self.sza < 90:
             raise ValueError(
                 f"sza must be in [0, 90) degrees, got {self.sza:g}: the sun is below the horizon; "
@@ -139,12 +141,43 @@ def sun_position(time, latitude, longitude, altitude=0.0):
     ----------
     NREL solar position algorithm, as implemented in pvlib; true (not refracted) zenith
     """
-    stamp = pd.Timestamp(time)
-    stamp = stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")
-    times = pd.DatetimeIndex([stamp])
+    times = _utc(time)
     sun = pvlib.solarposition.get_solarposition(times, latitude, longitude, altitude=altitude).iloc[0]
-    distance = float(pvlib.solarposition.nrel_earthsun_distance(times).iloc[0])
-    return Geometry(float(sun["zenith"]), float(sun["azimuth"]), earth_sun_distance=distance)
+    return Geometry(float(sun["zenith"]), float(sun["azimuth"]), earth_sun_distance=earth_sun_distance(time))
+
+
+def earth_sun_distance(time):
+    """
+    Distance of Earth and Sun.
+
+    Parameters
+    ----------
+    time : str or datetime
+        Taken as UTC where it names no time zone.
+
+    Returns
+    -------
+    distance : float
+        [astronomical unit]
+
+    References
+    ----------
+    NREL solar position algorithm, as implemented in pvlib
+
+    Examples
+    --------
+    >>> round(earth_sun_distance("1987-06-06T16:35:00Z"), 3)
+    1.015
+    """
+    return float(pvlib.solarposition.nrel_earthsun_distance(_utc(time)).iloc[0])
+
+
+def _utc(time):
+    try:
+        stamp = pd.Timestamp(time)
+    except ValueError:
+        raise ValueError(f"time must be a date and time such as 1987-06-06T16:35:00Z, got {time!r}") from None
+    return pd.DatetimeIndex([stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")])
 
 
 # A hypothetical overpass: no Landsat passed the FIFE site on this day (WRS-2 cycle), but the paper simulates it.

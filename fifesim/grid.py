@@ -1,4 +1,4 @@
-"""Grids as odc GeoBoxes: the FIFE site, what a DataArray's grid is, and where cells and pixels lie."""
+"""Grids as odc GeoBoxes: what a DataArray's grid is, and where cells and pixels lie."""
 
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
@@ -12,51 +12,6 @@ from odc.geo.xr import xr_coords
 # of a metre. Coordinates counted from the CRS origin are the same to the bit in a window and in the whole; summed from
 # each grid's own origin they differ by 1e-10 m, and xarray aligns exactly.
 _DECIMALS = 6
-
-FIFE_SIZE = 15000.0
-
-# FIFE's own corner in NAD27, and the nearest point of the 30 m lattice of today's NAD83 elevation models to the place
-# that a Helmert transformation (EPSG:1173, good to 7 m) gives it: 704968 E 4334211 N.
-_FIFE_CORNERS = {"NAD83": ("EPSG:26914", 704970.0, 4334220.0), "NAD27": ("EPSG:26714", 705000.0, 4334000.0)}
-
-
-def fife_site(cell, window=None, datum="NAD83"):
-    """
-    Grid of the FIFE site, 15 km x 15 km in UTM zone 14.
-
-    Parameters
-    ----------
-    cell : float
-        Cell size. [m]
-    window : ((int, int), (int, int)), optional
-        First and last-plus-one row, and column, of a part of the site. [cell]
-    datum : {"NAD83", "NAD27"}, optional
-        NAD83 has its corner at 704970 E 4334220 N, on the 30 m lattice of today's elevation models;
-        NAD27 is FIFE's own, with its corner at 705000 E 4334000 N, about 9 m from there.
-
-    Returns
-    -------
-    grid : odc.geo.geobox.GeoBox
-        As many whole cells as fit.
-
-    Raises
-    ------
-    ValueError
-        If cell, window or datum make no grid.
-
-    Examples
-    --------
-    >>> fife_site(30).shape
-    Shape2d(x=500, y=500)
-    """
-    if datum not in _FIFE_CORNERS:
-        raise ValueError(f"datum must be one of {', '.join(_FIFE_CORNERS)}, got {datum!r}")
-    if not 0 < cell <= FIFE_SIZE:
-        raise ValueError(f"cell must be in (0, {FIFE_SIZE:g}] m, got {cell:g}")
-    crs, west, north = _FIFE_CORNERS[datum]
-    size = int(FIFE_SIZE / cell + 1e-6)
-    site = GeoBox((size, size), Affine(cell, 0.0, west, 0.0, -cell, north), crs)
-    return site if window is None else _window(site, window)
 
 
 def grid_at(crs, west, north, width, height, cell):
@@ -112,7 +67,7 @@ def check_grid(grid):
     if not isinstance(grid, GeoBox):
         raise TypeError(f"a grid is an odc.geo.geobox.GeoBox, got {type(grid).__name__}: see fifesim.fife_site")
     if grid.crs is None:
-        raise ValueError("the grid has no CRS: give one, for instance with .rio.write_crs('EPSG:26914')")
+        raise ValueError("the grid has no CRS: make it with one, such as fifesim.grid_at('EPSG:26914', ...)")
     if grid.crs.geographic:
         raise ValueError(
             f"the grid is in a geographic CRS ({_crs_name(grid.crs)}), whose cells are degrees: "
@@ -152,7 +107,10 @@ def geobox(array):
     if missing:
         raise ValueError(f"a raster has dimensions y and x, got {array.dims}: rename its dimensions")
     if "spatial_ref" not in array.coords and array.odc.crs is None:
-        raise ValueError("the raster has no CRS: give it one, for instance with .rio.write_crs('EPSG:26914')")
+        raise ValueError(
+            "the raster has no CRS: open its file with decode_coords='all', or import rioxarray and give it one with "
+            ".rio.write_crs('EPSG:26914')"
+        )
     found = array.odc.geobox
     if found is None:
         raise ValueError("the raster's x and y are not the centres of a regular grid")
@@ -295,8 +253,8 @@ def lattice_offset(one, other):
     rows, columns = (b.f - a.f) / a.e, (b.c - a.c) / a.a
     if one.crs != other.crs or not same_cell or max(abs(rows - round(rows)), abs(columns - round(columns))) > 1e-3:
         raise ValueError(
-            f"the rasters lie on different lattices, cells of {-a.e:g} x {a.a:g} m from {a.c:.3f} E {a.f:.3f} N and of "
-            f'{-b.e:g} x {b.a:g} m from {b.c:.3f} E {b.f:.3f} N: bring one onto the other, or use pair="index"'
+            f"the rasters lie on different lattices, {describe(one)} and {describe(other)}: "
+            'bring one onto the other, or use pair="index"'
         )
     return round(rows), round(columns)
 
@@ -315,6 +273,25 @@ def cell_size(grid):
         [m]
     """
     return -grid.affine.e, grid.affine.a
+
+
+def describe(grid):
+    """
+    A grid in words, for messages.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    text : str
+    """
+    a = grid.affine
+    return (
+        f"{grid.shape.y} x {grid.shape.x} cells of {-a.e:g} x {a.a:g} m from {a.c:.3f} E {a.f:.3f} N "
+        f"in {_crs_name(grid.crs)}"
+    )
 
 
 def transform_points(affine, columns, rows):
@@ -338,22 +315,10 @@ def transform_points(affine, columns, rows):
     )
 
 
-def _window(site, window):
-    try:
-        (top, bottom), (left, right) = window
-    except (TypeError, ValueError):
-        raise ValueError(
-            f"window must be ((first row, last row), (first column, last column)), got {window!r}"
-        ) from None
-    rows, columns = site.shape
-    if not (0 <= top < bottom <= rows and 0 <= left < right <= columns):
-        raise ValueError(f"window must lie within {rows} rows and {columns} columns, got {window!r}")
-    return site[top:bottom, left:right]
-
-
 def _lattice(origin, cell):
     """Whole cells from the origin of the CRS, and what is left over [m]."""
-    index = round(origin / cell)
+    # The floor, not the nearest: halves rounded to even would move a window of a lattice at half cells by two cells.
+    index = int(np.floor(origin / cell + 1e-6))
     return index, round(origin - index * cell, _DECIMALS)
 
 

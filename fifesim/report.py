@@ -11,6 +11,7 @@ from matplotlib.patches import Rectangle
 
 from fifesim import grid as grids
 from fifesim.scenario import Scenario
+from fifesim.sensor.raster import to_reflectance
 
 _TEMPLATE = "report.html.j2"
 _DPI = 130
@@ -116,6 +117,8 @@ def _parameters(scenario):
                 value = ", ".join(value)
             elif isinstance(value, float):
                 value = f"{value:.10g}"
+            elif key in ("lai_file", "distribution") and value:
+                value = Path(value).name
             rows.append((key, "not given" if value is None else value, unit, known.description))
         sections.append((name, rows))
     return sections
@@ -141,7 +144,7 @@ def _detail_figure(image, truth, detail):
         Rectangle((box.left / 1000, box.bottom / 1000), (box.right - box.left) / 1000, (box.top - box.bottom) / 1000,
                   fill=False, edgecolor="black", linewidth=1.2)
     )  # fmt: skip
-    axes[2].set_title(f"Whole image: {_composite_name(image['dn'])}")
+    axes[2].set_title(f"Image: {_composite_name(image['dn'])}")
     return figure
 
 
@@ -215,26 +218,31 @@ def _map(axis, array, **style):
 
 def _composite(axis, dn, stretch):
     axis.set_facecolor(_NO_DATA)
-    bands = [(dn.sel(band=name).values.astype(float) - low) / max(high - low, 1.0) for name, low, high in stretch]
+    reflectance = to_reflectance(dn)
+    bands = [(reflectance.sel(band=name).values - low) / (high - low) for name, low, high in stretch]
     valid = (dn != 0).all("band").values
-    color = np.clip(np.dstack(bands), 0, 1)
-    # A little of the mean in each colour: with two bands alone the composite is red and cyan.
-    color = 0.75 * color + 0.25 * color.mean(axis=-1, keepdims=True)
-    axis.imshow(np.dstack([color, valid]), extent=_extent(dn), interpolation="nearest")
+    axis.imshow(
+        np.dstack([np.clip(np.nan_to_num(np.dstack(bands)), 0, 1), valid]), extent=_extent(dn), interpolation="nearest"
+    )
     _map_axes(axis)
 
 
 def _stretch(dn):
-    """Bands for red, green and blue, with the digital numbers that become dark and bright."""
-    chosen = _composite_bands(dn)
-    names = ([*chosen.values(), *[list(chosen.values())[-1]] * 2])[:3]
-    limits = []
+    """
+    Bands for red, green and blue, with the reflectances that become dark and bright.
+
+    All three span the same range about their own middle: stretched each by itself, bands that vary against each other
+    leave nothing but pure colours.
+    """
+    chosen = list(_composite_bands(dn).values())
+    names = [*chosen, *chosen[-1:] * 2][:3]
+    reflectance = to_reflectance(dn)
+    spans = []
     for name in names:
-        values = dn.sel(band=name).values
-        values = values[values > 0]
-        low, high = np.percentile(values, (1, 99)) if values.size else (0, 1)
-        limits.append((name, float(low), float(high)))
-    return limits
+        values = _finite(reflectance.sel(band=name))
+        spans.append(np.percentile(values, (1, 50, 99)) if values.size else (0.0, 0.5, 1.0))
+    half = max(*(max(high - middle, middle - low) for low, middle, high in spans), 1e-3)
+    return [(name, middle - half, middle + half) for name, (_, middle, _) in zip(names, spans, strict=True)]
 
 
 def _composite_bands(dn):
@@ -248,10 +256,7 @@ def _composite_bands(dn):
 
 
 def _composite_name(dn):
-    chosen = _composite_bands(dn)
-    return (
-        f"{', '.join(chosen.values())} as red, green, blue" if len(chosen) == 3 else f"{' and '.join(chosen.values())}"
-    )
+    return ", ".join(map(str, _composite_bands(dn).values()))
 
 
 def _map_axes(axis):

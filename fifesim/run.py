@@ -25,7 +25,7 @@ _DETAIL = 16
 _VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "dask", "numba", "rasterio", "odc-geo", "pvlib", "pyrsr")
 
 
-def run(scenario, folder, *, overwrite=False):
+def simulate_to_folder(scenario, folder, *, overwrite=False):
     """
     Simulate a scenario into a folder: image.tif, truth.tif, quicklook.png, report.html and scenario.toml.
 

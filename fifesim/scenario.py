@@ -103,7 +103,19 @@ class Ground(_Section):
         return self
 
     def leaf_optics(self):
-        """Leaf reflectance and transmittance by band, or None for the table's."""
+        """
+        Leaf optics by band.
+
+        Returns
+        -------
+        optics : dict of str to (float, float), or None
+            Reflectance and transmittance; None for the table's. [1]
+
+        Raises
+        ------
+        ValueError
+            If only one of the two is given for a band.
+        """
         if set(self.leaf_reflectance) != set(self.leaf_transmittance):
             raise ValueError("ground.leaf_reflectance and ground.leaf_transmittance must name the same bands")
         return {band: (value, self.leaf_transmittance[band]) for band, value in self.leaf_reflectance.items()} or None
@@ -115,10 +127,16 @@ class SunAndView(_Section):
     time: str = _text(geometry.FIFE_TIME, "UTC; a hypothetical overpass by default")
     latitude: float = _number(geometry.FIFE_LATITUDE, "degree", "north", ge=-90, le=90)
     longitude: float = _number(geometry.FIFE_LONGITUDE, "degree", "east", ge=-180, le=360)
-    sza: float | None = _number(None, "degree", "solar zenith, instead of time and place", ge=0, lt=90)
+    sza: float | None = _number(None, "degree", "solar zenith, instead of that of time and place", ge=0, lt=90)
     saa: float | None = _number(None, "degree", "solar azimuth, clockwise from north")
     vza: float = _number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=70)
     vaa: float = _number(0.0, "degree", "azimuth toward the sensor, clockwise from north")
+
+    @model_validator(mode="after")
+    def _whole_sun(self):
+        if (self.sza is None) != (self.saa is None):
+            raise ValueError("sza and saa go together: give both, or neither to have the sun of time and place")
+        return self
 
 
 class Air(_Section):
@@ -193,12 +211,12 @@ class Scenario(_Section):
     def sun_and_view(self):
         """Directions of sun and sensor, a `fifesim.geometry.Geometry`."""
         place = self.geometry
-        sun = (
-            geometry.sun_position(place.time, place.latitude, place.longitude, 1000 * self.atmosphere.altitude)
-            if (place.sza is None)
-            else geometry.Geometry(place.sza, place.saa or 0.0)
-        )
-        return geometry.Geometry(sun.sza, sun.saa, place.vza, place.vaa, sun.earth_sun_distance)
+        distance = geometry.earth_sun_distance(place.time)
+        if place.sza is not None:
+            return geometry.Geometry(place.sza, place.saa, place.vza, place.vaa, distance)
+        altitude = 1000 * self.atmosphere.altitude
+        sun = geometry.sun_position(place.time, place.latitude, place.longitude, altitude)
+        return geometry.Geometry(sun.sza, sun.saa, place.vza, place.vaa, distance)
 
     def model_atmosphere(self):
         """The atmosphere, a `fifesim.atmosphere.models.Atmosphere`."""
@@ -206,7 +224,8 @@ class Scenario(_Section):
 
     def complete(self):
         """The same scenario with every default that a run decides written out."""
-        box, names = self.geobox(), self.sensor.bands
+        box = self.geobox()
+        names = [band.name for band in instrument(self.sensor.instrument).select(self.sensor.bands)]
         a = box.affine
         grid = Grid(
             crs=f"EPSG:{box.crs.epsg}" if box.crs.epsg else box.crs.to_wkt(),
@@ -223,9 +242,11 @@ class Scenario(_Section):
                 "leaf_reflectance": _by_band(names, leaf_reflectance),
                 "leaf_transmittance": _by_band(names, leaf_transmittance),
                 "background": _by_band(names, background),
+                "lai_file": self.ground.lai_file and str(Path(self.ground.lai_file).resolve()),
+                "distribution": _resolved(self.ground.distribution),
             }
         )
-        sensor = self.sensor.model_copy(update={"pixel": self._pixel()})
+        sensor = self.sensor.model_copy(update={"pixel": self._pixel(), "bands": names})
         return self.model_copy(update={"grid": grid, "ground": ground, "sensor": sensor})
 
     def _pixel(self):
@@ -329,6 +350,11 @@ def write_scenario(scenario):
                 lines.append(f"{key} = {_toml(value)}  # {meaning}")
         lines += tables
     return "\n".join(lines) + "\n"
+
+
+def _resolved(distribution):
+    """A file of samples by its full path, so that the scenario can be run from elsewhere."""
+    return str(Path(distribution).resolve()) if distribution.lower().endswith(".csv") else distribution
 
 
 def _by_band(names, values):

@@ -27,8 +27,13 @@ def no_compute():
 
 
 def in_chunks(array, chunks):
-    """The array in chunks along those of its dimensions that they name."""
-    return array.chunk({name: size for name, size in chunks.items() if name in array.dims})
+    """
+    The array in chunks along those of its dimensions that they name.
+
+    Its coordinates stay in memory: wavelengths must be read to find a band. `DataArray.chunk` makes them lazy, too.
+    """
+    along = {name: size for name, size in chunks.items() if name in array.dims}
+    return array.copy(data=array.variable.chunk(along).data)
 
 
 def check_raster_function(function, *rasters, quantity):

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from lazy import in_chunks, no_compute
 
+import fifesim
 from fifesim import cf
 from fifesim.geometry import Geometry
 
@@ -79,3 +80,19 @@ def test_numbers_along_band_have_units():
     assert coordinates["band"].values.tolist() == ["TM3", "TM4"]
     assert coordinates["wavelength"].attrs["units"] == "um"
     assert coordinates["gain"].dtype == float and coordinates["gain"].dims == ("band",)
+
+
+@pytest.mark.parametrize(
+    ("step", "said"),
+    [
+        (lambda rho: rho.fifesim.sense("TM"), "surface reflectance factor by its standard_name"),
+        (lambda rho: rho.fifesim.to_toa().fifesim.to_toa(), "apparent reflectance at the top"),
+        (lambda rho: rho.fifesim.to_toa().fifesim.sense("TM").fifesim.sense("TM"), "digital numbers"),
+        (lambda rho: rho.isel(band=0, drop=True).fifesim.fpar(), "leaf area index is needed"),
+    ],
+)
+def test_a_raster_of_another_quantity_is_refused(step, said):
+    """All have units of 1: only the standard name tells that a step was left out or taken twice."""
+    lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 45), (0, 45))))
+    with pytest.raises(ValueError, match=said):
+        step(lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]))

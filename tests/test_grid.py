@@ -12,6 +12,7 @@ from odc.geo.geobox import GeoBox
 
 import fifesim
 from fifesim import grid as grids
+from fifesim import sites
 
 CELL = 30 / 9
 
@@ -92,7 +93,7 @@ def box(crs, affine=CORNER):
     "grid, message",
     [
         (box("EPSG:4326", Affine(0.1, 0, -96, 0, -0.1, 39)), "geographic CRS .EPSG:4326.*reproject"),
-        (box(None), "no CRS.*write_crs"),
+        (box(None), "no CRS.*grid_at"),
         (box("EPSG:2277"), "must be in metres.*US survey foot"),
         (box("EPSG:26914", Affine(30, 0, 705000, 0, 30, 4334000)), "north up"),
         (box("EPSG:26914", Affine(30, 1, 705000, 1, -30, 4334000)), "not rotated"),
@@ -202,3 +203,13 @@ def test_coarser_grid_shares_the_corner():
     assert grids.cell_size(grids.aligned(scene, (20, 40))) == (20.0, 40.0)
     with pytest.raises(ValueError, match="no pixel of 500 x 500 m fits"):
         grids.aligned(scene, 500)
+
+
+@pytest.mark.parametrize("cell", [10.0, 12.0, 20.0, 30 / 9, 60.0])
+def test_position_moves_by_as_many_cells_as_the_window(cell):
+    """At 20 m the site's corner lies half a cell off the lattice, where rounding to even would move by two or none."""
+    whole = sites.fife_site(cell)
+    first = grids.lattice_position(whole)
+    for shift in range(1, 6):
+        moved = grids.lattice_position(whole[shift:, shift:])
+        assert moved == (first[0] + shift, first[1] + shift)

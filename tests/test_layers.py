@@ -16,14 +16,15 @@ LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 # From the bottom up: a file imports only files of lower tiers. Physics of one stage may import each other, and so may
 # its files on labelled rasters, whose names end in "raster".
 TIERS = (
-    {"datasets", "footprints", "geometry", "lattice", "progress"},
+    {"datasets", "footprints", "geometry", "lattice", "progress", "sites"},
     {"bands"},
     {"cf", "grid"},
     {"chunks"},
     {"warp"},
     {"physics"},
     {"raster"},
-    {"chain", "export", "scenario"},
+    {"export", "scenario"},
+    {"chain"},
     {"report"},
     {"run"},
     {"cli"},
@@ -83,6 +84,7 @@ ORDINARY = sorted(set(FILES) - {"__init__", "accessor"})
 
 @pytest.mark.parametrize("name", ORDINARY)
 def test_imports_lead_down(name):
+    assert tier(name) >= 0
     for other in own_imports(name):
         same_layer = stage(name) is not None and stage(name) == stage(other) and tier(name) == tier(other)
         assert tier(other) < tier(name) or same_layer, f"{name} imports {other}, which is not below it"
@@ -106,6 +108,13 @@ def test_imports_have_no_circle():
 
 def test_only_the_package_imports_the_accessor():
     assert [name for name in FILES if "accessor" in own_imports(name)] == ["__init__"]
+
+
+@pytest.mark.parametrize("name", sorted(set(FILES) - {"cli"}))
+def test_imports_stand_at_the_top(name):
+    """Only the command line imports late, so that its help is instant."""
+    inside = [node for each in ast.walk(TREES[name]) if isinstance(each, ast.FunctionDef) for node in ast.walk(each)]
+    assert not any(isinstance(node, ast.Import | ast.ImportFrom) for node in inside)
 
 
 def test_only_the_front_doors_import_by_name():

@@ -7,7 +7,7 @@ import pytest
 import rasterio
 
 import fifesim
-from fifesim.run import run
+from fifesim.run import simulate_to_folder
 from fifesim.scenario import parse_scenario
 
 SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}}
@@ -16,7 +16,7 @@ SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "small"
-    run(parse_scenario(SMALL), folder)
+    simulate_to_folder(parse_scenario(SMALL), folder)
     return folder
 
 
@@ -60,10 +60,10 @@ def test_report_names_every_parameter_with_its_unit(folder):
 
 def test_all_bands_of_an_instrument_make_a_report(tmp_path):
     bands = ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
-    files = run(parse_scenario(SMALL | {"sensor": {"bands": bands}}), tmp_path / "all")
+    files = simulate_to_folder(parse_scenario(SMALL | {"sensor": {"bands": bands}}), tmp_path / "all")
     assert all(path.stat().st_size > 0 for path in files)
 
 
 def test_a_single_band_has_no_ndvi_and_still_a_report(tmp_path):
-    run(parse_scenario(SMALL | {"sensor": {"bands": ["TM5"]}}), tmp_path / "one")
+    simulate_to_folder(parse_scenario(SMALL | {"sensor": {"bands": ["TM5"]}}), tmp_path / "one")
     assert "What NDVI tells" not in (tmp_path / "one" / "report.html").read_text(encoding="utf-8")

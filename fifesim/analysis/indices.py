@@ -28,7 +28,8 @@ def normalized_difference(nir, red):
     >>> float(normalized_difference(0.75, 0.25))
     0.5
     """
-    total = np.asarray(nir) + red
+    nir, red = np.asarray(nir, float), np.asarray(red, float)
+    total = nir + red
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = (np.asarray(nir) - red) / total
+        ratio = (nir - red) / total
     return np.where(total == 0, np.nan, ratio)

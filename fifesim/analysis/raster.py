@@ -42,6 +42,7 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98):
     --------
     fifesim.footprints.regularize
     """
+    _check_no_counts(array)
     scene = grids.geobox(array)
     blocks = grids.aligned(scene, pixel)
     (down, across), a, b = grids.cell_size(blocks), scene.affine, blocks.affine
@@ -87,7 +88,7 @@ def ndvi(reflectance):
     --------
     fifesim.analysis.indices.normalized_difference
     """
-    cf.check_units(reflectance, "toa_reflectance")
+    cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
     red, nir = _nearest_band(reflectance, "red", *_RED), _nearest_band(reflectance, "near infrared", *_NIR)
     grid = grids.geobox(reflectance)
     per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
@@ -124,6 +125,7 @@ def regress(y, x, *, pair="coordinates"):
     if pair not in ("coordinates", "index"):
         raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
     for array in (y, x):
+        _check_no_counts(array)
         if set(array.dims) != {"y", "x"}:
             raise ValueError(f"regress takes rasters over (y, x), got {array.dims}: select one band first")
     y, x = (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
@@ -132,8 +134,19 @@ def regress(y, x, *, pair="coordinates"):
     return regression.fit(sums, *origins)
 
 
+def _check_no_counts(array):
+    """Digital numbers hold 0 for no data, which would be taken for dark ground."""
+    if "gain" in array.coords:
+        raise ValueError(
+            f"{array.name or 'the array'} holds digital numbers, whose 0 is no data: convert it with "
+            ".fifesim.to_reflectance() or .fifesim.to_radiance() first"
+        )
+
+
 def _nearest_band(reflectance, what, low, high, best):
-    if "wavelength" not in reflectance.coords or "band" not in reflectance.dims:
+    if "band" not in reflectance.dims:
+        raise ValueError("ndvi needs a red and a near infrared band along band, got a raster of one band")
+    if "wavelength" not in reflectance.coords:
         raise ValueError("the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords")
     wavelength = np.atleast_1d(reflectance["wavelength"].values)
     inside = np.flatnonzero((wavelength >= low) & (wavelength <= high))

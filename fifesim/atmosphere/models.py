@@ -249,7 +249,7 @@ def _check_name(what, value, allowed):
 
 def _checked(what, value, low, high):
     if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
-        raise TypeError(f"{what} must be a number in km, got {value!r}: type {what}={low}")
+        raise TypeError(f"{what} must be a number of km from {low} to {high}, got {value!r}: leave the unit out")
     if not low <= value <= high:
         nearest = low if value < low else high
         raise ValueError(

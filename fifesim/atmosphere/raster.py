@@ -36,7 +36,7 @@ def to_toa(reflectance, atmosphere, bands, geometry):
     --------
     fifesim.atmosphere.five_s.apparent_reflectance
     """
-    cf.check_units(reflectance, "surface_reflectance")
+    cf.check_quantity(reflectance, "surface_reflectance")
     step = (five_s.apparent_reflectance, "toa_reflectance", "to_toa")
     return _carry(*step, reflectance, atmosphere, bands, geometry)
 
@@ -67,12 +67,16 @@ def to_surface(reflectance, atmosphere, bands, geometry):
     --------
     fifesim.atmosphere.five_s.surface_reflectance
     """
-    cf.check_units(reflectance, "toa_reflectance")
+    cf.check_quantity(reflectance, "toa_reflectance")
     step = (five_s.surface_reflectance, "surface_reflectance", "to_surface")
     return _carry(*step, reflectance, atmosphere, bands, geometry)
 
 
 def _carry(kernel, name, verb, reflectance, atmosphere, bands, geometry):
+    if "band" not in reflectance.dims:
+        reflectance = reflectance.expand_dims("band")
+    if set(reflectance.dims) != {"band", "y", "x"}:
+        raise ValueError(f"a reflectance has dimensions (band, y, x), got {reflectance.dims}: select one layer first")
     terms = five_s.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
     per_band = [
         xr.DataArray(getattr(terms, term), dims="band")

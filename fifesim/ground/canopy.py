@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fifesim.geometry import relative_azimuth
-from fifesim.ground.exponential_chain import exponential_chain
+from fifesim.ground.divided_differences import exponential_chain
 from fifesim.ground.leaf_angles import azimuth_limit, leaf_angle_classes, leaf_projection
 
 

@@ -63,6 +63,8 @@ def lai_distribution(source):
     [Friedl1995]_, Fig. 3
     """
     if hasattr(source, "ppf") and hasattr(source, "support"):
+        if hasattr(getattr(source, "dist", source), "pmf"):
+            raise ValueError(f"leaf area index is continuous, got the discrete distribution {source.dist.name!r}")
         low = source.support()[0]
         if low < -_ROUNDING:
             raise ValueError(

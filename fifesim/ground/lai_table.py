@@ -6,8 +6,10 @@ import numba
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-LIMIT = 100.0
-"""Largest leaf area index in a table; denser canopies are computed exactly."""
+from fifesim.ground.optics import LARGEST_LAI
+
+LIMIT = LARGEST_LAI
+"""Largest leaf area index in a table."""
 
 _COARSEST = 32
 _FINEST = 2**16
@@ -98,7 +100,7 @@ def interpolate(table, lai):
 
     Returns
     -------
-    values : array, shape (column, *lai.shape)
+    values : array, shape (column,) + lai.shape
     """
     lai = np.asarray(lai, float)
     values = np.empty((table.coefficients.shape[1], lai.size))
@@ -118,12 +120,12 @@ def interpolate_over(table, lai, background):
         Columns A, B, C, D of each band in turn; D is the layer's rdd.
     lai : array
         NaN, and all outside 0 to `LIMIT`, gives NaN. [m2 m-2]
-    background : array, shape (band, *lai.shape) or broadcastable
+    background : array, shape (band,) + lai.shape or broadcastable
         Reflectance :math:`r` of the background. [1]
 
     Returns
     -------
-    reflectance : array, shape (band, *lai.shape)
+    reflectance : array, shape (band,) + lai.shape
         [1]
     """
     lai = np.asarray(lai, float)

@@ -7,6 +7,9 @@ import numpy as np
 
 from fifesim import datasets
 
+LARGEST_LAI = 100.0
+"""Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
+
 
 def leaf_optics(bands, given=None):
     """
@@ -159,7 +162,7 @@ def check_background(reflectance):
 
 def check_lai(lai):
     """
-    Refuse a leaf area index that is negative or infinite; NaN passes.
+    Refuse a leaf area index that is negative or above 100; NaN passes.
 
     Parameters
     ----------
@@ -169,18 +172,18 @@ def check_lai(lai):
     Raises
     ------
     ValueError
-        If one is negative or infinite.
+        If one is negative or above 100, which no canopy has: it is a fill value, or needs a scale.
 
     Examples
     --------
     >>> check_lai(2.5)
     """
     lai = np.asarray(lai, float)
-    wrong = (lai < 0) | np.isinf(lai)
+    wrong = (lai < 0) | (lai > LARGEST_LAI)
     if wrong.any():
         raise ValueError(
-            f"leaf area index must be finite and not negative, got {lai[wrong].flat[0]:g} in {wrong.sum()} of "
-            f"{lai.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
+            f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {lai[wrong].flat[0]:g} in "
+            f"{wrong.sum()} of {lai.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
         )
 
 

@@ -348,6 +348,8 @@ def check_seed(seed):
         raise ValueError(f"seed must be a whole number from 0 to 2**64 - 1, got {seed!r}")
 
 
+# Chunks smaller than tiles, or cut elsewhere, ask for a tile more than once. Sixteen tiles are 33 MB.
+@lru_cache(maxsize=16)
 def _tile(seed, arp, tile_row, tile_column):
     """One tile of the streaming field."""
     around = margin(arp)
@@ -361,7 +363,9 @@ def _tile(seed, arp, tile_row, tile_column):
                 seed, first_row // BLOCK + i, first_column // BLOCK + j
             )
     inside = slice(around, around + TILE)
-    return _filter(noise, _half_response(arp, (size, size)))[inside, inside]
+    tile = _filter(noise, _half_response(arp, (size, size)))[inside, inside].copy()
+    tile.flags.writeable = False
+    return tile
 
 
 def _noise_block(seed, block_row, block_column):

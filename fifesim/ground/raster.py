@@ -159,12 +159,14 @@ def surface_reflectance(
     Raises
     ------
     ValueError
-        If the optics are not possible, or LAI is negative.
+        If the optics or the hotspot are not possible, or LAI is negative.
 
     See Also
     --------
     fifesim.ground.canopy.sail
     """
+    if not 0 <= hotspot < np.inf:
+        raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
     angles = leaf_angle_classes(leaf_angles)
     parameters = {
         "leaf_reflectance": tuple(map(float, leaf_reflectance)),
@@ -177,8 +179,9 @@ def surface_reflectance(
         "diffuse_fraction": tuple(map(float, diffuse_fraction)),
         "exact": exact,
     }
-    cf.check_units(lai, "lai")
+    _check_scene(lai)
     if isinstance(background, xr.DataArray):
+        cf.check_units(background, "surface_reflectance")
         rasters = (lai, _background_bands(background, bands))
         described = "raster"
     else:
@@ -232,12 +235,20 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     --------
     fifesim.ground.absorption.fpar
     """
+    if not 0 < fpar_inf <= 1:
+        raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
     geometry = geometry or cf.geometry_of(lai) or fife_geometry()
     extinction = float(absorption.extinction_coefficient(geometry.sza, leaf_angles))
-    cf.check_units(lai, "lai")
+    _check_scene(lai)
     out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
     out = grids.place(out, grids.geobox(lai))
     return cf.label(out, "fpar", source=lai, history=f"fpar: Beer's law, K {extinction:.4f}, limit {fpar_inf:g}")
+
+
+def _check_scene(lai):
+    cf.check_quantity(lai, "lai")
+    if set(lai.dims) != {"y", "x"}:
+        raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
 
 
 def _streaming_scene(grid, density, arp, seed, chunks):

@@ -6,7 +6,7 @@ import numpy as np
 
 from fifesim.ground.absorption import extinction_coefficient
 from fifesim.ground.canopy import reflectance_factor, sail, with_background
-from fifesim.ground.lai_table import LIMIT, interpolate, interpolate_over, tabulate
+from fifesim.ground.lai_table import interpolate, interpolate_over, tabulate
 from fifesim.ground.leaf_angles import leaf_angle_classes
 from fifesim.ground.optics import check_background, check_lai, check_leaf_optics
 
@@ -38,7 +38,7 @@ def canopy_reflectance(
         Leaf area index. NaN gives NaN. [m2 m-2]
     leaf_reflectance, leaf_transmittance : array, shape (band,)
         [1]
-    background : float, or array of shape (band,), (band, *lai.shape) or broadcastable
+    background : float, or array of shape (band,), (band,) + lai.shape or broadcastable
         One dimension is bands, more are cells; NaN gives NaN. [1]
     sza, vza, raa : float
         [degree]
@@ -53,7 +53,7 @@ def canopy_reflectance(
 
     Returns
     -------
-    reflectance : array, shape (band, *lai.shape)
+    reflectance : array, shape (band,) + lai.shape
         Within 1e-6 of the exact values. [1]
 
     Raises
@@ -64,8 +64,7 @@ def canopy_reflectance(
     Notes
     -----
     Where the background is a number, its reflectance with the canopy is tabulated; where it is a raster, the layer's
-    reflectances and transmittances are, and each cell combines its own. Above a leaf area index of 100 cells
-    are computed exactly.
+    reflectances and transmittances are, and each cell combines its own.
 
     References
     ----------
@@ -89,13 +88,10 @@ def canopy_reflectance(
     optics = tuple(_per_band(v, bands) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction))
     scene = (*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
     if exact:
-        return _exact(lai, np.ones(lai.shape, bool), background, scene, np.full(bands + lai.shape, np.nan))
+        return _exact(lai, background, scene, bands)
     if uniform:
-        reflectance = interpolate(_surface_table(_per_band(background, bands), scene), lai)
-    else:
-        reflectance = interpolate_over(_layer_table(scene), lai, background)
-    beyond = lai > LIMIT
-    return _exact(lai, beyond, background, scene, reflectance) if beyond.any() else reflectance
+        return interpolate(_surface_table(_per_band(background, bands), scene), lai)
+    return interpolate_over(_layer_table(scene), lai, background)
 
 
 def _per_band(values, bands):
@@ -117,18 +113,18 @@ def _surface(lai, background, scene):
     return reflectance_factor(surface.rso, surface.rdo, sky)
 
 
-def _exact(lai, where, background, scene, reflectance):
-    """A raster of reflectance with the cells that are asked for computed exactly."""
-    bands = reflectance.shape[0]
+def _exact(lai, background, scene, bands):
+    """Reflectance of every cell computed exactly, shape (band,) + lai.shape."""
+    shape = bands + lai.shape
     if background.ndim < 2:
         background = np.reshape(background, (-1,) + (1,) * lai.ndim)
-    background = np.broadcast_to(background, reflectance.shape)
-    result = reflectance.reshape(bands, -1).copy()
-    cells = np.flatnonzero(where)
+    background = np.broadcast_to(background, shape).reshape(*bands, -1)
+    cells = lai.reshape(-1)
+    result = np.empty(background.shape)
     for start in range(0, cells.size, _BLOCK):
-        block = np.unravel_index(cells[start : start + _BLOCK], lai.shape)
-        result[:, cells[start : start + _BLOCK]] = _surface(lai[block], background[:, *block], scene)
-    return result.reshape(reflectance.shape)
+        block = slice(start, start + _BLOCK)
+        result[:, block] = _surface(cells[block], background[:, block], scene)
+    return result.reshape(shape)
 
 
 def _rate(scene):

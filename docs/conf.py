@@ -1,0 +1,72 @@
+"""Sphinx configuration. Build with: sphinx-build -W -b html docs docs/_build/html"""
+
+from docutils import nodes
+from sphinx.addnodes import pending_xref
+from sphinx.ext import autosummary
+
+import fifesim
+
+project = "fifesim"
+author = "the fifesim developers"
+copyright = "the fifesim developers"
+version = release = fifesim.__version__
+
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["_build", "gallery_src", "gallery/**/*.ipynb", "gallery/*.ipynb"]
+templates_path = ["_templates"]
+default_role = "py:obj"
+
+html_theme = "furo"
+html_title = f"fifesim {version}"
+html_theme_options = {name: {"code-font-size": "75%"} for name in ("light_css_variables", "dark_css_variables")}
+html_static_path = ["_static"]
+html_copy_source = False
+
+myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
+myst_heading_anchors = 3
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": "gallery_src",
+    "gallery_dirs": "gallery",
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "capture_repr": (),
+    "show_memory": False,
+    "show_signature": False,
+    "min_reported_time": 1000,
+    "default_thumb_file": None,
+}
+
+# A summary is a first sentence, and these do not end one.
+autosummary.WELL_KNOWN_ABBREVIATIONS += ("Fig.", "Eq.", "Sect.")
+
+
+def _cite(name, rawtext, text, lineno, inliner, options=None, content=None):
+    """A citation from Markdown: {cite}`Tanre1990` does what [Tanre1990]_ does in a docstring."""
+    shown = nodes.inline(rawtext, f"[{text}]")
+    reference = pending_xref(rawtext, shown, refdomain="citation", reftype="ref", reftarget=text, refwarn=True)
+    return [reference], []
+
+
+def _skip(app, what, name, obj, skip, options):
+    """Leave out what a class has by its making: unexplained tuple fields, a model's configuration."""
+    made = name == "model_config" or str(getattr(obj, "__doc__", "")).startswith("Alias for field number")
+    return True if made else None
+
+
+def setup(app):
+    app.add_role("cite", _cite)
+    app.connect("autodoc-skip-member", _skip)

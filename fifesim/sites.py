@@ -1,0 +1,62 @@
+"""Grids of study sites."""
+
+from affine import Affine
+from odc.geo.geobox import GeoBox
+
+FIFE_SIZE = 15000.0
+
+# FIFE's own corner in NAD27, and the nearest point of the 30 m lattice of today's NAD83 elevation models to the place
+# that a Helmert transformation (EPSG:1173, good to 7 m) gives it: 704968 E 4334211 N.
+_FIFE_CORNERS = {"NAD83": ("EPSG:26914", 704970.0, 4334220.0), "NAD27": ("EPSG:26714", 705000.0, 4334000.0)}
+
+
+def fife_site(cell, window=None, datum="NAD83"):
+    """
+    Grid of the FIFE site, 15 km x 15 km in UTM zone 14.
+
+    Parameters
+    ----------
+    cell : float
+        Cell size. [m]
+    window : ((int, int), (int, int)), optional
+        First and last-plus-one row, and column, of a part of the site. [cell]
+    datum : {"NAD83", "NAD27"}, optional
+        NAD83 has its corner at 704970 E 4334220 N, on the 30 m lattice of today's elevation models;
+        NAD27 is FIFE's own, with its corner at 705000 E 4334000 N, about 9 m from there.
+
+    Returns
+    -------
+    grid : odc.geo.geobox.GeoBox
+        As many whole cells as fit.
+
+    Raises
+    ------
+    ValueError
+        If cell, window or datum make no grid.
+
+    Examples
+    --------
+    >>> fife_site(30).shape
+    Shape2d(x=500, y=500)
+    """
+    if datum not in _FIFE_CORNERS:
+        raise ValueError(f"datum must be one of {', '.join(_FIFE_CORNERS)}, got {datum!r}")
+    if not 0 < cell <= FIFE_SIZE:
+        raise ValueError(f"cell must be in (0, {FIFE_SIZE:g}] m, got {cell:g}")
+    crs, west, north = _FIFE_CORNERS[datum]
+    size = int(FIFE_SIZE / cell + 1e-6)
+    site = GeoBox((size, size), Affine(cell, 0.0, west, 0.0, -cell, north), crs)
+    return site if window is None else _window(site, window)
+
+
+def _window(site, window):
+    try:
+        (top, bottom), (left, right) = window
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"window must be ((first row, last row), (first column, last column)), got {window!r}"
+        ) from None
+    rows, columns = site.shape
+    if not (0 <= top < bottom <= rows and 0 <= left < right <= columns):
+        raise ValueError(f"window must lie within {rows} rows and {columns} columns, got {window!r}")
+    return site[top:bottom, left:right]

@@ -1,0 +1,63 @@
+"""Workers of a cluster are other processes: what goes to them must pickle, and what they write must be whole."""
+
+import numpy as np
+import pytest
+import rasterio
+import xarray as xr
+from distributed import Client, LocalCluster
+
+import fifesim
+from fifesim.run import simulate_to_folder
+from fifesim.scenario import parse_scenario
+
+CHUNKS = {"y": 100, "x": 80}
+
+
+@pytest.fixture(scope="module")
+def client():
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+@pytest.fixture(scope="module")
+def lai_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("lai") / "lai.tif"
+    profile = {"driver": "GTiff", "width": 30, "height": 20, "count": 1, "dtype": "uint8", "crs": "EPSG:32614"}
+    values = np.random.default_rng(3).integers(0, 50, (20, 30)).astype("uint8")
+    with rasterio.open(path, "w", **profile, transform=rasterio.transform.from_origin(704970, 4334220, 30, 30)) as sink:
+        sink.write(values, 1)
+        sink.scales = [0.1]
+    return path
+
+
+def scene(path, chunks):
+    grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
+    return fifesim.open_lai(path, grid, chunks=chunks)
+
+
+def image_of(lai):
+    return lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM")
+
+
+def test_a_scale_of_the_file_is_applied(lai_file):
+    assert 4 < float(scene(lai_file, None).max()) <= 4.9
+
+
+def test_workers_give_the_bits_of_one_process(client, lai_file):
+    xr.testing.assert_identical(image_of(scene(lai_file, CHUNKS)).compute(), image_of(scene(lai_file, None)))
+
+
+def test_workers_write_a_file_together(client, lai_file, tmp_path):
+    fifesim.to_geotiff(image_of(scene(lai_file, CHUNKS)), tmp_path / "image.tif")
+    xr.testing.assert_identical(fifesim.open_image(tmp_path / "image.tif"), image_of(scene(lai_file, None)))
+
+
+def test_a_run_on_workers_gives_the_same_files(client, tmp_path):
+    scenario = parse_scenario({"grid": {"width": 900, "height": 600}, "ground": {"seed": 3}})
+    simulate_to_folder(scenario, tmp_path / "workers")
+    grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
+    expected = image_of(fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=3))
+    np.testing.assert_array_equal(fifesim.open_image(tmp_path / "workers" / "image.tif").values, expected.values)

@@ -1,0 +1,158 @@
+"""The scenario: units, ranges, one line a mistake, and a round trip through its own text."""
+
+import re
+import tomllib
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+
+import fifesim
+from fifesim import grid as grids
+from fifesim.geometry import FIFE_TIME, earth_sun_distance
+from fifesim.scenario import Scenario, parse_scenario, write_scenario
+
+SMALL = {"grid": {"width": 300.0, "height": 150.0}}
+
+
+def read_text(tmp_path, text):
+    path = tmp_path / "scenario.toml"
+    path.write_text(text, encoding="utf-8")
+    return fifesim.read_scenario(path)
+
+
+def test_default_is_the_paper_case_on_the_whole_site():
+    default = Scenario()
+    assert grids.same_grid(default.geobox(), fifesim.fife_site(30 / 9))
+    assert default.model_atmosphere() == fifesim.Atmosphere()
+    sun = default.sun_and_view()
+    assert (sun.sza, sun.saa) == pytest.approx((fifesim.fife_geometry().sza, fifesim.fife_geometry().saa), abs=1e-9)
+    assert (default.ground.distribution, default.ground.arp, default.ground.seed) == ("burned-grazed", 0.15, 7)
+    assert (default.sensor.instrument, default.sensor.bands) == ("TM", ["TM3", "TM4"])
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        SMALL,
+        {"geometry": {"sza": 40.0, "saa": 100.0, "vza": 10.0, "vaa": 5.0}},
+        {"ground": {"arp": 0.24, "seed": 2**63 - 1, "method": "periodic", "leaf_angles": "verhoef(-0.35,-0.15)"}},
+        {"ground": {"background": {"TM3": 0.1, "TM4": 0.2}}, "sensor": {"pixel": 15.0, "min_valid": 0.5}},
+        {"grid": {"cell": 1 / 3, "width": 30.0, "height": 30.0}},
+    ],
+)
+@pytest.mark.parametrize("complete", [False, True])
+def test_text_of_a_scenario_reads_as_the_same(tmp_path, values, complete):
+    scenario = parse_scenario(values)
+    scenario = scenario.complete() if complete else scenario
+    again = read_text(tmp_path, write_scenario(scenario))
+    assert again == scenario
+    assert write_scenario(again) == write_scenario(scenario)
+
+
+def test_complete_scenario_runs_the_same():
+    scenario = parse_scenario(SMALL | {"geometry": {"vza": 5}})
+    complete = scenario.complete()
+    assert complete.geobox() == scenario.geobox()
+    assert complete.sun_and_view() == scenario.sun_and_view()
+    assert complete.sensor.pixel == 30.0
+    assert set(complete.ground.background) == {"TM3", "TM4"}
+    assert complete.complete() == complete
+
+
+def test_every_key_has_a_meaning_and_every_number_a_unit():
+    """Text beside each key: `key = value  # unit; meaning`."""
+    text = write_scenario(Scenario().complete())
+    tomllib.loads(text)
+    for line in text.splitlines():
+        if "=" in line and not re.match(r"TM\d", line):
+            assert re.search(r"# \S", line), line
+            if re.search(r"= [-\d.]+\s", line):
+                assert re.search(r"# (m|km|degree|1); |seed", line), line
+
+
+@pytest.mark.parametrize(
+    "written, value",
+    [("'23 km'", 23.0), ("'23km'", 23.0), ("'23'", 23.0), ("23", 23.0), ("'2.3e1 km'", 23.0), ("' 23  km '", 23.0)],
+)
+def test_number_may_carry_its_unit(tmp_path, written, value):
+    assert read_text(tmp_path, f"[atmosphere]\nvisibility = {written}").atmosphere.visibility == value
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("[atmosphere]\nvisibilty = 45", "atmosphere.visibilty = 45: did you mean 'visibility'? allowed are profile, "),
+        ("[ground]\nARP = 0.1", "unknown key ground.ARP = 0.1"),
+        ("[atmosfere]\nvisibility = 45", "did you mean 'atmosphere'? allowed are grid, ground"),
+        ("[atmosphere]\nvisibility = '45000 m'", "visibility = '45000 m': visibility is in km; write a number, or a "),
+        ("[grid]\ncell = '3 px'", "cell = '3 px': cell is in m"),
+        ("[atmosphere]\nvisibility = 2", "atmosphere.visibility = 2"),
+        ("[atmosphere]\nvisibility = nan", "atmosphere.visibility = nan"),
+        ("[ground]\narp = 0.25", "ground.arp = 0.25"),
+        ("[ground]\narp = 0.2499", "arp = 0.2499: at most 0.2498 when streaming; or method"),
+        ("[ground]\nseed = -1", "ground.seed = -1"),
+        ("[ground]\nseed = 1.5", "ground.seed = 1.5"),
+        ("[ground]\ndistribution = 'burnt'", "did you mean 'burned-"),
+        ("[ground]\nleaf_angles = 'sphere'", "ground.leaf_angles = 'sphere'"),
+        ("[geometry]\nsza = 95", "geometry.sza = 95"),
+        ("[atmosphere]\naerosol = 'maritim'", "aerosol = 'maritim': must be one of"),
+        ("[sensor]\ninstrument = 'TN'", "TM"),
+        ("[sensor]\nbands = ['TM9']", "TM9"),
+        ("[sensor]\nbands = []", "name at least one band"),
+        ("atmosphere = 3", "atmosphere"),
+        ("[atmosphere", "scenario.toml is not valid TOML"),
+    ],
+)
+def test_mistake_is_one_line_that_names_it(tmp_path, text, message):
+    with pytest.raises(ValueError) as caught:
+        read_text(tmp_path, text)
+    assert message in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_every_mistake_is_told_at_once(tmp_path):
+    with pytest.raises(ValueError) as caught:
+        read_text(tmp_path, "[atmosphere]\nvisibility = 2\naltitude = -1\n[ground]\narp = 0.3")
+    lines = str(caught.value).splitlines()
+    assert [line.split(" = ")[0] for line in lines] == ["ground.arp", "atmosphere.visibility", "atmosphere.altitude"]
+
+
+def test_missing_scenario_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"cannot read the scenario .*none\.toml: No such file"):
+        fifesim.read_scenario(tmp_path / "none.toml")
+
+
+def test_files_lie_beside_the_scenario(tmp_path):
+    (tmp_path / "samples.csv").write_text("lai\n1\n1.5\n2\n2.5\n3\n")
+    scenario = read_text(tmp_path, "[ground]\ndistribution = 'samples.csv'\nlai_file = 'maps/lai.tif'")
+    assert scenario.ground.distribution == str((tmp_path / "samples.csv").resolve())
+    assert scenario.ground.lai_file == str((tmp_path / "maps" / "lai.tif").resolve())
+
+
+def test_sun_may_be_given_instead_of_time_and_place():
+    sun = parse_scenario({"geometry": {"sza": "40 degree", "saa": 100}}).sun_and_view()
+    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, earth_sun_distance(FIFE_TIME))
+    night = parse_scenario({"geometry": {"time": "1987-06-06T06:00:00Z"}})
+    with pytest.raises(ValueError, match="the sun is below the horizon"):
+        night.sun_and_view()
+
+
+def test_scene_of_a_map_covers_the_map(tmp_path):
+    path = tmp_path / "lai.tif"
+    affine = Affine(10, 0, 709003, 0, -10, 4332001)
+    with rasterio.open(
+        path, "w", driver="GTiff", height=33, width=44, count=1, dtype="float32", crs="EPSG:26914", transform=affine
+    ) as sink:
+        sink.write(np.ones((1, 33, 44), np.float32))
+    covering = parse_scenario({"ground": {"lai_file": str(path)}}).geobox().boundingbox
+    assert covering.left <= 709003 < covering.left + 30 and covering.top - 30 < 4332001 <= covering.top
+    given = parse_scenario(SMALL | {"ground": {"lai_file": str(path)}}).geobox()
+    assert given == parse_scenario(SMALL).geobox()
+
+
+def test_scenario_is_frozen():
+    with pytest.raises(ValueError, match="frozen"):
+        Scenario().atmosphere.visibility = 10.0
