@@ -27,6 +27,7 @@ _PUBLIC = {
     "fife_geometry": "geometry",
     "fife_site": "sites",
     "fine_dem": "ground.dem_raster",
+    "flint_hills": "ground.flint_hills_raster",
     "fpar": "ground.raster",
     "grid_at": "grid",
     "horizon": "ground.sky_raster",

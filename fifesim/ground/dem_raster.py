@@ -145,7 +145,7 @@ class _Model:
         place = placement(source, grid)
         sizes = place.cell_size()
         blocks = tuple(max(1, round(float(np.mean(grids.cell_size(grid))) / size)) for size in sizes)
-        resolution = float(np.mean([count * size for count, size in zip(blocks, sizes, strict=True)]))
+        resolution = round(float(np.mean([count * size for count, size in zip(blocks, sizes, strict=True)])), 6)
         return cls(source, place, blocks, tuple((fill or 0) / size for size in sizes), resolution)
 
     def tiles(self):
