@@ -1,10 +1,9 @@
-"""Figure 1 end to end: the one place that knows all stages, and hands to each what it needs of another."""
+"""The steps of Figure 1 that need more than one stage: what a stage needs of another is handed to it here."""
 
 import numpy as np
 import xarray as xr
 
 from fifesim import cf
-from fifesim import grid as grids
 from fifesim.analysis import raster as analysis
 from fifesim.atmosphere import five_s
 from fifesim.atmosphere import raster as atmosphere_raster
@@ -14,7 +13,6 @@ from fifesim.geometry import Geometry, fife_geometry
 from fifesim.ground import optics
 from fifesim.ground import raster as ground
 from fifesim.ground import terrain_raster as terrain
-from fifesim.scenario import Scenario
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.instruments import instrument as find_instrument
 from fifesim.sensor.instruments import instrument_names
@@ -277,66 +275,6 @@ def planetary_reflectance(image):
     """
     is_radiance = image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
     return sensor.to_reflectance(image) if "gain" in image.coords or is_radiance else image
-
-
-def simulate(scenario, chunks="auto"):
-    """
-    Scene, image and truth of a scenario.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.Scenario
-    chunks : mapping or int, optional
-        Of the scene; by default whole tiles of the random field.
-
-    Returns
-    -------
-    run : xarray.DataTree
-        Lazy. ``scene`` holds ``lai`` by cells, ``image`` the digital numbers ``dn`` and their ``ndvi``, ``truth`` the
-        means of ``lai`` and ``fpar`` over the ground of the pixels.
-
-    Raises
-    ------
-    ValueError
-        If the scenario asks for what cannot be.
-    """
-    if not isinstance(scenario, Scenario):
-        raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
-    grid, geometry, atmosphere = scenario.geobox(), scenario.sun_and_view(), scenario.model_atmosphere()
-    land, instrument = scenario.ground, find_instrument(scenario.sensor.instrument)
-    if land.lai_file:
-        lai = ground.open_lai(land.lai_file, grid, chunks=chunks)
-    else:
-        lai = ground.lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
-    reflectance = surface_reflectance(
-        lai,
-        instrument,
-        bands=scenario.sensor.bands,
-        atmosphere=atmosphere,
-        geometry=geometry,
-        leaf_optics=land.leaf_optics(),
-        background=land.background or None,
-        leaf_angles=land.leaf_angles,
-        hotspot=land.hotspot,
-    )
-    pixels = grids.aligned(grid, scenario.sensor.pixel or instrument.gsd)
-    image = sensor.sense(to_toa(reflectance), instrument, onto=pixels, min_valid=scenario.sensor.min_valid)
-    fpar = ground.fpar(lai, geometry=geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
-    pixel, min_valid = grids.cell_size(pixels)[0], scenario.sensor.min_valid
-    truth = {
-        name: analysis.aggregate(array, pixel, min_valid=min_valid) for name, array in (("lai", lai), ("fpar", fpar))
-    }
-    products = {"dn": image} | ({"ndvi": ndvi(image)} if _has_ndvi(image) else {})
-    return xr.DataTree.from_dict(
-        {"scene": xr.Dataset({"lai": lai}), "image": xr.Dataset(products), "truth": xr.Dataset(truth)}
-    )
-
-
-def _has_ndvi(image):
-    wavelength = image["wavelength"].values
-    return bool(
-        np.any((wavelength >= 0.6) & (wavelength <= 0.7)) and np.any((wavelength >= 0.75) & (wavelength <= 1.0))
-    )
 
 
 def _sunlight(terms):

@@ -43,7 +43,8 @@ def simulate(
 ):
     """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
     from fifesim.run import check_folder, simulate_to_folder
-    from fifesim.scenario import Scenario, read_scenario
+    from fifesim.scenario import Scenario
+    from fifesim.scenario_file import read_scenario
 
     try:
         check_folder(output, overwrite)
@@ -60,7 +61,8 @@ def simulate(
 @app.command()
 def scenario():
     """Print the default scenario, every key with its unit, to edit."""
-    from fifesim.scenario import Scenario, write_scenario
+    from fifesim.scenario import Scenario
+    from fifesim.scenario_file import write_scenario
 
     typer.echo(write_scenario(Scenario().complete()), nl=False)
 

@@ -26,8 +26,8 @@ def grid_at(crs, west, north, width, height, cell):
         Upper left corner. [m]
     width, height : float
         Size; as many whole cells as fit. [m]
-    cell : float
-        [m]
+    cell : float or (float, float)
+        Size of a cell, or down and across. [m]
 
     Returns
     -------
@@ -38,10 +38,11 @@ def grid_at(crs, west, north, width, height, cell):
     ValueError
         If the CRS is not projected in metres, or the size holds no cell.
     """
-    if not (cell > 0 and width >= cell and height >= cell):
-        raise ValueError(f"a grid of {width:g} x {height:g} m holds no cell of {cell:g} m")
-    shape = int(height / cell + 1e-6), int(width / cell + 1e-6)
-    return check_grid(GeoBox(shape, Affine(cell, 0.0, west, 0.0, -cell, north), crs))
+    down, across = np.broadcast_to(np.asarray(cell, float), 2).tolist()
+    if not (min(down, across) > 0 and width >= across and height >= down):
+        raise ValueError(f"a grid of {width:g} x {height:g} m holds no cell of {down:g} x {across:g} m")
+    shape = int(height / down + 1e-6), int(width / across + 1e-6)
+    return check_grid(GeoBox(shape, Affine(across, 0.0, west, 0.0, -down, north), crs))
 
 
 def check_grid(grid):

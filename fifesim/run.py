@@ -10,12 +10,13 @@ from pathlib import Path
 
 import xarray as xr
 
-from fifesim import chain, report
 from fifesim import grid as grids
+from fifesim import report
 from fifesim.analysis.raster import regress
 from fifesim.export import to_geotiff
 from fifesim.progress import ProgressBar
-from fifesim.scenario import write_scenario
+from fifesim.scenario_file import write_scenario
+from fifesim.simulation import simulate
 
 FILES = ("image.tif", "truth.tif", "quicklook.png", "report.html", "scenario.toml")
 
@@ -51,7 +52,7 @@ def simulate_to_folder(scenario, folder, *, overwrite=False):
     folder = Path(folder)
     check_folder(folder, overwrite)
     complete = scenario.complete()
-    tree = chain.simulate(complete)
+    tree = simulate(complete)
     wanted = {"image": tree["image"].to_dataset(), "truth": tree["truth"].to_dataset(), "detail": _detail(tree)}
     with ProgressBar("simulating"):
         # One pass for all: the cells are made once.

@@ -1,12 +1,10 @@
-"""The scenario of a run: every number with its unit and range, read from and written to TOML."""
+"""The scenario of a run: every number with its unit and range."""
 
 import re
-import tomllib
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from fifesim import geometry, warp
 from fifesim import grid as grids
@@ -121,6 +119,42 @@ class Ground(_Section):
         return {band: (value, self.leaf_transmittance[band]) for band, value in self.leaf_reflectance.items()} or None
 
 
+LAND_FORMS = ("flint-hills", "flat")
+
+
+def names_a_file(key, value):
+    """
+    Whether the value of a key of a scenario is the path of a file.
+
+    Parameters
+    ----------
+    key, value : str
+
+    Returns
+    -------
+    answer : bool
+
+    Examples
+    --------
+    >>> names_a_file("distribution", "burned-grazed"), names_a_file("distribution", "mine.csv")
+    (False, True)
+    """
+    if key == "dem":
+        return value not in LAND_FORMS
+    return key == "lai_file" or (key == "distribution" and value.lower().endswith(".csv"))
+
+
+class Terrain(_Section):
+    """Elevation, and the light on slopes."""
+
+    dem: str = _text("flint-hills", "flint-hills (synthetic), flat, or a raster file of elevation")
+    seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = Field(7, description="of the synthetic hills")
+    fill: float | None = _number(None, "m", "holes of the file are interpolated up to this distance", gt=0)
+    vertical_units: str | None = _text(None, "of the file's elevation where they are not metres, such as ft")
+    horizon_reach: float = _number(5000.0, "m", "greatest distance of terrain that hides the sky", gt=0)
+    upwelling: bool = Field(True, description="with the view's cosine on slopes (Eq. 5)")
+
+
 class SunAndView(_Section):
     """Directions; the sun's from time and place, or given by sza and saa."""
 
@@ -185,6 +219,7 @@ class Scenario(_Section):
     ----------
     grid : Grid
     ground : Ground
+    terrain : Terrain
     geometry : SunAndView
     atmosphere : Air
     sensor : Sensor
@@ -192,11 +227,12 @@ class Scenario(_Section):
     Raises
     ------
     pydantic.ValidationError
-        If a key is unknown or a value not allowed; `read_scenario` turns it into one line a mistake.
+        If a key is unknown or a value not allowed; `scenario_file.read_scenario` turns it into one line a mistake.
     """
 
     grid: Grid = Grid()
     ground: Ground = Ground()
+    terrain: Terrain = Terrain()
     geometry: SunAndView = SunAndView()
     atmosphere: Air = Air()
     sensor: Sensor = Sensor()
@@ -242,144 +278,22 @@ class Scenario(_Section):
                 "leaf_reflectance": _by_band(names, leaf_reflectance),
                 "leaf_transmittance": _by_band(names, leaf_transmittance),
                 "background": _by_band(names, background),
-                "lai_file": self.ground.lai_file and str(Path(self.ground.lai_file).resolve()),
-                "distribution": _resolved(self.ground.distribution),
+                "lai_file": _resolved("lai_file", self.ground.lai_file),
+                "distribution": _resolved("distribution", self.ground.distribution),
             }
         )
         sensor = self.sensor.model_copy(update={"pixel": self._pixel(), "bands": names})
-        return self.model_copy(update={"grid": grid, "ground": ground, "sensor": sensor})
+        terrain = self.terrain.model_copy(update={"dem": _resolved("dem", self.terrain.dem)})
+        return self.model_copy(update={"grid": grid, "ground": ground, "terrain": terrain, "sensor": sensor})
 
     def _pixel(self):
         return self.sensor.pixel or instrument(self.sensor.instrument).gsd
 
 
-def read_scenario(path):
-    """
-    Scenario of a TOML file.
-
-    Parameters
-    ----------
-    path : str or path
-        Files that it names lie relative to it.
-
-    Returns
-    -------
-    scenario : Scenario
-
-    Raises
-    ------
-    ValueError
-        If it is missing or not TOML, or a key or value is wrong: one line a mistake, with the key, the value and what
-        is allowed.
-    """
-    path = Path(path)
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"cannot read the scenario {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path.name} is not valid TOML: {error}") from None
-    ground = values.get("ground")
-    if isinstance(ground, dict):
-        for key in ("lai_file", "distribution"):
-            name = ground.get(key)
-            if isinstance(name, str) and (key == "lai_file" or name.lower().endswith(".csv")):
-                ground[key] = str((path.parent / name).resolve())
-    return parse_scenario(values)
-
-
-def parse_scenario(values):
-    """
-    Scenario of nested mappings.
-
-    Parameters
-    ----------
-    values : mapping
-        As TOML gives it.
-
-    Returns
-    -------
-    scenario : Scenario
-
-    Raises
-    ------
-    ValueError
-        One line a mistake.
-
-    Examples
-    --------
-    >>> parse_scenario({"atmosphere": {"visibility": "23 km"}}).atmosphere.visibility
-    23.0
-    """
-    try:
-        return Scenario.model_validate(values)
-    except ValidationError as error:
-        raise ValueError("\n".join(_explain(item) for item in error.errors())) from None
-
-
-def write_scenario(scenario):
-    """
-    TOML text of a scenario, every key with its unit and meaning.
-
-    Parameters
-    ----------
-    scenario : Scenario
-
-    Returns
-    -------
-    text : str
-        Reading it gives the same scenario.
-    """
-    lines = ["# Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
-    for name in Scenario.model_fields:
-        section = getattr(scenario, name)
-        lines += ["", f"[{name}]  # {type(section).__doc__.splitlines()[0]}"]
-        tables = []
-        for key, known in type(section).model_fields.items():
-            value, unit = getattr(section, key), (known.json_schema_extra or {}).get("unit", "")
-            meaning = f"{unit}; {known.description}" if unit else known.description
-            if isinstance(value, dict):
-                tables += [
-                    "",
-                    f"[{name}.{key}]  # {meaning}",
-                    *(f"{band} = {number!r}" for band, number in value.items()),
-                ]
-            elif value is None:
-                lines.append(f"# {key} =   # {meaning}")
-            else:
-                lines.append(f"{key} = {_toml(value)}  # {meaning}")
-        lines += tables
-    return "\n".join(lines) + "\n"
-
-
-def _resolved(distribution):
-    """A file of samples by its full path, so that the scenario can be run from elsewhere."""
-    return str(Path(distribution).resolve()) if distribution.lower().endswith(".csv") else distribution
+def _resolved(key, value):
+    """A file by its full path, so that the scenario can be run from elsewhere."""
+    return str(Path(value).resolve()) if value and names_a_file(key, value) else value
 
 
 def _by_band(names, values):
     return {name: float(value) for name, value in zip(names, values, strict=True)}
-
-
-def _toml(value):
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return repr(value)
-
-
-def _explain(error):
-    """One line that names the key, the value and what is allowed."""
-    key = ".".join(str(part) for part in error["loc"])
-    if error["type"] == "extra_forbidden":
-        known = list(Scenario.model_fields)
-        if len(error["loc"]) > 1 and error["loc"][0] in Scenario.model_fields:
-            known = list(Scenario.model_fields[error["loc"][0]].annotation.model_fields)
-        near = get_close_matches(str(error["loc"][-1]), known, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        return f"unknown key {key} = {error['input']!r}: {hint}allowed are {', '.join(known)}"
-    message = str(error["ctx"]["error"]) if error["type"] == "value_error" else error["msg"]
-    if isinstance(error["input"], dict):
-        return f"{key}: {message}"
-    return f"{key} = {error['input']!r}: {message}"

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from fifesim.cli import app
 from fifesim.run import FILES
-from fifesim.scenario import read_scenario, write_scenario
+from fifesim.scenario_file import read_scenario, write_scenario
 
 SMALL = """
 [grid]

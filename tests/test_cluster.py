@@ -8,7 +8,7 @@ from distributed import Client, LocalCluster
 
 import fifesim
 from fifesim.run import simulate_to_folder
-from fifesim.scenario import parse_scenario
+from fifesim.scenario_file import parse_scenario
 
 CHUNKS = {"y": 100, "x": 80}
 

@@ -8,7 +8,7 @@ import rasterio
 
 import fifesim
 from fifesim.run import simulate_to_folder
-from fifesim.scenario import parse_scenario
+from fifesim.scenario_file import parse_scenario
 
 SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}}
 

@@ -11,7 +11,8 @@ from affine import Affine
 import fifesim
 from fifesim import grid as grids
 from fifesim.geometry import FIFE_TIME, earth_sun_distance
-from fifesim.scenario import Scenario, parse_scenario, write_scenario
+from fifesim.scenario import Scenario
+from fifesim.scenario_file import parse_scenario, write_scenario
 
 SMALL = {"grid": {"width": 300.0, "height": 150.0}}
 

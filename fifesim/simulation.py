@@ -1,0 +1,165 @@
+"""Figure 1 end to end: a scenario as scene, image and truth."""
+
+import numpy as np
+import xarray as xr
+
+from fifesim import chain
+from fifesim import grid as grids
+from fifesim.analysis import raster as analysis
+from fifesim.ground import raster as ground
+from fifesim.ground import sky_raster, terrain_raster
+from fifesim.ground.dem_raster import fine_dem, source_dem
+from fifesim.ground.flint_hills_raster import flint_hills
+from fifesim.scenario import Scenario
+from fifesim.sensor import raster as sensor
+from fifesim.sensor.instruments import instrument as find_instrument
+
+# The synthetic hills around a scene are made at this resolution, as its own horizons are. [m]
+_HILLS_AROUND = 30.0
+
+
+def simulate(scenario, chunks="auto"):
+    """
+    Scene, image and truth of a scenario.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.Scenario
+    chunks : mapping or int, optional
+        Of the scene; by default whole tiles of the random field.
+
+    Returns
+    -------
+    run : xarray.DataTree
+        Lazy. ``scene`` holds ``lai`` by cells, and ``dem`` where the ground is not flat; ``image`` the digital numbers
+        ``dn`` and their ``ndvi``; ``truth`` the means of ``lai`` and ``fpar`` over the ground of the pixels. With
+        terrain, ``terrain`` holds ``dem``, ``slope`` and ``kt`` over the ground of the pixels, and ``level``, the
+        digital numbers on level ground; its attributes say how far the elevation is known beyond the scene.
+
+    Raises
+    ------
+    ValueError
+        If the scenario asks for what cannot be.
+    """
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+    grid, geometry = scenario.geobox(), scenario.sun_and_view()
+    instrument = find_instrument(scenario.sensor.instrument)
+    pixels = grids.aligned(grid, scenario.sensor.pixel or instrument.gsd)
+    min_valid = scenario.sensor.min_valid
+
+    def sensed(reflectance):
+        return sensor.sense(chain.to_toa(reflectance), instrument, onto=pixels, min_valid=min_valid)
+
+    def means(array):
+        return analysis.aggregate(array, grids.cell_size(pixels)[0], min_valid=min_valid)
+
+    lai = _leaf_area(scenario, grid, chunks)
+    land = scenario.ground
+    fpar = ground.fpar(lai, geometry=geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
+    level = _reflectance(scenario, lai, instrument)
+    nodes = {"scene": {"lai": lai}, "truth": {"lai": means(lai), "fpar": means(fpar)}}
+    dem, horizon, reach = elevation(scenario, grid, chunks)
+    if dem is None:
+        image = sensed(level)
+    else:
+        image = sensed(_reflectance(scenario, lai, instrument, dem=dem, horizon=horizon))
+        kt = chain.kt(level, dem, horizon=horizon)
+        nodes["scene"]["dem"] = dem
+        slope = terrain_raster.slope(dem)
+        nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt), "level": sensed(level)}
+    nodes["image"] = {"dn": image} | ({"ndvi": chain.ndvi(image)} if _has_ndvi(image) else {})
+    tree = xr.DataTree.from_dict({name: xr.Dataset(arrays) for name, arrays in nodes.items()})
+    if reach:
+        tree["terrain"].attrs = {f"reach_{side}": distance for side, distance in reach.items()}
+    return tree
+
+
+def elevation(scenario, grid, chunks=None):
+    """
+    Elevation of a scenario, and the horizon that the land around makes.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.Scenario
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells.
+    chunks : mapping or int, optional
+        Makes the elevation lazy.
+
+    Returns
+    -------
+    dem : xarray.DataArray, dims (y, x), or None
+        None where the ground is flat. [m]
+    horizon : xarray.DataArray, dims (direction, y, x), or None
+        In memory. [degree]
+    reach : dict of str to float
+        How far the elevation is known beyond each side of the grid, up to the reach of horizons. [m]
+
+    Raises
+    ------
+    ValueError
+        If the elevation cannot be had, or the sun reaches no slope.
+    """
+    terrain = scenario.terrain
+    if terrain.dem == "flat":
+        return None, None, {}
+    if terrain.dem == "flint-hills":
+        dem = flint_hills(grid, terrain.seed, chunks=chunks)
+        around = flint_hills(_padded(grid, terrain.horizon_reach), terrain.seed)
+        reach = dict.fromkeys(("north", "east", "south", "west"), terrain.horizon_reach)
+    else:
+        options = {"fill": terrain.fill, "vertical_units": terrain.vertical_units}
+        dem = fine_dem(terrain.dem, grid, chunks=chunks, **options)
+        around, reach = source_dem(terrain.dem, grid, terrain.horizon_reach, **options)
+    horizon = sky_raster.horizon(around, reach=terrain.horizon_reach)
+    # On lazy elevation no chunk knows whether the sun reaches another: the land around is in memory.
+    terrain_raster.illumination(around, scenario.sun_and_view(), horizon)
+    return dem, horizon, reach
+
+
+def _leaf_area(scenario, grid, chunks):
+    land = scenario.ground
+    if land.lai_file:
+        return ground.open_lai(land.lai_file, grid, chunks=chunks)
+    return ground.lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+
+
+def _reflectance(scenario, lai, instrument, **terrain):
+    land = scenario.ground
+    return chain.surface_reflectance(
+        lai,
+        instrument,
+        bands=scenario.sensor.bands,
+        atmosphere=scenario.model_atmosphere(),
+        geometry=scenario.sun_and_view(),
+        leaf_optics=land.leaf_optics(),
+        background=land.background or None,
+        leaf_angles=land.leaf_angles,
+        hotspot=land.hotspot,
+        upwelling=scenario.terrain.upwelling,
+        **terrain,
+    )
+
+
+def _padded(grid, margin):
+    """Coarse grid from a fine one's corner that reaches a margin further on every side."""
+    down, across = (max(round(_HILLS_AROUND / size), 1) * size for size in grids.cell_size(grid))
+    rows, columns = int(np.ceil(margin / down)), int(np.ceil(margin / across))
+    box = grid.boundingbox
+    height, width = box.top - box.bottom, box.right - box.left
+    return grids.grid_at(
+        grid.crs.to_wkt(),
+        box.left - columns * across,
+        box.top + rows * down,
+        (np.ceil(width / across) + 2 * columns) * across,
+        (np.ceil(height / down) + 2 * rows) * down,
+        (down, across),
+    )
+
+
+def _has_ndvi(image):
+    wavelength = image["wavelength"].values
+    return bool(
+        np.any((wavelength >= 0.6) & (wavelength <= 0.7)) and np.any((wavelength >= 0.75) & (wavelength <= 1.0))
+    )
