@@ -6,11 +6,13 @@ from pathlib import Path
 
 import jinja2
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LightSource, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fifesim import grid as grids
-from fifesim.scenario import Scenario
+from fifesim.scenario import Scenario, names_a_file
 from fifesim.sensor.raster import to_reflectance
 
 _TEMPLATE = "report.html.j2"
@@ -43,7 +45,7 @@ def quicklook(path, image, truth, detail):
     figure.savefig(path, dpi=_DPI, metadata={"Software": None})
 
 
-def page(scenario, image, truth, detail, fits, versions):
+def page(scenario, image, truth, detail, terrain, fits, versions):
     """
     One self-contained HTML page on a run.
 
@@ -53,6 +55,8 @@ def page(scenario, image, truth, detail, fits, versions):
     image, truth : xarray.Dataset
         As `quicklook` takes them.
     detail : xarray.DataArray
+    terrain : xarray.Dataset or None
+        ``dem``, ``slope``, ``kt`` and ``level`` over the pixels, and how far the elevation is known; None if flat.
     fits : mapping of str to fifesim.analysis.regression.Regression
         Of the true means on NDVI.
     versions : mapping of str to str
@@ -68,11 +72,13 @@ def page(scenario, image, truth, detail, fits, versions):
         "maps": _map_figure(image, truth),
         "histograms": _histogram_figure(image, truth, detail),
     }
+    if terrain is not None:
+        figures["terrain"] = _terrain_figure(image, terrain)
     if fits:
         figures["fits"] = _fit_figure(image, truth, fits)
     return template.render(
         title=_title(scenario),
-        summary=_summary(scenario, image, truth, fits),
+        summary=_summary(scenario, image, truth, fits) + _ground(terrain),
         figures={name: _png(figure) for name, figure in figures.items()},
         fits=[(_NAMES[name], fit) for name, fit in fits.items()],
         parameters=_parameters(scenario),
@@ -103,6 +109,19 @@ def _summary(scenario, image, truth, fits):
     return rows + [(f"R² of {_NAMES[name]} on NDVI", f"{fit.r2:.3f}") for name, fit in fits.items()]
 
 
+def _ground(terrain):
+    """Rows on the elevation."""
+    if terrain is None:
+        return [("Ground", "flat")]
+    dem, kt = terrain["dem"], terrain["kt"]
+    known = ", ".join(f"{side[6:]} {distance / 1000:.3g} km" for side, distance in terrain.attrs.items())
+    return [
+        ("Elevation of the pixels", f"{float(dem.min()):.0f} to {float(dem.max()):.0f} m"),
+        ("Elevation known beyond the scene, for horizons", known),
+        ("Kt of the pixels", f"{float(kt.min()):.3f} to {float(kt.max()):.3f}"),
+    ]
+
+
 def _parameters(scenario):
     """Key, value, unit and meaning of every parameter, by section."""
     sections = []
@@ -117,7 +136,9 @@ def _parameters(scenario):
                 value = ", ".join(value)
             elif isinstance(value, float):
                 value = f"{value:.10g}"
-            elif key in ("lai_file", "distribution") and value:
+            elif isinstance(value, bool):
+                value = "yes" if value else "no"
+            elif isinstance(value, str) and names_a_file(key, value):
                 value = Path(value).name
             rows.append((key, "not given" if value is None else value, unit, known.description))
         sections.append((name, rows))
@@ -161,6 +182,76 @@ def _map_figure(image, truth):
         axis.set_title(title)
         figure.colorbar(drawn, ax=axis, shrink=0.8, label=label)
     return figure
+
+
+def _terrain_figure(image, terrain):
+    """Shaded relief, slope, Kt, and the image less that of level ground."""
+    figure = Figure(figsize=(11, 2 * _height(image["dn"])), layout="constrained")
+    axes = figure.subplots(2, 2).ravel()
+    dem, band = terrain["dem"], str(image["dn"]["band"].values[-1])
+    down, across = grids.cell_size(grids.geobox(dem))
+    # Lit from the north-west, as maps are; hills and valleys change places when lit from below.
+    tint = ScalarMappable(Normalize(*_limits_of(dem)), "gist_earth")
+    lit = LightSource(azdeg=315, altdeg=45).shade_rgb(
+        tint.to_rgba(dem.values)[..., :3], np.nan_to_num(dem.values, nan=float(dem.mean())),
+        blend_mode="soft", vert_exag=3, dx=across, dy=down,
+    )  # fmt: skip
+    axes[0].set_facecolor(_NO_DATA)
+    axes[0].imshow(np.dstack([lit, np.isfinite(dem.values)]), extent=_extent(dem), interpolation="nearest")
+    _map_axes(axes[0])
+    axes[0].set_title("Shaded relief and elevation")
+    figure.colorbar(tint, ax=axes[0], shrink=0.8, label="m")
+    change = reflectance_change(image["dn"], terrain["level"], band)
+    reach = max(float(np.nanmax(np.abs(_limits_of(change)))), 1e-6)
+    for axis, array, title, label, style in (
+        (
+            axes[1],
+            terrain["slope"],
+            "Slope, mean of the cells",
+            "degrees",
+            {"cmap": "YlOrBr", **_limits(terrain["slope"])},
+        ),
+        (axes[2], terrain["kt"].sel(band=band), f"Kt in {band}, mean of the cells", "Kt", _around(terrain["kt"], 1.0)),
+        (
+            axes[3],
+            change,
+            f"What terrain did to {band}",
+            "reflectance",
+            {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach},
+        ),
+    ):
+        drawn = _map(axis, array, **style)
+        axis.set_title(title)
+        figure.colorbar(drawn, ax=axis, shrink=0.8, label=label)
+    return figure
+
+
+def reflectance_change(dn, level, band):
+    """
+    Planetary reflectance of an image less that of level ground.
+
+    Parameters
+    ----------
+    dn, level : xarray.DataArray, dims (band, y, x)
+        Digital numbers with and without terrain.
+    band : str
+
+    Returns
+    -------
+    change : xarray.DataArray, dims (y, x)
+        [1]
+    """
+    return to_reflectance(dn).sel(band=band) - to_reflectance(level).sel(band=band)
+
+
+def _limits_of(array):
+    return list(_limits(array).values())
+
+
+def _around(array, middle):
+    """Colours that diverge from a middle, over what most of the values span."""
+    half = max(*(abs(limit - middle) for limit in _limits_of(array)), 1e-6)
+    return {"cmap": "RdBu_r", "vmin": middle - half, "vmax": middle + half}
 
 
 def _histogram_figure(image, truth, detail):

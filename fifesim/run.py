@@ -53,17 +53,19 @@ def simulate_to_folder(scenario, folder, *, overwrite=False):
     check_folder(folder, overwrite)
     complete = scenario.complete()
     tree = simulate(complete)
-    wanted = {"image": tree["image"].to_dataset(), "truth": tree["truth"].to_dataset(), "detail": _detail(tree)}
+    wanted = {name: tree[name].to_dataset() for name in ("image", "truth", "terrain") if name in tree.children}
+    wanted["detail"] = _detail(tree)
     with ProgressBar("simulating"):
         # One pass for all: the cells are made once.
         done = xr.DataTree.from_dict(wanted).compute()
     image, truth, detail = done["image"].to_dataset(), done["truth"].to_dataset(), done["detail"]["lai"]
+    terrain = done["terrain"].to_dataset() if "terrain" in done.children else None
     with _whole_files(folder) as partial:
         to_geotiff(image["dn"], partial / "image.tif")
         to_geotiff(truth, partial / "truth.tif")
         report.quicklook(partial / "quicklook.png", image, truth, detail)
         fits = _fits(image, truth)
-        page = report.page(complete, image, truth, detail, fits, _versions())
+        page = report.page(complete, image, truth, detail, terrain, fits, _versions())
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
     return [folder / name for name in FILES]

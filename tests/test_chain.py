@@ -226,7 +226,7 @@ def test_hole_in_the_ground_is_no_data_in_the_image(lai):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({"dem": 1}, "dem must be None"),
+        ({"horizon": 1}, "a horizon stands around a dem"),
         ({"instrument": "TN"}, "TM"),
         ({"bands": ["TM33"]}, "TM3"),
         ({"leaf_optics": {"TM3": (0.8, 0.3), "TM4": (0.5, 0.4)}}, "TM3|sum|1"),
@@ -248,6 +248,7 @@ def test_low_sun_is_refused_by_the_atmosphere(lai):
 SMALL = {
     "grid": {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 180.0, "height": 150.0},
     "ground": {"seed": 7},
+    "terrain": {"dem": "flat"},
 }
 
 
@@ -284,6 +285,7 @@ def test_every_key_of_a_scenario_reaches_its_stage():
     leaf, back = {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)}, {"TM3": 0.1, "TM4": 0.2}
     options = {
         "grid": SMALL["grid"],
+        "terrain": SMALL["terrain"],
         "ground": {
             "distribution": "burned-ungrazed",
             "arp": 0.2,

@@ -55,7 +55,7 @@ def test_every_physics_module_is_in_the_api_page():
     page = (DOCS / "api.md").read_text(encoding="utf-8")
     stages = ("ground", "atmosphere", "sensor", "analysis")
     modules = [f"{stage}.{path.stem}" for stage in stages for path in (ROOT / "fifesim" / stage).glob("[a-z]*.py")]
-    wanted = [name for name in modules if not name.endswith((".raster", ".listing"))]
+    wanted = [name for name in modules if not name.endswith(("raster", ".listing"))]
     assert [name for name in wanted if name not in page] == []
 
 

@@ -107,7 +107,7 @@ def test_grid_whose_distances_are_no_metres_is_refused(grid, message):
 def test_something_else_than_a_grid_is_refused():
     with pytest.raises(TypeError, match=r"got tuple: see fifesim\.fife_site"):
         grids.check_grid((4, 5))
-    with pytest.raises(ValueError, match="holds no cell of 30 m"):
+    with pytest.raises(ValueError, match="holds no cell of 30 x 30 m"):
         fifesim.grid_at("EPSG:26914", 0, 0, 20, 100, 30)
 
 

@@ -10,7 +10,8 @@ import fifesim
 from fifesim.run import simulate_to_folder
 from fifesim.scenario_file import parse_scenario
 
-SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}}
+FLAT = {"dem": "flat"}
+SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}, "terrain": FLAT}
 
 
 @pytest.fixture(scope="module")
@@ -67,3 +68,11 @@ def test_all_bands_of_an_instrument_make_a_report(tmp_path):
 def test_a_single_band_has_no_ndvi_and_still_a_report(tmp_path):
     simulate_to_folder(parse_scenario(SMALL | {"sensor": {"bands": ["TM5"]}}), tmp_path / "one")
     assert "What NDVI tells" not in (tmp_path / "one" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_report_with_terrain_shows_it_and_says_how_far_it_is_known(tmp_path):
+    simulate_to_folder(parse_scenario(SMALL | {"terrain": {"horizon_reach": 900}}), tmp_path / "hills")
+    page = (tmp_path / "hills" / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 5
+    assert "north 0.9 km, east 0.9 km, south 0.9 km, west 0.9 km" in page
+    assert "flint-hills" in (tmp_path / "hills" / "scenario.toml").read_text(encoding="utf-8")
