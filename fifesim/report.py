@@ -6,8 +6,9 @@ from pathlib import Path
 
 import jinja2
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LightSource, Normalize
+from matplotlib.colors import LightSource, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -18,6 +19,8 @@ from fifesim.sensor.raster import to_reflectance
 _TEMPLATE = "report.html.j2"
 _DPI = 130
 _NO_DATA = (0.85, 0.85, 0.85)
+# Without the blue of the map's seas.
+_LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)))
 _LINE, _BAND = "#b2182b", "#f4a582"
 
 # Where the colours of a composite lie, and the wavelength that serves each best. [um]
@@ -191,7 +194,7 @@ def _terrain_figure(image, terrain):
     dem, band = terrain["dem"], str(image["dn"]["band"].values[-1])
     down, across = grids.cell_size(grids.geobox(dem))
     # Lit from the north-west, as maps are; hills and valleys change places when lit from below.
-    tint = ScalarMappable(Normalize(*_limits_of(dem)), "gist_earth")
+    tint = ScalarMappable(Normalize(*_limits_of(dem)), _LAND)
     lit = LightSource(azdeg=315, altdeg=45).shade_rgb(
         tint.to_rgba(dem.values)[..., :3], np.nan_to_num(dem.values, nan=float(dem.mean())),
         blend_mode="soft", vert_exag=3, dx=across, dy=down,
