@@ -8,8 +8,8 @@ The result is bent by smooth noise, mapped to the elevations of a real watershed
 the roughness of a real model.
 """
 
+import threading
 from functools import lru_cache, partial
-from threading import Lock
 
 import numba
 import numpy as np
@@ -75,7 +75,7 @@ _SPLINE_DEVIATION = 0.3939255651755652
 _BLOCK = 64
 _FIRST_STREAM = 16
 
-_lock = Lock()
+_lock = threading.Lock()
 
 
 def elevation(seed, northing, easting):

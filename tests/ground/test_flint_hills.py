@@ -101,7 +101,7 @@ def test_elevations_are_those_of_the_watershed(landscapes):
 
 
 def test_water_finds_its_way(landscapes):
-    """Cells of 30 m without a lower neighbour are few; a Gaussian field of this spectrum has several times as many."""
+    """Cells of 30 m without a lower neighbour are few."""
     shares = []
     for values in map(means_30m, landscapes):
         inner = values[1:-1, 1:-1]
