@@ -1,6 +1,7 @@
 """The scenario of a run: every number with its unit and range."""
 
 import re
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -140,7 +141,7 @@ def names_a_file(key, value):
     (False, True)
     """
     if key == "dem":
-        return value not in LAND_FORMS
+        return value not in LAND_FORMS and bool(Path(value).suffix)
     return key == "lai_file" or (key == "distribution" and value.lower().endswith(".csv"))
 
 
@@ -153,6 +154,15 @@ class Terrain(_Section):
     vertical_units: str | None = _text(None, "of the file's elevation where they are not metres, such as ft")
     horizon_reach: float = _number(5000.0, "m", "greatest distance of terrain that hides the sky", gt=0)
     upwelling: bool = Field(True, description="with the view's cosine on slopes (Eq. 5)")
+
+    @field_validator("dem")
+    @classmethod
+    def _known_land(cls, value):
+        if value not in LAND_FORMS and not names_a_file("dem", value):
+            near = get_close_matches(value, LAND_FORMS, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise ValueError(f"{hint}allowed are {', '.join(LAND_FORMS)}, or a raster file such as dem.tif")
+        return value
 
 
 class SunAndView(_Section):

@@ -93,6 +93,8 @@ def test_sensors_lists_bands_with_their_radiances(invoke):
             "[ground.leaf_reflectance]\nTM3 = 0.6\nTM4 = 0.6\n[ground.leaf_transmittance]\nTM3 = 0.5\nTM4 = 0.1\n",
             "add up",
         ),
+        ('[terrain]\ndem = "flint-hils"\n', "did you mean 'flint-hills'"),
+        ('[terrain]\ndem = "missing.tif"\n', "missing.tif"),
         ("[ground\n", "not valid TOML"),
     ],
 )
