@@ -54,7 +54,7 @@ def spectrum(values):
 # All reference values: USGS 3DEP, Kings Creek watershed of Konza Prairie, 11 km2. It is one watershed: the standard
 # deviation of the median slope among squares of its size is 1.4 degrees here, of the relief over 1 km 11 m.
 def test_slopes_are_those_of_the_watershed(landscapes):
-    """Within 15 % and two standard errors: mean of the quantiles of 48 squares of 2.61 km, near the watershed's size."""
+    """Within 15 % and two standard errors: mean quantiles of 48 squares of 2.61 km, near the watershed's size."""
     found = []
     for values in landscapes:
         down, across = np.gradient(means_30m(values), 30.0)
