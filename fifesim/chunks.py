@@ -179,6 +179,8 @@ def margin_reads(array, rows, columns=None, offset=(0, 0), shape=None):
     columns = rows if columns is None else columns
     depths = [(0, 0)] * (array.ndim - 2) + [(rows, rows), (columns, columns)]
     if rows or columns:
+        # Missing is NaN, which integers do not have.
+        array = array if array.dtype.kind == "f" else array.astype(float)
         pad = da.pad if isinstance(array, da.Array) else np.pad
         array = pad(array, depths, mode="constant", constant_values=np.nan)
     if shape is None:

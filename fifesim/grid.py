@@ -2,6 +2,7 @@
 
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
+import pyproj
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
@@ -274,6 +275,32 @@ def cell_size(grid):
         [m]
     """
     return -grid.affine.e, grid.affine.a
+
+
+def convergence(grid):
+    """
+    Angle from true north to the north of a grid, at its middle; positive where grid north lies east of true north.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    angle : float
+        [degree]
+
+    Examples
+    --------
+    East of the central meridian of a UTM zone, on the northern hemisphere:
+
+    >>> round(convergence(grid_at("EPSG:26914", 705000, 4334000, 3000, 3000, 30)), 2)
+    1.51
+    """
+    crs = pyproj.CRS.from_wkt(grid.crs.to_wkt())
+    x, y = transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)
+    to_degrees = pyproj.Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
+    return float(pyproj.Proj(crs).get_factors(*to_degrees.transform(x, y)).meridian_convergence)
 
 
 def describe(grid):

@@ -1,5 +1,7 @@
 """Fixed tiles of an unbounded lattice: what is made by the tile is the same in every window and chunk."""
 
+from functools import lru_cache
+
 import numpy as np
 
 
@@ -44,3 +46,24 @@ def _overlap(tile, index, window_start, window_size):
     tile_start = index * tile
     start, stop = max(tile_start, window_start), min(tile_start + tile, window_start + window_size)
     return slice(start - window_start, stop - window_start), slice(start - tile_start, stop - tile_start)
+
+
+class KeptTiles:
+    """
+    Make tiles and keep the last ones; a copy in another process starts with none.
+
+    Parameters
+    ----------
+    make : callable
+        ``make(tile_row, tile_column)`` gives one tile.
+    """
+
+    def __init__(self, make):
+        self._make = make
+        self._kept = lru_cache(maxsize=4)(make)
+
+    def __call__(self, tile_row, tile_column):
+        return self._kept(tile_row, tile_column)
+
+    def __reduce__(self):
+        return KeptTiles, (self._make,)

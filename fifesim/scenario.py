@@ -11,6 +11,7 @@ from fifesim import geometry, warp
 from fifesim import grid as grids
 from fifesim.atmosphere import aerosols, models
 from fifesim.ground import optics
+from fifesim.ground.dem import metres_per_unit
 from fifesim.ground.distribution import lai_distribution
 from fifesim.ground.leaf_angles import leaf_angle_classes
 from fifesim.ground.random_field import LARGEST_STREAMING_ARP
@@ -152,8 +153,22 @@ class Terrain(_Section):
     seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = Field(7, description="of the synthetic hills")
     fill: float | None = _number(None, "m", "holes of the file are interpolated up to this distance", gt=0)
     vertical_units: str | None = _text(None, "of the file's elevation where they are not metres, such as ft")
-    horizon_reach: float = _number(5000.0, "m", "greatest distance of terrain that hides the sky", gt=0)
+    horizon_reach: float = _number(5000.0, "m", "greatest distance of terrain that hides the sky", ge=30, le=100_000)
     upwelling: bool = Field(True, description="with the view's cosine on slopes (Eq. 5)")
+
+    @field_validator("vertical_units")
+    @classmethod
+    def _known_unit(cls, value):
+        if value is not None:
+            metres_per_unit(value)
+        return value
+
+    @model_validator(mode="after")
+    def _options_of_a_file(self):
+        for key in ("fill", "vertical_units"):
+            if getattr(self, key) is not None and self.dem in LAND_FORMS:
+                raise ValueError(f"{key} is for an elevation file, dem is {self.dem!r}: name a file or drop {key}")
+        return self
 
     @field_validator("dem")
     @classmethod
@@ -269,10 +284,25 @@ class Scenario(_Section):
         return models.Atmosphere(**self.atmosphere.model_dump())
 
     def complete(self):
-        """The same scenario with every default that a run decides written out."""
+        """
+        The same scenario with every default that a run decides written out.
+
+        Returns
+        -------
+        scenario : Scenario
+
+        Raises
+        ------
+        ValueError
+            If the image would have fewer than 2 x 2 pixels, or the grid, optics or bands are not possible.
+        """
         box = self.geobox()
         names = [band.name for band in instrument(self.sensor.instrument).select(self.sensor.bands)]
         a = box.affine
+        if min(grids.aligned(box, self._pixel()).shape) < 2:
+            raise ValueError(
+                f"grid: the image must have 2 x 2 pixels of {self._pixel():g} m or more, got {grids.describe(box)}"
+            )
         grid = Grid(
             crs=f"EPSG:{box.crs.epsg}" if box.crs.epsg else box.crs.to_wkt(),
             west=a.c,

@@ -65,8 +65,8 @@ def simulate(scenario, chunks="auto"):
     else:
         image = sensed(_reflectance(scenario, lai, instrument, dem=dem, horizon=horizon))
         kt = chain.kt(level, dem, horizon=horizon)
+        dem, slope = (_cut(raster, grid) for raster in (dem, terrain_raster.slope(dem)))
         nodes["scene"]["dem"] = dem
-        slope = terrain_raster.slope(dem)
         nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt), "level": sensed(level)}
     nodes["image"] = {"dn": image} | ({"ndvi": chain.ndvi(image)} if _has_ndvi(image) else {})
     tree = xr.DataTree.from_dict({name: xr.Dataset(arrays) for name, arrays in nodes.items()})
@@ -90,7 +90,7 @@ def elevation(scenario, grid, chunks=None):
     Returns
     -------
     dem : xarray.DataArray, dims (y, x), or None
-        None where the ground is flat. [m]
+        On the grid or a cell more on each side; None where the ground is flat. [m]
     horizon : xarray.DataArray, dims (direction, y, x), or None
         In memory. [degree]
     reach : dict of str to float
@@ -105,7 +105,8 @@ def elevation(scenario, grid, chunks=None):
     if terrain.dem == "flat":
         return None, None, {}
     if terrain.dem == "flint-hills":
-        dem = flint_hills(grid, terrain.seed, chunks=chunks)
+        # One cell more on each side: slopes at the border are those of the wider land.
+        dem = flint_hills(grid.pad(1), terrain.seed, chunks=chunks)
         around = flint_hills(_padded(grid, terrain.horizon_reach), terrain.seed)
         reach = dict.fromkeys(("north", "east", "south", "west"), terrain.horizon_reach)
     else:
@@ -142,20 +143,20 @@ def _reflectance(scenario, lai, instrument, **terrain):
     )
 
 
+def _cut(raster, grid):
+    """A raster cut to a grid of its cells."""
+    rows, columns = grids.lattice_offset(grids.geobox(raster), grid)
+    return raster.isel(y=slice(rows, rows + grid.shape.y), x=slice(columns, columns + grid.shape.x))
+
+
 def _padded(grid, margin):
-    """Coarse grid from a fine one's corner that reaches a margin further on every side."""
+    """Coarse grid on multiples of its cells from the origin of the CRS that reaches a margin past a fine one."""
     down, across = (max(round(_HILLS_AROUND / size), 1) * size for size in grids.cell_size(grid))
-    rows, columns = int(np.ceil(margin / down)), int(np.ceil(margin / across))
     box = grid.boundingbox
-    height, width = box.top - box.bottom, box.right - box.left
-    return grids.grid_at(
-        grid.crs.to_wkt(),
-        box.left - columns * across,
-        box.top + rows * down,
-        (np.ceil(width / across) + 2 * columns) * across,
-        (np.ceil(height / down) + 2 * rows) * down,
-        (down, across),
-    )
+    west, east = (np.floor((box.left - margin) / across), np.ceil((box.right + margin) / across))
+    south, north = (np.floor((box.bottom - margin) / down), np.ceil((box.top + margin) / down))
+    size = (east - west) * across, (north - south) * down
+    return grids.grid_at(grid.crs.to_wkt(), west * across, north * down, *size, (down, across))
 
 
 def _has_ndvi(image):

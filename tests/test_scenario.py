@@ -41,7 +41,7 @@ def test_default_is_the_paper_case_on_the_whole_site():
         {"geometry": {"sza": 40.0, "saa": 100.0, "vza": 10.0, "vaa": 5.0}},
         {"ground": {"arp": 0.24, "seed": 2**63 - 1, "method": "periodic", "leaf_angles": "verhoef(-0.35,-0.15)"}},
         {"ground": {"background": {"TM3": 0.1, "TM4": 0.2}}, "sensor": {"pixel": 15.0, "min_valid": 0.5}},
-        {"grid": {"cell": 1 / 3, "width": 30.0, "height": 30.0}},
+        {"grid": {"cell": 1 / 3, "width": 60.0, "height": 60.0}},
     ],
 )
 @pytest.mark.parametrize("complete", [False, True])

@@ -134,3 +134,24 @@ def test_the_scene_with_terrain_is_lazy_and_on_its_grid(hill):
         tree = fifesim.simulate(case, chunks={"y": 50, "x": 70})
     assert tree["scene"]["dem"].chunks is not None
     assert grids.same_grid(grids.geobox(tree["terrain"]["slope"]), grids.geobox(tree["image"]["dn"]))
+
+
+def test_a_mark_for_no_data_that_is_not_declared_is_no_elevation(hill, tmp_path):
+    with rasterio.open(hill()) as source:
+        values, profile = source.read(1), source.profile | {"nodata": None}
+    values[17, 20] = -9999
+    with rasterio.open(tmp_path / "marked.tif", "w", **profile) as sink:
+        sink.write(values, 1)
+    with pytest.raises(ValueError, match="-a_nodata"):
+        fifesim.simulate(scenario(dem=str(tmp_path / "marked.tif")))["terrain"]["dem"].compute()
+
+
+def test_elevation_of_a_file_goes_to_other_processes(hill):
+    lazy = fifesim.fine_dem(hill(), scenario().geobox(), chunks={"y": 50, "x": 70})
+    np.testing.assert_array_equal(lazy.compute(scheduler="processes", num_workers=2), lazy.compute(scheduler="threads"))
+
+
+@pytest.mark.parametrize("options", [{"fill": 60}, {"vertical_units": "ft"}])
+def test_what_is_for_a_file_is_refused_without_one(options):
+    with pytest.raises(ValueError, match="elevation file"):
+        scenario(**options)

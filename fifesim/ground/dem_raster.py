@@ -2,7 +2,7 @@
 
 import dataclasses
 import warnings
-from functools import lru_cache, partial
+from functools import partial
 
 import dask.array as da
 import numpy as np
@@ -15,8 +15,8 @@ from fifesim import cf
 from fifesim import chunks as chunking
 from fifesim import grid as grids
 from fifesim.ground import dem as kernels
-from fifesim.ground.elevation_raster import open_source, placement
-from fifesim.lattice import assemble
+from fifesim.ground.elevation_raster import check_heights, open_source, placement
+from fifesim.lattice import KeptTiles, assemble
 
 # Elevations are made in fixed tiles of this size. [cell]
 TILE = 504
@@ -150,7 +150,7 @@ class _Model:
 
     def tiles(self):
         """The function that makes a tile, which keeps the last ones."""
-        return lru_cache(maxsize=4)(partial(self._tile, *grids.lattice_position(self.place.grid)))
+        return KeptTiles(partial(self._tile, *grids.lattice_position(self.place.grid)))
 
     def cells(self, make_tile, first_row, first_column, shape):
         """Elevation from a row and column of the grid on; NaN where unknown."""
@@ -207,6 +207,7 @@ def _known_cells(model, make_tile, first_row, first_column, shape):
     """Cells of a grid that a model has to cover."""
     values = model.cells(make_tile, first_row, first_column, shape)
     unknown = ~np.isfinite(values)
+    check_heights(model.source.name, values)
     if unknown.any():
         grid = model.place.grid[first_row : first_row + shape[0], first_column : first_column + shape[1]]
         _raise_for_gaps(model, grid, unknown, np.arange(shape[0]), np.arange(shape[1]))
@@ -307,7 +308,8 @@ def _raise_for_gaps(model, grid, unknown, rows, columns):
     words = []
     if short:
         sides = ", ".join(f"{metres:.0f} m in the {side}" for side, metres in short.items())
-        near = int(np.ceil(max(short.values()) / 10 + 1)) * 10
+        # Filling counts from the centre of the last known cell.
+        near = int(np.ceil((max(short.values()) + model.resolution + max(_filled(model))) / 10 + 1)) * 10
         words.append(
             f"it lacks up to {sides}: take a smaller grid or a model that reaches farther"
             + (f", or fill={near} carries it on" if near <= _NEAR else "")
@@ -323,6 +325,11 @@ def _raise_for_gaps(model, grid, unknown, rows, columns):
             "interpolates it"
         )
     raise ValueError(f"{name} does not cover the grid, which spans {_extent(grid)}; " + "; ".join(words))
+
+
+def _filled(model):
+    """Distances that gaps are already filled over, down and across [m]."""
+    return [cells * size for cells, size in zip(model.fill, model.place.cell_size(), strict=True)]
 
 
 def _lead(unknown, sizes):

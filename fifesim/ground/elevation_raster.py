@@ -21,6 +21,9 @@ from fifesim.ground.dem import metres_per_unit
 # Positions in another CRS are a polynomial through those at so many Chebyshev nodes along each axis of a tile.
 _NODES = 12
 
+# Heights that land has, with room to spare. [m]
+LAND = (-500, 9000)
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
@@ -119,6 +122,11 @@ def _array_source(raster, vertical_units):
     found = raster.odc.geobox
     if found is None:
         raise ValueError(f"the x and y of {name} are not the centres of a regular grid")
+    scale, offset = raster.attrs.get("scale_factor", 1.0), raster.attrs.get("add_offset", 0.0)
+    if (scale, offset) != (1.0, 0.0):
+        raise ValueError(
+            f"{name} holds packed values, scale {scale:g}, offset {offset:g}: open it with mask_and_scale=True"
+        )
     cells = raster.transpose(*raster.odc.spatial_dims).data
     nodata = raster.rio.nodata
     nodata = None if nodata is None or np.isnan(nodata) else float(nodata)
@@ -254,3 +262,28 @@ def _chebyshev(values):
         np.polynomial.chebyshev.chebvander((values - middle) / half, _NODES - 1).T,
     ).T
     return middle + half * nodes, matrix
+
+
+def check_heights(name, values):
+    """
+    Refuse heights that land does not have.
+
+    Parameters
+    ----------
+    name : str
+        Of the elevation model.
+    values : array
+        NaN passes. [m]
+
+    Raises
+    ------
+    ValueError
+        If one is below the Dead Sea or above Mount Everest: a mark for no data, or another unit.
+    """
+    low, high = LAND
+    wrong = values[(values < low) | (values > high)]
+    if wrong.size:
+        raise ValueError(
+            f"{name} holds elevations such as {wrong.flat[0]:.0f} m, land has {low} to {high} m: if it marks no data, "
+            "declare it (gdal_edit.py -a_nodata); if the unit is another, give vertical_units="
+        )

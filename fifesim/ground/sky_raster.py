@@ -284,10 +284,22 @@ def elevation_grid(dem):
     Raises
     ------
     ValueError
-        If its units are not metres, or it does not lie north up in a projected CRS in metres.
+        If its units are not metres, it marks missing cells by a number, or it does not lie north up in a projected CRS
+        in metres.
+    TypeError
+        If it is no DataArray.
     """
+    if not isinstance(dem, xr.DataArray):
+        raise TypeError(f"a dem is an xarray.DataArray, got {dem!r}: bring it onto the grid with fifesim.fine_dem")
     cf.check_units(dem, "dem")
-    return grids.geobox(dem)
+    grid = grids.geobox(dem)
+    nodata = dem.rio.nodata
+    if nodata is not None and np.isfinite(nodata):
+        raise ValueError(
+            f"the dem marks missing cells as {nodata:g}, which would be taken for an elevation: "
+            "open it with masked=True, or bring it onto the grid with fifesim.fine_dem"
+        )
+    return grid
 
 
 def source_resolution(dem, given=None):
@@ -354,6 +366,6 @@ def _check_sun(gradient, toward_sun, geometry):
     lit = facing & (toward_sun * np.hypot(east, north) <= up)
     if np.isfinite(gradient).any() and not lit.any():
         raise ValueError(
-            f"the sun (sza {geometry.sza:g}, saa {geometry.saa:g}) is below the horizon of every slope: "
+            f"the sun (sza {geometry.sza:g}, {geometry.saa:.1f} from grid north) is below the horizon of every slope: "
             "no light falls on this terrain"
         )

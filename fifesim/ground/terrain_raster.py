@@ -1,5 +1,7 @@
 """Terrain on labelled rasters: slope, horizon, sky and the light on a slope, from an elevation model."""
 
+from dataclasses import replace
+
 import dask.array as da
 import numpy as np
 import xarray as xr
@@ -213,8 +215,8 @@ def kt(reflectance, dem, *, direct_transmittance, transmittance_down, geometry, 
     """
     direct, total = (np.reshape(each, (-1, 1, 1)) for each in (direct_transmittance, transmittance_down))
 
-    def kernel(rho, *place):
-        cosine, vd, mu_s_local, _ = lights.slope_light(*place, geometry)
+    def kernel(rho, seen, *place):
+        cosine, vd, mu_s_local, _ = lights.slope_light(*place, seen)
         return lights.kt(vd, (1 + cosine) / 2 - vd, rho, mu_s_local, geometry.mu_s, direct, total)
 
     return _on_slopes(kernel, reflectance, dem, geometry, horizon, "kt", "kt: Eq. 4")
@@ -264,8 +266,8 @@ def terrain_reflectance(
     """
     cf.check_units(reflectance, "surface_reflectance")
 
-    def kernel(rho, *place):
-        return lights.slope_reflectance(rho, *place, geometry, direct_transmittance, transmittance_down, upwelling)
+    def kernel(rho, seen, *place):
+        return lights.slope_reflectance(rho, *place, seen, direct_transmittance, transmittance_down, upwelling)
 
     said = f"terrain: Kt (Eq. 4){' and view cosine (Eq. 5)' if upwelling else ''}"
     return _on_slopes(kernel, reflectance, dem, geometry, horizon, "surface_reflectance", said)
@@ -284,7 +286,7 @@ def _slope_or_aspect(dem, name, which):
 def _light(dem, horizon, geometry, name, pick):
     """One of the quantities that `slope_light` gives, at every cell."""
     grid = sky_raster.elevation_grid(dem)
-    used = geometry or fife_geometry()
+    used = _from_grid_north(geometry or fife_geometry(), grid)
     dem = dem.transpose("y", "x")
     data, horizon = _lazy_together(dem.data, horizon)
     sky, between = sky_raster.sky_above(
@@ -308,11 +310,12 @@ def _on_slopes(kernel, reflectance, dem, geometry, horizon, name, said):
     offset = _offset(dem_grid, grid)
     reflectance, dem = reflectance.transpose("band", "y", "x"), dem.transpose("y", "x")
     rho, data, horizon = _lazy_together(reflectance.data, dem.data, horizon)
-    sky, between = sky_raster.sky_above(data, dem_grid, sky_raster.source_resolution(dem), horizon, geometry)
+    seen = _from_grid_north(geometry, grid)
+    sky, between = sky_raster.sky_above(data, dem_grid, sky_raster.source_resolution(dem), horizon, seen)
     cell, shape = grids.cell_size(grid), rho.shape
 
     def block_kernel(rows, columns, block, elevation, layers):
-        return kernel(block, elevation, layers, *between.block(rows, columns, offset), *cell)
+        return kernel(block, seen, elevation, layers, *between.block(rows, columns, offset), *cell)
 
     reads = [
         chunking.margin_reads(rho, 0),
@@ -323,6 +326,12 @@ def _on_slopes(kernel, reflectance, dem, geometry, horizon, name, said):
     out = grids.place(reflectance.copy(data=out), grid)
     out = cf.with_geometry(out, geometry)
     return cf.label(out, name, source=reflectance, history=said, references=sky_raster.REFERENCE)
+
+
+def _from_grid_north(geometry, grid):
+    """Directions whose azimuths count from the north of the grid, as aspects and horizons do."""
+    turn = grids.convergence(grid)
+    return replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
 
 
 def _offset(dem_grid, grid):

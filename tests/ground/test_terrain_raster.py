@@ -139,7 +139,8 @@ def test_chain_takes_its_light_from_the_atmosphere(lai, dem, level):
     without = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], dem=dem, geometry=SUN, upwelling=False)
     np.testing.assert_allclose(without, level * kt, rtol=1e-12)
     slope, aspect = np.radians(dem.fifesim.slope()), np.radians(dem.fifesim.aspect())
-    vza, vaa = np.radians(20.0), np.radians(40.0)
+    # Aspect counts from the north of the grid, the view from true north.
+    vza, vaa = np.radians(20.0), np.radians(40.0 - grids.convergence(grids.geobox(lai)))
     factor = np.cos(slope) + np.sin(slope) * np.tan(vza) * np.cos(vaa - aspect)
     tilted = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], dem=dem, geometry=SUN)
     np.testing.assert_allclose(tilted, without * factor, rtol=1e-10)
@@ -156,7 +157,7 @@ def test_nothing_is_computed_before_it_is_asked_for(lai, around):
 def test_sun_below_every_horizon_is_refused(site):
     steep = elevation(site, plane(tuple(site.shape), 10 / 3, 10 / 3, 40.0, 0.0))
     for function in (fifesim.shadow, fifesim.illumination):
-        with pytest.raises(ValueError, match=r"sza 60, saa 180.*below the horizon of every slope"):
+        with pytest.raises(ValueError, match=r"sza 60, 178.* from grid north.*below the horizon of every slope"):
             function(steep, Geometry(60.0, 180.0))
 
 
@@ -209,3 +210,25 @@ def test_small_and_coarse_rasters_have_horizons_too():
     np.testing.assert_allclose(fifesim.sky_view(tiny), 1, rtol=1e-12)
     wide = elevation(fifesim.grid_at("EPSG:26914", 700000, 4330000, 80000, 60000, 10000), np.full((6, 8), 7.0))
     np.testing.assert_allclose(fifesim.sky_view(wide), 1, rtol=1e-12)
+
+
+def test_the_sun_counts_from_true_north_and_the_slope_from_grid_north():
+    """In EPSG:3035 over Portugal grid north lies 12.8 degrees west of true north."""
+    grid = fifesim.grid_at("EPSG:3035", 2700000, 1900000, 600, 600, 10)
+    turn = grids.convergence(grid)
+    assert turn == pytest.approx(-12.8, abs=0.6)
+    hill = elevation(grid, plane(tuple(grid.shape), 10.0, 10.0, 20.0, 0.0))
+    # Straight up the slope, by the grid, stands the sun at the azimuth of the slope and the convergence.
+    aspect = float(hill.fifesim.aspect()[30, 30])
+    at = [float(hill.fifesim.illumination(Geometry(40.0, aspect + turn + side))[30, 30]) for side in (-5.0, 0.0, 5.0)]
+    assert at[1] == pytest.approx(np.cos(np.radians(20.0)), abs=1e-6)
+    assert at[0] == pytest.approx(at[2], abs=1e-9)
+
+
+def test_a_dem_of_integers_is_an_elevation_and_an_undeclared_mark_is_not(dem):
+    whole = dem.round().astype("int16").assign_attrs(dem.attrs)
+    np.testing.assert_array_equal(fifesim.slope(whole), fifesim.slope(whole.astype(float).assign_attrs(dem.attrs)))
+    with pytest.raises(ValueError, match="masked=True"):
+        fifesim.slope(dem.rio.write_nodata(-9999.0))
+    with pytest.raises(TypeError, match="fine_dem"):
+        fifesim.slope("hill.tif")
