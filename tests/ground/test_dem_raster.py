@@ -300,7 +300,7 @@ def test_terraces_of_whole_numbers_are_warned_of(tmp_path, path):
     with pytest.warns(UserWarning, match="vertical resolution of 1 m"):
         fifesim.fine_dem(write(tmp_path / "steps.tif", *model(gentle)), grid())
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", UserWarning)
         fifesim.fine_dem(path, grid())
 
 
