@@ -149,7 +149,9 @@ def names_a_file(key, value):
 class Terrain(_Section):
     """Elevation, and the light on slopes."""
 
-    dem: str = _text("flint-hills", "flint-hills (synthetic), flat, or a raster file of elevation")
+    dem: str = _text(
+        "flint-hills", "flint-hills (synthetic), flat, or a raster file of elevation; flat below a lai_file by default"
+    )
     seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = Field(7, description="of the synthetic hills")
     fill: float | None = _number(None, "m", "holes of the file are interpolated up to this distance", gt=0)
     vertical_units: str | None = _text(None, "of the file's elevation where they are not metres, such as ft")
@@ -261,6 +263,20 @@ class Scenario(_Section):
     geometry: SunAndView = SunAndView()
     atmosphere: Air = Air()
     sensor: Sensor = Sensor()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_invented_hills(cls, values):
+        """A map of real ground without an elevation is flat: synthetic hills are for synthetic landscapes."""
+        if not isinstance(values, dict):
+            return values
+        ground, terrain = (values.get(name, {}) for name in ("ground", "terrain"))
+        lai_file = (
+            ground.lai_file if isinstance(ground, Ground) else isinstance(ground, dict) and ground.get("lai_file")
+        )
+        if lai_file and isinstance(terrain, dict) and "dem" not in terrain:
+            return values | {"terrain": {"dem": "flat"} | terrain}
+        return values
 
     def geobox(self):
         """Grid of the ground cells, an `odc.geo.geobox.GeoBox`."""

@@ -11,7 +11,7 @@ from affine import Affine
 import fifesim
 from fifesim import grid as grids
 from fifesim.geometry import FIFE_TIME, earth_sun_distance
-from fifesim.scenario import Scenario
+from fifesim.scenario import Ground, Scenario
 from fifesim.scenario_file import parse_scenario, write_scenario
 
 SMALL = {"grid": {"width": 300.0, "height": 150.0}}
@@ -157,3 +157,11 @@ def test_scene_of_a_map_covers_the_map(tmp_path):
 def test_scenario_is_frozen():
     with pytest.raises(ValueError, match="frozen"):
         Scenario().atmosphere.visibility = 10.0
+
+
+def test_a_map_of_real_ground_lies_on_no_invented_hills():
+    assert parse_scenario({}).terrain.dem == "flint-hills"
+    assert parse_scenario({"ground": {"lai_file": "lai.tif"}}).terrain.dem == "flat"
+    given = {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "flint-hills"}}
+    assert parse_scenario(given).terrain.dem == "flint-hills"
+    assert Scenario(ground=Ground(lai_file="lai.tif")).terrain.dem == "flat"
