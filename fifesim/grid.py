@@ -289,18 +289,27 @@ def convergence(grid):
     -------
     angle : float
         [degree]
-
-    Examples
-    --------
-    East of the central meridian of a UTM zone, on the northern hemisphere:
-
-    >>> round(convergence(grid_at("EPSG:26914", 705000, 4334000, 3000, 3000, 30)), 2)
-    1.51
     """
     crs = pyproj.CRS.from_wkt(grid.crs.to_wkt())
     x, y = transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)
     to_degrees = pyproj.Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
     return float(pyproj.Proj(crs).get_factors(*to_degrees.transform(x, y)).meridian_convergence)
+
+
+def extent(grid):
+    """
+    Where a grid lies, in words.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    text : str
+    """
+    box = grid.boundingbox
+    return f"{box.left:.0f} to {box.right:.0f} E and {box.bottom:.0f} to {box.top:.0f} N"
 
 
 def describe(grid):

@@ -140,7 +140,7 @@ def file_onto_grid(path, grid, chunks=None):
         pipeline, _ = operation(source.crs, grid.crs.to_wkt(), area)
         back, _ = operation(grid.crs.to_wkt(), source.crs, area)
         if not _meets(source, grid, back):
-            raise ValueError(f"{path} does not overlap the grid, which spans {_extent(grid)}")
+            raise ValueError(f"{path} does not overlap the grid, which spans {grids.extent(grid)}")
     # A file that has changed is another file to the cache.
     state = Path(path).stat().st_mtime_ns
     make_tile = partial(_warp_tile, str(path), state, grid, pipeline, back)
@@ -250,11 +250,6 @@ def degrees(grid):
     """
     to_degrees = pyproj.Transformer.from_crs(grid.crs.to_wkt(), 4326, always_xy=True)
     return to_degrees.transform_bounds(*grid.boundingbox.bbox)
-
-
-def _extent(grid):
-    box = grid.boundingbox
-    return f"{box.left:.0f} to {box.right:.0f} E and {box.bottom:.0f} to {box.top:.0f} N"
 
 
 def _source_points(grid, crs, back, source_crs):

@@ -116,7 +116,7 @@ def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None):
     model = dataclasses.replace(model, place=placement(model.source, coarse))
     values = model.cells(model.tiles(), 0, 0, tuple(coarse.shape))
     if not np.isfinite(values).any():
-        raise ValueError(f"{model.source.name} does not reach the grid, which spans {_extent(grid)}")
+        raise ValueError(f"{model.source.name} does not reach the grid, which spans {grids.extent(grid)}")
     reach = _reach(np.isfinite(values), around, grids.cell_size(coarse))
     kept = _with_data(np.isfinite(values), around)
     dem = grids.place(xr.DataArray(values[kept], dims=("y", "x")), coarse[kept])
@@ -287,7 +287,9 @@ def _raise_for_gaps(model, grid, unknown, rows, columns):
     """Say which part of a grid a model lacks, from a look at some of its rows and columns."""
     name = model.source.name
     if unknown.all():
-        raise ValueError(f"{name} holds no elevation on the grid, which spans {_extent(grid)}: is it the right place?")
+        raise ValueError(
+            f"{name} holds no elevation on the grid, which spans {grids.extent(grid)}: is it the right place?"
+        )
     down, across = grids.cell_size(grid)
     height, width = (np.gradient(cells.astype(float)) * size for cells, size in ((rows, down), (columns, across)))
     leads = {
@@ -324,7 +326,7 @@ def _raise_for_gaps(model, grid, unknown, rows, columns):
             f"it has {number} of {tall:.0f} x {wide:.0f} m at {east:.0f} E {north:.0f} N: fill={middle_distance} "
             "interpolates it"
         )
-    raise ValueError(f"{name} does not cover the grid, which spans {_extent(grid)}; " + "; ".join(words))
+    raise ValueError(f"{name} does not cover the grid, which spans {grids.extent(grid)}; " + "; ".join(words))
 
 
 def _filled(model):
@@ -389,8 +391,3 @@ def _with_data(known, around):
         size = known.shape[axis]
         parts.append(slice(min(int(found[0]), margin), max(int(found[-1]) + 1, size - margin)))
     return tuple(parts)
-
-
-def _extent(grid):
-    box = grid.boundingbox
-    return f"{box.left:.0f} to {box.right:.0f} E and {box.bottom:.0f} to {box.top:.0f} N"

@@ -328,22 +328,6 @@ def source_resolution(dem, given=None):
     return found
 
 
-def extent(grid):
-    """
-    Where a grid lies, in words.
-
-    Parameters
-    ----------
-    grid : odc.geo.geobox.GeoBox
-
-    Returns
-    -------
-    extent : str
-    """
-    box = grid.boundingbox
-    return f"{box.left:.0f} to {box.right:.0f} E and {box.bottom:.0f} to {box.top:.0f} N"
-
-
 def _check_horizon(grid, horizon):
     cf.check_units(horizon, "horizon")
     found = grids.geobox(horizon)
@@ -354,8 +338,8 @@ def _check_horizon(grid, horizon):
     covers = b.left - a.left < across and a.right - b.right < across and b.bottom - a.bottom < down
     if found.crs != grid.crs or not (covers and a.top - b.top < down):
         raise ValueError(
-            f"the horizon spans {extent(found)} in {found.crs} and does not cover the dem's {extent(grid)} in "
-            f"{grid.crs}: take it from a dem that reaches further"
+            f"the horizon spans {grids.extent(found)} in {found.crs} and does not cover the dem's "
+            f"{grids.extent(grid)} in {grid.crs}: take it from a dem that reaches further"
         )
 
 

@@ -340,14 +340,12 @@ def _offset(dem_grid, grid):
         rows, columns = grids.lattice_offset(dem_grid, grid)
     except ValueError:
         raise ValueError(
-            f"the dem lies on other cells ({sky_raster.extent(dem_grid)}, {dem_grid.affine.a:g} m) than the raster "
-            f"({sky_raster.extent(grid)}, {grid.affine.a:g} m): bring it onto the raster's grid first"
+            f"the dem lies on other cells ({grids.extent(dem_grid)}, {dem_grid.affine.a:g} m) than the raster "
+            f"({grids.extent(grid)}, {grid.affine.a:g} m): bring it onto the raster's grid first"
         ) from None
     beyond = rows + grid.shape.y > dem_grid.shape.y or columns + grid.shape.x > dem_grid.shape.x
     if rows < 0 or columns < 0 or beyond:
-        raise ValueError(
-            f"the dem spans {sky_raster.extent(dem_grid)} and does not cover the raster's {sky_raster.extent(grid)}"
-        )
+        raise ValueError(f"the dem spans {grids.extent(dem_grid)} and does not cover the raster's {grids.extent(grid)}")
     return rows, columns
 
 
