@@ -1,6 +1,5 @@
 """How a kernel of numpy arrays meets dask: by cell, by place, or from one grid onto another."""
 
-from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
@@ -10,6 +9,7 @@ import xarray as xr
 from dask.base import tokenize
 
 from fifesim import grid as grids
+from fifesim.blocks import array_from_windows, gather, slices
 
 
 def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
@@ -89,11 +89,11 @@ def tiles(kernel, grid, chunks=None, *, tile):
     sizes = _tile_chunks(grid, tile) if chunks == "auto" else _chunk_tuple(chunks)
     normal = da.core.normalize_chunks(sizes, shape=tuple(grid.shape), dtype=float)
 
-    def block(block_info=None):
-        (top, bottom), (left, right) = block_info[None]["array-location"]
-        return kernel(top, left, (bottom - top, right - left))
+    def ask(rows, columns):
+        return (rows.start, columns.start, (rows.stop - rows.start, columns.stop - columns.start)), ()
 
-    lazy = xr.DataArray(da.map_blocks(block, chunks=normal, dtype=float), dims=("y", "x"))
+    data = array_from_windows(kernel, [], normal, ask, token=tokenize(kernel, normal))
+    lazy = xr.DataArray(data, dims=("y", "x"))
     # xarray would take over dask's name.
     return grids.place(lazy.rename(None), grid)
 
@@ -131,7 +131,11 @@ def resample(kernel, rows, columns, array, grid):
 
 
 class Reads(NamedTuple):
-    """What each cell of a result reads of an array: from its row ``rows[0]`` up to ``rows[1]``, and so its columns."""
+    """
+    What each cell of a result reads of an array: from its row ``rows[0]`` up to ``rows[1]``, and so its columns.
+
+    Rows and columns that the array does not have are NaN.
+    """
 
     array: np.ndarray | da.Array  # shape (..., y, x)
     rows: tuple[np.ndarray, np.ndarray]
@@ -177,16 +181,13 @@ def margin_reads(array, rows, columns=None, offset=(0, 0), shape=None):
     reads : Reads
     """
     columns = rows if columns is None else columns
-    depths = [(0, 0)] * (array.ndim - 2) + [(rows, rows), (columns, columns)]
-    if rows or columns:
+    if (rows or columns) and array.dtype.kind != "f":
         # Missing is NaN, which integers do not have.
-        array = array if array.dtype.kind == "f" else array.astype(float)
-        pad = da.pad if isinstance(array, da.Array) else np.pad
-        array = pad(array, depths, mode="constant", constant_values=np.nan)
+        array = array.astype(float)
     if shape is None:
-        shape = array.shape[-2] - 2 * rows - offset[0], array.shape[-1] - 2 * columns - offset[1]
-    starts = [first + np.arange(size) for first, size in zip(offset, shape, strict=True)]
-    return Reads(array, *((start, start + 1 + 2 * depth) for start, depth in zip(starts, (rows, columns), strict=True)))
+        shape = array.shape[-2] - offset[0], array.shape[-1] - offset[1]
+    cells = [first + np.arange(size) for first, size in zip(offset, shape, strict=True)]
+    return Reads(array, *((at - depth, at + depth + 1) for at, depth in zip(cells, (rows, columns), strict=True)))
 
 
 def windows(kernel, reads, shape, chunks=None):
@@ -209,16 +210,13 @@ def windows(kernel, reads, shape, chunks=None):
     """
     if chunks is None:
         whole = [slice(0, size) for size in shape[-2:]]
-        return kernel(*whole, *(each.array[(..., *each.window(*whole))] for each in reads))
-    # Once for all blocks: dask would pickle the kernel for each.
-    token = tokenize(kernel, reads, shape)
-    lines = [
-        da.concatenate(
-            [_window_block(kernel, reads, shape, rows, columns, token) for columns in _slices(chunks[1])], axis=-1
-        )
-        for rows in _slices(chunks[0])
-    ]
-    return da.concatenate(lines, axis=-2)
+        return kernel(*whole, *(gather(each.array, each.window(*whole)) for each in reads))
+
+    def ask(rows, columns):
+        return (rows, columns), [each.window(rows, columns) for each in reads]
+
+    token = tokenize(kernel, reads, shape, chunks)
+    return array_from_windows(kernel, [each.array for each in reads], chunks, ask, token=token, leading=shape[:-2])
 
 
 def neighbourhood(kernel, array, depth, bands=0):
@@ -273,53 +271,26 @@ def runs(cells, chunks):
     return tuple(np.diff([*starts, len(chunk)]).tolist())
 
 
-def _window_block(kernel, reads, shape, rows, columns, token):
-    """One block of a result, of one task."""
-    arguments = []
-    axes = len(shape)
-    for each in reads:
-        block = each.array[(..., *each.window(rows, columns))]
-        if isinstance(block, da.Array):
-            block = block.rechunk(-1)
-        arguments += [block, tuple(range(axes, axes + block.ndim))]
-        axes += block.ndim
-    sizes = (*shape[:-2], rows.stop - rows.start, columns.stop - columns.start)
-    return da.blockwise(
-        partial(kernel, rows, columns),
-        tuple(range(len(shape))),
-        *arguments,
-        new_axes=dict(enumerate(sizes)),
-        name=f"windows-{token}-{rows.start}-{columns.start}",
-        concatenate=True,
-        dtype=float,
-        meta=np.empty((0,) * len(shape)),
-    )
-
-
-def _slices(sizes):
-    ends = np.cumsum(sizes).tolist()
-    return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
-
-
 def _resample_lazily(kernel, rows, columns, data):
-    """One task for each output chunk and band chunk, on the merged input window."""
+    """One task for each block of pixels, on the merged window of cells."""
     # What regularize makes of it.
-    dtype = np.float32 if data.dtype == np.float32 else np.float64
-    blocks = []
-    for row_range in _output_ranges(rows, data.chunks[-2]):
-        line = []
-        for column_range in _output_ranges(columns, data.chunks[-1]):
-            these, those = rows[row_range], columns[column_range]
-            block = data[..., these.window, those.window].rechunk({data.ndim - 2: -1, data.ndim - 1: -1})
-            chunks = (*block.chunks[:-2], (len(these),), (len(those),))
-            line.append(block.map_blocks(kernel, these, those, dtype=dtype, chunks=chunks))
-        blocks.append(da.concatenate(line, axis=-1))
-    return da.concatenate(blocks, axis=-2)
+    dtype = np.dtype(np.float32 if data.dtype == np.float32 else np.float64)
+    # A pixel is made with the chunk of its last cell: all that it needs of others lies before, and was cut off there.
+    lasts = [axis.start + np.maximum(axis.count, 1) - 1 for axis in (rows, columns)]
+    chunks = tuple(runs(last, sizes) for last, sizes in zip(lasts, data.chunks[-2:], strict=True))
+    parts = [
+        {part.start: axis[part] for part in slices(sizes)} for axis, sizes in zip((rows, columns), chunks, strict=True)
+    ]
 
+    def ask(row_range, column_range):
+        these, those = parts[0][row_range.start], parts[1][column_range.start]
+        return (these, those), [(these.window, those.window)]
 
-def _output_ranges(operator, chunks):
-    """Runs of outputs whose footprints are centred in one input chunk, so that few chunks are read twice."""
-    return _slices(runs(operator.start + operator.count // 2, chunks))
+    def block(these, those, window):
+        return kernel(window, these, those)
+
+    token = tokenize(kernel, rows, columns, data.name)
+    return array_from_windows(block, [data], chunks, ask, token=token, leading=data.shape[:-2], dtype=dtype)
 
 
 def _other_coordinates(array):

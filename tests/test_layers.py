@@ -16,7 +16,7 @@ LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 # From the bottom up: a file imports only files of lower tiers. Physics of one stage may import each other, and so may
 # its files on labelled rasters, whose names end in "raster".
 TIERS = (
-    {"datasets", "footprints", "geometry", "lattice", "progress", "sites"},
+    {"blocks", "datasets", "footprints", "geometry", "lattice", "progress", "sites"},
     {"bands"},
     {"cf", "grid"},
     {"chunks"},

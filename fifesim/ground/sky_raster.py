@@ -200,8 +200,8 @@ def _samples(data, grid, places):
         i, j = (at[part] - at[part.start] + 1 for at, part in zip(cells, (rows, columns), strict=True))
         return np.stack([block[np.ix_(i, j)], *terrain.gradient(block, *size, i, j)])
 
-    padded = chunking.margin_reads(data, 1).array
-    reads = chunking.Reads(padded, *((each, each + 3) for each in cells))
+    known = chunking.margin_reads(data, 1).array
+    reads = chunking.Reads(known, *((each - 1, each + 2) for each in cells))
     chunks = None
     if isinstance(data, da.Array):
         chunks = tuple(chunking.runs(at, sizes) for at, sizes in zip(cells, data.chunks, strict=True))

@@ -1,0 +1,167 @@
+"""Lazy arrays whose every block is one task, which gathers windows of others and hands them to a kernel."""
+
+from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
+
+import dask.array as da
+import numpy as np
+from dask.highlevelgraph import HighLevelGraph
+
+
+class _Plan(NamedTuple):
+    """How the parts of a window come together: its shape, whether parts of it lie beyond the array, and the parts."""
+
+    shape: tuple[int, int]
+    beyond: bool
+    into: tuple[tuple[slice, slice], ...]
+    taken: tuple[tuple[slice, slice], ...]
+
+
+def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=float):
+    """
+    Lazy array whose blocks are made by a kernel from windows of other lazy arrays.
+
+    Where a window needs little of a chunk, that is cut out first, so that the chunk need not wait in memory for its
+    neighbours. All tasks are one layer of the graph, and the kernel is in it once.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(*place, *windows)`` gives a block, shape leading + (rows, columns).
+    arrays : sequence of dask.array.Array, shape (..., y, x)
+    chunks : (tuple of int, tuple of int)
+        Of the result over y and x.
+    ask : callable
+        ``ask(rows, columns)`` gives, for two slices of the result, the ``place`` that the kernel is told and the
+        ``(rows, columns)`` slices of each array. Beyond an array a window is NaN.
+    token : str
+        Names the result: equal for equal results only.
+    leading : tuple of int, optional
+        Lengths of the axes of the result before y and x.
+    dtype : dtype, optional
+        Of the result.
+
+    Returns
+    -------
+    array : dask.array.Array, shape leading + (y, x)
+    """
+    arrays = [array.rechunk(dict.fromkeys(range(array.ndim - 2), -1)) for array in arrays]
+    name, shared = f"windows-{token}", f"windows-kernel-{token}"
+    graph = {shared: kernel}
+    starts = [[_starts(sizes) for sizes in array.chunks[-2:]] for array in arrays]
+    for i, rows in enumerate(slices(chunks[0])):
+        for j, columns in enumerate(slices(chunks[1])):
+            place, windows = ask(rows, columns)
+            plans, keys = [], []
+            for array, edges, window in zip(arrays, starts, windows, strict=True):
+                plan, parts = _plan(array, edges, window, graph)
+                plans.append(plan)
+                keys.append(parts)
+            graph[(name, *(0 for _ in leading), i, j)] = (partial(_make, place, plans), shared, keys)
+    sizes = (*((length,) for length in leading), *chunks)
+    layers = HighLevelGraph.from_collections(name, graph, dependencies=arrays)
+    return da.Array(layers, name, sizes, dtype=dtype, meta=np.empty((0,) * len(sizes), dtype))
+
+
+def slices(sizes):
+    """
+    Slices of chunks.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+
+    Returns
+    -------
+    slices : list of slice
+
+    Examples
+    --------
+    >>> slices((3, 2))
+    [slice(0, 3, None), slice(3, 5, None)]
+    """
+    edges = _starts(sizes).tolist()
+    return [slice(start, stop) for start, stop in pairwise(edges)]
+
+
+def gather(array, window):
+    """
+    Window of an array in memory, NaN beyond it.
+
+    Parameters
+    ----------
+    array : numpy.ndarray, shape (..., y, x)
+    window : (slice, slice)
+        Rows and columns, which may be negative or larger than the array.
+
+    Returns
+    -------
+    window : numpy.ndarray, shape (..., rows, columns)
+        A view where it can be.
+    """
+    parts, into = [], []
+    for part, size in zip(window, array.shape[-2:], strict=True):
+        start, stop = max(part.start, 0), min(part.stop, size)
+        parts.append(slice(start, max(start, stop)))
+        into.append(slice(start - part.start, max(start, stop) - part.start))
+    shape = tuple(part.stop - part.start for part in window)
+    return _joined(_Plan(shape, tuple(parts) != tuple(window), (tuple(into),), (tuple(parts),)), [array])
+
+
+def _starts(sizes):
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(int)
+
+
+def _plan(array, edges, window, graph):
+    """Where the parts of a window come from; those that are little of a chunk are cut out by tasks of their own."""
+    shape = tuple(part.stop - part.start for part in window)
+    beyond = any(part.start < 0 or part.stop > size for part, size in zip(window, array.shape[-2:], strict=True))
+    into, taken, keys = [], [], []
+    for i, row_into, row_taken in _overlaps(edges[0], window[0]):
+        for j, column_into, column_taken in _overlaps(edges[1], window[1]):
+            whole = (edges[0][i + 1] - edges[0][i]) * (edges[1][j + 1] - edges[1][j])
+            key = (array.name, *(0,) * (array.ndim - 2), i, j)
+            part = (row_taken, column_taken)
+            if 2 * (row_taken.stop - row_taken.start) * (column_taken.stop - column_taken.start) < whole:
+                cut = (f"cut-{array.name}", i, j, *(edge for each in part for edge in (each.start, each.stop)))
+                graph[cut] = (partial(_cut, part), key)
+                key, part = cut, (slice(None), slice(None))
+            into.append((row_into, column_into))
+            taken.append(part)
+            keys.append(key)
+    return _Plan(shape, beyond, tuple(into), tuple(taken)), keys
+
+
+def _overlaps(edges, part):
+    """Chunks along an axis that a slice touches, where their cells go, and which they are."""
+    start, stop = max(part.start, 0), min(part.stop, int(edges[-1]))
+    if stop <= start:
+        return
+    for index in range(int(np.searchsorted(edges, start, side="right")) - 1, int(np.searchsorted(edges, stop))):
+        first, last = max(start, int(edges[index])), min(stop, int(edges[index + 1]))
+        if last > first:
+            before = int(edges[index])
+            yield index, slice(first - part.start, last - part.start), slice(first - before, last - before)
+
+
+def _cut(part, chunk):
+    return chunk[(..., *part)].copy()
+
+
+def _make(place, plans, kernel, parts):
+    return kernel(*place, *(_joined(plan, each) for plan, each in zip(plans, parts, strict=True)))
+
+
+def _joined(plan, parts):
+    if len(parts) == 1 and not plan.beyond:
+        return parts[0][(..., *plan.taken[0])]
+    dtype = np.result_type(*parts) if parts else np.float64
+    leading = parts[0].shape[:-2] if parts else ()
+    if plan.beyond:
+        window = np.full((*leading, *plan.shape), np.nan, np.result_type(dtype, np.float32))
+    else:
+        window = np.empty((*leading, *plan.shape), dtype)
+    for into, taken, part in zip(plan.into, plan.taken, parts, strict=True):
+        window[(..., *into)] = part[(..., *taken)]
+    return window
