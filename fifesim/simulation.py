@@ -17,6 +17,9 @@ from fifesim.sensor.instruments import instrument as find_instrument
 # The synthetic hills around a scene are made at this resolution, as its own horizons are. [m]
 _HILLS_AROUND = 30.0
 
+# A horizon has 32 numbers a cell: 16 MB in chunks of this size. [cell]
+_AROUND_CHUNK = 252
+
 
 def simulate(scenario, chunks="auto"):
     """
@@ -92,7 +95,7 @@ def elevation(scenario, grid, chunks=None):
     dem : xarray.DataArray, dims (y, x), or None
         On the grid or a cell more on each side; None where the ground is flat. [m]
     horizon : xarray.DataArray, dims (direction, y, x), or None
-        In memory. [degree]
+        Lazy. [degree]
     reach : dict of str to float
         How far the elevation is known beyond each side of the grid, up to the reach of horizons. [m]
 
@@ -107,16 +110,35 @@ def elevation(scenario, grid, chunks=None):
     if terrain.dem == "flint-hills":
         # One cell more on each side: slopes at the border are those of the wider land.
         dem = flint_hills(grid.pad(1), terrain.seed, chunks=chunks)
-        around = flint_hills(_padded(grid, terrain.horizon_reach), terrain.seed)
+        wider = _padded(grid, terrain.horizon_reach)
+        around = flint_hills(wider, terrain.seed, chunks=_AROUND_CHUNK)
+        middle = flint_hills(wider[_middle(wider.shape)], terrain.seed)
         reach = dict.fromkeys(("north", "east", "south", "west"), terrain.horizon_reach)
     else:
         options = {"fill": terrain.fill, "vertical_units": terrain.vertical_units}
         dem = fine_dem(terrain.dem, grid, chunks=chunks, **options)
         around, reach = source_dem(terrain.dem, grid, terrain.horizon_reach, **options)
-    horizon = sky_raster.horizon(around, reach=terrain.horizon_reach)
-    # On lazy elevation no chunk knows whether the sun reaches another: the land around is in memory.
-    terrain_raster.illumination(around, scenario.sun_and_view(), horizon)
+        middle, around = around[_middle(around.shape)], around.chunk(_AROUND_CHUNK)
+    horizon = sky_raster.horizon(around, reach=terrain.horizon_reach, beside=dem)
+    _check_sun(middle, around, horizon, scenario.sun_and_view())
     return dem, horizon, reach
+
+
+def _middle(shape):
+    return tuple(slice(max(size // 2 - 8, 0), size // 2 + 8) for size in shape)
+
+
+def _check_sun(middle, around, horizon, geometry):
+    """Somewhere the sun must shine: on lazy elevation no chunk knows whether it reaches another."""
+    # Where no slope is as steep as the sun is high, all face it, and what hides it from them is lit itself.
+    if float(terrain_raster.slope(middle).max()) < 90 - geometry.sza:
+        return
+    light = terrain_raster.illumination(around, geometry, horizon)
+    for block in light.data.blocks.ravel():
+        if np.any(block.compute() > 0):
+            return
+    # Nowhere: the same on elevation in memory says so.
+    terrain_raster.illumination(around.compute(), geometry, horizon.compute())
 
 
 def _leaf_area(scenario, grid, chunks):

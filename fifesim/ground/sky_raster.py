@@ -25,7 +25,7 @@ _SOURCE_RESOLUTION = 30.0
 REFERENCE = "Dozier and Frew (1990), doi:10.1109/36.58986"
 
 
-def horizon(dem, *, directions=DIRECTIONS, reach=REACH, resolution=None):
+def horizon(dem, *, directions=DIRECTIONS, reach=REACH, resolution=None, beside=None):
     """
     Horizon of the land around, at the resolution of the elevation's source.
 
@@ -40,6 +40,8 @@ def horizon(dem, *, directions=DIRECTIONS, reach=REACH, resolution=None):
     resolution : float, optional
         Spacing of the cells at which the horizon is found, as a whole number of cells; by default the attribute
         ``source_resolution`` of ``dem``, else 30 m. [m]
+    beside : xarray.DataArray, dims (y, x), optional
+        A lazy elevation model that ``dem`` lies around. A lazy result then has a chunk for each of its.
 
     Returns
     -------
@@ -64,6 +66,8 @@ def horizon(dem, *, directions=DIRECTIONS, reach=REACH, resolution=None):
     horizons.horizon_margin(*cell, reach)
     useful = _useful_reach(reach, cell, samples.shape[1:])
     reads = chunking.margin_reads(samples[0], *horizons.horizon_margin(*cell, useful))
+    if chunks is not None and beside is not None and beside.chunks is not None:
+        chunks = _chunks_beside(beside.transpose("y", "x"), _coarse_grid(grid, places))
 
     def kernel(rows, columns, block):
         return horizons.horizon_zenith(block, *cell, azimuths, useful)
@@ -178,7 +182,7 @@ def sky_above(data, grid, resolution, horizon, geometry, check=True):
         find = partial(horizons.horizon_tangent, cell_y=cell[0], cell_x=cell[1], directions=directions, reach=reach)
     else:
         directions, find = horizon["direction"].values.astype(float), horizons.tangent
-        cut = _around(grid, horizon)
+        cut = _around(grid, grids.geobox(horizon))
         reads.append(chunking.margin_reads(horizon.transpose("direction", "y", "x").data[(slice(None), *cut)], 0))
 
     def kernel(rows, columns, gradient, block):
@@ -236,18 +240,30 @@ def _coarse_grid(grid, places):
     return GeoBox(shape, Affine(across, 0.0, float(x) - across / 2, 0.0, -down, float(y) + down / 2), grid.crs)
 
 
-def _horizon_positions(grid, horizon):
-    """Rows and columns of the elevation's cells at which the horizon's places lie."""
-    a, b = grid.affine, grids.geobox(horizon).affine
-    rows = (b.f + (np.arange(horizon.sizes["y"]) + 0.5) * b.e - a.f) / a.e - 0.5
-    columns = (b.c + (np.arange(horizon.sizes["x"]) + 0.5) * b.a - a.c) / a.a - 0.5
+def _chunks_beside(dem, coarse):
+    """Chunks of a coarse grid that end where those of the elevation in its midst do."""
+    grid = grids.geobox(dem)
+    positions = _coarse_positions(grid, coarse)[0]
+    chunks = []
+    for at, cut, sizes in zip(positions, _around(grid, coarse), dem.chunks, strict=True):
+        inside = np.clip(np.round(at[cut]), 0, sum(sizes) - 1)
+        beyond = cut.start, at.size - min(cut.stop, at.size)
+        chunks.append(tuple(filter(None, (beyond[0], *chunking.runs(inside, sizes), beyond[1]))))
+    return tuple(chunks)
+
+
+def _coarse_positions(grid, coarse):
+    """Rows and columns of the elevation's cells at which the places of a coarse grid lie."""
+    a, b = grid.affine, coarse.affine
+    rows = (b.f + (np.arange(coarse.shape.y) + 0.5) * b.e - a.f) / a.e - 0.5
+    columns = (b.c + (np.arange(coarse.shape.x) + 0.5) * b.a - a.c) / a.a - 0.5
     return [np.round(each, 6) for each in (rows, columns)], (b.e / a.e, b.a / a.a)
 
 
-def _around(grid, horizon):
-    """Slices of the horizon's places that lie on the elevation, and one more on each side."""
+def _around(grid, coarse):
+    """Slices of the places of a coarse grid that lie on the elevation, and one more on each side."""
     cuts = []
-    for at, size in zip(_horizon_positions(grid, horizon)[0], grid.shape, strict=True):
+    for at, size in zip(_coarse_positions(grid, coarse)[0], grid.shape, strict=True):
         first, last = np.searchsorted(at, (0, size - 1), side="right")
         cuts.append(slice(max(int(first) - 1, 0), int(last) + 1))
     return cuts
@@ -255,8 +271,9 @@ def _around(grid, horizon):
 
 def _horizon_places(grid, horizon):
     _check_horizon(grid, horizon)
-    positions, step = _horizon_positions(grid, horizon)
-    return _Places(*(at[cut] for at, cut in zip(positions, _around(grid, horizon), strict=True)), step)
+    coarse = grids.geobox(horizon)
+    positions, step = _coarse_positions(grid, coarse)
+    return _Places(*(at[cut] for at, cut in zip(positions, _around(grid, coarse), strict=True)), step)
 
 
 def _between(places, size):
