@@ -6,7 +6,10 @@ from typing import NamedTuple
 
 import dask.array as da
 import numpy as np
-from dask.highlevelgraph import HighLevelGraph
+from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
+
+# Begins the names of tasks that cut a part off a chunk.
+_CUT = "cut-"
 
 
 class _Plan(NamedTuple):
@@ -109,6 +112,65 @@ def gather(array, window):
     return _joined(_Plan(shape, tuple(parts) != tuple(window), (tuple(into),), (tuple(parts),)), [array])
 
 
+def is_cut(key):
+    """
+    Whether a task only cuts off a part of a chunk.
+
+    Parameters
+    ----------
+    key : tuple or str
+        Of a task.
+
+    Returns
+    -------
+    answer : bool
+    """
+    return isinstance(key, tuple) and str(key[0]).startswith(_CUT)
+
+
+class _MadeByPlace(MaterializedLayer):
+    """Layer of an array whose blocks are made from their place alone, as any part of it can be."""
+
+    def __init__(self, graph, kernel):
+        super().__init__(graph)
+        self.kernel = kernel
+
+
+def array_by_place(kernel, chunks, *, token):
+    """
+    Lazy array of a kernel that makes its cells from their place alone.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(row, column, (rows, columns))`` gives the cells from a row and column on.
+    chunks : (tuple of int, tuple of int)
+    token : str
+        As in `array_from_windows`.
+
+    Returns
+    -------
+    array : dask.array.Array, shape (y, x)
+        What `array_from_windows` needs beside a chunk is made anew, not waited for.
+    """
+    name, shared = f"place-{token}", f"place-kernel-{token}"
+    graph = {shared: kernel}
+    for i, rows in enumerate(slices(chunks[0])):
+        for j, columns in enumerate(slices(chunks[1])):
+            graph[(name, i, j)] = _part_by_place(shared, rows, columns)
+    layers = HighLevelGraph({name: _MadeByPlace(graph, shared)}, {name: set()})
+    return da.Array(layers, name, chunks, dtype=float, meta=np.empty((0, 0)))
+
+
+def _part_by_place(kernel, rows, columns):
+    shape = rows.stop - rows.start, columns.stop - columns.start
+    return (partial(_make_by_place, rows.start, columns.start, shape), kernel)
+
+
+def _make_by_place(row, column, shape, kernel):
+    return kernel(row, column, shape)
+
+
 def _starts(sizes):
     return np.concatenate([[0], np.cumsum(sizes)]).astype(int)
 
@@ -124,8 +186,8 @@ def _plan(array, edges, window, graph):
             key = (array.name, *(0,) * (array.ndim - 2), i, j)
             part = (row_taken, column_taken)
             if 2 * (row_taken.stop - row_taken.start) * (column_taken.stop - column_taken.start) < whole:
-                cut = (f"cut-{array.name}", i, j, *(edge for each in part for edge in (each.start, each.stop)))
-                graph[cut] = (partial(_cut, part), key)
+                cut = (f"{_CUT}{array.name}", i, j, *(edge for each in part for edge in (each.start, each.stop)))
+                graph[cut] = _part(array, (edges[0][i], edges[1][j]), part, key)
                 key, part = cut, (slice(None), slice(None))
             into.append((row_into, column_into))
             taken.append(part)
@@ -143,6 +205,17 @@ def _overlaps(edges, part):
         if last > first:
             before = int(edges[index])
             yield index, slice(first - part.start, last - part.start), slice(first - before, last - before)
+
+
+def _part(array, start, part, key):
+    """Task that cuts a part off a chunk, or makes it where that takes no chunk."""
+    layer = array.dask.layers.get(array.name)
+    if isinstance(layer, _MadeByPlace):
+        rows, columns = (
+            slice(int(first) + each.start, int(first) + each.stop) for first, each in zip(start, part, strict=True)
+        )
+        return _part_by_place(layer.kernel, rows, columns)
+    return (partial(_cut, part), key)
 
 
 def _cut(part, chunk):

@@ -9,7 +9,7 @@ import xarray as xr
 from dask.base import tokenize
 
 from fifesim import grid as grids
-from fifesim.blocks import array_from_windows, gather, slices
+from fifesim.blocks import array_by_place, array_from_windows, gather, slices
 
 
 def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
@@ -88,12 +88,7 @@ def tiles(kernel, grid, chunks=None, *, tile):
         return grids.place(xr.DataArray(kernel(0, 0, tuple(grid.shape)), dims=("y", "x")), grid)
     sizes = _tile_chunks(grid, tile) if chunks == "auto" else _chunk_tuple(chunks)
     normal = da.core.normalize_chunks(sizes, shape=tuple(grid.shape), dtype=float)
-
-    def ask(rows, columns):
-        return (rows.start, columns.start, (rows.stop - rows.start, columns.stop - columns.start)), ()
-
-    data = array_from_windows(kernel, [], normal, ask, token=tokenize(kernel, normal))
-    lazy = xr.DataArray(data, dims=("y", "x"))
+    lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal)), dims=("y", "x"))
     # xarray would take over dask's name.
     return grids.place(lazy.rename(None), grid)
 
@@ -275,7 +270,7 @@ def _resample_lazily(kernel, rows, columns, data):
     """One task for each block of pixels, on the merged window of cells."""
     # What regularize makes of it.
     dtype = np.dtype(np.float32 if data.dtype == np.float32 else np.float64)
-    # A pixel is made with the chunk of its last cell: all that it needs of others lies before, and was cut off there.
+    # A pixel is made with the chunk of its last cell: what it needs of earlier chunks is cut off when these are made.
     lasts = [axis.start + np.maximum(axis.count, 1) - 1 for axis in (rows, columns)]
     chunks = tuple(runs(last, sizes) for last, sizes in zip(lasts, data.chunks[-2:], strict=True))
     parts = [

@@ -18,7 +18,7 @@ LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 TIERS = (
     {"blocks", "datasets", "footprints", "geometry", "lattice", "progress", "sites"},
     {"bands"},
-    {"cf", "grid"},
+    {"cf", "grid", "schedule"},
     {"chunks"},
     {"warp"},
     {"physics"},
