@@ -1,5 +1,7 @@
 """The command line. Everything slow to import is imported by the command that needs it, so that --help is instant."""
 
+import json
+from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
 from typing import Annotated
@@ -12,10 +14,11 @@ app = typer.Typer(
 
 
 class Exit(IntEnum):
-    """Exit codes: what was asked cannot be done, and what could be done failed."""
+    """Exit codes: what was asked cannot be done, what could be done failed, and somebody pressed Ctrl-C."""
 
     MISTAKE = 2
     FAILURE = 1
+    INTERRUPTED = 130
 
 
 def _version(asked: bool):
@@ -40,20 +43,35 @@ def simulate(
     scenario: Annotated[Path | None, typer.Argument(help="TOML file; the whole FIFE site by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("fife"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
+    scene: Annotated[bool, typer.Option("--scene", help="Write the cells too: scene.zarr.")] = False,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; one for each core by default.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Compute on so many processes.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only estimate time, memory and disk.")] = False,
 ):
     """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
-    from fifesim.run import check_folder, simulate_to_folder
+    from fifesim.estimates import describe, estimate
+    from fifesim.run import check_folder, scenario_to_resume, simulate_to_folder
     from fifesim.scenario import Scenario
     from fifesim.scenario_file import read_scenario
+    from fifesim.workers import cluster
 
-    try:
-        check_folder(output, overwrite)
-        found = Scenario() if scenario is None else read_scenario(scenario)
-        files = simulate_to_folder(found, output, overwrite=overwrite)
-    except ValueError as error:
-        _stop(error, Exit.MISTAKE)
-    except (OSError, MemoryError) as error:
-        _stop(error, Exit.FAILURE)
+    with _errors_in_one_line(output):
+        check_folder(output, overwrite, resume)
+        found = scenario_to_resume(output) if resume and scenario is None else None
+        found = found or (Scenario() if scenario is None else read_scenario(scenario))
+        if dry_run:
+            typer.echo(describe(estimate(found, threads=workers or threads, scene=scene), as_json))
+            return
+        found.complete()
+        with cluster(workers, scheduler) as client:
+            options = {"overwrite": overwrite, "resume": resume, "scene": scene, "as_json": as_json}
+            files = simulate_to_folder(found, output, threads=threads, client=client, **options)
+    if as_json:
+        typer.echo(json.dumps({"event": "finished", "files": [str(path) for path in files]}))
+        return
     for path in files:
         typer.echo(path)
 
@@ -75,6 +93,18 @@ def sensors():
 
     for name in instrument_names():
         typer.echo(describe(instrument(name)))
+
+
+@contextmanager
+def _errors_in_one_line(output):
+    try:
+        yield
+    except ValueError as error:
+        _stop(error, Exit.MISTAKE)
+    except (OSError, MemoryError, RuntimeError) as error:
+        _stop(error, Exit.FAILURE)
+    except KeyboardInterrupt:
+        _stop(f"interrupted; what is finished is kept, go on with --resume -o {output}", Exit.INTERRUPTED)
 
 
 def _stop(error, code):

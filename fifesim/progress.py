@@ -1,46 +1,113 @@
-"""A progress bar for what dask computes, shown on a terminal only."""
+"""How far a run is: a bar on a terminal, lines of JSON for batch systems, else nothing."""
 
+import json
 import sys
+import time
 
-from dask.callbacks import Callback
+import psutil
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+# Between two lines of JSON. [s]
+_PAUSE = 1.0
 
 
-class ProgressBar(Callback):
+def memory():
     """
-    Show how many tasks of a computation are done; a context manager around the call that computes.
+    Resident memory of this process and of those that it started.
+
+    Returns
+    -------
+    memory : int
+        [byte]
+    """
+    here = psutil.Process()
+    total = 0
+    for process in (here, *here.children(recursive=True)):
+        try:
+            total += process.memory_info().rss
+        except psutil.Error:
+            # A child that has just ended.
+            continue
+    return total
+
+
+class CellProgress:
+    """
+    Count of cells done; a context manager around the work.
 
     Parameters
     ----------
-    label : str
-        What is being done.
+    cells : int
+        In all.
+    done : int, optional
+        Of them from an earlier run.
+    as_json : bool, optional
+        One line of JSON a second at most, on standard output, instead of a bar on a terminal.
     """
 
-    def __init__(self, label):
-        self._progress = Progress(
+    def __init__(self, cells, done=0, as_json=False):
+        self._cells, self._before, self._done, self._as_json = cells, done, done, as_json
+        self._start, self._said = time.monotonic(), -_PAUSE
+        self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[said]}"),
             TimeRemainingColumn(),
             console=Console(file=sys.stderr),
-            disable=not sys.stderr.isatty(),
+            disable=as_json or not sys.stderr.isatty(),
             transient=True,
         )
-        self._task = self._progress.add_task(label, total=None)
-        super().__init__(start_state=self._begin, posttask=self._advance)
+        self._task = self._bar.add_task("simulating", total=cells, completed=done, said="")
 
     def __enter__(self):
-        self._progress.start()
-        return super().__enter__()
+        self._bar.start()
+        return self
 
     def __exit__(self, *error):
-        self._progress.stop()
-        return super().__exit__(*error)
+        self._bar.stop()
 
-    def _begin(self, graph, state):
-        self._progress.update(self._task, total=len(state["ready"]) + len(state["waiting"]))
+    def advance(self, cells):
+        """
+        Say that more cells are done.
 
-    def _advance(self, key, result, graph, state, worker):
-        self._progress.advance(self._task)
+        Parameters
+        ----------
+        cells : int
+        """
+        self._done += cells
+        now = time.monotonic()
+        if now - self._said < _PAUSE and self._done < self._cells:
+            return
+        self._said = now
+        if self._as_json:
+            print(json.dumps(self.state()), flush=True)
+        elif not self._bar.disable:
+            state = self.state()
+            said = (
+                f"{state['cells_done'] / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, "
+                f"{state['cells_per_second'] / 1e6:.1f} million/s, {state['memory'] / 1e9:.2f} GB"
+            )
+            self._bar.update(self._task, completed=self._done, said=said)
+
+    def state(self):
+        """
+        Where the run is.
+
+        Returns
+        -------
+        state : dict
+            ``cells_done``, ``cells``, ``cells_per_second``, ``seconds_left`` and ``memory`` [byte].
+        """
+        elapsed = max(time.monotonic() - self._start, 1e-9)
+        rate = (self._done - self._before) / elapsed
+        left = (self._cells - self._done) / rate if rate else None
+        return {
+            "event": "progress",
+            "cells_done": self._done,
+            "cells": self._cells,
+            "cells_per_second": round(rate),
+            "seconds_left": None if left is None else round(left, 1),
+            "memory": memory(),
+        }

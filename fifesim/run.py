@@ -1,32 +1,46 @@
-"""A run: a scenario simulated into a folder of files."""
+"""A run: a scenario simulated into a folder of files, block by block, which can be stopped and gone on with."""
 
 import importlib.metadata
+import json
 import os
 import platform
 import shutil
-import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
+import dask
+import numpy as np
+import rasterio
 import xarray as xr
 
 from fifesim import grid as grids
 from fifesim import report
 from fifesim.analysis.raster import regress
+from fifesim.chain import ndvi
 from fifesim.export import to_geotiff
-from fifesim.progress import ProgressBar
-from fifesim.scenario_file import write_scenario
+from fifesim.products import make_scene_store, products_of, wanted_blocks
+from fifesim.progress import CellProgress
+from fifesim.saved import save_block, saved_array, saved_blocks
+from fifesim.scenario_file import read_scenario, write_scenario
+from fifesim.schedule import ordered_blocks, run_on_client, run_on_threads
 from fifesim.simulation import simulate
+from fifesim.workers import found_client, usable_cores
 
 FILES = ("image.tif", "truth.tif", "quicklook.png", "report.html", "scenario.toml")
+SCENE = "scene.zarr"
 
-# The report shows the cells below this many pixels across, in the middle: enough to see what a pixel averages. [pixel]
-_DETAIL = 16
+# Folder of a run that is not finished, in the folder of its results.
+UNFINISHED = ".unfinished"
+
+# GDAL's own limit is a share of the machine's memory. [byte]
+_GDAL_CACHE = 64 * 2**20
 
 _VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "dask", "numba", "rasterio", "odc-geo", "pvlib", "pyrsr")
 
 
-def simulate_to_folder(scenario, folder, *, overwrite=False):
+def simulate_to_folder(
+    scenario, folder, *, overwrite=False, resume=False, scene=False, threads=None, client=None, as_json=False
+):
     """
     Simulate a scenario into a folder: image.tif, truth.tif, quicklook.png, report.html and scenario.toml.
 
@@ -37,6 +51,16 @@ def simulate_to_folder(scenario, folder, *, overwrite=False):
         Made where it does not exist.
     overwrite : bool, optional
         Replace these files where the folder holds something; other files stay.
+    resume : bool, optional
+        Go on with a run of the same scenario that was stopped in this folder; begin where there is none.
+    scene : bool, optional
+        Write leaf area index, elevation and reflectance of the cells too, as sharded Zarr.
+    threads : int, optional
+        By default one for each core that this process may use.
+    client : distributed.Client, optional
+        Compute on the workers of a cluster, by default on those of the current client where there is one.
+    as_json : bool, optional
+        Print progress as lines of JSON.
 
     Returns
     -------
@@ -47,74 +71,189 @@ def simulate_to_folder(scenario, folder, *, overwrite=False):
     ValueError
         If the scenario cannot be simulated, or the folder holds something; nothing is written then.
     OSError
-        If a file cannot be written; no half-written file is left.
+        If a file cannot be read or written. No half-written file is left; blocks that are finished are kept.
+
+    Notes
+    -----
+    Blocks are saved as they are finished, and the files made of them appear when all of them are whole. Memory does not
+    grow with the scene.
     """
     folder = Path(folder)
-    check_folder(folder, overwrite)
+    check_folder(folder, overwrite, resume)
     complete = scenario.complete()
-    tree = simulate(complete)
-    wanted = {name: tree[name].to_dataset() for name in ("image", "truth", "terrain") if name in tree.children}
-    wanted["detail"] = _detail(tree)
-    with ProgressBar("simulating"):
-        # One pass for all: the cells are made once.
-        done = xr.DataTree.from_dict(wanted).compute()
-    image, truth, detail = done["image"].to_dataset(), done["truth"].to_dataset(), done["detail"]["lai"]
-    terrain = done["terrain"].to_dataset() if "terrain" in done.children else None
-    with _whole_files(folder) as partial:
-        to_geotiff(image["dn"], partial / "image.tif")
-        to_geotiff(truth, partial / "truth.tif")
-        report.quicklook(partial / "quicklook.png", image, truth, detail)
-        fits = _fits(image, truth)
-        page = report.page(complete, image, truth, detail, terrain, fits, _versions())
-        (partial / "report.html").write_text(page, encoding="utf-8")
-        (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
-    return [folder / name for name in FILES]
+    with _unfinished(folder, complete, scene, resume) as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
+        tree = simulate(complete)
+        found = products_of(tree, unfinished / SCENE if scene else None)
+        if scene and not (unfinished / SCENE).exists():
+            make_scene_store(unfinished / SCENE, found.scene)
+        _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads or usable_cores(), as_json)
+        with dask.config.set(scheduler="threads", num_workers=threads or usable_cores()):
+            _write_files(complete, tree, found, unfinished)
+        names = FILES + (SCENE,) * scene
+        for name in names:
+            _replace(unfinished / name, folder / name)
+    return [folder / name for name in names]
 
 
-def check_folder(folder, overwrite):
+def check_folder(folder, overwrite, resume=False):
     """
     Refuse an output folder that is in use.
 
     Parameters
     ----------
     folder : pathlib.Path
-    overwrite : bool
+    overwrite, resume : bool
 
     Raises
     ------
     ValueError
-        If it is a file, or holds something and ``overwrite`` is off.
+        If it is a file, or holds something and neither ``overwrite`` nor ``resume`` is on.
     """
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"the output folder {str(folder)!r} is a file: name another with -o")
-    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
+    if not folder.is_dir() or overwrite:
+        return
+    held = {path.name for path in folder.iterdir()}
+    if UNFINISHED in held and not resume:
+        raise ValueError(
+            f"the output folder {str(folder)!r} holds a run that is not finished: go on with it by --resume, "
+            "begin again with --overwrite, or name another with -o"
+        )
+    if held - {UNFINISHED} and not resume:
         raise ValueError(f"the output folder {str(folder)!r} is not empty: name another with -o, or add --overwrite")
 
 
-def _detail(tree):
-    """LAI of the cells below some pixels in the middle of the image."""
-    lai, pixels = tree["scene"]["lai"], grids.geobox(tree["image"]["dn"])
-    cells = grids.geobox(lai)
-    (cell_down, cell_across), (pixel_down, pixel_across) = grids.cell_size(cells), grids.cell_size(pixels)
-    cut = {}
-    for axis, count, pixel, cell in (
-        ("y", pixels.shape.y, pixel_down, cell_down),
-        ("x", pixels.shape.x, pixel_across, cell_across),
-    ):
-        shown = min(count, _DETAIL)
-        first = (count - shown) // 2
-        cut[axis] = slice(round(first * pixel / cell), round((first + shown) * pixel / cell))
-    return xr.Dataset({"lai": lai.isel(cut)})
+def scenario_to_resume(folder):
+    """
+    Scenario of a run that was stopped.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Of its results.
+
+    Returns
+    -------
+    scenario : fifesim.scenario.Scenario or None
+        None where no run was stopped.
+    """
+    path = Path(folder) / UNFINISHED / "run.toml"
+    return read_scenario(path) if path.is_file() else None
+
+
+@contextmanager
+def _unfinished(folder, scenario, scene, resume):
+    """Folder of what is not finished: kept when the run is stopped, and away when it ends or can never end well."""
+    existed, path = folder.is_dir(), folder / UNFINISHED
+    text, state = write_scenario(scenario), _state(scenario, scene)
+    if path.is_dir() and resume and (path / "run.toml").is_file():
+        _check_same_run(path, text, state)
+    else:
+        shutil.rmtree(path, ignore_errors=True)
+        path.mkdir(parents=True)
+        (path / "run.json").write_text(json.dumps(state), encoding="utf-8")
+        (path / "run.toml").write_text(text, encoding="utf-8")
+    try:
+        yield path
+    except (ValueError, TypeError):
+        _remove(folder, path, existed)
+        raise
+    except OSError as error:
+        _remove_if_empty(folder, path, existed)
+        hint = f"; what is finished is kept, go on with --resume -o {folder}" if path.exists() else ""
+        raise OSError(f"{_said(error)}{hint}") from error
+    except BaseException:
+        _remove_if_empty(folder, path, existed)
+        raise
+    shutil.rmtree(path)
+
+
+def _state(scenario, scene):
+    """What must be the same for blocks of two runs to fit together, besides the scenario."""
+    named = (scenario.ground.lai_file, scenario.ground.distribution, scenario.terrain.dem)
+    inputs = {}
+    for name in named:
+        if name and Path(name).is_file():
+            status = os.stat(name)
+            inputs[name] = [status.st_size, status.st_mtime_ns]
+    return {"versions": _versions(), "inputs": inputs, "scene": bool(scene)}
+
+
+def _check_same_run(path, text, state):
+    before, kept = (path / "run.toml").read_text(encoding="utf-8"), json.loads((path / "run.json").read_text())
+    if before != text:
+        old, new = ({line.strip() for line in each.splitlines()} for each in (before, text))
+        changed = sorted(line.partition("#")[0].strip() for line in old - new) or ["keys"]
+        raise ValueError(
+            f"the run to resume is of another scenario, with {', '.join(changed[:3])}: "
+            "leave out SCENARIO to go on with that one, or begin again with --overwrite"
+        )
+    for key, what in (("versions", "other versions of its packages"), ("inputs", "an input file that has changed")):
+        if kept[key] != state[key]:
+            raise ValueError(f"the run to resume was begun with {what}: begin again with --overwrite")
+    if kept["scene"] != state["scene"]:
+        raise ValueError("the run to resume was begun with --scene or without it: give it as it was")
+
+
+def _compute(found, lai, folder, client, threads, as_json):
+    """Compute and save the blocks that are not saved yet."""
+    blocks = folder / "blocks"
+    saved = {name: saved_blocks(blocks, name, array) for name, array in found.arrays.items()}
+    cells, image = grids.geobox(lai), found.arrays["image"]
+    wanted = [each for each in wanted_blocks(found, lai.chunks, cells) if each[1] not in saved[each[0]]]
+    per_pixel = cells.shape.x * cells.shape.y / (image.shape[-1] * image.shape[-2])
+    sizes = {index: round(per_pixel * _pixels(image, index)) for index in np.ndindex(image.numblocks)}
+    done = sum(sizes[index] for index in saved["image"])
+    with CellProgress(sum(sizes.values()), done, as_json) as progress:
+
+        def deliver(name, index, block):
+            save_block(blocks, name, index, block)
+            if name == "image":
+                progress.advance(sizes[index])
+
+        tasks = ordered_blocks(found.arrays, wanted)
+        if client is None:
+            run_on_threads(*tasks, deliver, threads)
+        else:
+            run_on_client(*tasks, deliver, client)
+
+
+def _pixels(array, index):
+    return int(np.prod([sizes[at] for sizes, at in zip(array.chunks[-2:], index[-2:], strict=True)]))
+
+
+def _write_files(scenario, tree, found, folder):
+    """The files of a run from its saved blocks."""
+    saved = {
+        name: raster.copy(data=saved_array(folder / "blocks", name, found.arrays[name]))
+        for name, raster in found.rasters.items()
+    }
+    image = xr.Dataset({"dn": saved["image"]})
+    if "ndvi" in tree["image"]:
+        image["ndvi"] = ndvi(saved["image"])
+    truth = xr.Dataset({name: saved[name] for name in ("lai", "fpar")})
+    to_geotiff(image["dn"], folder / "image.tif")
+    to_geotiff(truth, folder / "truth.tif")
+    terrain = None
+    if "terrain" in tree.children:
+        terrain = xr.Dataset({name: saved[f"terrain-{name}"].compute() for name in tree["terrain"].data_vars})
+        terrain.attrs = dict(tree["terrain"].attrs)
+    detail = saved["detail"].compute()
+    report.quicklook(folder / "quicklook.png", image, truth, detail)
+    page = report.page(scenario, image, truth, detail, terrain, _fits(image, truth), _versions())
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    (folder / "scenario.toml").write_text(write_scenario(scenario), encoding="utf-8")
 
 
 def _fits(image, truth):
     """Regressions of the true means on NDVI; none where there is no NDVI or nothing to fit."""
     if "ndvi" not in image:
         return {}
+    spread = float(image["ndvi"].std())
     fits = {}
     for name in truth.data_vars:
-        valid = (truth[name].notnull() & image["ndvi"].notnull()).sum()
-        if valid > 2 and float(image["ndvi"].std()) > 0:
+        valid = int((truth[name].notnull() & image["ndvi"].notnull()).sum())
+        if valid > 2 and spread > 0:
             fits[name] = regress(truth[name], image["ndvi"])
     return fits
 
@@ -124,19 +263,24 @@ def _versions():
     return {"python": platform.python_version()} | versions
 
 
-@contextmanager
-def _whole_files(folder):
-    """A hidden folder whose files move into place when all of them are written."""
-    existed = folder.is_dir()
-    folder.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(prefix=".partial-", dir=folder))
-    try:
-        yield partial
-        for path in sorted(partial.iterdir()):
-            os.replace(path, folder / path.name)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        if not existed:
-            shutil.rmtree(folder, ignore_errors=True)
-        raise
-    partial.rmdir()
+def _said(error):
+    """What an error of the system says, with the file."""
+    name = f" ({error.filename})" if error.filename and str(error.filename) not in str(error.strerror) else ""
+    return f"{error.strerror}{name}" if error.strerror else str(error)
+
+
+def _replace(source, target):
+    if target.is_dir() and not target.is_symlink():
+        shutil.rmtree(target)
+    os.replace(source, target)
+
+
+def _remove(folder, path, existed):
+    shutil.rmtree(path, ignore_errors=True)
+    if not existed:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _remove_if_empty(folder, path, existed):
+    if not any((path / "blocks").glob("*/*.npy")):
+        _remove(folder, path, existed)

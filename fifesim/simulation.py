@@ -34,10 +34,11 @@ def simulate(scenario, chunks="auto"):
     Returns
     -------
     run : xarray.DataTree
-        Lazy. ``scene`` holds ``lai`` by cells, and ``dem`` where the ground is not flat; ``image`` the digital numbers
-        ``dn`` and their ``ndvi``; ``truth`` the means of ``lai`` and ``fpar`` over the ground of the pixels. With
-        terrain, ``terrain`` holds ``dem``, ``slope`` and ``kt`` over the ground of the pixels, and ``level``, the
-        digital numbers on level ground; its attributes say how far the elevation is known beyond the scene.
+        Lazy. ``scene`` holds ``lai`` and ``surface_reflectance`` by cells, and ``dem`` where the ground is not flat;
+        ``image`` the digital numbers ``dn`` and their ``ndvi``; ``truth`` the means of ``lai`` and ``fpar`` over the
+        ground of the pixels. With terrain, ``terrain`` holds ``dem``, ``slope`` and ``kt`` over the ground of the
+        pixels, and ``level``, the digital numbers on level ground; its attributes say how far the elevation is known
+        beyond the scene.
 
     Raises
     ------
@@ -64,13 +65,15 @@ def simulate(scenario, chunks="auto"):
     nodes = {"scene": {"lai": lai}, "truth": {"lai": means(lai), "fpar": means(fpar)}}
     dem, horizon, reach = elevation(scenario, grid, chunks)
     if dem is None:
-        image = sensed(level)
+        reflectance = level
     else:
-        image = sensed(_reflectance(scenario, lai, instrument, dem=dem, horizon=horizon))
+        reflectance = _reflectance(scenario, lai, instrument, dem=dem, horizon=horizon)
         kt = chain.kt(level, dem, horizon=horizon)
         dem, slope = (_cut(raster, grid) for raster in (dem, terrain_raster.slope(dem)))
         nodes["scene"]["dem"] = dem
         nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt), "level": sensed(level)}
+    nodes["scene"]["surface_reflectance"] = reflectance
+    image = sensed(reflectance)
     nodes["image"] = {"dn": image} | ({"ndvi": chain.ndvi(image)} if _has_ndvi(image) else {})
     tree = xr.DataTree.from_dict({name: xr.Dataset(arrays) for name, arrays in nodes.items()})
     if reach:

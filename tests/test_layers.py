@@ -18,16 +18,17 @@ LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 TIERS = (
     {"blocks", "datasets", "footprints", "geometry", "lattice", "progress", "sites"},
     {"bands"},
-    {"cf", "grid", "schedule"},
+    {"cf", "grid", "saved", "schedule", "workers"},
     {"chunks"},
     {"warp"},
     {"physics"},
     {"raster"},
     {"export", "scenario"},
     {"chain", "scenario_file"},
-    {"simulation"},
+    {"products", "simulation"},
+    {"figures"},
     {"report"},
-    {"run"},
+    {"estimates", "run"},
     {"cli"},
 )
 # What knows neither labels nor dask, beside the physics.

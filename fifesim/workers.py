@@ -1,0 +1,82 @@
+"""Where a run computes: threads of its own process, a local cluster, or one that is there."""
+
+import os
+from contextlib import contextmanager
+
+import dask
+from distributed import Client, LocalCluster, get_client
+
+# Without an answer for so long, there is no scheduler. [s]
+_TIMEOUT = 20
+
+
+def usable_cores():
+    """
+    Cores that this process may use.
+
+    Returns
+    -------
+    cores : int
+    """
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def found_client():
+    """
+    The current client of a cluster.
+
+    Returns
+    -------
+    client : distributed.Client or None
+    """
+    try:
+        return get_client()
+    except ValueError:
+        return None
+
+
+@contextmanager
+def cluster(workers=None, scheduler=None):
+    """
+    Workers to compute on.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Start so many processes on this machine, which end with the context.
+    scheduler : str, optional
+        Address of a scheduler that runs, such as ``tcp://head:8786``.
+
+    Yields
+    ------
+    client : distributed.Client or None
+        None where neither is given.
+
+    Raises
+    ------
+    ValueError
+        If both are given, or the number is not positive.
+    OSError
+        If no scheduler answers.
+    """
+    if workers is not None and scheduler is not None:
+        raise ValueError("--workers starts a cluster and --scheduler uses one that runs: give one of them")
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers must be at least 1, got {workers}")
+    if workers is None and scheduler is None:
+        yield None
+        return
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=_TIMEOUT, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise OSError(f"no scheduler answers at {scheduler}: {error}") from None
+        with client:
+            yield client
+        return
+    with (
+        dask.config.set({"distributed.worker.daemon": True}),
+        LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs="ERROR") as local,
+        Client(local, set_as_default=False) as client,
+    ):
+        yield client
