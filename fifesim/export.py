@@ -1,7 +1,9 @@
 """GeoTIFF files that a GIS opens in the right place, and that come back as they were."""
 
+import errno
 import json
 import os
+import shutil
 import tempfile
 import warnings
 from contextlib import contextmanager
@@ -10,11 +12,13 @@ from pathlib import Path
 import dask.array as da
 import numpy as np
 import rasterio
+import rasterio.errors
 import rasterio.shutil
 import rioxarray
 import xarray as xr
 from dask.utils import SerializableLock
 from distributed import Lock, get_client
+from rasterio._err import CPLE_BaseError
 from rasterio.windows import Window
 
 from fifesim import cf
@@ -62,7 +66,8 @@ def to_geotiff(raster, path):
     array = array if "band" in array.dims else array.expand_dims("band")
     array = array.transpose("band", "y", "x")
     grid = grids.geobox(array)
-    with _whole(path) as (streamed, finished):
+    _check_room(array, path)
+    with _whole(path) as (streamed, finished), _errors_of_gdal(path):
         _stream(array, grid, streamed, described=raster)
         rasterio.shutil.copy(
             streamed,
@@ -73,6 +78,7 @@ def to_geotiff(raster, path):
             blocksize=_BLOCK,
             overview_resampling="average",
         )
+        _check_written(streamed, finished, array)
     return path
 
 
@@ -135,6 +141,43 @@ def _stacked(dataset):
     histories = [dataset[name].attrs.get("history", "") for name in names]
     array.attrs = {"history": histories[0], "long_name": ", ".join(names)}
     return array
+
+
+def _streamed_bytes(array):
+    """Size of the cells of a tiled file, whose tiles are all whole."""
+    rows, columns = (-(-size // _BLOCK) * _BLOCK for size in array.shape[-2:])
+    return array.sizes["band"] * rows * columns * array.dtype.itemsize
+
+
+def _check_room(array, path):
+    """Refuse a disk that is full before GDAL, which says so in many lines, comes to it."""
+    if not path.parent.is_dir():
+        return
+    # The stream, and at worst as much again with overviews.
+    needed, free = _streamed_bytes(array) + 1.4 * array.nbytes, shutil.disk_usage(path.parent).free
+    if free < needed:
+        said = f"{os.strerror(errno.ENOSPC)}: {needed / 1e6:.1f} MB are needed, {free / 1e6:.1f} MB are free"
+        raise OSError(errno.ENOSPC, said, str(path))
+
+
+@contextmanager
+def _errors_of_gdal(path):
+    try:
+        yield
+    except (CPLE_BaseError, rasterio.errors.RasterioError) as error:
+        raise OSError(f"cannot write {path}: {error.__cause__ or error}") from error
+
+
+def _check_written(streamed, finished, array):
+    """A full disk may come to light when files are closed, when GDAL tells nobody."""
+    with rasterio.open(streamed) as one, rasterio.open(finished) as other:
+        if os.path.getsize(streamed) < _streamed_bytes(array):
+            raise rasterio.errors.RasterioIOError("the disk did not take all of it")
+        for _, window in other.block_windows(1):
+            if not np.array_equal(
+                one.read(window=window), other.read(window=window), equal_nan=array.dtype.kind == "f"
+            ):
+                raise rasterio.errors.RasterioIOError("what was written is not what is read")
 
 
 @contextmanager

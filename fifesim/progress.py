@@ -63,6 +63,8 @@ class CellProgress:
 
     def __enter__(self):
         self._bar.start()
+        if self._as_json:
+            print(json.dumps(self.state()), flush=True)
         return self
 
     def __exit__(self, *error):

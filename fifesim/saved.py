@@ -1,5 +1,6 @@
 """Finished blocks of a run on disk, from which it can go on when it was stopped."""
 
+import io
 import os
 from pathlib import Path
 
@@ -31,13 +32,15 @@ def save_block(folder, name, index, block):
     path = _path(folder, name, index)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial_path = path.with_suffix(".partial")
+    # numpy would not say why a file cannot be written.
+    content = io.BytesIO()
+    np.save(content, block)
     try:
-        with open(partial_path, "wb") as sink:
-            np.save(sink, block)
+        partial_path.write_bytes(content.getbuffer())
         os.replace(partial_path, path)
-    except BaseException:
+    except OSError as error:
         partial_path.unlink(missing_ok=True)
-        raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def saved_blocks(folder, name, array):

@@ -7,7 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 import dask
 from dask.core import get_dependencies
 from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
-from distributed import as_completed
+from distributed import KilledWorker, as_completed
 
 from fifesim.blocks import is_cut
 
@@ -113,8 +113,10 @@ def run_on_client(graph, outputs, order, deliver, client):
 
     Raises
     ------
+    RuntimeError
+        If a task has killed its workers too often.
     Exception
-        Whatever a task or ``deliver`` raises, or the cluster when it loses too many workers.
+        Whatever a task or ``deliver`` raises.
     """
     layer = MaterializedLayer(graph, annotations={"priority": _Priority(order), "retries": _RETRIES})
     whole = HighLevelGraph({"blocks": layer}, {"blocks": set()})
@@ -123,6 +125,8 @@ def run_on_client(graph, outputs, order, deliver, client):
         for future, result in as_completed(list(futures), loop=client.loop, with_results=True):
             deliver(*outputs[futures.pop(future)], result)
             future.release()
+    except KilledWorker as error:
+        raise RuntimeError(f"{error}: has a worker too little memory? What is finished is kept, use --resume") from None
     finally:
         client.cancel(list(futures), force=True)
 

@@ -286,7 +286,10 @@ def _warp_tile(path, state, grid, pipeline, back, tile_row, tile_column):
         window = _source_window(source, tile, back)
         if window is None:
             return out
-        values = source.read(1, window=window, masked=True).astype(float).filled(np.nan)
+        try:
+            values = source.read(1, window=window, masked=True).astype(float).filled(np.nan)
+        except rasterio.errors.RasterioIOError as error:
+            raise OSError(f"cannot read {path}: {error.__cause__ or error}") from error
         values = values * source.scales[0] + source.offsets[0]
         down, across = _cells_per_cell(source, grid, back)
         resampling = Resampling.average if max(down, across) > 1.01 else Resampling.bilinear

@@ -133,17 +133,6 @@ def test_negative_lai_leaves_no_output_behind(invoke, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_full_or_unwritable_place_is_a_failure_that_leaves_nothing(invoke, small, tmp_path, monkeypatch):
-    def full(*arguments, **keywords):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("fifesim.run.report.quicklook", full)
-    result = invoke("simulate", small, "-o", "out")
-    assert result.exit_code == 1
-    assert "No space left" in result.stderr
-    assert not (tmp_path / "out").exists()
-
-
 def test_help_does_not_import_what_is_slow():
     slow = ("numba", "pvlib", "matplotlib", "scipy")
     code = f"import sys; from fifesim.cli import app; print([name for name in {slow} if name in sys.modules])"

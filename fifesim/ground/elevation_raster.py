@@ -161,12 +161,16 @@ def _in_metres(source, wkt, unit, vertical_units):
 
 
 def _file_window(path, rows, columns):
-    with rasterio.open(path) as file:
-        window = rasterio.windows.Window(
-            columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start
-        )
-        values = file.read(1, window=window, masked=True).astype(float).filled(np.nan)
-        return values * file.scales[0] + file.offsets[0]
+    window = rasterio.windows.Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
+    try:
+        with rasterio.open(path) as file:
+            values = file.read(1, window=window, masked=True).astype(float).filled(np.nan)
+            return values * file.scales[0] + file.offsets[0]
+    except rasterio.errors.RasterioIOError as error:
+        raise OSError(
+            f"cannot read rows {rows.start} to {rows.stop} and columns {columns.start} to {columns.stop} of {path}: "
+            f"{error.__cause__ or error}"
+        ) from error
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,214 @@
+"""What happens in long runs, made to happen: killed processes and workers, full disks, broken files, Ctrl-C."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import psutil
+import pytest
+import rasterio
+
+from fifesim.run import FILES, UNFINISHED
+
+COMMAND = [sys.executable, "-c", "from fifesim.cli import app; app()", "simulate"]
+SCENARIO = """
+[grid]
+width = 7200
+height = 4800
+
+[ground]
+seed = 3
+
+[terrain]
+horizon_reach = 900
+"""
+# Far more than any step takes: a run that hangs fails.
+PATIENCE = 300
+
+
+def run(*arguments):
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE)
+
+
+def start(*arguments):
+    return subprocess.Popen([*COMMAND, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def saved(folder):
+    return list((folder / UNFINISHED / "blocks" / "image").glob("*.npy"))
+
+
+def wait_for_a_block(folder, process):
+    while not saved(folder):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+
+
+def contents(folder):
+    return {name: (folder / name).read_bytes() for name in FILES}
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    path = tmp_path_factory.mktemp("faults") / "scenario.toml"
+    path.write_text(SCENARIO)
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(scenario, tmp_path_factory):
+    """Files of a run that nothing happened to."""
+    folder = tmp_path_factory.mktemp("whole") / "out"
+    done = run(scenario, "-o", folder, "--threads", 1)
+    assert done.returncode == 0, done.stderr
+    return contents(folder)
+
+
+def resumed(scenario, folder):
+    done = run(scenario, "-o", folder, "--resume", "--json")
+    assert done.returncode == 0, done.stderr
+    assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
+    return contents(folder), [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def test_a_killed_run_goes_on_to_the_same_files(scenario, whole, tmp_path):
+    out = tmp_path / "out"
+    process = start(scenario, "-o", out, "--threads", 1)
+    wait_for_a_block(out, process)
+    process.kill()
+    process.wait()
+    assert [path.name for path in out.iterdir()] == [UNFINISHED]
+    files, lines = resumed(scenario, out)
+    assert files == whole
+    assert 0 < lines[0]["cells_done"] < lines[0]["cells"]
+
+
+@pytest.mark.slow
+def test_a_half_written_block_is_made_again(scenario, whole, tmp_path):
+    out = tmp_path / "out"
+    process = start(scenario, "-o", out, "--threads", 1)
+    wait_for_a_block(out, process)
+    process.kill()
+    process.wait()
+    block = saved(out)[0]
+    os.truncate(block, block.stat().st_size - 100)
+    assert resumed(scenario, out)[0] == whole
+
+
+def test_a_killed_worker_changes_nothing(scenario, whole, tmp_path):
+    out = tmp_path / "out"
+    process = start(scenario, "-o", out, "--workers", 2)
+    wait_for_a_block(out, process)
+    workers = [
+        child
+        for child in psutil.Process(process.pid).children(recursive=True)
+        if any("spawn_main" in word for word in child.cmdline())
+    ]
+    assert len(workers) >= 2
+    workers[0].kill()
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, errors
+    assert contents(out) == whole
+
+
+@pytest.mark.parametrize("options", [["--threads", 2], pytest.param(["--workers", 1], marks=pytest.mark.slow)])
+def test_ctrl_c_ends_a_run_that_can_go_on(scenario, whole, tmp_path, options):
+    out = tmp_path / "out"
+    process = start(scenario, "-o", out, *options)
+    wait_for_a_block(out, process)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert "--resume" in errors and "Traceback" not in errors
+    assert [path.name for path in out.iterdir()] == [UNFINISHED]
+    assert resumed(scenario, out)[0] == whole
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of a size that a test chooses and changes."""
+    place = tmp_path / "disk"
+    place.mkdir()
+
+    def mount(*options):
+        done = subprocess.run(["mount", "-t", "tmpfs", "-o", ",".join(options), "tmpfs", place], capture_output=True)
+        if done.returncode:
+            pytest.skip("a file system can only be mounted by root")
+        return place
+
+    yield mount
+    subprocess.run(["umount", place], capture_output=True)
+
+
+@pytest.mark.parametrize("size", ["2000k", *(pytest.param(size, marks=pytest.mark.slow) for size in ("100k", "3000k"))])
+def test_a_full_disk_leaves_what_is_finished_and_nothing_half_written(scenario, whole, small_disk, size):
+    """Full with the first blocks, with the last ones, and with the files that are made of them."""
+    out = small_disk(f"size={size}") / "out"
+    done = run(scenario, "-o", out)
+    assert done.returncode == 1, done.stdout
+    assert "space" in done.stderr and "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not out.exists() or [path.name for path in out.iterdir()] == [UNFINISHED]
+    small_disk("remount", "size=64m")
+    assert resumed(scenario, out)[0] == whole
+
+
+def test_a_file_that_cannot_grow_is_not_there(scenario, whole, tmp_path):
+    """A quota that GDAL meets in the middle of a file."""
+    out = tmp_path / "out"
+    limited = ["bash", "-c", 'ulimit -f 400; exec "$0" "$@"', *COMMAND, str(scenario), "-o", str(out)]
+    done = subprocess.run(limited, capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 1, done.stdout
+    assert "cannot write" in done.stderr and "Traceback" not in done.stderr
+    assert [path.name for path in out.iterdir()] == [UNFINISHED]
+    assert resumed(scenario, out)[0] == whole
+
+
+def test_an_unwritable_place_is_named(scenario, small_disk):
+    place = small_disk("ro")
+    done = run(scenario, "-o", place / "out")
+    assert done.returncode == 1
+    assert "Read-only file system" in done.stderr and str(place) in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.fixture(scope="module")
+def broken_dem(tmp_path_factory):
+    """A DEM whose file ends before its last rows."""
+    path = tmp_path_factory.mktemp("dem") / "broken.tif"
+    profile = {"driver": "GTiff", "width": 400, "height": 300, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
+    transform = rasterio.transform.from_origin(702000, 4337000, 30, 30)
+    heights = 400 + np.random.default_rng(1).normal(0, 1, (300, 400)).cumsum(axis=0).astype("float32")
+    with rasterio.open(path, "w", **profile, transform=transform) as sink:
+        sink.write(heights, 1)
+    os.truncate(path, path.stat().st_size // 2)
+    return path
+
+
+def test_a_dem_that_cannot_be_read_is_named(scenario, broken_dem, tmp_path):
+    broken = tmp_path / "broken.toml"
+    broken.write_text(SCENARIO + f'dem = "{broken_dem}"\n')
+    done = run(broken, "-o", tmp_path / "out")
+    assert done.returncode == 1, done.stdout
+    assert "broken.tif" in done.stderr and "Traceback" not in done.stderr
+    assert not any((tmp_path / "out" / name).exists() for name in FILES)
+
+
+def test_another_scenario_does_not_resume_a_run(scenario, tmp_path):
+    out = tmp_path / "out"
+    process = start(scenario, "-o", out, "--threads", 1)
+    wait_for_a_block(out, process)
+    process.kill()
+    process.wait()
+    other = tmp_path / "other.toml"
+    other.write_text(SCENARIO.replace("seed = 3", "seed = 4"))
+    done = run(other, "-o", out, "--resume")
+    assert done.returncode == 2
+    assert "seed = 3" in done.stderr and "--overwrite" in done.stderr
+    assert saved(out)
+    refused = run(scenario, "-o", out)
+    assert refused.returncode == 2 and "--resume" in refused.stderr
