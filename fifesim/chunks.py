@@ -61,7 +61,8 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     return out.transpose(*dims)
 
 
-# Tiles along the edge of an automatic chunk: about 8 MB in double precision for tiles of 500 cells.
+# Edge of an automatic chunk, and tiles along it at most: 8 MB in double precision. [cell]
+_CHUNK = 1008
 _TILES_PER_CHUNK = 2
 
 
@@ -294,7 +295,7 @@ def _other_coordinates(array):
 
 def _tile_chunks(grid, tile):
     """Chunks of whole tiles, but for the borders of the grid."""
-    step = _TILES_PER_CHUNK * tile
+    step = min(_TILES_PER_CHUNK, max(_CHUNK // tile, 1)) * tile
     sizes = []
     for first, size in zip(grids.lattice_position(grid), grid.shape, strict=True):
         ends = np.arange((first // step + 1) * step, first + size, step) - first

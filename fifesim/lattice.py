@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 
-def assemble(make_tile, tile, row, column, shape):
+def assemble(make_tile, tile, row, column, shape, out=None):
     """
     Window of a lattice, cut from the fixed tiles that it touches.
 
@@ -19,6 +19,8 @@ def assemble(make_tile, tile, row, column, shape):
         First row and column of the window.
     shape : (int, int)
         Rows and columns of the window.
+    out : array, shape (rows, columns), optional
+        Takes the window.
 
     Returns
     -------
@@ -30,7 +32,7 @@ def assemble(make_tile, tile, row, column, shape):
     [[0.0, 1.0, 1.0], [10.0, 11.0, 11.0]]
     """
     height, width = shape
-    window = np.empty(shape)
+    window = np.empty(shape) if out is None else out
     if not window.size:
         return window
     for tile_row in range(row // tile, -(-(row + height) // tile)):

@@ -18,12 +18,12 @@ _FINEST = 2**16
 @dataclass(frozen=True, eq=False)
 class LaiTable:
     """
-    Cubic splines of functions of leaf area index, on nodes that are equidistant in log(1 + rate LAI).
+    Cubic splines of functions of leaf area index, on nodes that are equidistant in rate LAI / (1 + rate LAI).
 
     Parameters
     ----------
     rate : float
-        Largest decay rate of the functions. [1]
+        Of the nodes. [1]
     coefficients : array, shape (interval, column, 4)
         Polynomial coefficients over the unit interval, constant term first.
     """
@@ -33,8 +33,8 @@ class LaiTable:
 
     @property
     def step(self):
-        """Intervals per unit of log(1 + rate LAI)."""
-        return len(self.coefficients) / np.log1p(self.rate * LIMIT)
+        """Intervals per unit of rate LAI / (1 + rate LAI)."""
+        return len(self.coefficients) / _length(self.rate)
 
 
 def tabulate(function, rate, combine=None, tolerance=1e-6):
@@ -70,7 +70,9 @@ def tabulate(function, rate, combine=None, tolerance=1e-6):
     True
     """
     combine = combine or (lambda values: values)
-    length = np.log1p(rate * LIMIT)
+    # Nodes for the slow decay of dense canopies too, which is of the order of 1.
+    rate = float(np.sqrt(rate))
+    length = _length(rate)
     values = function(_lai(np.linspace(0, 1, _COARSEST + 1), rate, length))
     while values.shape[1] <= _FINEST:
         position = np.linspace(0, 1, values.shape[1])
@@ -80,12 +82,17 @@ def tabulate(function, rate, combine=None, tolerance=1e-6):
         values = np.insert(values, np.arange(1, values.shape[1]), exact, axis=1)
         if np.abs(combine(coarse) - combine(exact)).max() < tolerance:
             spline = CubicSpline(np.arange(values.shape[1]), values, axis=1)
-            return LaiTable(float(rate), np.ascontiguousarray(spline.c[::-1].transpose(1, 2, 0)))
+            return LaiTable(rate, np.ascontiguousarray(spline.c[::-1].transpose(1, 2, 0)))
     raise ValueError(f"no table of {_FINEST} nodes reaches {tolerance:g}: use exact=True")
 
 
+def _length(rate):
+    return rate * LIMIT / (1 + rate * LIMIT)
+
+
 def _lai(position, rate, length):
-    return np.expm1(position * length) / rate
+    # Rounding must not lead past the last node.
+    return np.minimum(position * length / (1 - position * length) / rate, LIMIT)
 
 
 def interpolate(table, lai):
@@ -144,7 +151,7 @@ def _interpolate(lai, coefficients, rate, step, values):
             for column in range(columns):
                 values[column, i] = np.nan
             continue
-        position = np.log(1 + rate * lai[i]) * step
+        position = rate * lai[i] / (1 + rate * lai[i]) * step
         interval = min(int(position), last)
         share = position - interval
         for column in range(columns):
@@ -161,7 +168,7 @@ def _interpolate_over(lai, background, coefficients, rate, step, values):
             for band in range(values.shape[0]):
                 values[band, i] = np.nan
             continue
-        position = np.log(1 + rate * lai[i]) * step
+        position = rate * lai[i] / (1 + rate * lai[i]) * step
         interval = min(int(position), last)
         share = position - interval
         for band in range(values.shape[0]):

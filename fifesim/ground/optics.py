@@ -179,8 +179,9 @@ def check_lai(lai):
     >>> check_lai(2.5)
     """
     lai = np.asarray(lai, float)
-    wrong = (lai < 0) | (lai > LARGEST_LAI)
-    if wrong.any():
+    # Two passes without a temporary; NaN is passed over.
+    if np.fmin.reduce(lai, axis=None, initial=0.0) < 0 or np.fmax.reduce(lai, axis=None, initial=0.0) > LARGEST_LAI:
+        wrong = (lai < 0) | (lai > LARGEST_LAI)
         raise ValueError(
             f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {lai[wrong].flat[0]:g} in "
             f"{wrong.sum()} of {lai.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"

@@ -100,7 +100,7 @@ def test_seams_of_tiles_solve_the_equation(arp):
     The linear system x = e + arp (sum of four neighbours) on a patch across four tiles, away from its own borders.
 
     The noise is the field without interaction. Borders reach in as exp(-d arccosh(1 / (2 arp) - 1)): 5e-13 after 70
-    cells at arp 0.24.
+    cells at arp 0.24. Single precision leaves 3e-7 of the standard deviation rms, 2e-6 at most.
     """
     half, reach = 110, 70
     first, size = random_field.TILE - half, 2 * half
@@ -111,7 +111,7 @@ def test_seams_of_tiles_solve_the_equation(arp):
     solved = spsolve(system, noise.ravel()).reshape(size, size) / np.sqrt(field_variance(arp))
     inside = slice(reach, -reach)
     field = streaming_field(11, arp, first, -half, (size, size))
-    np.testing.assert_allclose(field[inside, inside], solved[inside, inside], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(field[inside, inside], solved[inside, inside], rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize("arp", [0.15, random_field.LARGEST_STREAMING_ARP])
@@ -178,8 +178,7 @@ def test_margin_holds_the_response():
     for arp in ARPS:
         cells = random_field.margin(arp)
         impulse = np.fft.ifft(1 / (1 - 2 * arp * (1 + np.cos(2 * np.pi * np.fft.fftfreq(4096))))).real
-        assert cells % random_field.BLOCK == 0
-        assert impulse[cells] < 1e-12 * impulse[0]
+        assert impulse[cells] < 2e-8 * impulse[0]
 
 
 @pytest.mark.parametrize("arp", [-0.01, 0.25, 0.3, np.nan])
