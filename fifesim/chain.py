@@ -5,7 +5,7 @@ import xarray as xr
 
 from fifesim import cf
 from fifesim.analysis import raster as analysis
-from fifesim.atmosphere import five_s
+from fifesim.atmosphere import engines
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.bands import Band
@@ -100,7 +100,7 @@ def surface_reflectance(
     description = find_instrument(instrument)
     selected = description.select(bands)
     names = [band.name for band in selected]
-    terms = five_s.band_terms(
+    terms = engines.band_terms(
         atmosphere, tuple(band.response for band in selected), geometry.sza, geometry.vza, geometry.raa
     )
     leaf_reflectance, leaf_transmittance = optics.leaf_optics(names, leaf_optics)
@@ -116,7 +116,7 @@ def surface_reflectance(
         leaf_angles=leaf_angles,
         hotspot=hotspot,
         exact=exact,
-        atmosphere=str(atmosphere),
+        atmosphere=atmosphere.text,
         instrument=description.name,
     )
     if dem is None:
@@ -159,7 +159,7 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
     fifesim.ground.illumination.kt
     """
     atmosphere, bands, geometry = _light(reflectance, atmosphere, geometry, instrument)
-    terms = five_s.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
+    terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
     return terrain.kt(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
 
 
@@ -195,7 +195,7 @@ def to_toa(reflectance, atmosphere=None, *, geometry=None, instrument=None):
 
     See Also
     --------
-    fifesim.atmosphere.five_s.apparent_reflectance
+    fifesim.atmosphere.coupling.apparent_reflectance
     """
     return atmosphere_raster.to_toa(reflectance, *_light(reflectance, atmosphere, geometry, instrument))
 
@@ -223,7 +223,7 @@ def to_surface(reflectance, atmosphere=None, *, geometry=None, instrument=None):
 
     See Also
     --------
-    fifesim.atmosphere.five_s.surface_reflectance
+    fifesim.atmosphere.coupling.surface_reflectance
     """
     reflectance = planetary_reflectance(reflectance)
     return atmosphere_raster.to_surface(reflectance, *_light(reflectance, atmosphere, geometry, instrument))

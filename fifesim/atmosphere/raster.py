@@ -4,7 +4,7 @@ import xarray as xr
 
 from fifesim import cf, chunks
 from fifesim import grid as grids
-from fifesim.atmosphere import five_s
+from fifesim.atmosphere import coupling, engines
 
 _REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
 
@@ -34,10 +34,10 @@ def to_toa(reflectance, atmosphere, bands, geometry):
 
     See Also
     --------
-    fifesim.atmosphere.five_s.apparent_reflectance
+    fifesim.atmosphere.coupling.apparent_reflectance
     """
     cf.check_quantity(reflectance, "surface_reflectance")
-    step = (five_s.apparent_reflectance, "toa_reflectance", "to_toa")
+    step = (coupling.apparent_reflectance, "toa_reflectance", "to_toa")
     return _carry(*step, reflectance, atmosphere, bands, geometry)
 
 
@@ -65,10 +65,10 @@ def to_surface(reflectance, atmosphere, bands, geometry):
 
     See Also
     --------
-    fifesim.atmosphere.five_s.surface_reflectance
+    fifesim.atmosphere.coupling.surface_reflectance
     """
     cf.check_quantity(reflectance, "toa_reflectance")
-    step = (five_s.surface_reflectance, "surface_reflectance", "to_surface")
+    step = (coupling.surface_reflectance, "surface_reflectance", "to_surface")
     return _carry(*step, reflectance, atmosphere, bands, geometry)
 
 
@@ -77,7 +77,7 @@ def _carry(kernel, name, verb, reflectance, atmosphere, bands, geometry):
         reflectance = reflectance.expand_dims("band")
     if set(reflectance.dims) != {"band", "y", "x"}:
         raise ValueError(f"a reflectance has dimensions (band, y, x), got {reflectance.dims}: select one layer first")
-    terms = five_s.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
+    terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
     per_band = [
         xr.DataArray(getattr(terms, term), dims="band")
         for term in (
@@ -93,5 +93,5 @@ def _carry(kernel, name, verb, reflectance, atmosphere, bands, geometry):
     if "band" in reflectance.coords:
         out = out.assign_coords(band=reflectance["band"])
     out = cf.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)
-    said = {"history": f"{verb}: 5S, {atmosphere}", "atmosphere": str(atmosphere), "references": _REFERENCE}
+    said = {"history": f"{verb}: {atmosphere.engine}, {atmosphere.text}", "atmosphere": atmosphere.text, "references": _REFERENCE}
     return cf.label(out, name, source=reflectance, **said)
