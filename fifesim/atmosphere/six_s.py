@@ -25,7 +25,7 @@ LIMITS = (0.25, 4.0)  # of the engine's spectrum [um]
 STEP = 0.0025  # of its spectrum [um]
 SURFACE_REFLECTANCE = 0.3  # of the uniform ground in a run; see `terms_of`
 PROCESSES = 2  # runs at a time
-LARGEST_ZENITH = 80.0  # nearer to the horizon the Earth is round, the engine's atmosphere is not [degree]
+LARGEST_ZENITH = 75.0  # nearer to the horizon the Earth is round, the engine's atmosphere is not [degree]
 COARSE = 1.0  # below it the last digit of a radiance or an irradiance is more than 0.1 % [W m-2 um-1]
 LEAST_GAS_TRANSMITTANCE = 1e-6  # where no light of the ground arrives, so that the path can be divided by it [1]
 
@@ -67,7 +67,7 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, progress=None):
     bands : sequence of Band, length (band,)
         Within 0.25 to 4 um.
     sza, vza : float
-        0 to 80. [degree]
+        0 to 75. [degree]
     raa : float
         0 has sun and sensor on the same side. [degree]
     progress : bool, optional

@@ -194,7 +194,7 @@ def test_missing_engine_says_what_to_type(monkeypatch):
 
 @pytest.mark.parametrize("angles, name", [((81.0, 0.0), "sza"), ((0.0, -1.0), "vza"), ((np.nan, 0.0), "sza")])
 def test_angle_that_6s_cannot_do_is_named(angles, name):
-    with pytest.raises(ValueError, match=f"{name} must be from 0 to 80 degrees, got"):
+    with pytest.raises(ValueError, match=f"{name} must be from 0 to 75 degrees, got"):
         six_s.band_terms(Atmosphere(), [RED], *angles, 0.0)
 
 
