@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from fifesim import datasets
-from fifesim.atmosphere import models, profiles
+from fifesim.atmosphere import profiles
 
 # Volume mixing ratios of the uniformly mixed gases, in the years of AFGL's 1982 line list. [1]
 MIXING_RATIO = {"co2": 330e-6, "o2": 0.20947, "n2o": 310e-9, "ch4": 1.72e-6}
@@ -178,7 +178,7 @@ def table_wavelengths():
 
 @lru_cache
 def _parameters(gas):
-    """Places of the absorbing wavelengths in the table, strength, saturation and two pairs of temperature coefficients."""
+    """Places of the absorbing wavelengths in the table; strength, saturation, two pairs of temperature coefficients."""
     table = datasets.table("gas_absorption.csv").query("gas == @gas")
     index = np.searchsorted(table_wavelengths(), table["wavelength"].to_numpy() - 1e-6)
     temperature = (table[[name, f"{name}_2"]].to_numpy().T for name in ("strength_temperature", "width_temperature"))
@@ -234,7 +234,8 @@ def gas_transmittance(wavelength, atmosphere, air_mass, *, gases=GASES):
 
     Examples
     --------
-    >>> atmosphere = models.Atmosphere()
+    >>> from fifesim.atmosphere.models import Atmosphere
+    >>> atmosphere = Atmosphere()
     >>> once, twice = gas_transmittance(0.94, atmosphere, [1.0, 2.0])[:, 0]
     >>> bool(twice > once**2)
     True
