@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping
 from difflib import get_close_matches
-from functools import lru_cache
 from numbers import Real
 
 import numpy as np
 
 from fifesim import datasets
-
-COMPONENTS = ("dust", "water_soluble", "oceanic", "soot")
+from fifesim.atmosphere import components
+from fifesim.atmosphere.components import COMPONENTS
 
 # Volume fractions of the components. [1] World Climate Programme WCP-55 (1983); Tanre et al. (1990).
 MODELS = {
@@ -234,8 +233,9 @@ def aerosol_phase(aerosol, scattering_cosine, wavelength):
     True
     """
     wavelength = _checked_wavelength(wavelength)
-    place = _angle_place(scattering_cosine), _wavelength_place(wavelength)
-    return _weighted_mean(mixture(aerosol), wavelength, lambda component: _component_phase(component, *place))
+    return _weighted_mean(
+        mixture(aerosol), wavelength, lambda name: components.phase(name, scattering_cosine, wavelength)
+    )
 
 
 def aerosol_polarization(aerosol, scattering_cosine, wavelength):
@@ -275,9 +275,12 @@ def aerosol_polarization(aerosol, scattering_cosine, wavelength):
     [0.0, 0.0]
     """
     wavelength = _checked_wavelength(wavelength)
-    place, fractions = (_angle_place(scattering_cosine), _wavelength_place(wavelength)), mixture(aerosol)
-    second = _weighted_mean(fractions, wavelength, lambda component: _component_second(component, *place))
-    return second / _weighted_mean(fractions, wavelength, lambda component: _component_phase(component, *place))
+    fractions = mixture(aerosol)
+    first, second = (
+        _weighted_mean(fractions, wavelength, lambda name: element(name, scattering_cosine, wavelength))  # noqa: B023
+        for element in (components.phase, components.polarized_phase)
+    )
+    return second / first
 
 
 def phase_moments(aerosol, wavelength, count):
@@ -319,14 +322,9 @@ def phase_moments(aerosol, wavelength, count):
     True
     """
     wavelength = np.atleast_1d(_checked_wavelength(wavelength))
-    index, share = _wavelength_place(wavelength)
-    share = share[:, None]
-
-    def moments(component):
-        table = _component_moments(component, count)
-        return table[index] * (1 - share) + table[index + 1] * share
-
-    return _weighted_mean(mixture(aerosol), wavelength[:, None], moments)
+    return _weighted_mean(
+        mixture(aerosol), wavelength[:, None], lambda name: components.phase_moments(name, wavelength, count)
+    )
 
 
 def _parsed(text):
@@ -379,107 +377,16 @@ def _checked_wavelength(wavelength):
 
 def _cross_sections(fractions, wavelength):
     """Extinction, scattering, and scattering times asymmetry of a mixture [um-1]."""
-    log_wavelength, total = np.log(wavelength), 0.0
-    for component, fraction in fractions.items():
-        nodes, log_extinction, log_scattering, asymmetry = _component_optics(component)
-        scattering = np.exp(np.interp(log_wavelength, nodes, log_scattering))
-        extinction = np.exp(np.interp(log_wavelength, nodes, log_extinction))
-        directed = scattering * np.interp(log_wavelength, nodes, asymmetry)
-        total = total + fraction * np.stack([extinction, scattering, directed])
-    return total
+    return sum(
+        fraction * np.stack(components.cross_sections(component, wavelength))
+        for component, fraction in fractions.items()
+    )
 
 
 def _weighted_mean(fractions, wavelength, values):
     """Mean over the components, by their scattering."""
     total = amount = 0.0
     for component, fraction in fractions.items():
-        nodes, _, log_scattering, _ = _component_optics(component)
-        weight = fraction * np.exp(np.interp(np.log(wavelength), nodes, log_scattering))
-        total, amount = total + weight * values(component), amount + weight
+        _, scattering, _ = components.cross_sections(component, wavelength)
+        total, amount = total + fraction * scattering * values(component), amount + fraction * scattering
     return total / amount
-
-
-def _component_phase(component, angle, wavelength):
-    (row, low), (column, share) = angle, wavelength
-    table = _log_phase(component)
-
-    def at(column):
-        return np.exp(table[row, column] * (1 - low) + table[row + 1, column] * low)
-
-    return at(column) * (1 - share) + at(column + 1) * share
-
-
-def _component_second(component, angle, wavelength):
-    """Element -12 of the phase matrix of a component [1]."""
-    (row, low), (column, share) = angle, wavelength
-    first, degree = _log_phase(component), _angle_table("aerosol_polarization.csv", component)
-
-    def at(column):
-        both = (table[row, column] * (1 - low) + table[row + 1, column] * low for table in (first, degree))
-        return np.exp(next(both)) * next(both)
-
-    return at(column) * (1 - share) + at(column + 1) * share
-
-
-def _angle_place(scattering_cosine):
-    """Row of the angle tables before each scattering angle, and the share of the next."""
-    nodes = _angles()
-    angle = np.degrees(np.arccos(np.clip(scattering_cosine, -1, 1)))
-    row = np.clip(np.searchsorted(nodes, angle) - 1, 0, nodes.size - 2)
-    return row, (angle - nodes[row]) / (nodes[row + 1] - nodes[row])
-
-
-def _wavelength_place(wavelength):
-    """Column of the tables before each wavelength, and the share of the next."""
-    nodes, _, _, _ = _component_optics(COMPONENTS[0])
-    logarithm = np.log(wavelength)
-    column = np.clip(np.searchsorted(nodes, logarithm) - 1, 0, nodes.size - 2)
-    return column, (logarithm - nodes[column]) / (nodes[column + 1] - nodes[column])
-
-
-@lru_cache
-def _component_optics(component):
-    """Logarithms of the tabulated wavelengths, of extinction and of scattering; asymmetry."""
-    table = datasets.table("aerosol_optics.csv").query("component == @component")
-    wavelength, extinction, scattering, directed = table.drop(columns="component").to_numpy(float).T
-    return np.log(wavelength), np.log(extinction), np.log(scattering), directed / scattering
-
-
-@lru_cache
-def _angle_table(name, component):
-    """Table by angle and wavelength."""
-    return datasets.table(name).query("component == @component").drop(columns=["component", "angle"]).to_numpy(float)
-
-
-@lru_cache
-def _angles():
-    """Scattering angles of the tables [degree]."""
-    return datasets.table("aerosol_phase.csv").query("component == @COMPONENTS[0]")["angle"].to_numpy(float)
-
-
-@lru_cache
-def _quadrature():
-    """Angles, and weights by solid angle that add up to 1: four Gauss points between neighbours of the tables."""
-    points, weights = np.polynomial.legendre.leggauss(4)
-    nodes, half = _angles()[:-1, None], np.diff(_angles())[:, None] / 2
-    angle = np.radians(nodes + half * (1 + points)).ravel()
-    return angle, (np.radians(half) * weights).ravel() * np.sin(angle) / 2
-
-
-@lru_cache
-def _log_phase(component):
-    """Logarithm of the phase function, scaled so that the mean of what is read from the table is 1."""
-    table = np.log(_angle_table("aerosol_phase.csv", component))
-    angle, weights = _quadrature()
-    row, low = _angle_place(np.cos(angle))
-    return table - np.log(weights @ np.exp(table[row] * (1 - low[:, None]) + table[row + 1] * low[:, None]))
-
-
-@lru_cache
-def _component_moments(component, count):
-    """Legendre moments at the tabulated wavelengths, shape (wavelength, count)."""
-    angle, weights = _quadrature()
-    row, low = _angle_place(np.cos(angle))
-    table = _log_phase(component)
-    phase = np.exp(table[row] * (1 - low[:, None]) + table[row + 1] * low[:, None])
-    return (phase * weights[:, None]).T @ np.polynomial.legendre.legvander(np.cos(angle), count - 1)
