@@ -1,15 +1,21 @@
 """The engines by which light goes through the atmosphere, behind one function."""
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
+from fifesim.atmosphere import six_s
 from fifesim.atmosphere.five_s import five_s_scattering
+from fifesim.atmosphere.mixed_air import mixed_scattering
 from fifesim.atmosphere.terms import BandTerms, band_means, nodes_of
 
 LARGEST_ZENITH = 75.0  # the plane-parallel atmosphere holds to here [degree]
 
-SCATTERING = {"5S": five_s_scattering}
+SCATTERING = {
+    "5S": five_s_scattering,
+    "successive-orders": mixed_scattering,
+    "successive-orders-scalar": partial(mixed_scattering, polarized=False),
+}
 
 
 def band_terms(atmosphere, bands, sza, vza, raa):
@@ -51,6 +57,8 @@ def band_terms(atmosphere, bands, sza, vza, raa):
     """
     check_zenith("sza", sza)
     check_zenith("vza", vza)
+    if atmosphere.engine == "6S":
+        return six_s.band_terms(atmosphere, tuple(bands), sza, vza, raa)
     return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
 
 
@@ -95,8 +103,34 @@ def terms_at(atmosphere, bands, sza, vza, raa):
         Shapes (V or 1, R or 1, band). [1]
     """
     nodes = nodes_of(bands)
-    scattering = SCATTERING[atmosphere.engine](atmosphere, nodes, sza, vza, raa)
-    return band_means(scattering, nodes, atmosphere, bands, sza, vza)
+    return band_means(scattering(atmosphere, nodes, sza, vza, raa), nodes, atmosphere, bands, sza, vza)
+
+
+def scattering(atmosphere, wavelength, sza, vza, raa):
+    """
+    What scattering does at some wavelengths, by the engine of the atmosphere.
+
+    Parameters
+    ----------
+    atmosphere : models.Atmosphere
+    wavelength : array, shape (n,)
+        [um]
+    sza : float
+    vza, raa : array, shape (V,) and (R,)
+        [degree]
+
+    Returns
+    -------
+    scattering : terms.Scattering
+
+    Raises
+    ------
+    ValueError
+        If the engine is 6S, which knows whole bands only.
+    """
+    if atmosphere.engine not in SCATTERING:
+        raise ValueError(f"engine must be one of {', '.join(SCATTERING)} here, got {atmosphere.engine!r}")
+    return SCATTERING[atmosphere.engine](atmosphere, wavelength, sza, vza, raa)
 
 
 @lru_cache(maxsize=256)

@@ -39,7 +39,8 @@ def five_s_scattering(atmosphere, wavelength, sza, vza, raa):
     Examples
     --------
     >>> from fifesim.atmosphere.models import Atmosphere
-    >>> blue, red = five_s_scattering(Atmosphere(), np.array([0.45, 0.65]), 30.0, np.zeros(1), np.zeros(1)).reflectance[0, 0]
+    >>> air = five_s_scattering(Atmosphere(), np.array([0.45, 0.65]), 30.0, np.zeros(1), np.zeros(1))
+    >>> blue, red = air.reflectance[0, 0]
     >>> bool(blue > red)
     True
     """

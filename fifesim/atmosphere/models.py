@@ -7,18 +7,8 @@ from difflib import get_close_matches
 import numpy as np
 
 from fifesim.atmosphere import aerosols, molecules
-from fifesim.atmosphere.profiles import (  # noqa: F401
-    BOLTZMANN,
-    GAS_CONSTANT,
-    GRAVITY,
-    MOLAR_MASS_AIR,
-    Levels,
-    MOLAR_MASS_OZONE,
-    MOLAR_VOLUME,
-    PROFILES,
-    column,
-    profile_above,
-)
+from fifesim.atmosphere.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
+from fifesim.atmosphere.summary import describe
 
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
@@ -90,7 +80,7 @@ class Atmosphere:
     def __post_init__(self):
         _check_name("profile", self.profile, PROFILES)
         _check_name("engine", self.engine, ENGINES)
-        aerosol = self.aerosol if self.aerosol == "none" else getattr(aerosols, 'canonical', str)(self.aerosol)
+        aerosol = self.aerosol if self.aerosol == "none" else aerosols.canonical(self.aerosol)
         self._set(aerosol=aerosol, altitude=_checked("altitude", self.altitude, 0, 4, "km"))
         for name, high, unit in (("h2o", 10, "g cm-2"), ("o3", 1, "cm-atm")):
             if getattr(self, name) is not None:
@@ -118,10 +108,14 @@ class Atmosphere:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
+    def __str__(self):
+        return describe(self)
+
     @property
     def text(self):
         """One line that says all, for `parse`."""
-        amount = f"aot={_shortest(self.aot)}" if self.visibility is None else f"visibility={_shortest(self.visibility)} km"
+        by_aot = self.visibility is None
+        amount = f"aot={_shortest(self.aot)}" if by_aot else f"visibility={_shortest(self.visibility)} km"
         return " ".join(
             [
                 f"profile={self.profile} aerosol={self.aerosol} {amount} altitude={_shortest(self.altitude)} km",

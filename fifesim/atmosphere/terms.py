@@ -76,12 +76,30 @@ def nodes_of(bands):
     >>> nodes_of([Band("red", (0.6, 0.65), (1, 1))]).tolist()
     [0.55, 0.59, 0.633, 0.67, 0.694]
     """
-    used = np.zeros(WAVELENGTHS.size, bool)
-    for band in bands:
-        low, high = band.limits
-        first = np.searchsorted(WAVELENGTHS, low, side="right") - 2
-        used[max(first, 0) : np.searchsorted(WAVELENGTHS, high) + 2] = True
-    return WAVELENGTHS[used]
+    return np.unique(np.concatenate([spectral_nodes(*band.limits) for band in bands]))
+
+
+def spectral_nodes(low, high):
+    """
+    Wavelengths of `WAVELENGTHS` on which a stretch of the spectrum depends.
+
+    Parameters
+    ----------
+    low, high : float
+        [um]
+
+    Returns
+    -------
+    wavelength : array, shape (n,)
+        [um]
+
+    Examples
+    --------
+    >>> spectral_nodes(0.6, 0.65).size
+    5
+    """
+    first = max(np.searchsorted(WAVELENGTHS, low, side="right") - 2, 0)
+    return WAVELENGTHS[first : np.searchsorted(WAVELENGTHS, high) + 2]
 
 
 def on_wavelengths(scattering, nodes, wavelength):
@@ -98,11 +116,17 @@ def on_wavelengths(scattering, nodes, wavelength):
     Returns
     -------
     scattering : Scattering
-        Logarithms are interpolated against that of the wavelength, by cubics that do not overshoot.
+        By cubics that do not overshoot: logarithms, and for a transmittance that of its optical depth, against the
+        logarithm of the wavelength.
     """
     log_nodes, log_wavelength = np.log(nodes), np.log(wavelength)
-    logs = (np.log(np.maximum(values, _TINY)) for values in scattering)
-    return Scattering(*(np.exp(PchipInterpolator(log_nodes, values, axis=-1)(log_wavelength)) for values in logs))
+
+    def between(values, is_transmittance):
+        values = np.maximum(-np.log(values) if is_transmittance else values, _TINY)
+        values = np.exp(PchipInterpolator(log_nodes, np.log(values), axis=-1)(log_wavelength))
+        return np.exp(-values) if is_transmittance else values
+
+    return Scattering(*(between(getattr(scattering, name), "transmittance" in name) for name in Scattering._fields))
 
 
 def band_means(scattering, nodes, atmosphere, bands, sza, vza):
@@ -172,7 +196,11 @@ def _one_band(scattering, nodes, atmosphere, band, sza, vza):
     def mean(spectrum):
         return band.mean(spectrum, wavelength, weight)
 
-    down, up, direct = mean(light.transmittance_down), mean(light.transmittance_up), mean(light.direct_transmittance_down)
+    down, up, direct = (
+        mean(light.transmittance_down),
+        mean(light.transmittance_up),
+        mean(light.direct_transmittance_down),
+    )
     used = mean(ground)
     return BandTerms(
         path_reflectance=mean(path) * down * up / used,
