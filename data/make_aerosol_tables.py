@@ -1,7 +1,7 @@
 """
 Make aerosol_optics.csv, aerosol_phase.csv and aerosol_polarization.csv by Mie theory from aerosol_components.csv.
 
-Needs miepython (MIT licence); fifesim itself does not. Run as ``python data/make_aerosol_tables.py``, two minutes.
+Needs miepython (MIT licence); fifesim itself does not. Run as ``python data/make_aerosol_tables.py``, a minute.
 """
 
 import os
