@@ -59,8 +59,8 @@ def environment_function(radius, vza=0.0):
     if not np.all((vza >= 0) & (vza < 90)):
         raise ValueError(f"vza must be from 0 to below 90 degrees, got {vza}: it is the angle from the zenith")
     r = np.asarray(radius, float) / 1000  # the fits are in km
-    molecules = 1 - 0.930 * np.exp(-0.080 * r) - 0.070 * np.exp(-1.10 * r)
-    aerosol = 1 - 0.448 * np.exp(-0.27 * r) - 0.552 * np.exp(-2.83 * r)
+    molecules = -0.930 * np.expm1(-0.080 * r) - 0.070 * np.expm1(-1.10 * r)
+    aerosol = -0.448 * np.expm1(-0.27 * r) - 0.552 * np.expm1(-2.83 * r)
     log_mu_v = np.log(np.cos(np.radians(vza)))
     a = (1.3347 + 0.57757 * log_mu_v) * log_mu_v
     b = (-1.479 - 1.5275 * log_mu_v) * log_mu_v
@@ -131,7 +131,7 @@ def mixed_environment_function(radius, vza, diffuse_up_molecules, diffuse_up_aer
 
     Examples
     --------
-    >>> float(mixed_environment_function(0.0, 30.0, 0.1, 0.2))
+    >>> float(mixed_environment_function(0.0, 30.0, 0.25, 0.75))
     0.0
     """
     weights = environment_weights(diffuse_up_molecules, diffuse_up_aerosol)
@@ -199,7 +199,7 @@ def inhomogeneous_reflectance(
 
     >>> round(float(inhomogeneous_reflectance(0.05, 0.4, 0.1, 0.8, 0.6, 0.25, 0.2) -
     ...             inhomogeneous_reflectance(0.05, 0.05, 0.1, 0.8, 0.6, 0.25, 0.2)), 4)
-    0.0796
+    0.0787
     """
     trapped = environment * np.asarray(spherical_albedo, float)
     if np.any(trapped >= 1):

@@ -11,7 +11,7 @@ from odc.geo.geobox import GeoBox
 
 from fifesim import chunks
 from fifesim import grid as grids
-from fifesim.atmosphere import adjacency, environment_grid
+from fifesim.atmosphere import adjacency, blocks, environment_grid
 from fifesim.footprints import Boxcar, axis_operator, regularize
 
 # How far from the scene a raster of its surroundings counts at its place. Beyond it lies 3e-4 of what molecules scatter
@@ -87,8 +87,8 @@ def apparent_reflectance(reflectance, terms, vza, surroundings=None):
     """
     reflectance = _banded(reflectance)
     weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
-    blocks = _environment(reflectance, weights, vza, surroundings)
-    return _couple(adjacency.inhomogeneous_reflectance, reflectance, blocks, terms)
+    coarse = _environment(reflectance, weights, vza, surroundings)
+    return _couple(adjacency.inhomogeneous_reflectance, reflectance, coarse, terms)
 
 
 def surface_reflectance(toa_reflectance, terms, vza, surroundings=None):
@@ -126,8 +126,8 @@ def surface_reflectance(toa_reflectance, terms, vza, surroundings=None):
     weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
     factors = _per_band(np.stack(np.broadcast_arrays(*_factors(terms)), axis=-1), toa_reflectance, "a term")
     solve = [partial(environment_grid.environment_of_target, factors=tuple(row)) for row in factors.tolist()]
-    blocks = _on_blocks(environment_grid.block_moments, solve, toa_reflectance, weights, vza, surroundings)
-    return _couple(adjacency.target_reflectance, toa_reflectance, blocks, terms)
+    coarse = _on_blocks(blocks.block_moments, solve, toa_reflectance, weights, vza, surroundings)
+    return _couple(adjacency.target_reflectance, toa_reflectance, coarse, terms)
 
 
 def _banded(array):
@@ -154,7 +154,7 @@ def _per_band(values, array, what):
 
 def _environment(reflectance, weights, vza, surroundings):
     solve = [environment_grid.environment] * reflectance.sizes["band"]
-    return _on_blocks(environment_grid.block_sums, solve, reflectance, weights, vza, surroundings)
+    return _on_blocks(blocks.block_sums, solve, reflectance, weights, vza, surroundings)
 
 
 def _on_blocks(summarize, solve, array, weights, vza, surroundings):
@@ -166,26 +166,30 @@ def _on_blocks(summarize, solve, array, weights, vza, surroundings):
     molecules, aerosol = (_per_band(values, array, "a weight") for values in weights)
     vza = _per_band(vza, array, "vza")
     lazy = array.chunks is not None or (outer is not None and outer.chunks is not None)
+    pieces, sums = _sums(summarize, array.data, along)
+    shape = tuple(axis.count + 2 for axis in along)
+    sizes = tuple((size,) for size in shape) if lazy else None
     bands = []
     for band, each in enumerate(solve):
-        sums = _summed(summarize, array.data[band], along)
         spread = (*along, cell, margin, *(float(values[band]) for values in (vza, molecules, aerosol)))
-        reads = [sums] if outer is None else [sums, outer.data[band]]
-        shape = tuple(axis.count + 2 for axis in along)
-        kernel = partial(_whole, each, spread, fars[band])
-        sizes = tuple((size,) for size in shape) if lazy else None
+        kernel = partial(_whole, each, pieces, spread, fars[band])
+        reads = [sums[band]] if outer is None else [sums[band], outer.data[band]]
         bands.append(chunks.windows(kernel, [_all_of(part, shape) for part in reads], shape, sizes))
     return da.stack(bands) if lazy else np.stack(bands)
 
 
 def _blocks(grid):
     place = zip(grids.lattice_position(grid), grids.cell_size(grid), grid.shape, strict=True)
-    return tuple(environment_grid.blocks_along(*axis) for axis in place)
+    return tuple(blocks.blocks_along(*axis) for axis in place)
 
 
-def _whole(solve, spread, far, rows, columns, sums, outer=None):
+def _whole(solve, pieces, spread, far, rows, columns, sums, outer=None):
     """Environment at all blocks of one band."""
-    return solve(sums, far if outer is None else outer, environment_grid.spread_over(*spread))
+    return solve(
+        blocks.whole_blocks(sums, *pieces),
+        far if outer is None else outer,
+        environment_grid.spread_over(*spread),
+    )
 
 
 def _all_of(array, shape):
@@ -194,45 +198,51 @@ def _all_of(array, shape):
     return chunks.Reads(array, rows, columns)
 
 
-def _summed(summarize, data, along):
-    """Sums over blocks, each chunk of them from few chunks of cells."""
-    edges = [axis.edges for axis in along]
-    sizes = None
-    if isinstance(data, da.Array):
-        sizes = tuple(chunks.runs(start, cells) for (start, _), cells in zip(edges, data.chunks, strict=True))
-    kernel = partial(summarize, along_y=along[0], along_x=along[1])
-    leading = (2, 1, 1) if summarize is environment_grid.block_sums else (2, 3, 3)
-    shape = (*leading, *(axis.count for axis in along))
-    return chunks.windows(kernel, [chunks.Reads(data, *edges)], shape, sizes)
+def _sums(summarize, data, along):
+    """Sums over pieces of blocks, and these; each chunk is let go before the next is made."""
+    lazy = isinstance(data, da.Array)
+    cuts = data.chunks[1:] if lazy else [(size,) for size in data.shape[1:]]
+    pieces, sizes = zip(*(axis.pieces(cut) for axis, cut in zip(along, cuts, strict=True)), strict=True)
+    kernel = partial(summarize, along_y=pieces[0], along_x=pieces[1])
+    leading = (2, 1, 1) if summarize is blocks.block_sums else (2, 3, 3)
+    shape = (*leading, *(len(each.start) for each in pieces))
+    edges = [(each.start, each.stop) for each in pieces]
+    if lazy:
+        return pieces, _by_bands(kernel, data, data.chunks[0], edges, shape, sizes)
+    return pieces, chunks.windows(kernel, [chunks.Reads(data, *edges)], (len(data), *shape))
 
 
-def _on_cells(blocks, array):
+def _by_bands(kernel, data, bands, edges, shape, sizes):
+    """Windows of the bands of one chunk at a time."""
+    parts = []
+    for end, count in zip(np.cumsum(bands).tolist(), bands, strict=True):
+        reads = [chunks.Reads(data[end - count : end], *edges)]
+        parts.append(chunks.windows(kernel, reads, (count, *shape), sizes))
+    return da.concatenate(parts)
+
+
+def _on_cells(coarse, array):
     """Raster of the environment on the cells, in the chunks of the array."""
     along_y, along_x = (axis.interpolation for axis in _blocks(grids.geobox(array)))
-    kernel = partial(environment_grid.on_cells, along_y=along_y, along_x=along_x)
+    kernel = partial(blocks.on_cells, along_y=along_y, along_x=along_x)
     edges = [(axis.start, axis.start + axis.count) for axis in (along_y, along_x)]
-    if isinstance(blocks, da.Array):
+    if isinstance(coarse, da.Array):
         sizes = array.chunks or tuple((size,) for size in array.shape)
-        ends = np.cumsum(sizes[0])
-        parts = [
-            chunks.windows(
-                kernel, [chunks.Reads(blocks[end - size : end], *edges)], (size, *array.shape[1:]), sizes[1:]
-            )
-            for end, size in zip(ends.tolist(), sizes[0], strict=True)
-        ]
-        data = da.concatenate(parts)
+        data = _by_bands(kernel, coarse, sizes[0], edges, array.shape[1:], sizes[1:])
     else:
-        data = chunks.windows(kernel, [chunks.Reads(blocks, *edges)], array.shape)
+        data = chunks.windows(kernel, [chunks.Reads(coarse, *edges)], array.shape)
     place = {name: value for name, value in array.coords.items() if not {"y", "x"} & set(value.dims)}
-    return grids.place(xr.DataArray(data, dims=("band", "y", "x"), coords=place), grids.geobox(array))
+    # xarray would take over dask's name.
+    out = xr.DataArray(data, dims=("band", "y", "x"), coords=place).rename(None)
+    return grids.place(out, grids.geobox(array))
 
 
-def _couple(kernel, array, blocks, terms):
+def _couple(kernel, array, coarse, terms):
     """Apply a kernel of `adjacency` to the cells and their environment."""
-    around = _on_cells(blocks, array)
+    around = _on_cells(coarse, array)
     if array.chunks is not None:
         # Made afresh once the environment is known, or all cells would be held until then.
-        array = array.copy(data=bind(array.data, blocks, seed=blocks.name))
+        array = array.copy(data=bind(array.data, coarse, seed=coarse.name))
     per_band = [xr.DataArray(_per_band(values, array, "a term"), dims="band") for values in _factors(terms)]
     plain = [each.drop_vars("band", errors="ignore") for each in (array, around)]
     out = chunks.pointwise(kernel, *plain, *per_band)
@@ -277,15 +287,15 @@ def _outer(surroundings, array, along):
     return (above, left), chunks.resample(partial(regularize, min_valid=0.0), rows, columns, wanted, grid)
 
 
-def _outer_axis(blocks, origin, cell, outer_origin, outer_cell, outer_cells):
+def _outer_axis(along, origin, cell, outer_origin, outer_cell, outer_cells):
     """First edge, signed size and margin of the blocks that a raster is brought onto, and the operator; or None."""
-    direction, size = np.sign(cell), blocks.cells * abs(cell)
+    direction, size = np.sign(cell), along.cells * abs(cell)
     before = direction * (origin - outer_origin)
-    behind = abs(outer_cells * outer_cell) - before - abs(blocks.n_cells * cell)
-    if min(before + abs(blocks.n_cells * cell), behind + abs(blocks.n_cells * cell)) <= -REACH:
+    behind = abs(outer_cells * outer_cell) - before - abs(along.n_cells * cell)
+    if min(before + abs(along.n_cells * cell), behind + abs(along.n_cells * cell)) <= -REACH:
         return None
     margin = max(1, int(np.ceil(min(max(before, behind), REACH) / size)))
-    first = origin - direction * (blocks.offset * abs(cell) + margin * size)
+    first = origin - direction * (along.offset * abs(cell) + margin * size)
     operator = axis_operator(
         Boxcar(size),
         cell_origin=outer_origin,
@@ -293,7 +303,7 @@ def _outer_axis(blocks, origin, cell, outer_origin, outer_cell, outer_cells):
         n_cells=outer_cells,
         pixel_origin=first,
         pixel_size=direction * size,
-        n_pixels=blocks.count + 2 * margin,
+        n_pixels=along.count + 2 * margin,
     )
     return first, direction * size, margin, operator
 

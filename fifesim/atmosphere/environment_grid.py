@@ -1,167 +1,21 @@
 """
-The environment of every cell of a scene, on a coarse grid of blocks of cells.
+The environment of a scene on a coarse grid of blocks of its cells.
 
-The mean of the ground around a target varies slowly. It is computed for the centres of blocks of about 60 m, with the
-point spread of `fifesim.atmosphere.adjacency`, and interpolated linearly to the cells. Outside of the scene lies what
-its surroundings are said to be; cells that are NaN are left out.
+The mean of the ground around a target varies slowly. It is computed for the centres of the blocks of
+`fifesim.atmosphere.blocks`, with the point spread of `fifesim.atmosphere.adjacency`. Outside of the scene lies what its
+surroundings are said to be; cells that are NaN are left out.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy import fft
 
 from fifesim.atmosphere import adjacency
-from fifesim.footprints import Boxcar, axis_operator, regularize
-
-BLOCK = 60.0  # size of the blocks, as far as whole cells go [m]
 
 _CONVERGED = 1e-12  # of the environment's reflectance
 _ITERATIONS = 3000
 _DUST = 1e-9  # a block's share of missing cells is at least one cell's, or rounding
-
-
-class Blocks(NamedTuple):
-    """Blocks of cells along one axis, counted from the origin of the CRS as cells are."""
-
-    cells: int  # in a block
-    offset: int  # of the scene's first cell in its block
-    n_cells: int  # of the scene
-
-    @property
-    def count(self):
-        """Number of blocks that the scene touches."""
-        return -(-(self.offset + self.n_cells) // self.cells)
-
-    @property
-    def edges(self):
-        """First cell of each block in the scene and behind its last, shape (count,) each."""
-        start = np.arange(self.count) * self.cells - self.offset
-        return np.maximum(start, 0), np.minimum(start + self.cells, self.n_cells)
-
-    @property
-    def inside(self):
-        """Share of each block that lies in the scene, shape (count,). [1]"""
-        start, stop = self.edges
-        return (stop - start) / self.cells
-
-    @property
-    def interpolation(self):
-        """Operator from blocks, with one more on either side, to cells."""
-        # The overlap of a block's width around a cell with the blocks is the weight of linear interpolation.
-        return axis_operator(
-            Boxcar(float(self.cells)),
-            cell_origin=-self.cells,
-            cell_size=self.cells,
-            n_cells=self.count + 2,
-            pixel_origin=self.offset,
-            pixel_size=1,
-            n_pixels=self.n_cells,
-        )
-
-    @property
-    def interpolation_weights(self):
-        """Weights of the block before, the own one and that behind, by the cell's place in it, shape (cells, 3)."""
-        place = (np.arange(self.cells) + 0.5) / self.cells - 0.5
-        return np.stack([np.maximum(-place, 0), 1 - np.abs(place), np.maximum(place, 0)], axis=-1)
-
-
-def blocks_along(position, cell_size, n_cells):
-    """
-    Blocks of a scene along one axis.
-
-    Parameters
-    ----------
-    position : int
-        Of the scene's first cell, counted from the origin of the CRS.
-    cell_size : float
-        [m]
-    n_cells : int
-
-    Returns
-    -------
-    blocks : Blocks
-
-    Examples
-    --------
-    >>> blocks = blocks_along(19, 30 / 9, 40)
-    >>> blocks.cells, blocks.offset, blocks.count
-    (18, 1, 3)
-    """
-    cells = max(1, round(BLOCK / cell_size))
-    return Blocks(cells, position % cells, n_cells)
-
-
-def block_sums(rows, columns, values, *, along_y, along_x):
-    """
-    Sums over the valid cells of blocks, and their number, both as shares of a whole block's cells.
-
-    Parameters
-    ----------
-    rows, columns : slice
-        Of the blocks.
-    values : array, shape (y, x)
-        Their cells, NaN where they are missing.
-    along_y, along_x : Blocks
-
-    Returns
-    -------
-    sums : array, shape (2, 1, 1, rows, columns)
-        Of the values, and of 1.
-    """
-    weights = (np.full((along.cells, 1), 1 / along.cells) for along in (along_y, along_x))
-    return _moments(rows, columns, values, along_y, along_x, *weights)
-
-
-def block_moments(rows, columns, values, *, along_y, along_x):
-    """
-    The sums of `block_sums`, with cells weighted as they interpolate between each pair of blocks.
-
-    Parameters
-    ----------
-    rows, columns : slice
-        Of the blocks.
-    values : array, shape (y, x)
-        Their cells, NaN where they are missing.
-    along_y, along_x : Blocks
-
-    Returns
-    -------
-    moments : array, shape (2, 3, 3, rows, columns)
-        Of the values, and of 1; by the block before, the own one and that behind, along y and along x.
-    """
-    weights = (along.interpolation_weights / along.cells for along in (along_y, along_x))
-    return _moments(rows, columns, values, along_y, along_x, *weights)
-
-
-def _moments(rows, columns, values, along_y, along_x, y_weights, x_weights):
-    sums = np.zeros((2, y_weights.shape[1], x_weights.shape[1], rows.stop - rows.start, columns.stop - columns.start))
-    # Place of the first cell in its block: only the scene's first block may lack its own first cells.
-    y_place, x_place = (
-        along.offset if blocks.start == 0 else 0 for along, blocks in ((along_y, rows), (along_x, columns))
-    )
-    dtype = np.float32 if values.dtype == np.float32 else np.float64
-    _add_moments(np.ascontiguousarray(values, dtype), y_place, x_place, y_weights, x_weights, sums)
-    return sums
-
-
-@njit(nogil=True, cache=True)
-def _add_moments(values, y_place, x_place, y_weights, x_weights, sums):
-    down, across = y_weights.shape[0], x_weights.shape[0]
-    for i in range(values.shape[0]):
-        row, y = divmod(y_place + i, down)
-        line = np.zeros((2, x_weights.shape[1], sums.shape[4]))
-        for j in range(values.shape[1]):
-            value = np.float64(values[i, j])
-            if not np.isnan(value):
-                column, x = divmod(x_place + j, across)
-                for k in range(x_weights.shape[1]):
-                    line[0, k, column] += x_weights[x, k] * value
-                    line[1, k, column] += x_weights[x, k]
-        for k in range(y_weights.shape[1]):
-            for part in range(2):
-                sums[part, k, :, row] += y_weights[y, k] * line[part]
 
 
 class Spread(NamedTuple):
@@ -179,10 +33,6 @@ class Spread(NamedTuple):
         around = fft.irfft2(spectrum, (self.spectrum.shape[0], size), overwrite_x=True)
         window = (slice(m - 1, m + n + 1) for m, n in zip(self.margin, self.inside.shape, strict=True))
         return around[tuple(window)]
-
-    def padded(self, field):
-        """Field on the scene's blocks with zeros around."""
-        return np.pad(field, [(size, size) for size in self.margin])
 
 
 def spread_over(along_y, along_x, cell, margin, vza, weight_molecules, weight_aerosol):
@@ -250,7 +100,12 @@ def _known_share(valid, spread):
     """Share of the environment that is not missing, 1 where none is."""
     hole = spread.inside - valid
     hole[hole < _DUST] = 0.0
-    return 1 - spread(spread.padded(hole)) if hole.any() else 1.0
+    return 1 - spread(_padded(spread, hole)) if hole.any() else 1.0
+
+
+def _padded(spread, field):
+    """Field on the scene's blocks with zeros on the margin."""
+    return np.pad(field, [(size, size) for size in spread.margin])
 
 
 def _around(total, valid, surroundings, spread, known):
@@ -262,9 +117,9 @@ def _around(total, valid, surroundings, spread, known):
         far = surroundings[found].mean() if found.any() else np.nan
     else:
         far = surroundings
-    field = spread.padded(total - valid * far)
+    field = _padded(spread, total - valid * far)
     if np.ndim(surroundings):
-        field += (1 - spread.padded(spread.inside)) * np.where(found, surroundings - far, 0.0)
+        field += (1 - _padded(spread, spread.inside)) * np.where(found, surroundings - far, 0.0)
     return far + spread(field) / known
 
 
@@ -323,23 +178,3 @@ def _weighted(slope, around):
         for k in range(slope.shape[0])
         for m in range(slope.shape[1])
     )
-
-
-def on_cells(rows, columns, around, *, along_y, along_x):
-    """
-    Interpolate linearly from blocks to cells.
-
-    Parameters
-    ----------
-    rows, columns : slice
-        Of the cells.
-    around : array, shape (..., y, x)
-        At the centres of the blocks that these need.
-    along_y, along_x : AxisOperator
-        `Blocks.interpolation`.
-
-    Returns
-    -------
-    cells : array, shape (..., rows, columns)
-    """
-    return regularize(around, along_y[rows], along_x[columns], min_valid=0.0)
