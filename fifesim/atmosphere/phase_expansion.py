@@ -77,7 +77,8 @@ def matrix_moments(phase, polarization, scattering_cosine, weights, count):
     -----
     :math:`F_{22}` of spheres is :math:`F_{11}`. :math:`F_{33}` is taken as that, too: it carries only what is already
     polarized. Beside the whole matrices of continental, maritime and urban aerosol, of optical depth up to 0.9 at
-    0.49 to 0.86 um, that moves the path reflectance by less than .06 %.
+    0.49 to 0.86 um, that moves the path reflectance by less than .06 %. 500 Gauss points carry the moments of dust and
+    sea salt to 1e-5; 200 do not, to 1e-3.
 
     References
     ----------

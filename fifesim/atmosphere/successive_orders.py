@@ -55,9 +55,9 @@ def path_reflectance(
     phase : array, shape (views, azimuths)
         Phase function of the aerosol at the scattering angles of the views. [1]
     sza : float
-        [degree]
+        Below 90. [degree]
     vza : array, shape (views,)
-        [degree]
+        Below 90. [degree]
     raa : array, shape (azimuths,)
         0 has sun and sensor on the same side. [degree]
     polarized : bool
@@ -73,8 +73,12 @@ def path_reflectance(
     Notes
     -----
     Molecules and aerosol fall off exponentially with scale heights of 8 and 2 km. Each layer is of even composition,
-    with an even source. Given moments of the phase function alone, the aerosol does not polarize. V, circular
-    polarization, is left out.
+    with an even source. Given moments of the phase function alone, the aerosol does not polarize, which moves the
+    reflectance by up to 2 %. V, circular polarization, is left out: at depth 1 it moves nothing by more than 1e-6.
+
+    Sun and views within 65 degrees, 60 layers are within .03 % of many at depth 1.2, 16 directions within .01 % of
+    many for continental and urban aerosol and .2 % straight back from maritime. Beside 6SV1 at 0.4 to 0.63 um, the
+    sun at 45 or 60 degrees: within .05 % for continental aerosol, .12 % for urban, .75 % for maritime.
 
     References
     ----------
