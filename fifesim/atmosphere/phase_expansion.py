@@ -120,7 +120,7 @@ def truncated_expansion(moments, count):
     Notes
     -----
     Moments of the phase function alone stand for particles that do not polarize, and depolarize what they scatter out
-    of the peak. Beside the whole matrix, that moves the path reflectance over molecules by up to 1.5 %.
+    of the peak.
 
     References
     ----------

@@ -74,7 +74,8 @@ def path_reflectance(
     -----
     Molecules and aerosol fall off exponentially with scale heights of 8 and 2 km. Each layer is of even composition,
     with an even source. Given moments of the phase function alone, the aerosol does not polarize, which moves the
-    reflectance by up to 2 %. V, circular polarization, is left out: at depth 1 it moves nothing by more than 1e-6.
+    reflectance by up to 1.2 % for continental aerosol and 2.9 % for urban; without any polarization it is up to 6 % off
+    at 0.44 um. V, circular polarization, is left out: at depth 1 it moves nothing by more than 1e-5.
 
     Sun and views within 65 degrees, 60 layers are within .03 % of many at depth 1.2, 16 directions within .01 % of
     many for continental and urban aerosol and .2 % straight back from maritime. Beside 6SV1 at 0.4 to 0.63 um, the
