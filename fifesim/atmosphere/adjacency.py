@@ -326,10 +326,13 @@ def _flux_differences(shape, cell, vza, weights, nodes):
 
 def _edge_flux(distance, middle, length, vza, weights, nodes):
     """Flux through edges on lines at a distance from the target, by the place of their middle on these. [1]"""
-    total = 0.0
-    for node, weight in zip(*np.polynomial.legendre.leggauss(nodes), strict=True):
-        r_squared = distance**2 + (middle + node * length / 2) ** 2
+    distance, middle = np.broadcast_arrays(distance, middle)
+    node, weight = (values[:, None] for values in np.polynomial.legendre.leggauss(nodes))
+    flux = np.empty(distance.shape)
+    # By rows, which stay in the processor's cache: a scene of 185 km has ten million blocks.
+    for row in range(len(flux)):
+        r_squared = distance[row] ** 2 + (middle[row] + node * length / 2) ** 2
         functions = environment_function(np.sqrt(r_squared), vza)
         scattered = weights[0] * functions[0] + weights[1] * functions[1]
-        total = total + weight * scattered / r_squared
-    return total * distance * length / (4 * np.pi)
+        flux[row] = (weight * scattered / r_squared).sum(axis=0) * distance[row]
+    return flux * length / (4 * np.pi)

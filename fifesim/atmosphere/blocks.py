@@ -179,8 +179,12 @@ def whole_blocks(sums, along_y, along_x):
     sums : array, shape (..., y, x)
         Of blocks, the same to the bit however these were cut.
     """
-    whole = np.add.reduceat(np.add.reduceat(sums, along_y.first, axis=-2), along_x.first, axis=-1)
-    return whole / _UNIT
+    first_row, first_column = along_y.first, along_x.first
+    whole = np.empty((*sums.shape[:-2], first_row.size, first_column.size))
+    for layer in np.ndindex(sums.shape[:-2]):
+        lines = np.add.reduceat(sums[layer], first_row, axis=0)
+        whole[layer] = np.add.reduceat(lines, first_column, axis=1) / _UNIT
+    return whole
 
 
 def _moments(rows, columns, values, along_y, along_x, y_weights, x_weights):

@@ -151,10 +151,10 @@ def environment_of_target(moments, surroundings, spread, factors):
         If the iteration does not converge, for want of direct light.
     """
     path, down, direct, diffuse, albedo, gas = factors
-    valid = moments[1].sum(axis=(0, 1))
-    ground = moments[0] / gas - path * moments[1]
-    bare = ground.sum(axis=(0, 1)) / (down * direct)
-    slope = (albedo / down * ground + diffuse * moments[1]) / direct
+    total, valid = moments.sum(axis=(1, 2))
+    bare = (total / gas - path * valid) / (down * direct)
+    slope = moments[0] * (albedo / (down * direct * gas))
+    slope += moments[1] * ((diffuse - albedo * path / down) / direct)
     # The operator's eigenvalues lie between 1 and this above it.
     largest = np.divide(slope.sum(axis=(0, 1)), valid, out=np.zeros_like(valid), where=valid > 0).max(initial=0.0)
     known = _known_share(valid, spread)
