@@ -58,6 +58,7 @@ _PUBLIC = {
     "to_surface": "chain",
     "to_toa": "chain",
     "treatments": "ground.distribution",
+    "verify": "verification.areas",
 }
 
 __all__ = ["__version__", *_PUBLIC]
