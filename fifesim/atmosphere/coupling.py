@@ -1,6 +1,7 @@
 """Coupling of surface and atmosphere: reflectance at the surface to apparent reflectance in space, and back."""
 
 import numpy as np
+from numba import vectorize
 
 
 def apparent_reflectance(
@@ -56,14 +57,16 @@ def apparent_reflectance(
     >>> float(apparent_reflectance(0.25, 0.0, 1.0, 1.0, 0.0))
     0.25
     """
-    trapped = surface_reflectance * np.asarray(spherical_albedo, float)
-    if np.any(trapped >= 1):
+    factors = path_reflectance, transmittance_down, transmittance_up, spherical_albedo, gas_transmittance
+    toa = _apparent(surface_reflectance, *factors)
+    # The kernel marks what does not converge.
+    if np.any(np.isinf(toa)):
+        trapped = surface_reflectance * np.asarray(spherical_albedo, float)
         raise ValueError(
             f"surface_reflectance times spherical_albedo must be below 1, got {np.nanmax(trapped):g}: "
             "reflectance is a fraction, not a percentage"
         )
-    ground = transmittance_down * surface_reflectance / (1 - trapped) * transmittance_up
-    return gas_transmittance * (path_reflectance + ground)
+    return toa
 
 
 def surface_reflectance(
@@ -106,5 +109,19 @@ def surface_reflectance(
     >>> round(float(surface_reflectance(apparent_reflectance(0.25, 0.1, 0.8, 0.9, 0.2), 0.1, 0.8, 0.9, 0.2)), 12)
     0.25
     """
-    ground = (toa_reflectance / gas_transmittance - path_reflectance) / (transmittance_down * transmittance_up)
-    return ground / (1 + spherical_albedo * ground)
+    factors = path_reflectance, transmittance_down, transmittance_up, spherical_albedo, gas_transmittance
+    return _surface(toa_reflectance, *factors)
+
+
+@vectorize(["float64(float64, float64, float64, float64, float64, float64)"], cache=True)
+def _apparent(rho, path, down, up, albedo, gas):
+    trapped = rho * albedo
+    if trapped >= 1:
+        return np.inf
+    return gas * (path + down * rho / (1 - trapped) * up)
+
+
+@vectorize(["float64(float64, float64, float64, float64, float64, float64)"], cache=True)
+def _surface(toa, path, down, up, albedo, gas):
+    ground = (toa / gas - path) / (down * up)
+    return ground / (1 + albedo * ground)

@@ -5,10 +5,12 @@ from functools import lru_cache, partial
 import numpy as np
 
 from fifesim.atmosphere import aerosols, successive_orders
+from fifesim.atmosphere.phase_expansion import matrix_moments
 from fifesim.atmosphere.terms import Scattering
 from fifesim.geometry import scattering_angle_cosine
 
-_MOMENTS = 81  # Legendre moments of the aerosol's phase function
+_MOMENTS = 48  # of the aerosol's scattering matrix: the solver uses the first 33
+_COSINES, _WEIGHTS = np.polynomial.legendre.leggauss(500)  # fine enough for the forward peak of coarse particles
 
 
 def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
@@ -24,7 +26,7 @@ def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
     vza, raa : array, shape (V,) and (R,)
         raa of 0 has sun and sensor on the same side. [degree]
     polarized : bool, optional
-        Whether light is polarized; fluxes are computed without.
+        Whether light is polarized, by molecules and aerosol.
 
     Returns
     -------
@@ -53,7 +55,7 @@ def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
         float(depth[0]) for depth in (atmosphere.rayleigh_optical_depth(at), atmosphere.aerosol_optical_depth(at))
     )
     albedo, moments, phase = _aerosol(
-        atmosphere, at, scattering_angle_cosine(sza, np.array(vza)[:, None], np.array(raa))
+        atmosphere, at, scattering_angle_cosine(sza, np.array(vza)[:, None], np.array(raa)), polarized
     )
 
     def reflectance(tau_aerosol):
@@ -62,7 +64,11 @@ def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
         )
 
     flux = partial(
-        successive_orders.flux_transmittance, single_scattering_albedo=albedo, moments=moments, zenith=(sza, *vza)
+        successive_orders.flux_transmittance,
+        single_scattering_albedo=albedo,
+        moments=moments,
+        zenith=(sza, *vza),
+        polarized=polarized,
     )
     (total, spherical_albedo), (molecules, _), (aerosol, _) = (
         flux(*depths) for depths in ((tau_r, tau_a), (tau_r, 0.0), (0.0, tau_a))
@@ -83,10 +89,19 @@ def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
     )
 
 
-def _aerosol(atmosphere, wavelength, cosine):
-    """Single scattering albedo, moments and phase function of the aerosol."""
+def _aerosol(atmosphere, wavelength, cosine, polarized):
+    """Single scattering albedo, moments of the scattering matrix, and phase function of the aerosol."""
     if atmosphere.aot == 0:
         return 0.0, np.eye(1, _MOMENTS)[0], np.zeros(cosine.shape)
     _, albedo, _ = aerosols.aerosol_optics(atmosphere.aerosol, wavelength)
-    moments = aerosols.phase_moments(atmosphere.aerosol, wavelength, _MOMENTS)[0]
-    return float(albedo[0]), moments, aerosols.aerosol_phase(atmosphere.aerosol, cosine, wavelength[0])
+    phase = aerosols.aerosol_phase(atmosphere.aerosol, cosine, wavelength[0])
+    return float(albedo[0]), _moments(atmosphere.aerosol, float(wavelength[0]), polarized), phase
+
+
+@lru_cache(maxsize=256)
+def _moments(aerosol, wavelength, polarized):
+    if not polarized:
+        return aerosols.phase_moments(aerosol, np.array([wavelength]), _MOMENTS)[0]
+    functions = aerosols.aerosol_phase, aerosols.aerosol_polarization
+    matrix = (function(aerosol, _COSINES, wavelength) for function in functions)
+    return matrix_moments(*matrix, _COSINES, _WEIGHTS, _MOMENTS)
