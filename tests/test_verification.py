@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 import fifesim
 from fifesim.cli import app
-from fifesim.ground import absorption, terrain
+from fifesim.ground import absorption, dem, terrain
 from fifesim.sensor import calibration
 from fifesim.verification import areas, atmosphere, canopy
 from fifesim.verification.deviations import Deviation, largest
@@ -32,17 +32,19 @@ def test_installation_is_within_all_bounds():
 
 
 @pytest.mark.parametrize(
-    "area, owner, name, said",
+    "area, owner, name, wrong, said",
     [
-        ("canopy", absorption, "extinction_coefficient", "canopy: extinction by spherical leaves"),
-        ("terrain", terrain, "sky_view", "terrain: sky seen from a wide plane"),
-        ("sensor", calibration, "gain_offset", "sensor: counts of TM's radiances"),
+        ("canopy", absorption, "extinction_coefficient", 1.01, "canopy: extinction by spherical leaves"),
+        ("terrain", terrain, "sky_view", 1.01, "terrain: sky seen from a wide plane"),
+        ("terrain", terrain, "sky_view", np.nan, "terrain: Kt of planes"),
+        ("terrain", dem, "spline_grid", np.nan, "terrain: wave of six cells"),
+        ("sensor", calibration, "gain_offset", 1.01, "sensor: counts of TM's radiances"),
     ],
 )
-def test_broken_physics_is_named_with_exit_code_1(monkeypatch, only, area, owner, name, said):
+def test_broken_physics_is_named_with_exit_code_1(monkeypatch, only, area, owner, name, wrong, said):
     only(area)
     right = getattr(owner, name)
-    monkeypatch.setattr(owner, name, lambda *given, **options: 1.01 * np.asarray(right(*given, **options)))
+    monkeypatch.setattr(owner, name, lambda *given, **options: wrong * np.asarray(right(*given, **options)))
     result = run()
     assert result.exit_code == 1
     last = result.stdout.splitlines()[-1]

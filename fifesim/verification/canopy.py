@@ -24,16 +24,14 @@ _SHAPES = ("spherical", "planophile", "erectophile")
 def _limits():
     """Rounding, of up to 20 optical thicknesses of leaves."""
     bare = with_background(sail(0.0, _RHO, 1 - _RHO, sza=_SZA, vza=_VZA, hotspot=0.05), 0.15)
-    yield _deviation("no leaves show the background", max(largest(r, 0.15) for r in bare), 0.0, "1", "theory")
+    yield _deviation("no leaves show the background", np.max([largest(r, 0.15) for r in bare]), 0.0, "1", "theory")
     white = [sail(_LAI, _RHO, 1 - _RHO, sza=_SZA, vza=_VZA, raa=50, leaf_angles=shape) for shape in _SHAPES]
-    lost = max(
-        largest(reflected + transmitted, 1)
-        for c in white
-        for reflected, transmitted in ((c.rdd, c.tdd), (c.rsd, c.tsd + c.tss), (c.rdo, c.tdo + c.too))
+    lost = np.max(
+        [largest(out, 1) for c in white for out in (c.rdd + c.tdd, c.rsd + c.tsd + c.tss, c.rdo + c.tdo + c.too)]
     )
     yield _deviation("leaves that absorb nothing lose no light", lost, 1e-12, "1", "energy budget")
     over_white = [with_background(canopy, 1.0) for canopy in white]
-    kept = max(largest(r, 1) for surface in over_white for r in (surface.rdd, surface.rsd, surface.rdo))
+    kept = np.max([largest(r, 1) for surface in over_white for r in (surface.rdd, surface.rsd, surface.rdo)])
     yield _deviation("and reflect all of it over white ground", kept, 1e-12, "1", "energy budget")
 
 
@@ -55,7 +53,7 @@ def _half_space():
         back = ((1 + squared) * rho + (1 - squared) * tau) / 2
         loss = 1 - ((1 + squared) * tau + (1 - squared) * rho) / 2
         thick = sail(400.0, rho, tau, sza=30.0, leaf_angles=f"{inclination:g}: 1")
-        worst = max(worst, largest(thick.rdd, (loss - np.sqrt(loss**2 - back**2)) / back))
+        worst = np.maximum(worst, largest(thick.rdd, (loss - np.sqrt(loss**2 - back**2)) / back))
     yield _deviation("reflectance of a canopy without end", worst, 1e-12, "1", "Kubelka and Munk (1931)")
 
 
@@ -70,7 +68,7 @@ def _spherical_leaves():
         cosine = np.cos(s) * np.cos(v) + np.sin(s) * np.sin(v) * np.cos(azimuth)
         between = np.arccos(np.clip(cosine, -1, 1))
         ross = np.sin(between) - between * np.cos(between)
-        worst = max(worst, largest(found, np.array([ross + np.pi * np.cos(between), ross]) / (3 * np.pi)))
+        worst = np.maximum(worst, largest(found, np.array([ross + np.pi * np.cos(between), ross]) / (3 * np.pi)))
     yield _deviation("single scattering by spherical leaves", worst, 1e-5, "1", "Ross (1981), closed form")
 
 
@@ -88,7 +86,7 @@ def _hot_spot():
         seen = lai * quad(_gap, 0, 1, args=(ks, ko, lai, apart), epsabs=1e-14, epsrel=1e-11, limit=200)[0]
         plain = -np.expm1(-(ks + ko) * lai) / (ks + ko)
         spot, none = (sail(lai, 0.5, 0.3, sza=sza, vza=vza, raa=raa, hotspot=h).rso for h in (size, 0.0))
-        worst = max(worst, largest(spot - none, w * (seen - plain)))
+        worst = np.maximum(worst, largest(spot - none, w * (seen - plain)))
     yield _deviation("hot spot", worst, 1e-9, "1", "Kuusk (1991), by quadrature")
 
 
@@ -108,7 +106,7 @@ def _other_sail():
         canopy = sail(row.lai, row.leaf_reflectance, row.leaf_transmittance, **angles, leaf_angles=leaves)
         surface = with_background(canopy, row.background)
         found = [surface.rdd, surface.rsd, surface.rdo, surface.rso, canopy.tss]
-        worst = max(worst, largest(found, [row.rdd, row.rsd, row.rdo, row.rso, row.tss]))
+        worst = np.maximum(worst, largest(found, [row.rdd, row.rsd, row.rdo, row.rso, row.tss]))
     yield _deviation(f"{len(table)} canopies of any leaf angles", worst, 1e-7, "1", "SAIL of prosail 2.0.5")
 
 

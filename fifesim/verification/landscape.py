@@ -20,7 +20,7 @@ def _covariances(arp):
 
 
 def _moments():
-    variance = max(abs(field_variance(arp) / _covariances(arp)[0, 0] - 1) for arp in _ARPS)
+    variance = largest([field_variance(arp) / _covariances(arp)[0, 0] for arp in _ARPS], 1)
     yield _deviation("variance", variance, 1e-12, "1", "integral of the spectrum")
     lags = np.arange(40)
     found, expected = [], []
@@ -49,7 +49,7 @@ def _equation():
         noise = periodic_field(5, 0.0, (90, 70))
         field = periodic_field(5, arp, (90, 70)) * np.sqrt(field_variance(arp))
         neighbours = sum(np.roll(field, step, axis) for step in (-1, 1) for axis in (0, 1))
-        worst = max(worst, largest(field - arp * neighbours, noise))
+        worst = np.maximum(worst, largest(field - arp * neighbours, noise))
     yield _deviation("a field is its neighbours and noise", worst, 1e-12, "1", "its own equation, cell by cell")
 
 

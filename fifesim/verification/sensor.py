@@ -62,8 +62,8 @@ def _wave():
         k = 2 * np.pi / wavelength
         scene = np.diff(np.sin(k * np.arange(cells + 1) * cell)) / (k * cell)
         expected = _integral(np.array(-_WIDTH), np.array(_WIDTH), 1 / wavelength)
-        image = max(image, largest(regularize(scene[None], single, columns), expected * np.cos(k * centres)))
-        transfer = max(transfer, largest(CosineSpread(_WIDTH).mtf(1 / wavelength), expected))
+        image = np.maximum(image, largest(regularize(scene[None], single, columns), expected * np.cos(k * centres)))
+        transfer = np.maximum(transfer, largest(CosineSpread(_WIDTH).mtf(1 / wavelength), expected))
     yield _deviation("image of waves of 21 to 400 m", image, 1e-7, "1", "its Fourier transform, quadrature")
     yield _deviation("modulation transfer function", transfer, 1e-12, "1", "its Fourier transform, quadrature")
 
@@ -86,7 +86,7 @@ def _counts():
         radiance = np.linspace(band.min_radiance + gain, band.full_scale_radiance, 1001)
         counts = calibration.radiance_to_dn(radiance, gain, offset, bits=8).astype(float)
         step = (band.full_scale_radiance - band.min_radiance) / 255
-        worst = max(worst, largest(counts * step + band.min_radiance, radiance) / step)
+        worst = np.maximum(worst, largest(counts * step + band.min_radiance, radiance) / step)
     yield _deviation("counts of TM's radiances", worst, 0.5 + 1e-9, "count", "Friedl et al. (1995), Table 1")
 
 

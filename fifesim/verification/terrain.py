@@ -27,7 +27,7 @@ def _vector(zenith, azimuth):
 def _slopes():
     """Elevations of 1000 m leave 1e-13 m, and the gentlest slope turns that into 1e-10 degree."""
     found = [terrain.slope_aspect(_plane(*plane), 20.0, 30.0) for plane in _PLANES]
-    slope = max(largest(one[0], plane[0]) for one, plane in zip(found, _PLANES, strict=True))
+    slope = np.max([largest(one[0], plane[0]) for one, plane in zip(found, _PLANES, strict=True)])
     turned = [(one[1] - plane[1] + 180) % 360 - 180 for one, plane in zip(found, _PLANES, strict=True)]
     yield _deviation("slope of planes (Horn)", slope, 1e-9, "degree", "plane")
     yield _deviation("aspect of planes (Horn)", largest(turned, 0), 1e-9, "degree", "plane")
@@ -79,7 +79,7 @@ def _light():
         found = illumination.kt(sky, terrain.terrain_view(plane[0], sky), 0.3, sun, mu_s, direct, total)
         beam = max(_vector(*plane) @ _vector(sza, saa), 0.0) / mu_s * direct
         expected = (beam + (1 + np.cos(np.radians(plane[0]))) / 2 * (total - direct)) / total
-        worst = max(worst, largest(found, expected))
+        worst = np.maximum(worst, largest(found, expected))
     yield _deviation("Kt of planes", worst, 1e-9, "1", "cosine law, Liu and Jordan (1960)")
 
 
@@ -92,7 +92,7 @@ def _shadow():
     worst = 0.0
     for elevation in (12.0, 20.0, 45.0):
         dark = tangents[:60] > np.tan(np.radians(elevation))
-        worst = max(worst, abs(2.0 * dark.sum() - 20.0 / np.tan(np.radians(elevation))))
+        worst = np.maximum(worst, abs(2.0 * dark.sum() - 20.0 / np.tan(np.radians(elevation))))
     yield _deviation("length of the shadow of a cliff of 20 m", worst, 2.0, "m", "20 m / tan(elevation)")
 
 
@@ -104,7 +104,7 @@ def _upsampling():
     for turn in (0.0, 30.0, 45.0):
         u, v = 2 * np.pi / 6 * np.cos(np.radians(turn)), 2 * np.pi / 6 * np.sin(np.radians(turn))
         found = dem.spline_grid(dem.spline_coefficients(np.sin(u * columns + v * rows)), y, x)
-        worst = max(worst, largest(found, np.sin(u * x + v * y[:, None])))
+        worst = np.maximum(worst, largest(found, np.sin(u * x + v * y[:, None])))
     yield _deviation("wave of six cells, nine times finer", worst, 2e-4, "1", "the wave itself")
 
 
