@@ -54,7 +54,7 @@ def sense(toa, instrument="TM", *, onto=None, min_valid=MIN_VALID, geometry=None
     description = find_instrument(instrument)
     toa = toa if "band" in toa.dims else toa.expand_dims("band")
     bands = matching_bands(toa, description)
-    geometry = geometry or cf.geometry_of(toa) or fife_geometry()
+    geometry = (geometry or cf.geometry_of(toa) or fife_geometry()).uniform("sense")
     radiance = _as_radiance(_regularized(toa, description, onto, min_valid), bands, geometry)
     gain, offset = calibration.gain_offset(
         [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands], description.bits
@@ -141,6 +141,7 @@ def to_reflectance(image):
     geometry = cf.geometry_of(image)
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
+    geometry.uniform("to_reflectance")
     out = chunks.pointwise(
         calibration.radiance_to_reflectance,
         radiance,
