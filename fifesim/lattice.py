@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 
-def assemble(make_tile, tile, row, column, shape, out=None):
+def assemble(make_tile, tile, row, column, shape):
     """
     Window of a lattice, cut from the fixed tiles that it touches.
 
@@ -19,8 +19,6 @@ def assemble(make_tile, tile, row, column, shape, out=None):
         First row and column of the window.
     shape : (int, int)
         Rows and columns of the window.
-    out : array, shape (rows, columns), optional
-        Takes the window.
 
     Returns
     -------
@@ -32,7 +30,7 @@ def assemble(make_tile, tile, row, column, shape, out=None):
     [[0.0, 1.0, 1.0], [10.0, 11.0, 11.0]]
     """
     height, width = shape
-    window = np.empty(shape) if out is None else out
+    window = np.empty(shape)
     if not window.size:
         return window
     for tile_row in range(row // tile, -(-(row + height) // tile)):

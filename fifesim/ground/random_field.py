@@ -11,11 +11,11 @@ from functools import lru_cache, partial
 import numpy as np
 from scipy import fft, optimize, special
 
+from fifesim.ground.white_noise import white_noise
 from fifesim.lattice import assemble
 
-# Noise block and field tile [cells].
-BLOCK = 72
-TILE = 14 * BLOCK
+# Field tile. [cell]
+TILE = 1008
 
 # A margin of 18 decay lengths leaves exp(-18) = 1.5e-8 of the standard deviation at a tile's edge, less than the
 # rounding of the single precision in which a tile is filtered: that moves cells by 4e-7 of it rms, and reflectances by
@@ -356,20 +356,11 @@ def _tile(seed, arp, tile_row, tile_column):
     """One tile of the streaming field, in single precision."""
     around = margin(arp)
     size = fft.next_fast_len(TILE + 2 * around, real=True)
-    noise = np.empty((size, size), np.float32)
-    blocks = partial(_noise_block, seed)
-    first_row, first_column = (tile * TILE - around for tile in (tile_row, tile_column))
-    assemble(blocks, BLOCK, first_row, first_column, noise.shape, out=noise)
+    noise = white_noise(seed, tile_row * TILE - around, tile_column * TILE - around, (size, size))
     inside = slice(around, around + TILE)
     tile = _filter(noise, _half_response(arp, (size, size), np.float32))[inside, inside].copy()
     tile.flags.writeable = False
     return tile
-
-
-def _noise_block(seed, block_row, block_column):
-    """White noise of one lattice block: the block's place is the upper half of the Philox counter."""
-    counter = np.array([0, 0, block_row % 2**64, block_column % 2**64], dtype=np.uint64)
-    return np.random.Generator(np.random.Philox(counter=counter, key=_key(seed, 0))).standard_normal((BLOCK, BLOCK))
 
 
 def _key(seed, method):
@@ -378,7 +369,7 @@ def _key(seed, method):
 
 
 def _filter(noise, half_response):
-    spectrum = fft.rfft2(noise, overwrite_x=True)
+    spectrum = fft.rfft2(noise)
     spectrum *= half_response
     return fft.irfft2(spectrum, s=noise.shape, overwrite_x=True)
 
