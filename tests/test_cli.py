@@ -1,5 +1,6 @@
 """The command line as a user meets it: files, exit codes, and one line for a mistake."""
 
+import json
 import os
 import subprocess
 import sys
@@ -131,6 +132,30 @@ def test_negative_lai_leaves_no_output_behind(invoke, tmp_path):
     assert result.exit_code == 2
     assert "negative" in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_dry_run_estimates_and_writes_nothing(invoke, small, tmp_path):
+    result = invoke("simulate", small, "-o", "out", "--dry-run", "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert (found["cells"], found["pixels"]) == (270 * 180, 30 * 20)
+    assert found["tasks"] > 0 and found["seconds"] > 0 and found["memory"] > 0
+    assert not (tmp_path / "out").exists()
+    assert "million" in invoke("simulate", small, "--dry-run").stdout
+
+
+def test_json_says_how_far_it_is(invoke, small):
+    lines = [json.loads(line) for line in invoke("simulate", small, "-o", "out", "--json").stdout.splitlines()]
+    assert {line["event"] for line in lines[:-1]} == {"progress"}
+    assert lines[-1]["event"] == "finished"
+    assert (lines[0]["cells_done"], lines[-2]["cells_done"]) == (0, 270 * 180)
+    assert len(lines[-1]["files"]) == len(FILES)
+
+
+def test_workers_and_a_scheduler_are_not_asked_for_together(invoke, small):
+    result = invoke("simulate", small, "--workers", 2, "--scheduler", "tcp://nowhere:1")
+    assert result.exit_code == 2
+    assert "one of them" in result.stderr
 
 
 def test_help_does_not_import_what_is_slow():

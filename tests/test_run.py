@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 import rasterio
+import rioxarray  # noqa: F401  registers .rio
+import xarray as xr
 
 import fifesim
-from fifesim.run import simulate_to_folder
+from fifesim.run import FILES, simulate_to_folder
 from fifesim.scenario_file import parse_scenario
 
 FLAT = {"dem": "flat"}
@@ -76,3 +78,43 @@ def test_a_report_with_terrain_shows_it_and_says_how_far_it_is_known(tmp_path):
     assert page.count("data:image/png;base64,") == 5
     assert "north 0.9 km, east 0.9 km, south 0.9 km, west 0.9 km" in page
     assert "flint-hills" in (tmp_path / "hills" / "scenario.toml").read_text(encoding="utf-8")
+
+
+HILLS = {
+    "grid": {"width": 4500, "height": 3900},
+    "ground": {"seed": 3},
+    "terrain": {"horizon_reach": 600},
+}
+
+
+@pytest.fixture(scope="module")
+def hills(tmp_path_factory):
+    """A scene of several chunks on terrain, with its cells."""
+    folder = tmp_path_factory.mktemp("hills") / "out"
+    simulate_to_folder(parse_scenario(HILLS), folder, scene=True, threads=2)
+    return folder
+
+
+@pytest.mark.parametrize("chunks", [None, 512, 1500, {"y": 333, "x": 1170}])
+def test_a_run_gives_the_bits_of_the_chain_under_any_chunks(hills, chunks):
+    whole = -1 if chunks is None else chunks
+    tree = fifesim.simulate(parse_scenario(HILLS).complete(), chunks=whole)
+    np.testing.assert_array_equal(fifesim.open_image(hills / "image.tif").values, tree["image"]["dn"].values)
+    truth = fifesim.open_image(hills / "truth.tif")
+    for name in ("lai", "fpar"):
+        np.testing.assert_array_equal(truth.sel(band=name), tree["truth"][name].values)
+
+
+def test_the_scene_holds_the_cells_in_shards(hills):
+    tree = fifesim.simulate(parse_scenario(HILLS).complete())
+    with xr.open_zarr(hills / "scene.zarr", decode_coords="all", consolidated=False) as scene:
+        for name in ("lai", "dem", "surface_reflectance"):
+            np.testing.assert_array_equal(scene[name].values, tree["scene"][name].values)
+            assert scene[name].encoding["shards"][-2:] == (1008, 1008)
+            assert scene[name].attrs["units"] == tree["scene"][name].attrs["units"]
+        assert scene.rio.crs.to_epsg() == 26914
+        np.testing.assert_array_equal(scene["x"], tree["scene"]["x"])
+
+
+def test_nothing_unfinished_stays(hills):
+    assert sorted(path.name for path in hills.iterdir()) == sorted([*FILES, "scene.zarr"])

@@ -1,0 +1,116 @@
+"""
+What is measured: calls without arguments, by name, for a number of cells along each side.
+
+Each gives, as a pair, the call and how many cells it makes.
+"""
+
+import tempfile
+from pathlib import Path
+
+import dask
+import numpy as np
+from chain import BANDS, chain, floor
+
+import fifesim
+from fifesim.run import simulate_to_folder
+from fifesim.scenario_file import parse_scenario
+from fifesim.simulation import simulate
+
+CELL = 30 / 9
+WEST, NORTH = 704970.0, 4334220.0
+
+
+def grid_of(side):
+    return fifesim.grid_at("EPSG:26914", WEST, NORTH, side * CELL + 1e-3, side * CELL + 1e-3, CELL)
+
+
+def scenario_of(side, dem="flat"):
+    size = side // 9 * 9 * CELL
+    return parse_scenario({"grid": {"width": size, "height": size}, "terrain": {"dem": dem}}).complete()
+
+
+def lai_of(side):
+    """Leaf area index in memory, in chunks as the chain has them."""
+    return fifesim.lai_scene(grid_of(side), "burned-grazed", arp=0.15, seed=7, chunks="auto").persist()
+
+
+def field(side):
+    lai = fifesim.lai_scene(grid_of(side), "burned-grazed", arp=0.15, seed=7, chunks="auto")
+    return lambda: _run(lai.data)
+
+
+def canopy(side):
+    lai = lai_of(side)
+    return lambda: _run(lai.fifesim.surface_reflectance("TM", bands=BANDS).data)
+
+
+def atmosphere(side):
+    rho = lai_of(side).fifesim.surface_reflectance("TM", bands=BANDS).persist()
+    return lambda: _run(rho.fifesim.to_toa().data)
+
+
+def sensor(side):
+    toa = lai_of(side).fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().persist()
+    return lambda: toa.fifesim.sense("TM").compute()
+
+
+def truth(side):
+    lai = lai_of(side)
+    return lambda: lai.fifesim.aggregate(30).compute()
+
+
+def flat_chain(side):
+    return lambda: chain_on(side).compute()
+
+
+def terrain_chain(side):
+    scenario = scenario_of(side, "flint-hills")
+    return lambda: simulate(scenario)["image"]["dn"].compute()
+
+
+def run_flat(side):
+    return _to_folder(scenario_of(side))
+
+
+def run_terrain(side):
+    return _to_folder(scenario_of(side, "flint-hills"))
+
+
+def floor_of(side):
+    return lambda: floor(side, 1)
+
+
+def chain_on(side):
+    if side <= 4500:
+        return chain(side)
+    lai = fifesim.lai_scene(grid_of(side), "burned-grazed", arp=0.15, seed=7, chunks="auto")
+    return lai.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM")
+
+
+def _to_folder(scenario):
+    def call():
+        with tempfile.TemporaryDirectory() as folder:
+            simulate_to_folder(scenario, Path(folder) / "out", threads=dask.config.get("num_workers"))
+
+    return call
+
+
+def _run(array):
+    """Compute all blocks and keep none."""
+    dask.compute(array.map_blocks(lambda block: np.zeros((1,) * block.ndim), chunks=(1,) * array.ndim, dtype=float))
+
+
+STAGES = {
+    "field and LAI": field,
+    "canopy, 2 bands": canopy,
+    "atmosphere, 2 bands": atmosphere,
+    "sensor, 2 bands": sensor,
+    "30 m truth": truth,
+}
+CHAINS = {
+    "flat chain, field to DN": flat_chain,
+    "terrain chain, field to DN": terrain_chain,
+    "fifesim simulate, flat": run_flat,
+    "fifesim simulate, terrain": run_terrain,
+}
+FLOOR = {"floor: normals and FFT": floor_of}
