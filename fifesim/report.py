@@ -13,7 +13,7 @@ from fifesim.scenario import Scenario, names_a_file
 _TEMPLATE = "report.html.j2"
 _DPI = 130
 # Figures show every so many pixels of an image that has more rows or columns. [pixel]
-_MOST = 1200
+_MOST = 600
 
 
 def quicklook(path, image, truth, detail):

@@ -11,7 +11,7 @@ from functools import lru_cache, partial
 import numpy as np
 from scipy import fft, optimize, special
 
-from fifesim.ground.white_noise import white_noise
+from fifesim.ground.lattice_noise import white_noise
 from fifesim.lattice import assemble
 
 # Field tile. [cell]
