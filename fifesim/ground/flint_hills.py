@@ -120,7 +120,8 @@ def elevation(seed, northing, easting):
     return spline_grid(coefficients, rows - first[0], columns - first[1])
 
 
-@lru_cache(maxsize=64)
+# The tiles of 29 km x 29 km, in 65 MB.
+@lru_cache(maxsize=128)
 def _tile(seed, tile_row, tile_column):
     """Coefficients of the surface on one tile of its lattice."""
     per_bent = round(BENT_STEP / STEP)
