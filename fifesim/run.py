@@ -33,7 +33,10 @@ SCENE = "scene.zarr"
 UNFINISHED = ".unfinished"
 
 # GDAL's own limit is a share of the machine's memory. [byte]
-_GDAL_CACHE = 64 * 2**20
+_GDAL_CACHE = 32 * 2**20
+
+# Of pixels that are read back for statistics; dask's own choice is a whole image.
+_CHUNK_SIZE = "4MiB"
 
 _VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "dask", "numba", "rasterio", "odc-geo", "pvlib", "pyrsr")
 
@@ -87,7 +90,8 @@ def simulate_to_folder(
         if scene and not (unfinished / SCENE).exists():
             make_scene_store(unfinished / SCENE, found.scene)
         _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads or usable_cores(), as_json)
-        with dask.config.set(scheduler="threads", num_workers=threads or usable_cores()):
+        options = {"scheduler": "threads", "num_workers": threads or usable_cores(), "array.chunk-size": _CHUNK_SIZE}
+        with dask.config.set(options):
             _write_files(complete, tree, found, unfinished)
         names = FILES + (SCENE,) * scene
         for name in names:
