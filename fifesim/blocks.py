@@ -11,6 +11,9 @@ from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
 # Begins the names of tasks that cut a part off a chunk.
 _CUT = "cut-"
 
+# Of an array in memory beside lazy ones. [cell]
+_CHUNK = 1024
+
 
 class _Plan(NamedTuple):
     """How the parts of a window come together: its shape, whether parts of it lie beyond the array, and the parts."""
@@ -32,7 +35,7 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
     ----------
     kernel : callable
         ``kernel(*place, *windows)`` gives a block, shape leading + (rows, columns).
-    arrays : sequence of dask.array.Array, shape (..., y, x)
+    arrays : sequence of dask.array.Array or numpy.ndarray, shape (..., y, x)
     chunks : (tuple of int, tuple of int)
         Of the result over y and x.
     ask : callable
@@ -49,7 +52,7 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
     -------
     array : dask.array.Array, shape leading + (y, x)
     """
-    arrays = [array.rechunk(dict.fromkeys(range(array.ndim - 2), -1)) for array in arrays]
+    arrays = [_lazy(array) for array in arrays]
     name, shared = f"windows-{token}", f"windows-kernel-{token}"
     graph = {shared: kernel}
     starts = [[_starts(sizes) for sizes in array.chunks[-2:]] for array in arrays]
@@ -169,6 +172,14 @@ def _part_by_place(kernel, rows, columns):
 
 def _make_by_place(row, column, shape, kernel):
     return kernel(row, column, shape)
+
+
+def _lazy(array):
+    """An array in chunks that hold all of its leading axes."""
+    leading = dict.fromkeys(range(array.ndim - 2), -1)
+    if isinstance(array, da.Array):
+        return array.rechunk(leading)
+    return da.from_array(array, chunks=(*leading.values(), _CHUNK, _CHUNK), name=False)
 
 
 def _starts(sizes):
