@@ -55,6 +55,7 @@ QUANTITIES = {
     ),
     "dn": Quantity("1", "", "digital number", "0 is no data; radiance = gain * dn + offset"),
     "ndvi": Quantity("1", "normalized_difference_vegetation_index", "normalized difference vegetation index"),
+    "ren": Quantity("1", "", "relative equivalent noise", "uncertainty of an inferred variable over its value"),
     "sza": Quantity("degree", "solar_zenith_angle", "solar zenith angle"),
     "saa": Quantity("degree", "solar_azimuth_angle", "solar azimuth angle", "toward the sun, clockwise from north"),
     "vza": Quantity("degree", "sensor_zenith_angle", "sensor zenith angle"),

@@ -2,13 +2,12 @@
 
 from functools import partial
 
-import dask
-import dask.array as da
 import numpy as np
 
 from fifesim import cf, chunks
 from fifesim import grid as grids
 from fifesim.analysis import indices, regression
+from fifesim.analysis.pairs_raster import check_no_counts, matched, origins, sums_by_row
 from fifesim.footprints import Boxcar, axis_operator, regularize
 
 # The red chlorophyll absorption and the near infrared plateau: where a band must lie, and the best place. [um]
@@ -42,7 +41,7 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98):
     --------
     fifesim.footprints.regularize
     """
-    _check_no_counts(array)
+    check_no_counts(array)
     scene = grids.geobox(array)
     blocks = grids.aligned(scene, pixel)
     (down, across), a, b = grids.cell_size(blocks), scene.affine, blocks.affine
@@ -122,25 +121,10 @@ def regress(y, x, *, pair="coordinates"):
     --------
     fifesim.analysis.regression.fit
     """
-    if pair not in ("coordinates", "index"):
-        raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
-    for array in (y, x):
-        _check_no_counts(array)
-        if set(array.dims) != {"y", "x"}:
-            raise ValueError(f"regress takes rasters over (y, x), got {array.dims}: select one band first")
-    y, x = (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
-    origins = _origins(y, x)
-    sums = _lazy_row_sums(y, x, *origins) if da.Array in (type(y.data), type(x.data)) else _row_sums(y, x, *origins)
-    return regression.fit(sums, *origins)
-
-
-def _check_no_counts(array):
-    """Digital numbers hold 0 for no data, which would be taken for dark ground."""
-    if "gain" in array.coords:
-        raise ValueError(
-            f"{array.name or 'the array'} holds digital numbers, whose 0 is no data: convert it with "
-            ".fifesim.to_reflectance() or .fifesim.to_radiance() first"
-        )
+    y, x = matched(y, x, pair)
+    y_origin, x_origin = origins(y, x)
+    sums = sums_by_row(regression.row_sums, y, x, count=6, y_origin=y_origin, x_origin=x_origin)
+    return regression.fit(sums, y_origin, x_origin)
 
 
 def _nearest_band(reflectance, what, low, high, best):
@@ -154,43 +138,3 @@ def _nearest_band(reflectance, what, low, high, best):
         found = ", ".join(f"{value:.3f}" for value in wavelength)
         raise ValueError(f"no {what} band between {low:g} and {high:g} um: the raster has {found} um")
     return int(inside[np.argmin(np.abs(wavelength[inside] - best))])
-
-
-def _common_index(y, x):
-    rows, columns = min(y.sizes["y"], x.sizes["y"]), min(y.sizes["x"], x.sizes["x"])
-    return y.isel(y=slice(rows), x=slice(columns)), x.isel(y=slice(rows), x=slice(columns))
-
-
-def _common_place(y, x):
-    """Both cut to the ground that they share."""
-    one, two = grids.geobox(y), grids.geobox(x)
-    rows, columns = grids.lattice_offset(one, two)
-    cut_y, cut_x = {}, {}
-    for axis, shift in (("y", rows), ("x", columns)):
-        start, stop = max(0, shift), min(y.sizes[axis], shift + x.sizes[axis])
-        if stop <= start:
-            raise ValueError("the rasters do not overlap")
-        cut_y[axis], cut_x[axis] = slice(start, stop), slice(start - shift, stop - shift)
-    return y.isel(cut_y), x.isel(cut_x)
-
-
-def _origins(y, x):
-    """Values near the means that leave digits to the sums; the first rows hold one unless they are empty."""
-    first = dask.compute(y.isel(y=slice(1)).data, x.isel(y=slice(1)).data)
-    return tuple(float(np.nan_to_num(row[np.isfinite(row)].mean())) if np.isfinite(row).any() else 0.0 for row in first)
-
-
-def _row_sums(y, x, y_origin, x_origin):
-    return regression.row_sums(
-        np.ascontiguousarray(y.values, float), np.ascontiguousarray(x.values, float), y_origin, x_origin
-    )
-
-
-def _lazy_row_sums(y, x, y_origin, x_origin):
-    """Sums of whole rows, so that the chunks do not change their rounding."""
-    rows = da.core.normalize_chunks("auto", shape=y.shape, dtype=float, previous_chunks=None)[0]
-    arrays = (da.asarray(array.data).astype(float).rechunk((rows, -1)) for array in (y, x))
-    sums = da.map_blocks(
-        regression.row_sums, *arrays, y_origin=y_origin, x_origin=x_origin, dtype=float, chunks=(rows, (6,))
-    )
-    return sums.compute()
