@@ -42,7 +42,8 @@ def simulate(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
 ):
     """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
-    from fifesim.run import check_folder, simulate_to_folder
+    from fifesim.folders import check_folder
+    from fifesim.run import simulate_to_folder
     from fifesim.scenario import Scenario
     from fifesim.scenario_file import read_scenario
 
@@ -50,6 +51,27 @@ def simulate(
         check_folder(output, overwrite)
         found = Scenario() if scenario is None else read_scenario(scenario)
         files = simulate_to_folder(found, output, overwrite=overwrite)
+    except ValueError as error:
+        _stop(error, Exit.MISTAKE)
+    except (OSError, MemoryError) as error:
+        _stop(error, Exit.FAILURE)
+    for path in files:
+        typer.echo(path)
+
+
+@app.command()
+def reproduce(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("friedl1995"),
+    realisations: Annotated[int, typer.Option(help="How many of each of the nine scenes.")] = 20,
+    cells: Annotated[int, typer.Option(help="Along the edge of a scene, of 3.33 m each.")] = 333,
+    seed: Annotated[int, typer.Option(help="Of the first realisation; the others follow.")] = 1995,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+):
+    """Repeat the paper: table2.csv, figure3.png to figure9.png, report.html."""
+    from fifesim.experiments.reproduction import reproduce_to_folder
+
+    try:
+        files = reproduce_to_folder(output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite)
     except ValueError as error:
         _stop(error, Exit.MISTAKE)
     except (OSError, MemoryError) as error:

@@ -4,7 +4,15 @@ import sys
 
 from dask.callbacks import Callback
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+    track,
+)
 
 
 class ProgressBar(Callback):
@@ -44,3 +52,21 @@ class ProgressBar(Callback):
 
     def _advance(self, key, result, graph, state, worker):
         self._progress.advance(self._task)
+
+
+def steps(sequence, label):
+    """
+    Go through a sequence and show how far it is, on a terminal only.
+
+    Parameters
+    ----------
+    sequence : sequence
+    label : str
+        What is being done.
+
+    Returns
+    -------
+    sequence : iterator
+    """
+    console = Console(file=sys.stderr)
+    return track(sequence, label, console=console, disable=not sys.stderr.isatty(), transient=True)

@@ -1,11 +1,7 @@
 """A run: a scenario simulated into a folder of files."""
 
 import importlib.metadata
-import os
 import platform
-import shutil
-import tempfile
-from contextlib import contextmanager
 from pathlib import Path
 
 import xarray as xr
@@ -14,6 +10,7 @@ from fifesim import grid as grids
 from fifesim import report
 from fifesim.analysis.raster import regress
 from fifesim.export import to_geotiff
+from fifesim.folders import check_folder, whole_files
 from fifesim.progress import ProgressBar
 from fifesim.scenario_file import write_scenario
 from fifesim.simulation import simulate
@@ -60,7 +57,7 @@ def simulate_to_folder(scenario, folder, *, overwrite=False):
         done = xr.DataTree.from_dict(wanted).compute()
     image, truth, detail = done["image"].to_dataset(), done["truth"].to_dataset(), done["detail"]["lai"]
     terrain = done["terrain"].to_dataset() if "terrain" in done.children else None
-    with _whole_files(folder) as partial:
+    with whole_files(folder) as partial:
         to_geotiff(image["dn"], partial / "image.tif")
         to_geotiff(truth, partial / "truth.tif")
         report.quicklook(partial / "quicklook.png", image, truth, detail)
@@ -69,26 +66,6 @@ def simulate_to_folder(scenario, folder, *, overwrite=False):
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
     return [folder / name for name in FILES]
-
-
-def check_folder(folder, overwrite):
-    """
-    Refuse an output folder that is in use.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-    overwrite : bool
-
-    Raises
-    ------
-    ValueError
-        If it is a file, or holds something and ``overwrite`` is off.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise ValueError(f"the output folder {str(folder)!r} is a file: name another with -o")
-    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
-        raise ValueError(f"the output folder {str(folder)!r} is not empty: name another with -o, or add --overwrite")
 
 
 def _detail(tree):
@@ -122,21 +99,3 @@ def _fits(image, truth):
 def _versions():
     versions = {name: importlib.metadata.version(name) for name in _VERSIONS}
     return {"python": platform.python_version()} | versions
-
-
-@contextmanager
-def _whole_files(folder):
-    """A hidden folder whose files move into place when all of them are written."""
-    existed = folder.is_dir()
-    folder.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(prefix=".partial-", dir=folder))
-    try:
-        yield partial
-        for path in sorted(partial.iterdir()):
-            os.replace(path, folder / path.name)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        if not existed:
-            shutil.rmtree(folder, ignore_errors=True)
-        raise
-    partial.rmdir()

@@ -77,6 +77,12 @@ READINGS = (
 )
 
 
+def _leaf_optics():
+    """Those of the experiment, by band."""
+    table = datasets.table("friedl1995_optics.csv").set_index("band")
+    return {band: tuple(row) for band, row in zip(table.index, table.to_numpy(), strict=True)}
+
+
 @dataclass(frozen=True)
 class Case:
     """
@@ -87,10 +93,10 @@ class Case:
     cells : int
         Along the edge of a scene.
     reading : Reading
-    leaf_optics : mapping of str to (float, float), optional
-        As `chain.surface_reflectance` takes it; the tables' by default. [1]
+    leaf_optics : mapping of str to (float, float)
+        Reflectance and transmittance by band. [1]
     background : mapping of str to float, optional
-        [1]
+        Its reflectance by band; the table's by default. [1]
     densities : mapping of str to frozen scipy distribution
         Of LAI, where another than the table's is wanted, by treatment.
     instrument : fifesim.sensor.instruments.Instrument
@@ -98,7 +104,7 @@ class Case:
 
     cells: int = CELLS
     reading: Reading = USED
-    leaf_optics: Mapping | None = None
+    leaf_optics: Mapping = field(default_factory=_leaf_optics)
     background: Mapping | None = None
     densities: Mapping = field(default_factory=dict)
     instrument: Instrument = field(default_factory=lambda: find_instrument("TM"))

@@ -1,0 +1,57 @@
+"""Folders of results: refused where in use, and filled with whole files only."""
+
+import os
+import shutil
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+
+def check_folder(folder, overwrite):
+    """
+    Refuse an output folder that is in use.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+    overwrite : bool
+
+    Raises
+    ------
+    ValueError
+        If it is a file, or holds something and ``overwrite`` is off.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"the output folder {str(folder)!r} is a file: name another with -o")
+    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
+        raise ValueError(f"the output folder {str(folder)!r} is not empty: name another with -o, or add --overwrite")
+
+
+@contextmanager
+def whole_files(folder):
+    """
+    A hidden folder whose files move into place when all of them are written; a context manager.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Made where it does not exist, and removed again where nothing comes of it.
+
+    Yields
+    ------
+    partial : pathlib.Path
+        To write into.
+    """
+    existed = folder.is_dir()
+    folder.mkdir(parents=True, exist_ok=True)
+    partial = Path(tempfile.mkdtemp(prefix=".partial-", dir=folder))
+    try:
+        yield partial
+        for path in sorted(partial.iterdir()):
+            os.replace(path, folder / path.name)
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True)
+        if not existed:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    partial.rmdir()
