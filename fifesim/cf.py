@@ -55,6 +55,8 @@ QUANTITIES = {
     ),
     "dn": Quantity("1", "", "digital number", "0 is no data; radiance = gain * dn + offset"),
     "ndvi": Quantity("1", "normalized_difference_vegetation_index", "normalized difference vegetation index"),
+    "ndvi_bias": Quantity("1", "", "mean NDVI less NDVI of the mean reflectance"),
+    "fpar_bias": Quantity("1", "", "mean FPAR less FPAR of the mean leaf area index"),
     "ren": Quantity("1", "", "relative equivalent noise", "uncertainty of an inferred variable over its value"),
     "sza": Quantity("degree", "solar_zenith_angle", "solar zenith angle"),
     "saa": Quantity("degree", "solar_azimuth_angle", "solar azimuth angle", "toward the sun, clockwise from north"),

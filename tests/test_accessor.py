@@ -13,14 +13,24 @@ from fifesim import accessor
 METHODS = {
     "aggregate": fifesim.aggregate,
     "aspect": fifesim.aspect,
+    "autocovariance": fifesim.autocovariance,
+    "density": fifesim.density,
     "fpar": fifesim.fpar,
+    "fpar_bias": fifesim.fpar_bias,
     "horizon": fifesim.horizon,
     "illumination": fifesim.illumination,
+    "inversion_error": fifesim.inversion_error,
+    "invert": fifesim.invert,
     "kt": fifesim.kt,
     "ndvi": fifesim.ndvi,
+    "ndvi_bias": fifesim.ndvi_bias,
+    "ndvi_linearity": fifesim.ndvi_linearity,
     "regress": fifesim.regress,
+    "regularized_variance": fifesim.regularized_variance,
+    "relative_equivalent_noise": fifesim.relative_equivalent_noise,
     "sense": fifesim.sense,
     "shadow": fifesim.shadow,
+    "share_kept": fifesim.share_kept,
     "sky_view": fifesim.sky_view,
     "slope": fifesim.slope,
     "surface_reflectance": fifesim.surface_reflectance,
@@ -30,6 +40,7 @@ METHODS = {
     "to_reflectance": fifesim.to_reflectance,
     "to_surface": fifesim.to_surface,
     "to_toa": fifesim.to_toa,
+    "variogram": fifesim.variogram,
 }
 
 

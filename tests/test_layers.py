@@ -26,6 +26,7 @@ TIERS = (
     {"export", "scenario"},
     {"chain", "scenario_file"},
     {"simulation"},
+    {"sweeps"},
     {"report"},
     {"run"},
     {"experiments.friedl1995"},

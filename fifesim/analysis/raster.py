@@ -15,7 +15,7 @@ _RED = (0.60, 0.70, 0.66)
 _NIR = (0.75, 1.00, 0.84)
 
 
-def aggregate(array, pixel=30.0, *, min_valid=0.98):
+def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     """
     Means over square blocks of ground: the truth that a pixel is compared with.
 
@@ -26,6 +26,9 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98):
         Size of the blocks, any multiple of the cell or not. [m]
     min_valid : float, optional
         Share of its area that a block needs on valid cells; below it is NaN. [1]
+    lsf : line spread function, optional
+        As `fifesim.footprints` has it, to weight the cells about each block's middle; all within the block count the
+        same by default.
 
     Returns
     -------
@@ -46,11 +49,11 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98):
     blocks = grids.aligned(scene, pixel)
     (down, across), a, b = grids.cell_size(blocks), scene.affine, blocks.affine
     rows = axis_operator(
-        Boxcar(down), cell_origin=a.f, cell_size=a.e, n_cells=scene.shape.y, pixel_origin=b.f, pixel_size=b.e,
+        lsf or Boxcar(down), cell_origin=a.f, cell_size=a.e, n_cells=scene.shape.y, pixel_origin=b.f, pixel_size=b.e,
         n_pixels=blocks.shape.y,
     )  # fmt: skip
     columns = axis_operator(
-        Boxcar(across), cell_origin=a.c, cell_size=a.a, n_cells=scene.shape.x, pixel_origin=b.c, pixel_size=b.a,
+        lsf or Boxcar(across), cell_origin=a.c, cell_size=a.a, n_cells=scene.shape.x, pixel_origin=b.c, pixel_size=b.a,
         n_pixels=blocks.shape.x,
     )  # fmt: skip
     means = chunks.resample(partial(regularize, min_valid=min_valid), rows, columns, array, blocks)
@@ -87,12 +90,8 @@ def ndvi(reflectance):
     --------
     fifesim.analysis.indices.normalized_difference
     """
-    cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
-    red, nir = _nearest_band(reflectance, "red", *_RED), _nearest_band(reflectance, "near infrared", *_NIR)
-    grid = grids.geobox(reflectance)
-    per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
-    plain = [reflectance.isel(band=index).drop_vars([*per_band, "band"], errors="ignore") for index in (nir, red)]
-    out = grids.place(chunks.pointwise(indices.normalized_difference, *plain), grid)
+    red, nir = red_and_nir(reflectance)
+    out = grids.place(chunks.pointwise(indices.normalized_difference, nir, red), grids.geobox(reflectance))
     return cf.label(out, "ndvi", source=reflectance, history="ndvi")
 
 
@@ -125,6 +124,31 @@ def regress(y, x, *, pair="coordinates"):
     y_origin, x_origin = origins(y, x)
     sums = sums_by_row(regression.row_sums, y, x, count=6, y_origin=y_origin, x_origin=x_origin)
     return regression.fit(sums, y_origin, x_origin)
+
+
+def red_and_nir(reflectance):
+    """
+    The red and the near infrared band of a raster.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        As `ndvi` takes it.
+
+    Returns
+    -------
+    red, nir : xarray.DataArray, dims (y, x)
+        Without the coordinates along band.
+
+    Raises
+    ------
+    ValueError
+        As in `ndvi`.
+    """
+    cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
+    numbers = (_nearest_band(reflectance, "red", *_RED), _nearest_band(reflectance, "near infrared", *_NIR))
+    per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
+    return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
 
 
 def _nearest_band(reflectance, what, low, high, best):

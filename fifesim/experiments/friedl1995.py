@@ -11,7 +11,7 @@ from fifesim import chain, datasets, sites
 from fifesim import grid as grids
 from fifesim.analysis import raster as analysis
 from fifesim.ground import raster as ground
-from fifesim.ground.distribution import treatments
+from fifesim.ground.distribution import treatments, truncated_normal
 from fifesim.ground.flint_hills_raster import flint_hills
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.instruments import CosineResponse, Instrument
@@ -83,6 +83,12 @@ def _leaf_optics():
     return {band: tuple(row) for band, row in zip(table.index, table.to_numpy(), strict=True)}
 
 
+def _densities():
+    """Those of the experiment, by treatment."""
+    table = datasets.table("friedl1995_densities.csv").set_index("treatment")
+    return {name: truncated_normal(*row) for name, row in zip(table.index, table.to_numpy(), strict=True)}
+
+
 @dataclass(frozen=True)
 class Case:
     """
@@ -98,7 +104,7 @@ class Case:
     background : mapping of str to float, optional
         Its reflectance by band; the table's by default. [1]
     densities : mapping of str to frozen scipy distribution
-        Of LAI, where another than the table's is wanted, by treatment.
+        Of LAI, by treatment.
     instrument : fifesim.sensor.instruments.Instrument
     """
 
@@ -106,7 +112,7 @@ class Case:
     reading: Reading = USED
     leaf_optics: Mapping = field(default_factory=_leaf_optics)
     background: Mapping | None = None
-    densities: Mapping = field(default_factory=dict)
+    densities: Mapping = field(default_factory=_densities)
     instrument: Instrument = field(default_factory=lambda: find_instrument("TM"))
 
     def __post_init__(self):
@@ -157,8 +163,7 @@ def landscape(case, treatment, arp, seed):
     lai, fpar : xarray.DataArray, dims (y, x)
         By the paper's own route: one Fourier transform of the scene, and exact ranks.
     """
-    density = case.densities.get(treatment, treatment)
-    lai = ground.lai_scene(case.grid, density, arp=arp, seed=seed, method="periodic")
+    lai = ground.lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method="periodic")
     return lai, ground.fpar(lai)
 
 

@@ -133,7 +133,7 @@ def changes(case):
     for name, after, shift, factor, bound in (
         ("mean LAI", "each + 0.1", 0.1, 1.0, 0.0),
         ("standard deviation of LAI", "each less a tenth", 0.0, 0.9, 0.0),
-        ("upper bound of LAI", "each one standard deviation higher", 0.0, 1.0, 1.0),
+        ("bounds of LAI", "2.75 standard deviations from the mean", 0.0, 1.0, -0.25),
     ):
         found.append(Change(name, "the table's", after, replace(case, densities=_densities(shift, factor, bound))))
     fine = {name: getattr(case.instrument, name) for name in case.instrument.__dataclass_fields__} | {"bits": 16}
@@ -143,12 +143,12 @@ def changes(case):
 
 
 def _densities(shift, factor, bound):
-    """The tabulated densities with their means moved, their deviations multiplied, or their upper bounds lifted."""
-    table = datasets.table("lai_distributions.csv").set_index("treatment")
+    """The tabulated densities with means moved, deviations multiplied, or bounds moved out by deviations."""
+    table = datasets.table("friedl1995_densities.csv").set_index("treatment")
     found = {}
     for name in treatments():
         mean, deviation, lower, upper = table.loc[name]
-        moved = lower + shift if lower else lower, upper + shift + bound * deviation
+        moved = lower + shift - bound * deviation if lower else lower, upper + shift + bound * deviation
         found[name] = truncated_normal(mean + shift, factor * deviation, *moved)
     return found
 

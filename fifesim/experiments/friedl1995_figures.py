@@ -9,7 +9,7 @@ from fifesim.analysis import density, regression, scaling
 from fifesim.analysis import raster as analysis
 from fifesim.experiments import friedl1995, friedl1995_table
 from fifesim.experiments.friedl1995 import ARPS, BANDS, PIXEL, VARIABLES
-from fifesim.ground.distribution import lai_distribution, treatments
+from fifesim.ground.distribution import treatments
 
 # Okabe and Ito's colours, which the colour-blind tell apart; dashes and markers tell them apart in grey.
 _COLORS = ("#0072B2", "#D55E00", "#009E73")
@@ -42,9 +42,13 @@ def pixels(case, treatment, seed):
     return [_scene(case, treatment, arp, seed) for arp in ARPS]
 
 
-def figure3():
+def figure3(case):
     """
     Densities of LAI of the three treatments.
+
+    Parameters
+    ----------
+    case : fifesim.experiments.friedl1995.Case
 
     Returns
     -------
@@ -53,7 +57,7 @@ def figure3():
     figure = Figure(figsize=(4.6, 3.2), layout="constrained")
     axis = figure.subplots()
     for treatment, color, dash in zip(treatments(), _COLORS, _DASHES, strict=True):
-        distribution = lai_distribution(treatment)
+        distribution = case.densities[treatment]
         low, high = distribution.support()
         at = np.linspace(low, high, 400)
         # Down to zero where the density is cut off.

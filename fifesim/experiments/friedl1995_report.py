@@ -14,8 +14,8 @@ _TEMPLATE = "friedl1995.html.j2"
 CAPTIONS = {
     3: "Densities of LAI of the three treatments, inferred from Table 2 (the measurements are not public).",
     4: "LAI of the ground, burned and grazed: a part of 120 x 120 cells of 3.33 m.",
-    5: "LAI and FPAR of 200 pixels against NDVI, burned and grazed. Ground: means of the cells' NDVI over the blocks of "
-    "the truth. Sensor: the simulated image, whose 8 bits show as columns.",
+    5: "LAI and FPAR of 200 pixels against NDVI, burned and grazed. Ground: means of the cells' NDVI over the blocks "
+    "of the truth. Sensor: the simulated image, whose 8 bits show as columns.",
     6: "Densities of 200 pixels, and of all cells, burned and grazed; NDVI is that at the top of the atmosphere.",
     7: "Relative equivalent noise (Eq. 7) of 200 pixels by increments of 0.1 of LAI and 0.05 of FPAR with at "
     "least three pixels.",
@@ -63,6 +63,8 @@ def page(case, table, text, effects, figures, run, versions):
         figures=encoded, captions=CAPTIONS, run=run, versions=versions, readings=friedl1995.READINGS,
         used=friedl1995.USED, interval=case.instrument.ground_interval, cell=friedl1995.CELL, pixel=friedl1995.PIXEL,
         optics=case.leaf_optics, drift=_drift(case),
+        relief=_named(effects["readings"], "native interval with relief"),
+        aligned_relief=_named(effects["readings"], "aligned with relief"),
     )  # fmt: skip
 
 
@@ -104,6 +106,11 @@ def criteria(table, text):
         out.append({"name": f"mean REN of {variable.upper()} at arp 0.24 over that at 0.05", "value": growth,
                     "limit": "2 to 3.3", "met": 2 <= growth <= 3.3})  # fmt: skip
     return out
+
+
+def _named(table, name):
+    """The row of a table with a name."""
+    return table[table["name"] == name].iloc[0].to_dict()
 
 
 def _drift(case):

@@ -80,7 +80,7 @@ def reproduce_to_folder(folder, *, realisations=20, cells=333, seed=1995, overwr
 def _draw(case, seed, folder):
     """The figures as files, by number."""
     scenes = figures.pixels(case, figures.BURNED_GRAZED, seed)
-    drawn = {3: figures.figure3()} | {number: getattr(figures, f"figure{number}")(scenes) for number in NUMBERS[1:]}
+    drawn = {3: figures.figure3(case)} | {number: getattr(figures, f"figure{number}")(scenes) for number in NUMBERS[1:]}
     paths = {number: folder / f"figure{number}.png" for number in NUMBERS}
     for number, path in paths.items():
         drawn[number].savefig(path, dpi=_DPI, metadata={"Software": None})
