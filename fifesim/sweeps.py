@@ -71,7 +71,7 @@ def sweep(scenario, axes, measures=None, *, pair="coordinates"):
     # Statistics first, then the axes.
     found = da.stack(points, axis=1).reshape(shape[0], *sizes, *shape[1:])
     dims = (*steps, *(("variable",) if measures is None else ()))
-    coordinates = {name: list(values) for name, (values, _) in steps.items()}
+    coordinates = {name: (name, list(values), _meaning(name, axes[name])) for name, (values, _) in steps.items()}
     if measures is None:
         coordinates["variable"] = list(VARIABLES)
     return xr.Dataset({name: (dims, found[k]) for k, name in enumerate(names)}, coords=coordinates)
@@ -90,7 +90,7 @@ def _point(scenario, measures, pair):
 
 def _axis(name, given):
     """Values of an axis, and the function that puts one into a scenario."""
-    if isinstance(given, tuple) and len(given) == 2 and callable(given[1]):
+    if _has_function(given):
         return list(given[0]), given[1]
     section, key = _place(name)
 
@@ -101,6 +101,21 @@ def _axis(name, given):
         return parse_scenario(values | {section: values.get(section, {}) | {key: plain}})
 
     return list(given), change
+
+
+def _meaning(name, given):
+    """Attributes of an axis: what plots write beside it."""
+    if _has_function(given):
+        return {}
+    section, key = _place(name)
+    known = Scenario.model_fields[section].annotation.model_fields[key]
+    # The description's first words name the key; ranges and hints follow them.
+    found = {"long_name": known.description.split(";")[0], "units": (known.json_schema_extra or {}).get("unit", "")}
+    return {name: text for name, text in found.items() if text}
+
+
+def _has_function(given):
+    return isinstance(given, tuple) and len(given) == 2 and callable(given[1])
 
 
 def _place(name):

@@ -37,7 +37,8 @@ def test_coordinates_select_and_plot(fit):
     assert dict(fit.r2.sizes) == {"arp": 2, "visibility": 2, "variable": 2}
     # Patches larger than a pixel are seen better, whatever the air.
     assert (fit.r2.sel(arp=0.24) > fit.r2.sel(arp=0.05)).all()
-    fit.r2.sel(arp=0.24, variable="lai").plot()
+    (line,) = fit.r2.sel(arp=0.24, variable="lai").plot()
+    assert line.axes.get_xlabel() == "meteorological range [km]"
 
 
 def test_axis_may_be_a_function(small):

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from affine import Affine
@@ -32,6 +33,7 @@ FEWEST_CELLS = 90
 
 # Where in the FIFE site the scene lies, in cells from its corner: only the relief depends on it.
 _CORNER = 1000
+_HILLS_SEED = 7
 
 
 @dataclass(frozen=True)
@@ -181,7 +183,7 @@ def surface_reflectance(case, lai):
     reflectance : xarray.DataArray, dims (band, y, x)
         [1]
     """
-    dem = flint_hills(case.grid.pad(1), 7) if case.reading.topography else None
+    dem = _relief(case.grid) if case.reading.topography else None
     return chain.surface_reflectance(
         lai, case.instrument, bands=BANDS, dem=dem, leaf_optics=case.leaf_optics, background=case.background
     )
@@ -289,6 +291,12 @@ def paper_text():
         Columns quantity, variable, arp and value.
     """
     return datasets.table("friedl1995_text.csv")
+
+
+@lru_cache(maxsize=1)
+def _relief(grid):
+    """Elevation of the synthetic hills, with a cell more on each side for the slopes at the border."""
+    return flint_hills(grid.pad(1), _HILLS_SEED)
 
 
 def _instrument(case):

@@ -32,9 +32,9 @@ class Outcome:
     sampled : array, shape (realisation, scene, variable, draw, 3)
         The same of samples of 200 pixels.
     ren : array, shape (realisation, scene, variable)
-        Mean relative equivalent noise of a sample over its increments. [1]
+        Mean relative equivalent noise of a sample over its increments, in the mean over samples. [1]
     kept : array, shape (realisation, scene, 3)
-        Share of the range of the cells of LAI, FPAR and NDVI that a sample has. [1]
+        Share of the range of the cells of LAI, FPAR and NDVI that a sample has, in the mean over samples. [1]
     """
 
     fits: np.ndarray
@@ -232,6 +232,9 @@ def _one(case, scene, seed):
     samples = draw(pixels, SAMPLE, [seed, friedl1995.scenes().index(scene)], _DRAWS)
     fits = np.stack([line(pixels[2], pixels[k]) for k in range(2)])
     sampled = np.stack([line(samples[2], samples[k]) for k in range(2)])
-    ren = [mean_noise(samples[k, 0], samples[2, 0], INCREMENTS[name])[1].mean() for k, name in enumerate(VARIABLES)]
+    ren = [
+        np.mean([mean_noise(*pair, INCREMENTS[name])[1].mean() for pair in zip(samples[k], samples[2], strict=True)])
+        for k, name in enumerate(VARIABLES)
+    ]
     kept = np.ptp(samples, axis=-1).mean(axis=-1) / np.ptp(limits, axis=-1)
     return fits, sampled, np.array(ren), kept
