@@ -41,6 +41,14 @@ def test_coordinates_select_and_plot(fit):
     assert line.axes.get_xlabel() == "meteorological range [km]"
 
 
+def test_selection_runs_its_own_points_only(small):
+    runs = []
+    measures = {"seen": lambda run: runs.append(run["truth"]["lai"].attrs["arp"]) or runs[-1]}
+    lazy = fifesim.sweep(small, {"arp": [0.05, 0.15, 0.24], "visibility": [10.0, 45.0]}, measures)
+    np.testing.assert_array_equal(lazy.seen.sel(arp=0.15), [0.15, 0.15])
+    assert runs == [0.15, 0.15]
+
+
 def test_axis_may_be_a_function(small):
     """The correlation length as an axis: 8.3 m is that of arp 0.15."""
 

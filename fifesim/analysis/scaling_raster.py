@@ -159,7 +159,8 @@ def share_kept(pixels, cells):
     Returns
     -------
     kept : xarray.Dataset
-        ``range`` and ``variance``; lazy where an input is. [1]
+        ``range`` and ``variance``; lazy where an input is, when the chunks may change the last digit of the variance.
+        [1]
 
     References
     ----------

@@ -158,7 +158,8 @@ def regularized_variance(array, pixel=30.0, lsf=None):
     reach = lags.sizes["lag_y"] - 1, lags.sizes["lag_x"] // 2
     down, across = (kernels.weight_correlation(each, step) for each, step in zip((rows, columns), reach, strict=True))
     predicted = kernels.footprint_variance(lags["covariance"].values, down, across)
-    simulated = float(aggregate(array, pixel, lsf=lsf).var())
+    # In memory, so that the chunks change no rounding.
+    simulated = float(aggregate(array, pixel, lsf=lsf).compute().var())
     cells = float(lags["covariance"].sel(lag_y=0.0, lag_x=0.0))
     return xr.Dataset({"cells": cells, "predicted": predicted, "simulated": simulated}, attrs={"pixel": float(pixel)})
 
