@@ -2,12 +2,11 @@
 
 import math
 
-import numba
-import numpy as np
 import xarray as xr
 
 from fifesim import cf, chunks
 from fifesim import grid as grids
+from fifesim.analysis import uncertainty
 from fifesim.analysis.pairs_raster import matched, sums_by_row
 
 _LIMITS = ("low", "high")
@@ -91,41 +90,15 @@ def inversion_error(estimate, truth, *, pair="coordinates"):
         maps = [estimate[name] for name in (variable, *_LIMITS)]
     matched_maps = [matched(each, truth, pair) for each in maps]
     arrays = [matched_maps[0][1], *(each for each, _ in matched_maps)]
-    n, total, squares, inside = (math.fsum(column) for column in sums_by_row(error_sums, *arrays, count=4).T)
+    n, total, squares, inside = (
+        math.fsum(column) for column in sums_by_row(uncertainty.error_sums, *arrays, count=4).T
+    )
     if n == 0:
         raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
     found = {"bias": total / n, "rmse": math.sqrt(squares / n), "n": int(n)}
     if isinstance(estimate, xr.Dataset):
         found["coverage"] = inside / n
     return xr.Dataset(found)
-
-
-@numba.njit(nogil=True, cache=True)
-def error_sums(truth, estimate, low, high):
-    """
-    Sums of each row over the pixels in which truth and estimate are there.
-
-    Parameters
-    ----------
-    truth, estimate, low, high : array, shape (rows, columns)
-        NaN where missing.
-
-    Returns
-    -------
-    sums : array, shape (rows, 4)
-        Of 1, the error, its square, and of pixels whose truth is between low and high.
-    """
-    sums = np.zeros((truth.shape[0], 4))
-    for i in range(truth.shape[0]):
-        for j in range(truth.shape[1]):
-            error = estimate[i, j] - truth[i, j]
-            if error == error:
-                sums[i, 0] += 1.0
-                sums[i, 1] += error
-                sums[i, 2] += error * error
-                if low[i, j] <= truth[i, j] <= high[i, j]:
-                    sums[i, 3] += 1.0
-    return sums
 
 
 def _limit(fit, end, level):

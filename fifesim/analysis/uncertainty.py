@@ -112,3 +112,31 @@ def increment_moments(sums):
         variance = (square - index * index / count) / (count - 1)
         mean = np.where(count > 0, value / count, np.nan)
     return count.astype(int), mean, np.sqrt(np.where(count > 1, np.maximum(variance, 0.0), np.nan))
+
+
+@numba.njit(nogil=True, cache=True)
+def error_sums(truth, estimate, low, high):
+    """
+    Sums of each row over the pixels in which truth and estimate are there.
+
+    Parameters
+    ----------
+    truth, estimate, low, high : array, shape (rows, columns)
+        NaN where missing.
+
+    Returns
+    -------
+    sums : array, shape (rows, 4)
+        Of 1, the error, its square, and of pixels whose truth is between low and high.
+    """
+    sums = np.zeros((truth.shape[0], 4))
+    for i in range(truth.shape[0]):
+        for j in range(truth.shape[1]):
+            error = estimate[i, j] - truth[i, j]
+            if error == error:
+                sums[i, 0] += 1.0
+                sums[i, 1] += error
+                sums[i, 2] += error * error
+                if low[i, j] <= truth[i, j] <= high[i, j]:
+                    sums[i, 3] += 1.0
+    return sums

@@ -116,7 +116,7 @@ def changes(case):
     ground = dict(zip(friedl1995.BANDS, background(list(friedl1995.BANDS), case.background), strict=True))
     found = []
     for name, (band, position, step) in {
-        "leaf reflectance TM3": ("TM3", 0, -0.01),
+        "leaf reflectance TM3": ("TM3", 0, -0.005),
         "leaf reflectance TM4": ("TM4", 0, 0.01),
         "leaf transmittance TM3": ("TM3", 1, 0.01),
         "leaf transmittance TM4": ("TM4", 1, 0.02),
