@@ -26,9 +26,9 @@ BANDS = ("TM3", "TM4")
 CELL = 30 / 9
 PIXEL = 30.0
 
-# Table 2 does not follow without a scene size, and the paper states none: see the sizes in the report.
+# Along the edge of a scene. The paper states no size; the report shows what others give.
 CELLS = 333
-# A sample of 200 pixels leaves some of its bins, and the criteria of the report, without meaning on fewer cells.
+# With fewer than a hundred pixels increments hold too few for a deviation.
 FEWEST_CELLS = 90
 
 # Where in the FIFE site the scene lies, in cells from its corner: only the relief depends on it.
@@ -120,8 +120,8 @@ class Case:
     def __post_init__(self):
         if self.cells < FEWEST_CELLS:
             raise ValueError(
-                f"a scene needs at least {FEWEST_CELLS} cells along its edge, got {self.cells}: the paper's tables "
-                "come from 200 pixels of 9 x 9 cells, which is 128 cells and more"
+                f"cells must be at least {FEWEST_CELLS}, 10 pixels along the edge of a scene, got {self.cells}: "
+                "samples of 200 pixels need 135"
             )
 
     @property

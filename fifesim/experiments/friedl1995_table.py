@@ -108,8 +108,8 @@ def agreement(table):
     -------
     agreement : dict of str to float
         By variable, ``lai`` or ``fpar``: root mean square and largest difference of R2, the same of the three rows at
-        arp 0.24, root mean square, mean and largest relative difference of slopes, largest difference of intercepts; and
-        ``chi_square``, the mean over all coefficients of the squared difference in standard deviations of a sample.
+        arp 0.24, root mean square, mean and largest relative difference of slopes, largest difference of intercepts;
+        and ``chi_square``, the mean over all coefficients of the squared difference in standard deviations of a sample.
     """
     found = {}
     for variable, rows in table.groupby("variable"):

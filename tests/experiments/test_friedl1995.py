@@ -176,7 +176,11 @@ def test_command_writes_table_figures_and_page(quick, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [(("--cells", 50), "at least 90 cells"), (("--realisations", 0), "at least 1"), (("--seed", -1), "seed must be")],
+    [
+        (("--cells", 50), "at least 90, 10 pixels"),
+        (("--realisations", 0), "at least 1"),
+        (("--seed", -1), "seed must be"),
+    ],
 )
 def test_mistake_is_one_line_and_leaves_nothing(quick, tmp_path, arguments, said):
     result = quick("-o", "out", *arguments)
