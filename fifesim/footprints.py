@@ -64,6 +64,24 @@ class Boxcar:
         """
         return np.clip(0.5 + np.asarray(x, float) / self.width, 0.0, 1.0)
 
+    def mtf(self, frequency):
+        r"""
+        Modulation transfer function, the Fourier transform of the line spread function.
+
+        .. math:: M(f) = \mathrm{sinc}(f W), \qquad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
+
+        Parameters
+        ----------
+        frequency : array
+            Spatial frequency. [cycles m-1]
+
+        Returns
+        -------
+        mtf : array, shape of frequency
+            Factor by which a sinusoid's amplitude is reduced, negative where bright and dark change places. [1]
+        """
+        return np.sinc(np.asarray(frequency, float) * self.width)
+
 
 def check_width(width):
     """
