@@ -244,7 +244,7 @@ def _tabulate(parts, truncation):
             return TableSpread(positions, np.concatenate([half[:0:-1], half])), float(abs(beyond[last]))
         left = float(abs(beyond[-1]))
     raise ValueError(
-        f"the response of {parts} decays too slowly: {left:.1e} of it lies beyond {step * beyond.size:.0f} m, more than "
+        f"the response of {parts} decays too slowly: {left:.1e} of it lies beyond {step * beyond.size:.0f} m, above "
         f"truncation = {truncation:g}; allow a larger truncation"
     )
 
