@@ -98,6 +98,31 @@ def tiles(kernel, grid, chunks=None, *, tile):
     return grids.place(lazy.rename(None), grid)
 
 
+def located(kernel, array):
+    """
+    Apply a kernel that must know where its block lies.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(block, starts)`` gives an array like the block, whose first element lies at these indices of the whole.
+    array : xarray.DataArray
+
+    Returns
+    -------
+    array : xarray.DataArray
+        Float, lazy where the input is.
+    """
+
+    def call(block, block_info=None):
+        return kernel(block, tuple(start for start, _ in block_info[0]["array-location"]))
+
+    data = array.data
+    if isinstance(data, da.Array):
+        return array.copy(data=data.map_blocks(call, dtype=float, meta=np.empty((0,) * data.ndim)))
+    return array.copy(data=kernel(data, (0,) * data.ndim))
+
+
 def resample(kernel, rows, columns, array, grid):
     """
     Carry a raster onto another grid by one operator for each axis.

@@ -144,7 +144,7 @@ class AxisOperator:
         return AxisOperator(start, count, self.weights[pixels], self.share[pixels], window)
 
 
-def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_size, n_pixels):
+def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_size, n_pixels, shift=0.0):
     r"""
     Weights of ground cells in sensor pixels along one axis.
 
@@ -163,6 +163,8 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
         Both negative where the coordinate decreases with the index, as rows do on a north-up grid. [m]
     n_cells, n_pixels : int
         Numbers of cells and of pixels.
+    shift : float or array, shape (n_pixels,), optional
+        Distance from where a pixel should lie to where it does, positive toward higher indices. [m]
 
     Returns
     -------
@@ -195,6 +197,7 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
         raise ValueError(f"n_cells and n_pixels must be at least 1, got {n_cells} and {n_pixels}")
     # Distances are taken from the scene's edge: coordinates of millions of metres would cost digits.
     center = np.sign(cell_size) * (pixel_origin - cell_origin) + (np.arange(n_pixels) + 0.5) * abs(pixel_size)
+    center = center + np.asarray(shift, float)
     size = abs(cell_size)
     first = np.floor((center - lsf.half_width) / size).astype(np.int64)
     steps = np.arange(int(np.ceil(2 * lsf.half_width / size)) + 2)

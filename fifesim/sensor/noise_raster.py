@@ -1,0 +1,62 @@
+"""The noise of an instrument on labelled rasters."""
+
+from fifesim import chunks
+from fifesim import grid as grids
+from fifesim.sensor import sampling
+from fifesim.sensor.noise import add_noise, check_kinds, check_seed
+
+
+def noisy(radiance, instrument, bands, kinds, seed):
+    """
+    Radiance with the noise of an instrument.
+
+    Parameters
+    ----------
+    radiance : xarray.DataArray, dims (band, y, x)
+        By pixels. [W m-2 sr-1 um-1]
+    instrument : fifesim.sensor.instruments.Instrument
+    bands : sequence of fifesim.sensor.instruments.InstrumentBand
+        One for each of the array.
+    kinds : str or sequence of str
+        Among "shot", "thermal" and "fixed-pattern".
+    seed : int
+
+    Returns
+    -------
+    radiance : xarray.DataArray, dims (band, y, x)
+        The same array without kinds. Scan lines count from the origin of the CRS, so that a window of an image has the
+        noise of the whole. [W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    ValueError
+        If a kind is unknown, or a band's description has no noise.
+
+    See Also
+    --------
+    fifesim.sensor.noise.add_noise
+    """
+    kinds = check_kinds(kinds)
+    if not kinds:
+        return radiance
+    check_seed(seed)
+    models = [sampling.noise_model(instrument, band) for band in bands]
+    numbers = [instrument.bands.index(band) for band in bands]
+    first_row, first_column = grids.lattice_position(grids.geobox(radiance))
+
+    def kernel(block, starts):
+        band, row, column = starts
+        out = block.astype(float)
+        for layer in range(block.shape[0]):
+            out[layer] = add_noise(
+                block[layer],
+                models[band + layer],
+                kinds,
+                seed=seed,
+                band=numbers[band + layer],
+                row=first_row + row,
+                column=first_column + column,
+            )
+        return out
+
+    return chunks.located(kernel, radiance)
