@@ -9,9 +9,11 @@ from scipy.fft import irfft
 from fifesim.sensor.spatial import TableSpread
 
 # Samples of the tabulated response over its equivalent width, and the periods of the transform that are tried, in the
-# same widths: the response beyond half a period folds back into it.
+# same widths. What lies beyond half a period folds back into it: of a response that decays as x^-2 about 1 % of the
+# share that is cut at a sixteenth of the period.
 _SAMPLES = 128
-_PERIODS = (64, 256, 1024, 4096)
+_PERIODS = (64, 512, 4096, 16384)
+_CUT = 16
 
 # Share of a sinusoid at the end of the sampled frequencies above which the response has jumps that no table holds.
 _JUMP = 1e-3
@@ -234,7 +236,7 @@ def _tabulate(parts, truncation):
         density = _density(parts, step, period * _SAMPLES)
         # Half of the response at a distance of each sample and closer, the origin counted by half.
         within = step * (np.cumsum(density) - (density[0] + density) / 2)
-        beyond = 1 - 2 * within[: density.size // 2]
+        beyond = 1 - 2 * within[: 2 * density.size // _CUT]
         # Lobes: what lies beyond must stay small.
         small = np.maximum.accumulate(np.abs(beyond)[::-1])[::-1] <= truncation
         if small.any():
