@@ -2,7 +2,6 @@
 
 from fifesim import chunks
 from fifesim import grid as grids
-from fifesim.sensor import sampling
 from fifesim.sensor.noise import add_noise, check_kinds, check_seed
 
 
@@ -40,7 +39,7 @@ def noisy(radiance, instrument, bands, kinds, seed):
     if not kinds:
         return radiance
     check_seed(seed)
-    models = [sampling.noise_model(instrument, band) for band in bands]
+    models = [instrument.noise_model(band) for band in bands]
     numbers = [instrument.bands.index(band) for band in bands]
     first_row, first_column = grids.lattice_position(grids.geobox(radiance))
 

@@ -8,7 +8,6 @@ import xarray as xr
 from fifesim import chunks
 from fifesim import grid as grids
 from fifesim.footprints import axis_operator, regularize
-from fifesim.sensor import sampling
 
 
 def matching_bands(array, instrument):
@@ -88,11 +87,11 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
             raise ValueError(f"onto must be in the CRS of the scene, {scene.crs}, got {pixels.crs}")
         return pixels
     if interval is None:
-        return grids.aligned(scene, _common(instrument, bands, sampling.product_pixel))
+        return grids.aligned(scene, _common(instrument, bands, lambda band: (instrument.pixel(band),) * 2))
     if isinstance(interval, str):
         if interval != "native":
             raise ValueError(f"interval must be 'native', or metres between pixels, got {interval!r}")
-        return grids.aligned(scene, _common(instrument, bands, sampling.native_interval))
+        return grids.aligned(scene, _common(instrument, bands, instrument.ground_intervals))
     return grids.aligned(scene, interval)
 
 
@@ -100,7 +99,7 @@ def _common(instrument, bands, size):
     """Pixel size that the bands share, along and across the track [m]."""
     names = {}
     for band in bands:
-        names.setdefault(size(instrument, band), []).append(band.name)
+        names.setdefault(tuple(size(band)), []).append(band.name)
     if len(names) > 1:
         groups = "; ".join(f"{along:g} x {across:g} m: {', '.join(each)}" for (along, across), each in names.items())
         raise ValueError(
@@ -144,7 +143,7 @@ def regularized(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_vali
     shifts = [_shift(*axis) for axis in axes]
     groups = {}
     for number, band in enumerate(bands):
-        groups.setdefault(sampling.line_spreads(instrument, band), []).append(number)
+        groups.setdefault(instrument.line_spreads(band), []).append(number)
     kernel = partial(regularize, min_valid=min_valid)
     parts = []
     for spreads, numbers in groups.items():
