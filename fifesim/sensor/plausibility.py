@@ -27,7 +27,7 @@ _RADIANCE = (0.02, 5.0)
 # Response at the ends of its table, in its maximum, above which the table was cut inside the band.
 _END = 0.2
 
-# Published and computed swaths differ by the roundness of the earth and of the numbers.
+# Published swaths are round numbers, and that of a plane is up to 20 % narrower than that of the sphere.
 _SWATH = 0.25
 
 
