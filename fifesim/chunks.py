@@ -58,7 +58,7 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
         call, *arrays, join="exact", dask="parallelized", output_dtypes=[dtype], keep_attrs=True, **core
     )
     dims = [name for name in ("band", "y", "x") if name in out.dims]
-    return out.transpose(*dims)
+    return out.transpose(*dims, ...)
 
 
 # Tiles along the edge of an automatic chunk: about 8 MB in double precision for tiles of 500 cells.

@@ -1,11 +1,10 @@
 """The noise of an instrument on labelled rasters."""
 
 from fifesim import chunks
-from fifesim import grid as grids
 from fifesim.sensor.noise import add_noise, check_kinds, check_seed
 
 
-def noisy(radiance, instrument, bands, kinds, seed):
+def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0)):
     """
     Radiance with the noise of an instrument.
 
@@ -19,12 +18,13 @@ def noisy(radiance, instrument, bands, kinds, seed):
     kinds : str or sequence of str
         Among "shot", "thermal" and "fixed-pattern".
     seed : int
+    first : (int, int), optional
+        Line and sample of the first pixel, which draw the noise.
 
     Returns
     -------
     radiance : xarray.DataArray, dims (band, y, x)
-        The same array without kinds. Scan lines count from the origin of the CRS, so that a window of an image has the
-        noise of the whole. [W m-2 sr-1 um-1]
+        The same array without kinds. [W m-2 sr-1 um-1]
 
     Raises
     ------
@@ -41,7 +41,7 @@ def noisy(radiance, instrument, bands, kinds, seed):
     check_seed(seed)
     models = [instrument.noise_model(band) for band in bands]
     numbers = [instrument.bands.index(band) for band in bands]
-    first_row, first_column = grids.lattice_position(grids.geobox(radiance))
+    first_row, first_column = first
 
     def kernel(block, starts):
         band, row, column = starts

@@ -87,16 +87,35 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
             raise ValueError(f"onto must be in the CRS of the scene, {scene.crs}, got {pixels.crs}")
         return pixels
     if interval is None:
-        return grids.aligned(scene, _common(instrument, bands, lambda band: (instrument.pixel(band),) * 2))
+        return grids.aligned(scene, common_size(instrument, bands, lambda band: (instrument.pixel(band),) * 2))
     if isinstance(interval, str):
         if interval != "native":
             raise ValueError(f"interval must be 'native', or metres between pixels, got {interval!r}")
-        return grids.aligned(scene, _common(instrument, bands, instrument.ground_intervals))
+        return grids.aligned(scene, common_size(instrument, bands, instrument.ground_intervals))
     return grids.aligned(scene, interval)
 
 
-def _common(instrument, bands, size):
-    """Pixel size that the bands share, along and across the track [m]."""
+def common_size(instrument, bands, size):
+    """
+    Size that bands share, such as that of their pixels.
+
+    Parameters
+    ----------
+    instrument : fifesim.sensor.instruments.Instrument
+    bands : sequence of fifesim.sensor.instruments.InstrumentBand
+    size : callable
+        ``size(band)`` gives metres along and across the track.
+
+    Returns
+    -------
+    along, across : float
+        [m]
+
+    Raises
+    ------
+    ValueError
+        If the bands differ.
+    """
     names = {}
     for band in bands:
         names.setdefault(tuple(size(band)), []).append(band.name)

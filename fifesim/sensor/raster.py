@@ -82,9 +82,11 @@ def sense(
     geometry = geometry or cf.geometry_of(toa) or fife_geometry()
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
     means = regularized(toa, description, bands, pixels, offset=offset, min_valid=min_valid)
-    radiance = noisy(_as_radiance(means, bands, geometry), description, bands, noise, seed)
+    # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
+    first = grids.lattice_position(pixels)
+    radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first)
     history = _history(description, interval, offset, noise, seed, quantise)
-    image = _digitised(radiance, description, bands) if quantise else _plain_radiance(radiance, bands)
+    image = recorded(radiance, description, bands, quantise)
     image = cf.with_geometry(grids.place(image, pixels), geometry)
     image = cf.label(
         image, "dn" if quantise else "toa_radiance", source=toa, history=history, instrument=description.name
@@ -94,8 +96,33 @@ def sense(
     return image
 
 
-def _digitised(radiance, description, bands):
-    """Digital numbers with their calibration."""
+def recorded(radiance, description, bands, quantise):
+    """
+    What an instrument records of a radiance, with the coordinates of its bands.
+
+    Parameters
+    ----------
+    radiance : xarray.DataArray
+        With a dimension band. [W m-2 sr-1 um-1]
+    description : fifesim.sensor.instruments.Instrument
+    bands : sequence of fifesim.sensor.instruments.InstrumentBand
+        One for each of the array.
+    quantise : bool
+        Whether as digital numbers.
+
+    Returns
+    -------
+    image : xarray.DataArray
+        Digital numbers, or the radiance itself.
+    """
+    if not quantise:
+        return radiance.assign_coords(
+            cf.band_coordinates(
+                band=[band.name for band in bands],
+                wavelength=[band.wavelength for band in bands],
+                solar_irradiance=[band.solar_irradiance for band in bands],
+            )
+        )
     gain, offset = calibration.gain_offset(
         [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands], description.bits
     )
@@ -112,16 +139,6 @@ def _digitised(radiance, description, bands):
             wavelength=[band.wavelength for band in bands],
             gain=gain,
             offset=offset,
-            solar_irradiance=[band.solar_irradiance for band in bands],
-        )
-    )
-
-
-def _plain_radiance(radiance, bands):
-    return radiance.assign_coords(
-        cf.band_coordinates(
-            band=[band.name for band in bands],
-            wavelength=[band.wavelength for band in bands],
             solar_irradiance=[band.solar_irradiance for band in bands],
         )
     )
@@ -166,7 +183,7 @@ def to_radiance(image):
     if missing:
         raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
     out = chunks.pointwise(calibration.dn_to_radiance, image, *_plain(image, "gain", "offset"))
-    out = grids.place(out.drop_vars(["gain", "offset"]), grids.geobox(image))
+    out = _placed_as(out.drop_vars(["gain", "offset"]), image)
     return cf.label(out, "toa_radiance", source=image, history="to_radiance")
 
 
@@ -195,7 +212,8 @@ def to_reflectance(image):
     """
     radiance = to_radiance(image) if "gain" in image.coords else image
     cf.check_quantity(radiance, "toa_radiance")
-    geometry = cf.geometry_of(image)
+    # The sun alone counts, and a scan's view is an array.
+    geometry = cf.geometry_of(image.drop_vars(["vza", "vaa"], errors="ignore"))
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
     out = chunks.pointwise(
@@ -205,12 +223,32 @@ def to_reflectance(image):
         mu_s=geometry.mu_s,
         earth_sun_distance=geometry.earth_sun_distance,
     )
-    out = grids.place(out, grids.geobox(image))
+    out = _placed_as(out, image)
     return cf.label(out, "toa_reflectance", source=radiance, history="to_reflectance")
 
 
-def _as_radiance(array, bands, geometry):
-    """Radiance of a reflectance; it is scaled once regularized, which is linear and leaves fewer numbers."""
+def _placed_as(array, image):
+    """On the grid of an image; the pixels of a scan have none, and keep their coordinates."""
+    return grids.place(array, grids.geobox(image)) if {"y", "x"} <= set(image.dims) else array
+
+
+def as_radiance(array, bands, geometry):
+    """
+    Radiance of a reflectance, once it is regularized: that is linear and leaves fewer numbers.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+        Reflectance, or radiance by its units, with a dimension band.
+    bands : sequence of fifesim.sensor.instruments.InstrumentBand
+        One for each of the array.
+    geometry : fifesim.geometry.Geometry
+
+    Returns
+    -------
+    radiance : xarray.DataArray
+        [W m-2 sr-1 um-1]
+    """
     if str(array.attrs.get("units", "1")) == cf.QUANTITIES["toa_radiance"].units:
         return array
     irradiance = xr.DataArray([band.solar_irradiance for band in bands], dims="band")
