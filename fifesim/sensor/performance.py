@@ -157,7 +157,7 @@ def swath_width(altitude, max_angle):
     --------
     A narrow swath is that of a plane:
 
-    >>> round(swath_width(705e3, 0.1) / (2 * 705e3 * np.tan(np.radians(0.1))), 5)
+    >>> round(float(swath_width(705e3, 0.1) / (2 * 705e3 * np.tan(np.radians(0.1)))), 5)
     1.0
     """
     angle = np.radians(max_angle)
