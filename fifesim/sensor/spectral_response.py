@@ -174,7 +174,7 @@ def half_peak(response):
     return above[0], above[-1]
 
 
-@lru_cache
+@lru_cache(maxsize=512)
 def _read_pyrsr(name, response):
     try:
         table = RSR_reader(response.satellite, response.sensor, LayerBandsAssignment=[response.band])[response.band]
@@ -189,7 +189,7 @@ def _read_pyrsr(name, response):
     return Band(name, wavelength, np.maximum(table[:, 1], 0))
 
 
-@lru_cache
+@lru_cache(maxsize=512)
 def _read_table(name, response):
     beside = Path(response.folder) / response.table
     path = beside if response.folder and beside.is_file() else _in_data(response.table)

@@ -1,5 +1,6 @@
 """Each instrument that is shipped reproduces its published figures from its file."""
 
+import pickle
 import tomllib
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from fifesim import datasets
 from fifesim.sensor.calibration import gain_offset, radiance_to_reflectance, reflectance_to_radiance
 from fifesim.sensor.instruments import instrument, instrument_names, read_instrument
+from fifesim.sensor.listing import describe
 from fifesim.sensor.performance import swath_width
 from fifesim.sensor.plausibility import check_units
 
@@ -72,6 +74,22 @@ def test_every_number_has_a_source_and_every_reference_is_used(name):
             for number in ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance", *each.sources)
         }
     assert used == set(item.references.values())
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_instrument_travels_to_workers_and_is_a_key(name):
+    item = instrument(name)
+    again = pickle.loads(pickle.dumps(item))
+    assert again == item
+    assert {item: 1}[again] == 1
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_description_has_a_line_for_every_band_and_every_source(name):
+    item = instrument(name)
+    text = describe(item)
+    assert all(any(line.split()[:1] == [each.name] for line in text.splitlines()) for each in item.bands)
+    assert all(reference in text for reference in item.references.values())
 
 
 @pytest.mark.parametrize("name", instrument_names())
