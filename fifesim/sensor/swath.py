@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from scipy.sparse import csr_array
 
-# A cell is cut until its pieces are this share of the narrower response, which is taken as constant over each.
-_PIECE = 1 / 32
+# A cell is cut until its pieces are this share of the narrower response.
+_PIECE = 1 / 16
 
 # Nodes of the tabulated responses.
 _NODES = 4097
@@ -39,7 +39,8 @@ class Footprints:
         """Half height and half width of the box around each footprint, each of shape (n_pixels,) [cell]."""
         back = np.linalg.inv(self.frame)
         half = np.array([self.along.half_width, self.across.half_width])
-        return np.moveaxis(np.abs(back) @ half, -1, 0)
+        # Pieces that touch the footprint from outside have a share, too.
+        return np.moveaxis(np.abs(back) @ half, -1, 0) + 1
 
     def window(self, shape):
         """
@@ -70,9 +71,13 @@ def footprint_operator(footprints, rows, columns):
     r"""
     Weights of the cells of a window in turned footprints.
 
-    .. math:: w_{ij} \propto \sum_k w_{along}(u_{ijk}) \, w_{across}(v_{ijk})
+    .. math::
 
-    over pieces k of cell j, at u along and v across the track from the centre of pixel i.
+        w_{ij} \propto \sum_k \left[ C_{along}(u + \tfrac{a}{2}) - C_{along}(u - \tfrac{a}{2}) \right]
+            \left[ C_{across}(v + \tfrac{b}{2}) - C_{across}(v - \tfrac{b}{2}) \right]
+
+    over pieces k of cell j, which lie at u along and v across the track from the centre of pixel i. A piece stands for
+    an upright rectangle of sides a and b with its own second moments; on a grid along the track that is exact.
 
     Parameters
     ----------
@@ -100,7 +105,7 @@ def footprint_operator(footprints, rows, columns):
     1.0
     """
     tables = [_table(spread) for spread in (footprints.along, footprints.across)]
-    widths = [1 / density.max() for density, _ in tables]
+    widths = [2 * half / (table.size - 1) / np.diff(table).max() for table, half in tables]
     step = np.sqrt(np.abs(np.linalg.det(footprints.frame)))
     pieces = np.clip(np.ceil(step / (_PIECE * min(widths))), 1, 64).astype(np.int64)
     half_row, half_column = footprints.reach()
@@ -147,17 +152,13 @@ def apply_operator(operator, values, min_valid):
 
 
 def _table(spread):
-    """Density of a line spread function at even nodes, and the half width that they span."""
-    x = np.linspace(-spread.half_width, spread.half_width, _NODES)
-    step = x[1] - x[0]
-    return np.diff(spread.cumulative(np.append(x - step / 2, x[-1] + step / 2))) / step, spread.half_width
+    """Cumulative line spread function at even nodes, and the half width that they span."""
+    return spread.cumulative(np.linspace(-spread.half_width, spread.half_width, _NODES)), spread.half_width
 
 
 @njit(nogil=True, cache=True)
-def _density(table, half, x):
-    place = (x + half) * (table.size - 1) / (2 * half)
-    if place < 0 or place > table.size - 1:
-        return 0.0
+def _cumulative(table, half, x):
+    place = min(max((x + half) * (table.size - 1) / (2 * half), 0.0), table.size - 1.0)
     index = min(int(place), table.size - 2)
     share = place - index
     return table[index] * (1 - share) + table[index + 1] * share
@@ -172,20 +173,24 @@ def _fill(
     width = window[3] - window[2]
     for pixel in range(row.size):
         start, total = used, 0.0
+        n = pieces[pixel]
+        a = np.hypot(frame[pixel, 0, 0], frame[pixel, 0, 1]) / (2 * n)
+        b = np.hypot(frame[pixel, 1, 0], frame[pixel, 1, 1]) / (2 * n)
         for i in range(int(np.floor(row[pixel] - half_row[pixel])), int(np.ceil(row[pixel] + half_row[pixel]))):
             for j in range(
                 int(np.floor(column[pixel] - half_column[pixel])), int(np.ceil(column[pixel] + half_column[pixel]))
             ):
                 weight = 0.0
-                n = pieces[pixel]
                 for k in range(n):
                     down = i + (k + 0.5) / n - row[pixel]
                     for m in range(n):
                         right = j + (m + 0.5) / n - column[pixel]
                         u = frame[pixel, 0, 0] * down + frame[pixel, 0, 1] * right
                         v = frame[pixel, 1, 0] * down + frame[pixel, 1, 1] * right
-                        weight += _density(along, along_half, u) * _density(across, across_half, v)
-                weight /= n * n
+                        if abs(u) < along_half + a and abs(v) < across_half + b:
+                            weight += (
+                                _cumulative(along, along_half, u + a) - _cumulative(along, along_half, u - a)
+                            ) * (_cumulative(across, across_half, v + b) - _cumulative(across, across_half, v - b))
                 total += weight
                 if weight != 0 and window[0] <= i < window[1] and window[2] <= j < window[3]:
                     indices[used] = (i - window[0]) * width + j - window[2]
