@@ -24,6 +24,7 @@ _PUBLIC = {
     "aggregate": "analysis.raster",
     "arp_for_length": "ground.random_field",
     "aspect": "ground.terrain_raster",
+    "compare": "comparison",
     "correlation_length": "ground.random_field",
     "fife_geometry": "geometry",
     "fife_site": "sites",

@@ -13,6 +13,7 @@ from fifesim import accessor
 METHODS = {
     "aggregate": fifesim.aggregate,
     "aspect": fifesim.aspect,
+    "compare": fifesim.compare,
     "fpar": fifesim.fpar,
     "horizon": fifesim.horizon,
     "illumination": fifesim.illumination,
@@ -20,6 +21,7 @@ METHODS = {
     "ndvi": fifesim.ndvi,
     "regress": fifesim.regress,
     "sense": fifesim.sense,
+    "sense_swath": fifesim.sense_swath,
     "shadow": fifesim.shadow,
     "sky_view": fifesim.sky_view,
     "slope": fifesim.slope,

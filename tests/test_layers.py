@@ -25,7 +25,7 @@ TIERS = (
     {"raster"},
     {"export", "scenario"},
     {"chain", "scenario_file"},
-    {"simulation"},
+    {"comparison", "simulation"},
     {"report"},
     {"run"},
     {"cli"},
