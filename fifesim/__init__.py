@@ -18,6 +18,7 @@ _PUBLIC = {
     "Band": "bands",
     "Geometry": "geometry",
     "Instrument": "sensor.instruments",
+    "NoiseModel": "sensor.noise",
     "Regression": "analysis.regression",
     "Scenario": "scenario",
     "Track": "sensor.scan",

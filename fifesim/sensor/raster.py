@@ -26,6 +26,7 @@ def sense(
     offset=(0.0, 0.0),
     noise=(),
     seed=0,
+    noise_models=None,
     quantise=True,
     min_valid=MIN_VALID,
     geometry=None,
@@ -52,6 +53,8 @@ def sense(
         Among "shot", "thermal" and "fixed-pattern"; the instrument's description has their size.
     seed : int, optional
         Of the noise.
+    noise_models : fifesim.sensor.noise.NoiseModel, or mapping of str to NoiseModel, optional
+        Size of the noise for every band, or by name of a band, where the description lacks it or is not to count.
     quantise : bool, optional
         Whether to digitise; radiance otherwise.
     min_valid : float, optional
@@ -84,7 +87,7 @@ def sense(
     means = regularized(toa, description, bands, pixels, offset=offset, min_valid=min_valid)
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
     first = grids.lattice_position(pixels)
-    radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first)
+    radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
     history = _history(description, interval, offset, noise, seed, quantise)
     image = recorded(radiance, description, bands, quantise)
     image = cf.with_geometry(grids.place(image, pixels), geometry)

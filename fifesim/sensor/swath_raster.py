@@ -36,6 +36,7 @@ def sense_swath(
     heading=180.0,
     noise=(),
     seed=0,
+    noise_models=None,
     quantise=True,
     min_valid=MIN_VALID,
     geometry=None,
@@ -52,7 +53,7 @@ def sense_swath(
     instrument : str or fifesim.sensor.instruments.Instrument, optional
     track, nadir_offset, heading : optional
         As in `fifesim.sensor.scan_raster.scan_geometry`.
-    noise, seed, quantise, min_valid, geometry : optional
+    noise, seed, noise_models, quantise, min_valid, geometry : optional
         As in `fifesim.sensor.raster.sense`.
 
     Returns
@@ -84,7 +85,7 @@ def sense_swath(
     track = find_track(scene, track, nadir_offset, heading)
     pixels = _pixels(scene, description, bands, track)
     means = _means(toa.transpose("band", "y", "x"), description, bands, pixels, min_valid)
-    radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, pixels.first)
+    radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, pixels.first, noise_models)
     image = recorded(radiance, description, bands, quantise).assign_coords(_coordinates(scene, pixels, description))
     image = _with_sun(image, geometry)
     image = cf.label(

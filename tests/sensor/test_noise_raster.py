@@ -12,6 +12,7 @@ from fifesim import cf
 from fifesim import grid as grids
 from fifesim.geometry import Geometry
 from fifesim.sensor.instruments import instrument
+from fifesim.sensor.noise import NoiseModel
 from fifesim.sensor.performance import Noise
 
 TM = instrument("TM")
@@ -103,3 +104,18 @@ def test_noise_that_is_not_described_is_refused():
         fifesim.sense(uniform((90, 99)), silent, noise="shot")
     with pytest.raises(ValueError, match="unknown noise thermic"):
         fifesim.sense(uniform((90, 99)), NOISY, noise="thermic")
+    bare = NoiseModel(0.5, 0.0)
+    with pytest.raises(ValueError, match=r"TM has no fixed-pattern noise for TM3.*noise_models=\{'TM3'"):
+        fifesim.sense(uniform((90, 99)), NOISY, noise=ALL, noise_models=bare)
+    with pytest.raises(ValueError, match="TM has no shot noise for TM4"):
+        fifesim.sense(uniform((90, 99)), NOISY, noise="shot", noise_models={"TM4": bare})
+
+
+def test_noise_may_be_given():
+    model = NoiseModel(0.8, 0.0)
+    options = {"noise": "thermal", "seed": 1, "quantise": False}
+    both = fifesim.sense(uniform(), TM, noise_models=model, **options)
+    assert float(both.sel(band="TM3").std()) == pytest.approx(0.8, rel=0.03)
+    mixed = fifesim.sense(uniform(), NOISY, noise_models={"TM3": model}, **options)
+    np.testing.assert_array_equal(mixed.sel(band="TM3"), both.sel(band="TM3"))
+    np.testing.assert_array_equal(mixed.sel(band="TM4"), fifesim.sense(uniform(), NOISY, **options).sel(band="TM4"))
