@@ -157,11 +157,16 @@ def _table(spread):
 
 
 @njit(nogil=True, cache=True)
-def _cumulative(table, half, x):
-    place = min(max((x + half) * (table.size - 1) / (2 * half), 0.0), table.size - 1.0)
+def _cumulative(table, half, scale, x):
+    place = min(max((x + half) * scale, 0.0), table.size - 1.0)
     index = min(int(place), table.size - 2)
     share = place - index
     return table[index] * (1 - share) + table[index + 1] * share
+
+
+@njit(nogil=True, cache=True)
+def _share(table, half, scale, x, reach):
+    return _cumulative(table, half, scale, x + reach) - _cumulative(table, half, scale, x - reach)
 
 
 @njit(nogil=True, cache=True)
@@ -171,9 +176,12 @@ def _fill(
 ):  # fmt: skip
     used = 0
     width = window[3] - window[2]
+    # Nodes of the tables a metre.
+    s, t = (along.size - 1) / (2 * along_half), (across.size - 1) / (2 * across_half)
     for pixel in range(row.size):
         start, total = used, 0.0
         n = pieces[pixel]
+        piece = 1.0 / n
         a = np.hypot(frame[pixel, 0, 0], frame[pixel, 0, 1]) / (2 * n)
         b = np.hypot(frame[pixel, 1, 0], frame[pixel, 1, 1]) / (2 * n)
         for i in range(int(np.floor(row[pixel] - half_row[pixel])), int(np.ceil(row[pixel] + half_row[pixel]))):
@@ -182,15 +190,13 @@ def _fill(
             ):
                 weight = 0.0
                 for k in range(n):
-                    down = i + (k + 0.5) / n - row[pixel]
+                    down = i + (k + 0.5) * piece - row[pixel]
                     for m in range(n):
-                        right = j + (m + 0.5) / n - column[pixel]
+                        right = j + (m + 0.5) * piece - column[pixel]
                         u = frame[pixel, 0, 0] * down + frame[pixel, 0, 1] * right
                         v = frame[pixel, 1, 0] * down + frame[pixel, 1, 1] * right
                         if abs(u) < along_half + a and abs(v) < across_half + b:
-                            weight += (
-                                _cumulative(along, along_half, u + a) - _cumulative(along, along_half, u - a)
-                            ) * (_cumulative(across, across_half, v + b) - _cumulative(across, across_half, v - b))
+                            weight += _share(along, along_half, s, u, a) * _share(across, across_half, t, v, b)
                 total += weight
                 if weight != 0 and window[0] <= i < window[1] and window[2] <= j < window[3]:
                     indices[used] = (i - window[0]) * width + j - window[2]

@@ -18,7 +18,7 @@ from fifesim.sensor.raster import MIN_VALID, as_radiance, recorded
 from fifesim.sensor.scan_raster import degrees, find_track, transformer
 from fifesim.sensor.swath import Footprints, apply_operator, footprint_operator
 
-# Pixels along each side of a lazy block.
+# Pixels along each side of a block.
 _BLOCK = 128
 
 # Displacement on the ground by which the frame of a pixel is found. [m]
@@ -167,22 +167,21 @@ def _means(toa, description, bands, pixels, min_valid):
     lazy = isinstance(toa.data, da.Array)
     parts = []
     for spreads, numbers in groups.items():
-        lines, samples = _cuts(pixels.row.shape, lazy)
-        blocks = [[_block(toa.data[numbers], spreads, pixels, i, j, min_valid) for j in samples] for i in lines]
-        parts.append(da.block(blocks) if lazy else blocks[0][0])
+        lines, samples = _cuts(pixels.row.shape)
+        blocks = [[_block(toa.data, numbers, spreads, pixels, i, j, min_valid) for j in samples] for i in lines]
+        parts.append((da if lazy else np).block(blocks))
     order = np.argsort(np.concatenate(list(groups.values())))
     data = (da if lazy else np).concatenate(parts)[order]
     coords = {name: value for name, value in toa.coords.items() if not {"y", "x"} & set(value.dims)}
     return xr.DataArray(data, dims=("band", "line", "sample"), coords=coords, attrs=toa.attrs)
 
 
-def _cuts(shape, lazy):
-    if not lazy:
-        return [slice(0, shape[0])], [slice(0, shape[1])]
+def _cuts(shape):
+    """Slices of blocks, whose operators are made one after the other: that of a whole image would fill the memory."""
     return tuple([slice(at, min(at + _BLOCK, size)) for at in range(0, size, _BLOCK)] for size in shape)
 
 
-def _block(data, spreads, pixels, lines, samples, min_valid):
+def _block(data, numbers, spreads, pixels, lines, samples, min_valid):
     """A block of the image, from the window of the scene that its footprints touch."""
     shape = lines.stop - lines.start, samples.stop - samples.start
     footprints = Footprints(
@@ -192,12 +191,12 @@ def _block(data, spreads, pixels, lines, samples, min_valid):
         *spreads,
     )
     window = footprints.window(data.shape[-2:])
-    cells = data[(..., *window)]
+    cells = data[(..., *window)][numbers]
     kernel = partial(_regularize, footprints=footprints, window=window, shape=shape, min_valid=min_valid)
     if not isinstance(cells, da.Array):
         return kernel(cells)
     cells = cells.rechunk(-1)
-    return cells.map_blocks(kernel, dtype=float, chunks=((data.shape[0],), (shape[0],), (shape[1],)))
+    return cells.map_blocks(kernel, dtype=float, chunks=((len(numbers),), (shape[0],), (shape[1],)))
 
 
 def _regularize(cells, footprints, window, shape, min_valid):
