@@ -29,7 +29,8 @@ figure.colorbar(shown, ax=axes, label="NDVI", shrink=0.8)
 figure.suptitle("NDVI of the same ground: 1.5 km (MSI, TM, OLI) and 6.6 km (MODIS, AVHRR)")
 
 # %%
-# What each lets pass in the red, across the track. Their own intervals decide the frequency beyond which detail is folded back.
+# What each lets pass in the red, across the track. Their own intervals decide the frequency beyond which detail folds
+# back.
 
 figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
 frequency = np.geomspace(1e-4, 0.1, 300)
@@ -42,9 +43,9 @@ axis.set(xlabel="spatial frequency [cycles km⁻¹]", ylabel="modulation transfe
 axis.legend(frameon=False)
 
 # %%
-# **Noise and stripes.** A uniform target of 40 W m⁻² sr⁻¹ µm⁻¹ in TM's red band. The TM sweeps 16 lines at once, one for
-# each detector: what they differ in comes back every 16 lines. The random noise, 0.5 W m⁻² sr⁻¹ µm⁻¹, and the spread of the
-# detectors, 0.8 %, are assumed here: no source was found for them.
+# **Noise and stripes.** A uniform target of 40 W m⁻² sr⁻¹ µm⁻¹ in TM's red band. The TM sweeps 16 lines at once,
+# one for each detector: what they differ in comes back every 16 lines. The noise, 0.5 W m⁻² sr⁻¹ µm⁻¹, and the spread
+# of the detectors, 0.8 %, are assumed here: no source was found for them.
 
 model = fifesim.NoiseModel(thermal=0.5, shot=0.0, detectors=16, gain_spread=0.008)
 target = wrap_xr(np.full((900, 900), 40.0), fifesim.fife_site(30 / 9, window=((0, 900), (0, 900))))

@@ -188,6 +188,12 @@ def _fill(
             for j in range(
                 int(np.floor(column[pixel] - half_column[pixel])), int(np.ceil(column[pixel] + half_column[pixel]))
             ):
+                # Most cells of the box lie beyond the footprint's turned sides.
+                down, right = i + 0.5 - row[pixel], j + 0.5 - column[pixel]
+                u = frame[pixel, 0, 0] * down + frame[pixel, 0, 1] * right
+                v = frame[pixel, 1, 0] * down + frame[pixel, 1, 1] * right
+                if abs(u) > along_half + 2 * n * a or abs(v) > across_half + 2 * n * b:
+                    continue
                 weight = 0.0
                 for k in range(n):
                     down = i + (k + 0.5) * piece - row[pixel]
