@@ -67,12 +67,15 @@ _PUBLIC = {
     "to_surface": "chain",
     "to_toa": "chain",
     "treatments": "ground.distribution",
+    "verify": "verification.areas",
 }
 
 __all__ = ["__version__", *_PUBLIC]
 
 
 def __getattr__(name):
+    if name == "atmosphere":
+        return import_module("fifesim.atmosphere")
     if name not in _PUBLIC:
         raise AttributeError(f"module 'fifesim' has no attribute {name!r}")
     found = getattr(import_module(f"fifesim.{_PUBLIC[name]}"), name)

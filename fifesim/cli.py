@@ -88,6 +88,25 @@ def sensors(
     typer.echo(text)
 
 
+@app.command()
+def verify():
+    """Check this installation against independent results; exit code 1 where one deviates more than it may."""
+    from fifesim.verification.areas import deviations
+    from fifesim.verification.listing import HEADING, line, summary
+
+    found = []
+    try:
+        typer.echo(HEADING)
+        for deviation in deviations():
+            typer.echo(line(deviation))
+            found.append(deviation)
+    except OSError as error:
+        _stop(error, Exit.FAILURE)
+    typer.echo(summary(found))
+    if not all(deviation.within for deviation in found):
+        raise typer.Exit(Exit.FAILURE)
+
+
 def _stop(error, code):
     typer.echo(f"fifesim: {error}", err=True)
     raise typer.Exit(code) from None

@@ -1,5 +1,6 @@
 """Pixels of an instrument over a labelled scene: which bands, where they lie, and the means over their footprints."""
 
+import dataclasses
 from functools import partial
 
 import numpy as np
@@ -7,7 +8,7 @@ import xarray as xr
 
 from fifesim import chunks
 from fifesim import grid as grids
-from fifesim.footprints import axis_operator, regularize
+from fifesim.footprints import Boxcar, axis_operator, regularize
 
 
 def matching_bands(array, instrument):
@@ -175,6 +176,34 @@ def regularized(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_vali
     order = np.argsort(np.concatenate(list(groups.values())))
     joined = xr.concat(parts, dim="band", combine_attrs="override", coords="minimal", compat="override", join="exact")
     return grids.place(joined.isel(band=order), pixels)
+
+
+def directions_on(pixels, geometry):
+    """
+    Directions of sun and sensor at the pixels, where they vary over the cells.
+
+    Parameters
+    ----------
+    pixels : odc.geo.geobox.GeoBox
+    geometry : fifesim.geometry.Geometry
+
+    Returns
+    -------
+    geometry : fifesim.geometry.Geometry
+        Means of the zenith angles, and the azimuths of mean vectors, over each pixel.
+    """
+
+    def mean(array):
+        scene = grids.geobox(array)
+        rows, columns = _operators([Boxcar(size) for size in grids.cell_size(pixels)], scene, pixels, (0.0, 0.0))
+        return chunks.resample(partial(regularize, min_valid=0.01), rows, columns, array, pixels)
+
+    def azimuth(array):
+        radians = np.radians(array)
+        return np.degrees(np.arctan2(mean(np.sin(radians)), mean(np.cos(radians)))) % 360
+
+    averaged = {"sza": mean, "vza": mean, "saa": azimuth, "vaa": azimuth}
+    return dataclasses.replace(geometry, **{name: averaged[name](getattr(geometry, name)) for name in geometry.rasters})
 
 
 def _operators(spreads, scene, pixels, shifts):

@@ -5,12 +5,12 @@ import xarray as xr
 
 from fifesim import cf, chunks
 from fifesim import grid as grids
-from fifesim.geometry import fife_geometry
+from fifesim.geometry import ANGLES, fife_geometry
 from fifesim.sensor import calibration
 from fifesim.sensor.instruments import instrument as find_instrument
 from fifesim.sensor.noise import check_kinds
 from fifesim.sensor.noise_raster import noisy
-from fifesim.sensor.pixels_raster import matching_bands, pixel_grid, regularized
+from fifesim.sensor.pixels_raster import directions_on, matching_bands, pixel_grid, regularized
 
 # Share of its footprint's weight that a pixel needs on valid cells. The paper's footprint of 30.32 m leaves a
 # scene of whole 30 m pixels by 0.16 m.
@@ -84,7 +84,9 @@ def sense(
     bands = matching_bands(toa, description)
     geometry = geometry or cf.geometry_of(toa) or fife_geometry()
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
-    means = regularized(toa, description, bands, pixels, offset=offset, min_valid=min_valid)
+    geometry = directions_on(pixels, geometry)
+    scene = toa.drop_vars(ANGLES, errors="ignore")
+    means = regularized(scene, description, bands, pixels, offset=offset, min_valid=min_valid)
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
@@ -223,7 +225,7 @@ def to_reflectance(image):
         calibration.radiance_to_reflectance,
         radiance,
         *_plain(image, "solar_irradiance"),
-        mu_s=geometry.mu_s,
+        xr.DataArray(geometry.mu_s),
         earth_sun_distance=geometry.earth_sun_distance,
     )
     out = _placed_as(out, image)
@@ -260,7 +262,7 @@ def as_radiance(array, bands, geometry):
         calibration.reflectance_to_radiance,
         plain,
         irradiance,
-        mu_s=geometry.mu_s,
+        xr.DataArray(geometry.mu_s),
         earth_sun_distance=geometry.earth_sun_distance,
     )
 

@@ -81,6 +81,7 @@ def sense_swath(
     toa = toa if "band" in toa.dims else toa.expand_dims("band")
     bands = matching_bands(toa, description)
     geometry = geometry or cf.geometry_of(toa.drop_vars(["vza", "vaa"], errors="ignore")) or fife_geometry()
+    geometry.uniform("sense_swath")
     scene = grids.geobox(toa)
     track = find_track(scene, track, nadir_offset, heading)
     pixels = _pixels(scene, description, bands, track)
