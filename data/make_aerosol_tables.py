@@ -1,7 +1,7 @@
 """
-Make aerosol_optics.csv and aerosol_phase.csv by Mie theory from aerosol_components.csv.
+Make aerosol_optics.csv, aerosol_phase.csv and aerosol_polarization.csv by Mie theory from aerosol_components.csv.
 
-Needs miepython (MIT licence); fifesim itself does not. Run as ``python data/make_aerosol_tables.py``, half a minute.
+Needs miepython (MIT licence); fifesim itself does not. Run as ``python data/make_aerosol_tables.py``, a minute.
 """
 
 import os
@@ -15,12 +15,12 @@ import pandas as pd
 
 DATA = Path(__file__).parent
 
-# Volume fractions of the components. World Climate Programme WCP-55 (1983); Tanre et al. (1990).
-MODELS = {"continental": {"dust": 0.70, "water_soluble": 0.29, "soot": 0.01}}
-
 RADIUS = np.geomspace(1e-3, 20.0, 1000)  # [um], the range of d'Almeida et al. (1991)
-ANGLE = np.concatenate([np.arange(0, 10, 0.5), np.arange(10, 181, 1.0)])  # scattering angle [degree]
-REFERENCE_WAVELENGTH = 0.55  # [um]
+
+# Scattering angle [degree], fine where the largest dust particles diffract: their first minimum lies at .6 degrees.
+ANGLE = np.concatenate(
+    [np.arange(0, 2, 0.1), np.arange(2, 10, 0.25), np.arange(10, 30, 0.5), np.arange(30, 181, 1.0)]
+).round(2)
 
 
 def number_density(radius, sigma):
@@ -30,7 +30,7 @@ def number_density(radius, sigma):
 
 def component_optics(rows):
     """
-    Mean cross sections of one particle, by wavelength.
+    Cross sections of the particles of one component, for a unit of their volume.
 
     Parameters
     ----------
@@ -39,10 +39,9 @@ def component_optics(rows):
 
     Returns
     -------
-    volume : float
-        [um3]
-    optics : array, shape (wavelength, 3 + angle)
-        Extinction, scattering, scattering times asymmetry, scattering times phase function. [um2]
+    optics : array, shape (wavelength, 3 + 2 angle)
+        Extinction, scattering, scattering times asymmetry [um-1]; scattering times the elements 11 and -12 of the
+        phase matrix, whose first has the mean 1 over the sphere [um-1].
     """
     number = number_density(rows["radius"].iloc[0], rows["sigma"].iloc[0])
     log_radius, area = np.log(RADIUS), np.pi * RADIUS**2
@@ -50,70 +49,57 @@ def component_optics(rows):
     optics = []
     for wavelength, n, k in rows[["wavelength", "n", "k"]].to_numpy():
         spheres = np.array([sphere_optics(complex(n, -k), size) for size in 2 * np.pi * RADIUS / wavelength])
-        optics.append(np.trapezoid(spheres * (area * number)[:, None], log_radius, axis=0))
-    return volume, np.array(optics)
+        optics.append(np.trapezoid(spheres * (area * number)[:, None], log_radius, axis=0) / volume)
+    return np.array(optics)
 
 
 def sphere_optics(index, size):
-    """Efficiencies of one sphere: extinction, scattering, that times asymmetry and times phase function. [1]"""
+    """Efficiencies of one sphere: extinction, scattering, that times asymmetry and times the phase matrix. [1]"""
     extinction, scattering, _, asymmetry = miepython.efficiencies_mx(index, size)
-    # The package integrates the phase function over the sphere to the scattering efficiency; here to 4 pi of it.
-    phase = 4 * np.pi * miepython.i_unpolarized(index, size, np.cos(np.radians(ANGLE)), norm="qsca")
-    return np.concatenate([[extinction, scattering, scattering * asymmetry], phase])
+    # The package makes the phase function's integral over the sphere the scattering efficiency; here it is 4 pi of it.
+    perpendicular, parallel = miepython.S1_S2(index, size, np.cos(np.radians(ANGLE)), norm="qsca")
+    perpendicular, parallel = 2 * np.pi * np.abs(perpendicular) ** 2, 2 * np.pi * np.abs(parallel) ** 2
+    moments = [extinction, scattering, scattering * asymmetry]
+    return np.concatenate([moments, perpendicular + parallel, perpendicular - parallel])
 
 
-def mixture(fractions, components):
-    """
-    Optics of an external mixture, per particle.
-
-    Parameters
-    ----------
-    fractions : dict
-        Volume fraction of each component. [1]
-    components : dict
-        Volume and optics of each component, from `component_optics`.
-
-    Returns
-    -------
-    optics : array, shape (wavelength, 3 + angle)
-        As in `component_optics`.
-    """
-    number = {name: share / components[name][0] for name, share in fractions.items()}
-    return sum(number[name] / sum(number.values()) * components[name][1] for name in fractions)
+def by_angle(component, wavelength, values):
+    """Table of one component: an angle a row, a wavelength a column."""
+    table = pd.DataFrame(values.T, columns=[f"{w:g}" for w in wavelength])
+    table.insert(0, "angle", ANGLE)
+    table.insert(0, "component", component)
+    return table
 
 
 def main():
     table = pd.read_csv(DATA / "aerosol_components.csv", comment="#")
-    wavelength = table["wavelength"].unique()
-    components = {name: component_optics(rows) for name, rows in table.groupby("component")}
-    optics, phases = [], []
-    for model, fractions in MODELS.items():
-        extinction, scattering, directed, *phase = mixture(fractions, components).T
-        frame = pd.DataFrame({"model": model, "wavelength": wavelength})
-        reference = np.interp(REFERENCE_WAVELENGTH, wavelength, extinction)
-        frame["extinction"] = (extinction / reference).round(6)
-        frame["single_scattering_albedo"] = (scattering / extinction).round(6)
-        frame["asymmetry"] = (directed / scattering).round(6)
+    optics, phases, polarizations = [], [], []
+    for component, rows in table.groupby("component", sort=False):
+        wavelength, values = rows["wavelength"].to_numpy(), component_optics(rows)
+        frame = pd.DataFrame(values[:, :3], columns=["extinction", "scattering", "directed"])
+        frame.insert(0, "wavelength", wavelength)
+        frame.insert(0, "component", component)
         optics.append(frame)
-        phase = pd.DataFrame(np.array(phase) / scattering, columns=[f"{w:g}" for w in wavelength])
-        phase.insert(0, "angle", ANGLE)
-        phase.insert(0, "model", model)
-        phases.append(phase)
+        first, second = np.split(values[:, 3:], 2, axis=1)
+        phases.append(by_angle(component, wavelength, first / values[:, 1:2]))
+        polarizations.append(by_angle(component, wavelength, (second / first).round(5) + 0.0))
     source = (
-        f"# Aerosol models by Mie theory (miepython {miepython.__version__}) from aerosol_components.csv,\n"
+        f"# Aerosol components by Mie theory (miepython {miepython.__version__}) from aerosol_components.csv,\n"
         "# made by make_aerosol_tables.py. "
     )
+    angles = "# by scattering angle [degree] (rows) and wavelength [um] (columns)\n"
     write(
         "aerosol_optics.csv",
         pd.concat(optics),
-        source + "wavelength [um], extinction relative to 0.55 um [1],\n"
-        "# single scattering albedo [1], asymmetry parameter [1]\n",
+        source + "wavelength [um]; cross sections for a unit of the particles' volume [um-1]:\n"
+        "# extinction, scattering, and directed, which is scattering times the asymmetry parameter\n",
     )
+    write("aerosol_phase.csv", pd.concat(phases), source + "Phase function, mean over the sphere 1 [1],\n" + angles)
     write(
-        "aerosol_phase.csv",
-        pd.concat(phases),
-        source + "Phase function, whose mean over the sphere is 1 [1],\n"
-        "# by scattering angle [degree] (rows) and wavelength [um] (columns)\n",
+        "aerosol_polarization.csv",
+        pd.concat(polarizations),
+        source + "Degree of linear polarization of scattered\n# natural light, -P12 / P11, positive where light "
+        "vibrates across the plane of scattering [1],\n" + angles,
     )
 
 

@@ -18,12 +18,15 @@ _PUBLIC = {
     "Band": "bands",
     "Geometry": "geometry",
     "Instrument": "sensor.instruments",
+    "NoiseModel": "sensor.noise",
     "Regression": "analysis.regression",
     "Scenario": "scenario",
+    "Track": "sensor.scan",
     "aggregate": "analysis.raster",
     "arp_for_length": "ground.random_field",
     "aspect": "ground.terrain_raster",
     "autocovariance": "analysis.variogram_raster",
+    "compare": "comparison",
     "correlation_length": "ground.random_field",
     "density": "analysis.scaling_raster",
     "fife_geometry": "geometry",
@@ -42,22 +45,28 @@ _PUBLIC = {
     "kt": "chain",
     "lai_distribution": "ground.distribution",
     "lai_scene": "ground.raster",
+    "mtf": "sensor.response_raster",
     "ndvi": "chain",
     "ndvi_bias": "analysis.scaling_raster",
     "ndvi_linearity": "analysis.scaling_raster",
+    "noise_equivalent_radiance": "sensor.signal_to_noise",
     "open_image": "export",
     "open_lai": "ground.raster",
+    "psf": "sensor.response_raster",
     "read_instrument": "sensor.instruments",
     "read_scenario": "scenario_file",
     "regress": "analysis.raster",
     "regularized_variance": "analysis.variogram_raster",
     "relative_equivalent_noise": "analysis.uncertainty_raster",
     "scale_bias": "analysis.scaling_raster",
+    "scan_geometry": "sensor.scan_raster",
     "sense": "sensor.raster",
+    "sense_swath": "sensor.swath_raster",
     "shadow": "ground.terrain_raster",
     "share_kept": "analysis.scaling_raster",
     "simulate": "simulation",
     "source_dem": "ground.dem_raster",
+    "snr": "sensor.signal_to_noise",
     "sky_view": "ground.terrain_raster",
     "slope": "ground.terrain_raster",
     "sun_position": "geometry",
@@ -71,12 +80,15 @@ _PUBLIC = {
     "to_toa": "chain",
     "treatments": "ground.distribution",
     "variogram": "analysis.variogram_raster",
+    "verify": "verification.areas",
 }
 
 __all__ = ["__version__", *_PUBLIC]
 
 
 def __getattr__(name):
+    if name == "atmosphere":
+        return import_module("fifesim.atmosphere")
     if name not in _PUBLIC:
         raise AttributeError(f"module 'fifesim' has no attribute {name!r}")
     found = getattr(import_module(f"fifesim.{_PUBLIC[name]}"), name)

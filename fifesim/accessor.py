@@ -44,6 +44,8 @@ class DataArrayAccessor:
     to_toa = _Method("chain")
     to_surface = _Method("chain")
     sense = _Method("sensor.raster")
+    sense_swath = _Method("sensor.swath_raster")
+    compare = _Method("comparison")
     to_radiance = _Method("sensor.raster")
     to_reflectance = _Method("sensor.raster")
     ndvi = _Method("chain")

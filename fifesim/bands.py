@@ -45,6 +45,12 @@ class Band:
         """Response-weighted mean wavelength [um]."""
         return float(self.mean(self.wavelength, self.wavelength))
 
+    @property
+    def limits(self):
+        """Wavelengths between which the response is not zero [um]."""
+        used = np.flatnonzero(self.response)
+        return self.wavelength[max(used[0] - 1, 0)], self.wavelength[min(used[-1] + 1, len(self.wavelength) - 1)]
+
     def mean(self, values, wavelength, weight=1.0):
         """
         Mean of a spectrum over the response, by the trapezoidal rule on the union of both wavelength sets.
@@ -77,9 +83,7 @@ class Band:
 
     def _nodes(self, wavelength):
         """Wavelengths of both the response and a spectrum inside the band, with the response there."""
-        used = np.flatnonzero(self.response)
-        low = self.wavelength[max(used[0] - 1, 0)]
-        high = self.wavelength[min(used[-1] + 1, len(self.wavelength) - 1)]
+        low, high = self.limits
         if wavelength[0] > low or wavelength[-1] < high:
             raise ValueError(
                 f"band {self.name} spans {low:g} to {high:g} um, "

@@ -210,7 +210,7 @@ def check_units(array, *names):
 
 def with_geometry(array, geometry):
     """
-    Carry the directions of sun and sensor as scalar coordinates.
+    Carry the directions of sun and sensor as coordinates: numbers, or rasters on the same cells.
 
     Parameters
     ----------
@@ -221,8 +221,12 @@ def with_geometry(array, geometry):
     -------
     array : xarray.DataArray
     """
-    scalars = {name: xr.DataArray(getattr(geometry, name), attrs=attributes(name)) for name in _GEOMETRY}
-    return array.assign_coords(scalars)
+    angles = {name: xr.Variable(*_dims_and_data(getattr(geometry, name)), attributes(name)) for name in _GEOMETRY}
+    return array.assign_coords(angles)
+
+
+def _dims_and_data(angle):
+    return (angle.dims, angle.data) if isinstance(angle, xr.DataArray) else ((), angle)
 
 
 def geometry_of(array):
@@ -237,18 +241,12 @@ def geometry_of(array):
     -------
     geometry : fifesim.geometry.Geometry or None
         None where it carries no solar zenith angle.
-
-    Raises
-    ------
-    ValueError
-        If an angle varies over the raster.
     """
     if "sza" not in array.coords:
         return None
-    rasters = [name for name in _GEOMETRY if name in array.coords and array.coords[name].ndim]
-    if rasters:
-        raise ValueError(f"{', '.join(rasters)} must be one number for the raster: drop or average it first")
-    found = {name: float(array.coords[name]) for name in _GEOMETRY if name in array.coords}
+    carried = {name: array.coords[name] for name in _GEOMETRY if name in array.coords}
+    rasters = {name: angle.drop_vars(set(angle.coords) - {"y", "x", "spatial_ref"}) for name, angle in carried.items()}
+    found = {name: angle if angle.ndim else float(angle) for name, angle in rasters.items()}
     return Geometry(**({"saa": 0.0} | found))
 
 

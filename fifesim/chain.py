@@ -5,7 +5,7 @@ import xarray as xr
 
 from fifesim import cf
 from fifesim.analysis import raster as analysis
-from fifesim.atmosphere import five_s
+from fifesim.atmosphere import engines
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.bands import Band
@@ -100,9 +100,7 @@ def surface_reflectance(
     description = find_instrument(instrument)
     selected = description.select(bands)
     names = [band.name for band in selected]
-    terms = five_s.band_terms(
-        atmosphere, tuple(band.response for band in selected), geometry.sza, geometry.vza, geometry.raa
-    )
+    responses = tuple(band.response for band in selected)
     leaf_reflectance, leaf_transmittance = optics.leaf_optics(names, leaf_optics)
     level = ground.surface_reflectance(
         lai,
@@ -111,16 +109,18 @@ def surface_reflectance(
         leaf_reflectance=leaf_reflectance,
         leaf_transmittance=leaf_transmittance,
         background=background if isinstance(background, xr.DataArray) else optics.background(names, background),
-        diffuse_fraction=terms.diffuse_fraction,
+        diffuse_fraction=atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry),
         geometry=geometry,
         leaf_angles=leaf_angles,
         hotspot=hotspot,
         exact=exact,
-        atmosphere=str(atmosphere),
+        atmosphere=atmosphere.text,
         instrument=description.name,
     )
     if dem is None:
         return level
+    geometry.uniform("surface_reflectance on slopes")
+    terms = engines.band_terms(atmosphere, responses, geometry.sza, geometry.vza, geometry.raa)
     light = _sunlight(terms) | {"geometry": geometry, "horizon": horizon}
     return terrain.terrain_reflectance(level, dem, upwelling=upwelling, **light)
 
@@ -159,13 +159,23 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
     fifesim.ground.illumination.kt
     """
     atmosphere, bands, geometry = _light(reflectance, atmosphere, geometry, instrument)
-    terms = five_s.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
+    geometry.uniform("kt")
+    terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
     return terrain.kt(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
 
 
-def to_toa(reflectance, atmosphere=None, *, geometry=None, instrument=None):
+def to_toa(
+    reflectance,
+    atmosphere=None,
+    *,
+    geometry=None,
+    instrument=None,
+    elevation=None,
+    adjacency=False,
+    surroundings=None,
+):
     """
-    Apparent reflectance at the top of the atmosphere, by the 5S equations.
+    Apparent reflectance at the top of the atmosphere.
 
     Parameters
     ----------
@@ -174,10 +184,17 @@ def to_toa(reflectance, atmosphere=None, *, geometry=None, instrument=None):
     atmosphere : Atmosphere, optional
         By default that which the array carries, else midlatitude summer, continental aerosol, 45 km visibility.
     geometry : Geometry, optional
-        By default that which the array carries, else the paper's.
+        Its angles are numbers or rasters; by default that which the array carries, else the paper's.
     instrument : str or Instrument, optional
         Whose spectral response the bands have; by default that which the array carries. Without one, each band is as
         narrow as the gas tables, 2.5 nm.
+    elevation : xarray.DataArray, dims (y, x), optional
+        Of the ground, in the place of the atmosphere's one altitude, where relief matters. [m]
+    adjacency : bool, optional
+        Whether light that the surroundings reflect is scattered into the view of a cell.
+    surroundings : number, sequence or xarray.DataArray, optional
+        Reflectance around the scene, for adjacency: one number, one for each band, or a raster on a larger grid; by
+        default the scene's mean. [1]
 
     Returns
     -------
@@ -189,18 +206,34 @@ def to_toa(reflectance, atmosphere=None, *, geometry=None, instrument=None):
     ValueError
         If the array was made for another atmosphere, or units, bands or angles are not usable.
 
+    Notes
+    -----
+    Without ``elevation`` all of the scene lies at the altitude of the atmosphere: 100 m of relief is 1 % of the
+    molecules, .001 of reflectance in the blue and less elsewhere.
+
     References
     ----------
     [Tanre1990]_
 
     See Also
     --------
-    fifesim.atmosphere.five_s.apparent_reflectance
+    fifesim.atmosphere.coupling.apparent_reflectance
     """
-    return atmosphere_raster.to_toa(reflectance, *_light(reflectance, atmosphere, geometry, instrument))
+    light = _light(reflectance, atmosphere, geometry, instrument)
+    scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
+    return atmosphere_raster.to_toa(reflectance, *light, **scene)
 
 
-def to_surface(reflectance, atmosphere=None, *, geometry=None, instrument=None):
+def to_surface(
+    reflectance,
+    atmosphere=None,
+    *,
+    geometry=None,
+    instrument=None,
+    elevation=None,
+    adjacency=False,
+    surroundings=None,
+):
     """
     Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.
 
@@ -208,7 +241,7 @@ def to_surface(reflectance, atmosphere=None, *, geometry=None, instrument=None):
     ----------
     reflectance : xarray.DataArray, dims (band, y, x)
         Reflectance at the top of the atmosphere; radiance and digital numbers are converted first.
-    atmosphere, geometry, instrument : optional
+    atmosphere, geometry, instrument, elevation, adjacency, surroundings : optional
         As in `to_toa`.
 
     Returns
@@ -223,10 +256,12 @@ def to_surface(reflectance, atmosphere=None, *, geometry=None, instrument=None):
 
     See Also
     --------
-    fifesim.atmosphere.five_s.surface_reflectance
+    fifesim.atmosphere.coupling.surface_reflectance
     """
     reflectance = planetary_reflectance(reflectance)
-    return atmosphere_raster.to_surface(reflectance, *_light(reflectance, atmosphere, geometry, instrument))
+    light = _light(reflectance, atmosphere, geometry, instrument)
+    scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
+    return atmosphere_raster.to_surface(reflectance, *light, **scene)
 
 
 def ndvi(image):
@@ -293,8 +328,8 @@ def _light(array, atmosphere, geometry, instrument):
         carried = Atmosphere.parse(carried)
         if atmosphere is not None and atmosphere != carried:
             raise ValueError(
-                f"the reflectance was made for another atmosphere ({carried}) than the one given ({atmosphere}): "
-                "give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
+                f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
+                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
             )
     return (
         atmosphere or carried or Atmosphere(),

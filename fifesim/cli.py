@@ -90,13 +90,43 @@ def scenario():
 
 
 @app.command()
-def sensors():
-    """List the instruments: bands, sampling, point spread, radiometry, source."""
-    from fifesim.sensor.instruments import instrument, instrument_names
-    from fifesim.sensor.listing import describe
+def sensors(
+    name: Annotated[str | None, typer.Argument(help="Name or alias of one, or its file; all by default.")] = None,
+    check: Annotated[Path | None, typer.Option("--check", help="Check a file of your own, and say what it is.")] = None,
+):
+    """List the instruments, or one in detail: bands, sampling, point spread, radiometry, noise, sources."""
+    from fifesim.sensor.instruments import instrument, instrument_names, read_instrument
+    from fifesim.sensor.listing import describe, list_instruments
 
-    for name in instrument_names():
-        typer.echo(describe(instrument(name)))
+    try:
+        if check is not None:
+            text = f"{describe(read_instrument(check))}\n{check} is right: every number has a source and its unit."
+        elif name is not None:
+            text = describe(instrument(name))
+        else:
+            text = list_instruments([instrument(each) for each in instrument_names()])
+    except (ValueError, FileNotFoundError) as error:
+        _stop(error, Exit.MISTAKE)
+    typer.echo(text)
+
+
+@app.command()
+def verify():
+    """Check this installation against independent results; exit code 1 where one deviates more than it may."""
+    from fifesim.verification.areas import deviations
+    from fifesim.verification.listing import HEADING, line, summary
+
+    found = []
+    try:
+        typer.echo(HEADING)
+        for deviation in deviations():
+            typer.echo(line(deviation))
+            found.append(deviation)
+    except OSError as error:
+        _stop(error, Exit.FAILURE)
+    typer.echo(summary(found))
+    if not all(deviation.within for deviation in found):
+        raise typer.Exit(Exit.FAILURE)
 
 
 def _stop(error, code):

@@ -7,19 +7,22 @@ import numpy as np
 import pandas as pd
 import pvlib
 
+ANGLES = ("sza", "saa", "vza", "vaa")
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Geometry:
     """
     Directions of sun and sensor seen from the ground.
 
-    Azimuths point toward the sun and toward the sensor, clockwise from north.
+    Azimuths point toward the sun and toward the sensor, clockwise from north. An angle that varies over a scene is a
+    raster on its cells.
 
     Parameters
     ----------
-    sza, saa : float
+    sza, saa : float or xarray.DataArray, dims (y, x)
         Solar zenith and azimuth angles. [degree]
-    vza, vaa : float, optional
+    vza, vaa : float or xarray.DataArray, dims (y, x), optional
         Sensor zenith and azimuth angles; nadir by default. [degree]
     earth_sun_distance : float, optional
         [astronomical unit]
@@ -27,7 +30,7 @@ class Geometry:
     Raises
     ------
     ValueError
-        If the sun or the sensor is not above the horizon.
+        If the sun or the sensor is not above the horizon; in a raster, when it is used.
     """
 
     sza: float
@@ -37,19 +40,64 @@ class Geometry:
     earth_sun_distance: float = 1.0
 
     def __post_init__(self):
-        if not np.all(np.isfinite([self.saa, self.vaa])):
-            raise ValueError(f"saa and vaa must be finite degrees, got {self.saa} and {self.vaa}")
-        if not 0 <= self.sza < 90:
-            raise ValueError(
-                f"sza must be in [0, 90) degrees, got {self.sza:g}: the sun is below the horizon; "
-                "check time, latitude and longitude"
-            )
-        if not 0 <= self.vza < 90:
-            raise ValueError(f"vza must be in [0, 90) degrees, got {self.vza:g}: the sensor looks down")
+        for name in ("saa", "vaa"):
+            angle = getattr(self, name)
+            if np.ndim(angle) == 0 and not np.isfinite(angle):
+                raise ValueError(f"{name} must be finite degrees, got {angle}")
+        hints = {
+            "sza": "the sun is below the horizon; check time, latitude and longitude",
+            "vza": "the sensor looks down",
+        }
+        for name, hint in hints.items():
+            angle = getattr(self, name)
+            if np.ndim(angle) == 0 and not 0 <= angle < 90:
+                raise ValueError(f"{name} must be in [0, 90) degrees, got {angle:g}: {hint}")
         if not 0.9 < self.earth_sun_distance < 1.1:
             raise ValueError(
                 f"earth_sun_distance is in astronomical units, 0.983 to 1.017, got {self.earth_sun_distance:g}"
             )
+
+    def __eq__(self, other):
+        if not isinstance(other, Geometry):
+            return NotImplemented
+        return self is other or (not self.rasters and not other.rasters and self._angles == other._angles)
+
+    def __hash__(self):
+        return id(self) if self.rasters else hash(self._angles)
+
+    @property
+    def _angles(self):
+        return self.sza, self.saa, self.vza, self.vaa, self.earth_sun_distance
+
+    @property
+    def rasters(self):
+        """Names of the angles that vary over the scene."""
+        return tuple(name for name in ANGLES if np.ndim(getattr(self, name)))
+
+    def uniform(self, what):
+        """
+        This geometry, where one direction of sun and sensor is needed.
+
+        Parameters
+        ----------
+        what : str
+            What needs it.
+
+        Returns
+        -------
+        geometry : Geometry
+
+        Raises
+        ------
+        ValueError
+            If an angle varies over the scene.
+        """
+        if self.rasters:
+            raise ValueError(
+                f"{what} needs one direction of sun and sensor, got rasters of {', '.join(self.rasters)}: "
+                "give their means as geometry=fifesim.Geometry(sza, saa, vza, vaa)"
+            )
+        return self
 
     @property
     def raa(self):
@@ -59,12 +107,12 @@ class Geometry:
     @property
     def mu_s(self):
         """Cosine of the solar zenith angle [1]."""
-        return float(np.cos(np.radians(self.sza)))
+        return np.cos(np.radians(self.sza))
 
     @property
     def mu_v(self):
         """Cosine of the sensor zenith angle [1]."""
-        return float(np.cos(np.radians(self.vza)))
+        return np.cos(np.radians(self.vza))
 
 
 def relative_azimuth(saa, vaa):

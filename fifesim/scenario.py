@@ -190,7 +190,7 @@ class SunAndView(_Section):
     longitude: float = _number(geometry.FIFE_LONGITUDE, "degree", "east", ge=-180, le=360)
     sza: float | None = _number(None, "degree", "solar zenith, instead of that of time and place", ge=0, lt=90)
     saa: float | None = _number(None, "degree", "solar azimuth, clockwise from north")
-    vza: float = _number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=70)
+    vza: float = _number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=75)
     vaa: float = _number(0.0, "degree", "azimuth toward the sensor, clockwise from north")
 
     @model_validator(mode="after")
@@ -204,17 +204,42 @@ class Air(_Section):
     """The atmosphere."""
 
     profile: str = _text("midlatitude-summer", "of pressure, temperature, water vapour and ozone")
-    aerosol: str = _text("continental", "aerosol model")
-    visibility: float = _number(45.0, "km", "meteorological range", ge=5, le=100)
+    aerosol: str = _text("continental", 'aerosol model, "none", or a mixture such as "dust:0.5+soot:0.5" by volume')
+    visibility: float | None = _number(45.0, "km", "meteorological range; give it or aot", ge=5, le=100)
+    aot: float | None = _number(None, "1", "aerosol optical thickness at 0.55 um, instead of visibility", ge=0, le=2)
     altitude: float = _number(0.4, "km", "of the ground above the sea", ge=0, le=4)
+    h2o: float | None = _number(None, "g cm-2", "water vapour, instead of the profile's", ge=0, le=10)
+    o3: float | None = _number(None, "cm-atm", "ozone, instead of the profile's", ge=0, le=1)
+    engine: str = _text("5S", f"one of {', '.join(models.ENGINES)}")
+    adjacency: bool = Field(False, description="whether light of the surroundings is scattered into a cell's view")
 
-    @field_validator("profile", "aerosol")
+    @model_validator(mode="before")
     @classmethod
-    def _known_model(cls, value, info):
-        allowed = models.PROFILES if info.field_name == "profile" else aerosols.MODELS
+    def _one_amount(cls, values):
+        by_aot = isinstance(values, dict) and values.get("aot") is not None
+        return values | {"visibility": values.get("visibility")} if by_aot else values
+
+    @field_validator("profile", "engine")
+    @classmethod
+    def _known_name(cls, value, info):
+        allowed = {"profile": models.PROFILES, "engine": models.ENGINES}[info.field_name]
         if value not in allowed:
             raise ValueError(f"must be one of {', '.join(allowed)}, got {value!r}")
         return value
+
+    @field_validator("aerosol")
+    @classmethod
+    def _known_aerosol(cls, value):
+        return value if value == "none" else aerosols.canonical(value)
+
+    @model_validator(mode="after")
+    def _possible(self):
+        self.model()
+        return self
+
+    def model(self):
+        """The atmosphere that these keys describe, a `fifesim.atmosphere.models.Atmosphere`."""
+        return models.Atmosphere(**self.model_dump(exclude={"adjacency"}))
 
 
 class Sensor(_Section):
@@ -297,7 +322,7 @@ class Scenario(_Section):
 
     def model_atmosphere(self):
         """The atmosphere, a `fifesim.atmosphere.models.Atmosphere`."""
-        return models.Atmosphere(**self.atmosphere.model_dump())
+        return self.atmosphere.model()
 
     def complete(self):
         """

@@ -49,7 +49,8 @@ def simulate(scenario, chunks="auto"):
     min_valid = scenario.sensor.min_valid
 
     def sensed(reflectance):
-        return sensor.sense(chain.to_toa(reflectance), instrument, onto=pixels, min_valid=min_valid)
+        toa = chain.to_toa(reflectance, adjacency=scenario.atmosphere.adjacency)
+        return sensor.sense(toa, instrument, onto=pixels, min_valid=min_valid)
 
     def means(array):
         return analysis.aggregate(array, grids.cell_size(pixels)[0], min_valid=min_valid)

@@ -99,7 +99,7 @@ def test_number_may_carry_its_unit(tmp_path, written, value):
         ("[ground]\ndistribution = 'burnt'", "did you mean 'burned-"),
         ("[ground]\nleaf_angles = 'sphere'", "ground.leaf_angles = 'sphere'"),
         ("[geometry]\nsza = 95", "geometry.sza = 95"),
-        ("[atmosphere]\naerosol = 'maritim'", "aerosol = 'maritim': must be one of"),
+        ("[atmosphere]\naerosol = 'maritim'", "aerosol = 'maritim': aerosol must be one of"),
         ("[sensor]\ninstrument = 'TN'", "TM"),
         ("[sensor]\nbands = ['TM9']", "TM9"),
         ("[sensor]\nbands = []", "name at least one band"),

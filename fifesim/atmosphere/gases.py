@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from fifesim import datasets
-from fifesim.atmosphere import models
+from fifesim.atmosphere import profiles
 
 # Volume mixing ratios of the uniformly mixed gases, in the years of AFGL's 1982 line list. [1]
 MIXING_RATIO = {"co2": 330e-6, "o2": 0.20947, "n2o": 310e-9, "ch4": 1.72e-6}
@@ -82,32 +82,33 @@ BAND_MODEL = {gas: goody if gas == "h2o" else malkmus for gas in GASES}
 
 def absorber_layers(levels, gas):
     """
-    Amount of a gas above the ground, level by level.
+    Amount of a gas above the ground, layer by layer.
 
     Parameters
     ----------
-    levels : models.Levels
+    levels : profiles.Levels
     gas : str
         One of `GASES`.
 
     Returns
     -------
-    amount : array, shape (level,)
+    amount : array, shape (level - 1,)
         Water vapour [g cm-2], the others [cm-atm].
 
     Examples
     --------
-    >>> levels = models.profile_above("midlatitude-summer", 0.0)
+    >>> levels = profiles.profile_above("midlatitude-summer", 0.0)
     >>> round(float(absorber_layers(levels, "h2o").sum()), 1)
     2.9
     """
+    air = -np.diff(levels.pressure) * 100 / profiles.GRAVITY  # [kg m-2]
     if gas == "h2o":
-        return models.column(levels, levels.h2o) / 10
+        return _layer_mean(levels.h2o) * air / 10
     if gas == "o3":
-        moles = models.column(levels, levels.o3) / models.MOLAR_MASS_OZONE
+        moles = _layer_mean(levels.o3) * air / profiles.MOLAR_MASS_OZONE
     else:
-        moles = models.column(levels, MIXING_RATIO[gas]) / models.MOLAR_MASS_AIR
-    return 100 * moles * models.MOLAR_VOLUME
+        moles = MIXING_RATIO[gas] * air / profiles.MOLAR_MASS_AIR
+    return 100 * moles * profiles.MOLAR_VOLUME
 
 
 def effective_amounts(levels, gas, strength_temperature, width_temperature):
@@ -116,21 +117,26 @@ def effective_amounts(levels, gas, strength_temperature, width_temperature):
 
     .. math::
 
-        U = \int e^{c (T - T_0)} \, \mathrm{d}u, \qquad
-        V = \int e^{d (T - T_0)} \frac{p}{p_0} \, \mathrm{d}u
+        U = \int e^{c_1 \Delta T + c_2 \Delta T^2} \, \mathrm{d}u, \qquad
+        V = \int e^{d_1 \Delta T + d_2 \Delta T^2} \frac{p}{p_0} \, \mathrm{d}u, \qquad \Delta T = T - T_0
 
     Parameters
     ----------
-    levels : models.Levels
+    levels : profiles.Levels
     gas : str
         One of `GASES`.
-    strength_temperature, width_temperature : array, shape (n,)
-        :math:`c` and :math:`d`. [K-1]
+    strength_temperature, width_temperature : array, shape (2, n)
+        :math:`c_1, c_2` and :math:`d_1, d_2`. [K-1, K-2]
 
     Returns
     -------
     amount, broadening_amount : array, shape (n,)
         :math:`U` and :math:`V`, in the unit of `absorber_layers`.
+
+    Notes
+    -----
+    Each layer has the mean temperature and the mean pressure of its two levels. The second power of temperature
+    is what one set of parameters needs from tropical to subarctic winter air.
 
     References
     ----------
@@ -140,15 +146,21 @@ def effective_amounts(levels, gas, strength_temperature, width_temperature):
     --------
     Without temperature the first is the column:
 
-    >>> levels = models.profile_above("midlatitude-summer", 0.0)
-    >>> round(float(effective_amounts(levels, "o3", 0.0, 0.0)[0]), 2)
+    >>> levels = profiles.profile_above("midlatitude-summer", 0.0)
+    >>> round(float(effective_amounts(levels, "o3", np.zeros((2, 1)), np.zeros((2, 1)))[0][0]), 2)
     0.32
     """
     layers = absorber_layers(levels, gas)
-    excess = levels.temperature - REFERENCE_TEMPERATURE
-    amount = np.exp(np.multiply.outer(strength_temperature, excess)) @ layers
-    broadening = np.exp(np.multiply.outer(width_temperature, excess)) @ (layers * levels.pressure / STANDARD_PRESSURE)
+    excess = _layer_mean(levels.temperature) - REFERENCE_TEMPERATURE
+    powers = np.stack([excess, excess**2])
+    amount = np.exp(np.transpose(strength_temperature) @ powers) @ layers
+    pressure = _layer_mean(levels.pressure) / STANDARD_PRESSURE
+    broadening = np.exp(np.transpose(width_temperature) @ powers) @ (layers * pressure)
     return amount, broadening
+
+
+def _layer_mean(values):
+    return (values[1:] + values[:-1]) / 2
 
 
 @lru_cache
@@ -165,17 +177,21 @@ def table_wavelengths():
 
 
 @lru_cache
-def _vertical(profile, altitude, gas):
-    """Weak-line optical depth and saturation at air mass 1, at the wavelengths of the table."""
+def _parameters(gas):
+    """Places of the absorbing wavelengths in the table; strength, saturation, two pairs of temperature coefficients."""
     table = datasets.table("gas_absorption.csv").query("gas == @gas")
-    levels = models.profile_above(profile, altitude)
-    temperature = (table[name].to_numpy() for name in ("strength_temperature", "width_temperature"))
-    amount, broadening = effective_amounts(levels, gas, *temperature)
     index = np.searchsorted(table_wavelengths(), table["wavelength"].to_numpy() - 1e-6)
-    weak, saturation = np.zeros((2, table_wavelengths().size))
-    weak[index] = table["strength"] * amount
-    saturation[index] = table["saturation"] * amount**2 / broadening
-    return weak, saturation
+    temperature = (table[[name, f"{name}_2"]].to_numpy().T for name in ("strength_temperature", "width_temperature"))
+    return index, table["strength"].to_numpy(), table["saturation"].to_numpy(), *temperature
+
+
+@lru_cache(maxsize=256)
+def _vertical(atmosphere, gas):
+    """Where a gas absorbs in the table, and its weak-line optical depth and saturation there at air mass 1."""
+    index, strength, saturation, *temperature = _parameters(gas)
+    amount, broadening = effective_amounts(atmosphere.levels, gas, *temperature)
+    ratio = np.divide(amount, broadening, out=np.zeros_like(amount), where=broadening > 0)  # no gas: not saturated
+    return index, strength * amount, saturation * amount * ratio
 
 
 def gas_transmittance(wavelength, atmosphere, air_mass, *, gases=GASES):
@@ -208,8 +224,8 @@ def gas_transmittance(wavelength, atmosphere, air_mass, *, gases=GASES):
     Notes
     -----
     Lines saturate, so the transmittance of the path down and up is not the product of the two: the amounts add.
-    The parameters reproduce each gas of 6SV1.1 at each wavelength within 7e-4 at the ground altitudes of their fit
-    (0, 1, 2 and 4 km, midlatitude summer, air masses of 1 to 4.9) and within 1.5e-3 between them.
+    The parameters reproduce each gas of 6SV1.1 at each wavelength within 2.5e-3 in the six model atmospheres, with the
+    ground at 0 to 4 km and air masses of 1 to 7.7; 95 of 100 wavelengths within 1.1e-3.
     They stand for the mean over 10 cm-1 at each wavelength.
 
     References
@@ -218,7 +234,8 @@ def gas_transmittance(wavelength, atmosphere, air_mass, *, gases=GASES):
 
     Examples
     --------
-    >>> atmosphere = models.Atmosphere()
+    >>> from fifesim.atmosphere.models import Atmosphere
+    >>> atmosphere = Atmosphere()
     >>> once, twice = gas_transmittance(0.94, atmosphere, [1.0, 2.0])[:, 0]
     >>> bool(twice > once**2)
     True
@@ -230,16 +247,19 @@ def gas_transmittance(wavelength, atmosphere, air_mass, *, gases=GASES):
             f"wavelength must be from {nodes[0]:g} to {nodes[-1]:g} um, got {wavelength.min():g} to "
             f"{wavelength.max():g}: give it in micrometres, inside the gas table"
         )
-    air_mass = np.asarray(air_mass, float)[..., None]
-    depth = np.zeros((*air_mass.shape[:-1], nodes.size))
-    for gas in gases:
-        weak, saturation = _vertical(atmosphere.profile, atmosphere.altitude, gas)
-        depth = depth + BAND_MODEL[gas](weak * air_mass, saturation * air_mass)
-    return _interpolated(np.exp(-depth), nodes, wavelength)
-
-
-def _interpolated(values, nodes, wavelength):
-    """Linear interpolation along the last axis."""
     index = np.clip(np.searchsorted(nodes, wavelength) - 1, 0, nodes.size - 2)
     share = (wavelength - nodes[index]) / (nodes[index + 1] - nodes[index])
-    return values[..., index] * (1 - share) + values[..., index + 1] * share
+    first, last = index.min(), index.max() + 2
+    transmittance = np.exp(-_optical_depth(atmosphere, np.asarray(air_mass, float), gases, first, last))
+    return transmittance[..., index - first] * (1 - share) + transmittance[..., index - first + 1] * share
+
+
+def _optical_depth(atmosphere, air_mass, gases, first, last):
+    """Sum over the gases at the wavelengths of the table from `first` up to `last`, shape (..., last - first)."""
+    depth = np.zeros((*air_mass.shape, last - first))
+    for gas in gases:
+        index, weak, saturation = _vertical(atmosphere, gas)
+        used = slice(*np.searchsorted(index, (first, last)))
+        mass = air_mass[..., None]
+        depth[..., index[used] - first] += BAND_MODEL[gas](weak[used] * mass, saturation[used] * mass)
+    return depth

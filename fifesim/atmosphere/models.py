@@ -1,54 +1,49 @@
-"""The state of the atmosphere: profile of the air, aerosol and visibility."""
+"""The state of the atmosphere: profile of the air, aerosol and how much there is of each."""
 
 import re
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
-from fifesim import datasets
 from fifesim.atmosphere import aerosols, molecules
+from fifesim.atmosphere.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
+from fifesim.atmosphere.summary import describe
 
-PROFILES = ("midlatitude-summer",)
-
-GRAVITY = 9.80665  # [m s-2]
-GAS_CONSTANT = 8.314463  # [J mol-1 K-1]
-BOLTZMANN = 1.380649e-23  # [J K-1]
-MOLAR_MASS_AIR = 0.028964  # [kg mol-1]
-MOLAR_MASS_OZONE = 0.047998  # [kg mol-1]
-MOLAR_VOLUME = 0.02241396  # at 273.15 K and 1013.25 hPa [m3 mol-1]
+ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
 _NUMBER = r"([-+.\deE]+)"
-_TEXT = re.compile(rf"profile=(\S+) aerosol=(\S+) visibility={_NUMBER} km altitude={_NUMBER} km")
-
-
-class Levels(NamedTuple):
-    """Levels of a profile from the ground up, each of shape (level,); water vapour and ozone are mass mixing ratios."""
-
-    altitude: np.ndarray  # [km]
-    pressure: np.ndarray  # [hPa]
-    temperature: np.ndarray  # [K]
-    h2o: np.ndarray  # [kg kg-1]
-    o3: np.ndarray  # [kg kg-1]
+_TEXT = re.compile(
+    rf"profile=(\S+) aerosol=(\S+) (?:visibility={_NUMBER} km|aot={_NUMBER}) altitude={_NUMBER} km"
+    rf"(?: h2o={_NUMBER} g cm-2)?(?: o3={_NUMBER} cm-atm)?(?: engine=(\S+))?"
+)
 
 
 @dataclass(frozen=True)
 class Atmosphere:
     """
-    A plane-parallel atmosphere.
+    A plane-parallel atmosphere, and the scheme by which light goes through it.
 
     Parameters
     ----------
     profile : str, optional
         Pressure, temperature, water vapour and ozone by altitude, one of `PROFILES`.
-    aerosol : str, optional
-        Optical properties of the aerosol, one of `aerosols.MODELS`.
+    aerosol : str or mapping, optional
+        Optical properties of the aerosol: one of `aerosols.MODELS`, "none", or a mixture of
+        `aerosols.COMPONENTS` by volume, such as ``{"dust": 0.5, "water_soluble": 0.5}``.
     visibility : float, optional
-        Meteorological range at the ground, 5 to 100. [km]
+        Meteorological range at the ground, 5 to 100; 45 where there is no ``aot``. [km]
     altitude : float, optional
         Of the ground, 0 to 4. [km]
+    aot : float, optional
+        Aerosol optical thickness at 0.55 um, 0 to 2, in the place of ``visibility``. [1]
+    h2o : float, optional
+        Column of water vapour, 0 to 10; by default that of the profile. [g cm-2]
+    o3 : float, optional
+        Column of ozone, 0 to 1; by default that of the profile. [cm-atm]
+    engine : str, optional
+        One of `ENGINES`: the closed forms of 5S, successive orders of scattering with or without polarization, or
+        6SV itself, which is an extra.
 
     Raises
     ------
@@ -58,6 +53,8 @@ class Atmosphere:
     Notes
     -----
     Raising the ground cuts the profile of the air off below; the aerosol stands on the ground and keeps its amount.
+    The columns of the user scale the profile at all levels. `aot` is known afterwards in either case, `visibility` is
+    None where the user gave `aot`.
 
     References
     ----------
@@ -67,26 +64,66 @@ class Atmosphere:
     --------
     The text that travels with the data says all:
 
-    >>> Atmosphere.parse(str(Atmosphere(visibility=23))) == Atmosphere(visibility=23)
+    >>> Atmosphere.parse(Atmosphere(visibility=23).text) == Atmosphere(visibility=23)
     True
     """
 
     profile: str = "midlatitude-summer"
     aerosol: str = "continental"
-    visibility: float = 45.0
+    visibility: float | None = None
     altitude: float = 0.4
+    aot: float | None = None
+    h2o: float | None = None
+    o3: float | None = None
+    engine: str = "5S"
 
     def __post_init__(self):
         _check_name("profile", self.profile, PROFILES)
-        _check_name("aerosol", self.aerosol, aerosols.MODELS)
-        object.__setattr__(self, "visibility", _checked("visibility", self.visibility, 5, 100))
-        object.__setattr__(self, "altitude", _checked("altitude", self.altitude, 0, 4))
+        _check_name("engine", self.engine, ENGINES)
+        aerosol = self.aerosol if self.aerosol == "none" else aerosols.canonical(self.aerosol)
+        self._set(aerosol=aerosol, altitude=_checked("altitude", self.altitude, 0, 4, "km"))
+        for name, high, unit in (("h2o", 10, "g cm-2"), ("o3", 1, "cm-atm")):
+            if getattr(self, name) is not None:
+                self._set(**{name: _checked(name, getattr(self, name), 0, high, unit)})
+        self._set_amount()
+
+    def _set_amount(self):
+        visibility, aot = self.visibility, self.aot
+        if aot is not None:
+            aot = _checked("aot", aot, 0, 2, "optical thickness at 0.55 um")
+        if visibility is not None or aot is None:
+            visibility = _checked("visibility", 45.0 if visibility is None else visibility, 5, 100, "km")
+            follows = 0.0 if self.aerosol == "none" else aerosols.aerosol_optical_thickness(visibility)
+            if aot not in (None, follows):
+                raise ValueError(
+                    f"give visibility or aot, not both: {visibility:g} km is an aot of {follows:.4g}, got {aot:g}; "
+                    "type None for the other"
+                )
+            aot = follows
+        if self.aerosol == "none" and aot:
+            raise ValueError(f"aot must be 0 without aerosol, got {aot:g}: name an aerosol, or leave aot out")
+        self._set(visibility=visibility, aot=aot)
+
+    def _set(self, **values):
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     def __str__(self):
-        visibility, altitude = (
-            np.format_float_positional(value, trim="-") for value in (self.visibility, self.altitude)
+        return describe(self)
+
+    @property
+    def text(self):
+        """One line that says all, for `parse`."""
+        by_aot = self.visibility is None
+        amount = f"aot={_shortest(self.aot)}" if by_aot else f"visibility={_shortest(self.visibility)} km"
+        return " ".join(
+            [
+                f"profile={self.profile} aerosol={self.aerosol} {amount} altitude={_shortest(self.altitude)} km",
+                *([] if self.h2o is None else [f"h2o={_shortest(self.h2o)} g cm-2"]),
+                *([] if self.o3 is None else [f"o3={_shortest(self.o3)} cm-atm"]),
+                *([] if self.engine == "5S" else [f"engine={self.engine}"]),
+            ]
         )
-        return f"profile={self.profile} aerosol={self.aerosol} visibility={visibility} km altitude={altitude} km"
 
     @classmethod
     def parse(cls, text):
@@ -96,7 +133,7 @@ class Atmosphere:
         Parameters
         ----------
         text : str
-            As ``str(atmosphere)`` writes it.
+            As `text` says it.
 
         Returns
         -------
@@ -109,14 +146,22 @@ class Atmosphere:
         """
         match = _TEXT.fullmatch(text.strip())
         if match is None:
-            raise ValueError(f"atmosphere must read like {str(cls())!r}, got {text!r}")
-        profile, aerosol, visibility, altitude = match.groups()
-        return cls(profile, aerosol, float(visibility), float(altitude))
+            raise ValueError(f"atmosphere must read like {cls().text!r}, got {text!r}")
+        profile, aerosol, *numbers, engine = match.groups()
+        visibility, aot, altitude, h2o, o3 = (None if number is None else float(number) for number in numbers)
+        return cls(profile, aerosol, visibility, altitude, aot, h2o, o3, engine or "5S")
 
     @property
     def levels(self):
-        """Profile above the ground, as `Levels`."""
-        return profile_above(self.profile, self.altitude)
+        """Profile above the ground with the user's columns, as `profiles.Levels`."""
+        levels = profile_above(self.profile, self.altitude)
+        columns = {"h2o": (self.h2o, water_vapour_column), "o3": (self.o3, ozone_column)}
+        scaled = {
+            name: getattr(levels, name) * wanted / measure(levels)
+            for name, (wanted, measure) in columns.items()
+            if wanted is not None
+        }
+        return levels._replace(**scaled)
 
     @property
     def pressure(self):
@@ -124,20 +169,14 @@ class Atmosphere:
         return float(self.levels.pressure[0])
 
     @property
-    def h2o(self):
-        """Column of water vapour [g cm-2]."""
-        return float(column(self.levels, self.levels.h2o).sum() / 10)
+    def water_vapour(self):
+        """Column of water vapour above the ground [g cm-2]."""
+        return water_vapour_column(self.levels)
 
     @property
-    def o3(self):
-        """Column of ozone [cm-atm]."""
-        moles = column(self.levels, self.levels.o3).sum() / MOLAR_MASS_OZONE
-        return float(100 * moles * MOLAR_VOLUME)
-
-    @property
-    def aot(self):
-        """Aerosol optical thickness at 0.55 um [1]."""
-        return aerosols.aerosol_optical_thickness(self.visibility)
+    def ozone(self):
+        """Column of ozone above the ground [cm-atm]."""
+        return ozone_column(self.levels)
 
     def rayleigh_optical_depth(self, wavelength):
         """
@@ -170,74 +209,56 @@ class Atmosphere:
         tau : array
             [1]
         """
+        if self.aot == 0:
+            return np.zeros(np.shape(wavelength))
         extinction, _, _ = aerosols.aerosol_optics(self.aerosol, wavelength)
         return self.aot * extinction
 
 
-@lru_cache
-def profile_above(profile, altitude):
+def water_vapour_column(levels):
     """
-    Levels of a profile above the ground.
+    Column of water vapour.
 
     Parameters
     ----------
-    profile : str
-        One of `PROFILES`.
-    altitude : float
-        Of the ground. [km]
+    levels : profiles.Levels
 
     Returns
     -------
-    levels : Levels
-        The lowest lies on the ground: temperature and densities linear in altitude there, pressure exponential.
-
-    References
-    ----------
-    [McClatchey1972]_, Table 1
+    h2o : float
+        [g cm-2]
 
     Examples
     --------
-    >>> round(float(profile_above("midlatitude-summer", 0.0).pressure[0]), 9)
-    1013.0
+    >>> round(water_vapour_column(profile_above("midlatitude-summer", 0.0)), 2)
+    2.93
     """
-    table = datasets.table("atmosphere_profiles.csv").query("profile == @profile")
-    altitudes = table["altitude"].to_numpy(float)
-    above = np.concatenate([[altitude], altitudes[altitudes > altitude]])
-    pressure = np.exp(np.interp(above, altitudes, np.log(table["pressure"])))
-    temperature, h2o, o3 = (np.interp(above, altitudes, table[name]) for name in ("temperature", "h2o", "o3"))
-    # The air's density in the table's unit. [g m-3]
-    air = 1000 * pressure * 100 * MOLAR_MASS_AIR / (GAS_CONSTANT * temperature)
-    return Levels(above, pressure, temperature, h2o / air, o3 / air)
+    return float(column(levels, levels.h2o).sum() / 10)
 
 
-def column(levels, mixing_ratio):
-    r"""
-    Mass of a gas above the ground, level by level.
-
-    .. math:: u = \int q \, \frac{\mathrm{d}p}{g}
+def ozone_column(levels):
+    """
+    Column of ozone.
 
     Parameters
     ----------
-    levels : Levels
-    mixing_ratio : array, shape (level,)
-        Mass of the gas in a mass of air, :math:`q`. [kg kg-1]
+    levels : profiles.Levels
 
     Returns
     -------
-    mass : array, shape (level,)
-        The sum is the column, by the trapezoidal rule in pressure. [kg m-2]
+    o3 : float
+        [cm-atm]
 
     Examples
     --------
-    The air itself weighs what the pressure says:
-
-    >>> levels = profile_above("midlatitude-summer", 0.0)
-    >>> round(float(column(levels, 1.0).sum() * 9.80665 / 100))
-    1013
+    >>> round(ozone_column(profile_above("midlatitude-summer", 0.0)), 2)
+    0.32
     """
-    half = -np.diff(levels.pressure) * 100 / 2
-    thickness = np.concatenate([half, [0]]) + np.concatenate([[0], half])
-    return mixing_ratio * thickness / GRAVITY
+    return float(100 * column(levels, levels.o3).sum() / MOLAR_MASS_OZONE * MOLAR_VOLUME)
+
+
+def _shortest(value):
+    return np.format_float_positional(value, trim="-")
 
 
 def _check_name(what, value, allowed):
@@ -247,12 +268,12 @@ def _check_name(what, value, allowed):
     raise ValueError(f"{what} must be one of {', '.join(allowed)}, got {value!r}: type {what}={nearest!r}")
 
 
-def _checked(what, value, low, high):
+def _checked(what, value, low, high, unit):
     if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
-        raise TypeError(f"{what} must be a number of km from {low} to {high}, got {value!r}: leave the unit out")
+        raise TypeError(f"{what} must be a number from {low} to {high} [{unit}], got {value!r}: leave the unit out")
     if not low <= value <= high:
         nearest = low if value < low else high
         raise ValueError(
-            f"{what} must be from {low} to {high} km, got {value:g}: type {what}={nearest}, the nearest allowed"
+            f"{what} must be from {low} to {high} {unit}, got {value:g}: type {what}={nearest}, the nearest allowed"
         )
     return float(value)

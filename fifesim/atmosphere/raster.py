@@ -4,14 +4,16 @@ import xarray as xr
 
 from fifesim import cf, chunks
 from fifesim import grid as grids
-from fifesim.atmosphere import five_s
+from fifesim.atmosphere import adjacency_raster, coupling, engines, lookup
+from fifesim.geometry import ANGLES
 
 _REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
+_UNIFORM = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
 
 
-def to_toa(reflectance, atmosphere, bands, geometry):
+def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacency=False, surroundings=None):
     """
-    Apparent reflectance at the top of the atmosphere, over a surface that is locally uniform.
+    Apparent reflectance at the top of the atmosphere.
 
     Parameters
     ----------
@@ -21,6 +23,13 @@ def to_toa(reflectance, atmosphere, bands, geometry):
     bands : sequence of fifesim.bands.Band
         One for each band of the raster.
     geometry : fifesim.geometry.Geometry
+        Its angles may be rasters on the cells.
+    elevation : xarray.DataArray, dims (y, x), optional
+        Of the ground on the cells, 0 to 4000, in the place of the atmosphere's one altitude. [m]
+    adjacency : bool, optional
+        Whether light that the surroundings reflect is scattered into the view of a cell.
+    surroundings : number, sequence or xarray.DataArray, optional
+        Reflectance around the scene, for adjacency; by default the scene's mean. [1]
 
     Returns
     -------
@@ -30,28 +39,28 @@ def to_toa(reflectance, atmosphere, bands, geometry):
     Raises
     ------
     ValueError
-        If the units are wrong, or sun or sensor stand lower than the model holds.
+        If the units are wrong, sun or sensor stand lower than the model holds, or adjacency is asked for where the
+        geometry or the altitude varies.
 
     See Also
     --------
-    fifesim.atmosphere.five_s.apparent_reflectance
+    fifesim.atmosphere.coupling.apparent_reflectance, fifesim.atmosphere.adjacency.inhomogeneous_reflectance
     """
     cf.check_quantity(reflectance, "surface_reflectance")
-    step = (five_s.apparent_reflectance, "toa_reflectance", "to_toa")
-    return _carry(*step, reflectance, atmosphere, bands, geometry)
+    said = ("toa_reflectance", "to_toa")
+    return _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings)
 
 
-def to_surface(reflectance, atmosphere, bands, geometry):
+def to_surface(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacency=False, surroundings=None):
     """
-    Surface reflectance from that at the top of the atmosphere; the exact inverse of `to_toa`.
+    Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.
 
     Parameters
     ----------
     reflectance : xarray.DataArray, dims (band, y, x)
         At the top of the atmosphere. [1]
-    atmosphere : fifesim.atmosphere.models.Atmosphere
-    bands : sequence of fifesim.bands.Band
-    geometry : fifesim.geometry.Geometry
+    atmosphere, bands, geometry, elevation, adjacency, surroundings
+        As in `to_toa`.
 
     Returns
     -------
@@ -61,37 +70,99 @@ def to_surface(reflectance, atmosphere, bands, geometry):
     Raises
     ------
     ValueError
-        If the units are wrong, or sun or sensor stand lower than the model holds.
+        As in `to_toa`.
 
     See Also
     --------
-    fifesim.atmosphere.five_s.surface_reflectance
+    fifesim.atmosphere.coupling.surface_reflectance
     """
     cf.check_quantity(reflectance, "toa_reflectance")
-    step = (five_s.surface_reflectance, "surface_reflectance", "to_surface")
-    return _carry(*step, reflectance, atmosphere, bands, geometry)
+    said = ("surface_reflectance", "to_surface")
+    return _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings)
 
 
-def _carry(kernel, name, verb, reflectance, atmosphere, bands, geometry):
+def diffuse_fraction(atmosphere, bands, geometry):
+    """
+    Share of skylight in the irradiance of level ground.
+
+    Parameters
+    ----------
+    atmosphere : fifesim.atmosphere.models.Atmosphere
+    bands : sequence of fifesim.bands.Band, length (band,)
+    geometry : fifesim.geometry.Geometry
+
+    Returns
+    -------
+    diffuse_fraction : array, shape (band,), or xarray.DataArray, dims (band, y, x)
+        The latter where the sun varies. [1]
+
+    See Also
+    --------
+    fifesim.atmosphere.lookup.varying_diffuse_fraction
+    """
+    if "sza" not in geometry.rasters:
+        return engines.band_terms(atmosphere, tuple(bands), geometry.sza, 0.0, 0.0).diffuse_fraction
+
+    def kernel(sza):
+        return lookup.varying_diffuse_fraction(sza, atmosphere=atmosphere, bands=tuple(bands))
+
+    return chunks.pointwise(kernel, geometry.sza, bands=len(bands))
+
+
+def _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings):
+    name, verb = said
     if "band" not in reflectance.dims:
         reflectance = reflectance.expand_dims("band")
     if set(reflectance.dims) != {"band", "y", "x"}:
         raise ValueError(f"a reflectance has dimensions (band, y, x), got {reflectance.dims}: select one layer first")
-    terms = five_s.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
-    per_band = [
-        xr.DataArray(getattr(terms, term), dims="band")
-        for term in (
-            "path_reflectance",
-            "transmittance_down",
-            "transmittance_up",
-            "spherical_albedo",
-            "gas_transmittance",
-        )
-    ]
-    plain = reflectance.drop_vars("band", errors="ignore")
-    out = chunks.pointwise(kernel, plain, *per_band)
+    if surroundings is not None and not adjacency:
+        raise ValueError("surroundings matter with adjacency=True only: give both, or leave surroundings out")
+    plain = reflectance.drop_vars(["band", *ANGLES], errors="ignore")
+    if adjacency:
+        out = _with_adjacency(verb, plain, atmosphere, bands, geometry, elevation, surroundings)
+    elif elevation is None and not geometry.rasters:
+        out = _uniform(verb, plain, atmosphere, bands, geometry)
+    else:
+        out = _varying(verb, plain, atmosphere, bands, geometry, elevation)
     if "band" in reflectance.coords:
         out = out.assign_coords(band=reflectance["band"])
     out = cf.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)
-    said = {"history": f"{verb}: 5S, {atmosphere}", "atmosphere": str(atmosphere), "references": _REFERENCE}
-    return cf.label(out, name, source=reflectance, **said)
+    text = f"{verb}: {atmosphere.engine}{' with adjacency' if adjacency else ''}, {atmosphere.text}"
+    return cf.label(out, name, source=reflectance, history=text, atmosphere=atmosphere.text, references=_REFERENCE)
+
+
+def _uniform(verb, reflectance, atmosphere, bands, geometry):
+    terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
+    kernel = coupling.apparent_reflectance if verb == "to_toa" else coupling.surface_reflectance
+    per_band = (xr.DataArray(getattr(terms, term), dims="band") for term in _UNIFORM)
+    return chunks.pointwise(kernel, reflectance, *per_band)
+
+
+def _varying(verb, reflectance, atmosphere, bands, geometry, elevation):
+    if atmosphere.engine == "6S":
+        raise ValueError(
+            "engine='6S' runs for one geometry and one altitude: average the angles and leave elevation out, "
+            "or use engine='successive-orders'"
+        )
+    if elevation is None:
+        altitude = xr.DataArray(atmosphere.altitude)
+    else:
+        cf.check_quantity(elevation, "dem")
+        altitude = elevation / 1000
+    angles = (xr.DataArray(getattr(geometry, name)) for name in ANGLES)
+
+    def kernel(rho, *places):
+        return lookup.varying_reflectance(
+            rho, *places, atmosphere=atmosphere, bands=tuple(bands), to_surface=verb == "to_surface"
+        )
+
+    return chunks.pointwise(kernel, reflectance, altitude, *angles, bands=len(bands))
+
+
+def _with_adjacency(verb, reflectance, atmosphere, bands, geometry, elevation, surroundings):
+    if elevation is not None or geometry.rasters:
+        what = "elevation" if elevation is not None else "rasters of " + ", ".join(geometry.rasters)
+        raise ValueError(f"adjacency takes one geometry and one altitude, got {what}: leave one of the two out")
+    terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
+    step = adjacency_raster.apparent_reflectance if verb == "to_toa" else adjacency_raster.surface_reflectance
+    return step(reflectance, terms, geometry.vza, surroundings)

@@ -1,22 +1,22 @@
 """The experiment of Friedl et al. (1995): nine scenes, what the sensor makes of them, and Table 2."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
-from affine import Affine
+
 from odc.geo.geobox import GeoBox
 
 from fifesim import chain, datasets, sites
-from fifesim import grid as grids
 from fifesim.analysis import raster as analysis
 from fifesim.ground import raster as ground
 from fifesim.ground.distribution import treatments, truncated_normal
 from fifesim.ground.flint_hills_raster import flint_hills
 from fifesim.sensor import raster as sensor
-from fifesim.sensor.instruments import CosineResponse, Instrument
+from fifesim.sensor.description import Instrument
 from fifesim.sensor.instruments import instrument as find_instrument
+from fifesim.sensor.spatial_response import CosineResponse
 
 ARPS = (0.05, 0.15, 0.24)
 VARIABLES = ("lai", "fpar")
@@ -203,24 +203,13 @@ def sense(case, reflectance):
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
     """
-    return sensor.sense(chain.to_toa(reflectance), _instrument(case), onto=pixel_grid(case))
-
-
-def pixel_grid(case):
-    """
-    Grid of the pixels as a reading of Table 1 has it.
-
-    Parameters
-    ----------
-    case : Case
-
-    Returns
-    -------
-    grid : odc.geo.geobox.GeoBox
-    """
-    size = case.instrument.ground_interval if case.reading.own_interval else PIXEL
-    pixels, shift = grids.aligned(case.grid, size), case.reading.offset * CELL
-    return GeoBox(pixels.shape, Affine.translation(shift, -shift) * pixels.affine, pixels.crs)
+    reading = case.reading
+    return sensor.sense(
+        chain.to_toa(reflectance),
+        _instrument(case),
+        interval="native" if reading.own_interval else None,
+        offset=(reading.offset * CELL / PIXEL,) * 2,
+    )
 
 
 def pixel_values(truth, *images):
@@ -303,9 +292,4 @@ def _instrument(case):
     if case.reading.count is None:
         return case.instrument
     lsf = case.instrument.lsf
-    return _with_lsf(case.instrument, CosineResponse(kind=lsf.kind, step=lsf.step, count=case.reading.count))
-
-
-def _with_lsf(instrument, lsf):
-    values = {name: getattr(instrument, name) for name in instrument.__dataclass_fields__}
-    return Instrument(**values | {"lsf": lsf})
+    return replace(case.instrument, lsf=CosineResponse(kind=lsf.kind, step=lsf.step, count=case.reading.count))

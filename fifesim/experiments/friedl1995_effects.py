@@ -136,8 +136,7 @@ def changes(case):
         ("bounds of LAI", "2.75 standard deviations from the mean", 0.0, 1.0, -0.25),
     ):
         found.append(Change(name, "the table's", after, replace(case, densities=_densities(shift, factor, bound))))
-    fine = {name: getattr(case.instrument, name) for name in case.instrument.__dataclass_fields__} | {"bits": 16}
-    finer = replace(case, instrument=type(case.instrument)(**fine))
+    finer = replace(case, instrument=replace(case.instrument, bits=16))
     found.append(Change("radiometric bits", f"{case.instrument.bits}", "16, next to no quantisation", finer))
     return found
 

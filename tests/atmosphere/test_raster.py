@@ -6,7 +6,7 @@ from lazy import check_raster_function
 
 import fifesim
 from fifesim import cf
-from fifesim.atmosphere import five_s
+from fifesim.atmosphere import coupling, engines
 from fifesim.atmosphere.raster import to_surface, to_toa
 from fifesim.geometry import Geometry
 from fifesim.sensor.instruments import instrument
@@ -14,7 +14,7 @@ from fifesim.sensor.instruments import instrument
 AIR = fifesim.Atmosphere(visibility=23.0)
 SUN = Geometry(40.0, 120.0, 5.0, 200.0)
 BANDS = tuple(band.response for band in instrument("TM").select(["TM3", "TM4"]))
-TERMS = five_s.band_terms(AIR, BANDS, SUN.sza, SUN.vza, SUN.raa)
+TERMS = engines.band_terms(AIR, BANDS, SUN.sza, SUN.vza, SUN.raa)
 FACTORS = [
     getattr(TERMS, name)[:, None, None]
     for name in ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
@@ -36,7 +36,7 @@ def downward(array):
 
 def test_to_toa_keeps_its_word_and_equals_the_kernel(ground):
     result = check_raster_function(upward, ground, quantity="toa_reflectance")
-    np.testing.assert_array_equal(result, five_s.apparent_reflectance(ground.values, *FACTORS))
+    np.testing.assert_array_equal(result, coupling.apparent_reflectance(ground.values, *FACTORS))
     np.testing.assert_array_equal(np.isnan(result), np.isnan(ground))
     assert result["band"].values.tolist() == ["TM3", "TM4"]
     assert "wavelength" in result.coords
@@ -47,7 +47,7 @@ def test_to_toa_keeps_its_word_and_equals_the_kernel(ground):
 def test_to_surface_keeps_its_word_and_equals_the_kernel(ground):
     toa = upward(ground)
     result = check_raster_function(downward, toa, quantity="surface_reflectance")
-    np.testing.assert_array_equal(result, five_s.surface_reflectance(toa.values, *FACTORS))
+    np.testing.assert_array_equal(result, coupling.surface_reflectance(toa.values, *FACTORS))
 
 
 def test_there_and_back_is_the_same(ground):

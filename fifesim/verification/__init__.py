@@ -1,0 +1,1 @@
+"""Checks of an installation against results that others found, or that follow from theory."""

@@ -1,0 +1,88 @@
+"""`fifesim verify`: it passes where all is well, and says what is wrong where it is not."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import fifesim
+from fifesim.cli import app
+from fifesim.ground import absorption, dem, terrain
+from fifesim.sensor import calibration
+from fifesim.verification import areas, atmosphere, canopy
+from fifesim.verification.deviations import Deviation, largest
+
+
+def run():
+    return CliRunner().invoke(app, ["verify"])
+
+
+@pytest.fixture
+def only(monkeypatch):
+    """Leave one area to check."""
+    return lambda area: monkeypatch.setattr(areas, "AREAS", {area: areas.AREAS[area]})
+
+
+def test_installation_is_within_all_bounds():
+    result = run()
+    *lines, last = result.stdout.splitlines()
+    assert result.exit_code == 0, last
+    assert last == f"{len(lines) - 1} checks, all within their bounds"
+    assert all(any(line.startswith(area) for line in lines) for area in areas.AREAS)
+    assert any("6SV1.1" in line for line in lines) and any("prosail" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    "area, owner, name, wrong, said",
+    [
+        ("canopy", absorption, "extinction_coefficient", 1.01, "canopy: extinction by spherical leaves"),
+        ("terrain", terrain, "sky_view", 1.01, "terrain: sky seen from a wide plane"),
+        ("terrain", terrain, "sky_view", np.nan, "terrain: Kt of planes"),
+        ("terrain", dem, "spline_grid", np.nan, "terrain: wave of six cells"),
+        ("sensor", calibration, "gain_offset", 1.01, "sensor: counts of TM's radiances"),
+    ],
+)
+def test_broken_physics_is_named_with_exit_code_1(monkeypatch, only, area, owner, name, wrong, said):
+    only(area)
+    right = getattr(owner, name)
+    monkeypatch.setattr(owner, name, lambda *given, **options: wrong * np.asarray(right(*given, **options)))
+    result = run()
+    assert result.exit_code == 1
+    last = result.stdout.splitlines()[-1]
+    assert "beyond their bounds" in last and said in last
+    assert sum("EXCEEDED" in line for line in result.stdout.splitlines()) == last.count(f"{area}: ")
+
+
+def test_a_tighter_bound_is_exceeded(monkeypatch):
+    """The closed forms of 5S do not reach a hundredth of a percent."""
+    monkeypatch.setattr(areas, "AREAS", {"atmosphere": (atmosphere._five_s_at_fife,)})
+    monkeypatch.setattr(atmosphere, "_FIFE_BOUNDS", (0.007, 0.004, 1e-5, 0.002, 0.001, 0.001))
+    result = run()
+    assert result.exit_code == 1
+    assert result.stdout.splitlines()[-1] == "6 checks, 1 beyond their bounds: atmosphere: 5S, FIFE case, TM3"
+
+
+def test_what_is_not_a_number_is_beyond_its_bound():
+    assert np.isnan(largest([1.0, np.nan], 1.0))
+    assert not Deviation("canopy", "anything", np.nan, 1.0, "1", "theory").within
+    assert Deviation("canopy", "anything", 1.0, 1.0, "1", "theory").within
+
+
+def test_missing_table_is_one_line_with_exit_code_1(monkeypatch):
+    def missing(name):
+        raise FileNotFoundError(f"the data file {name!r} is missing from this installation: reinstall fifesim")
+
+    monkeypatch.setattr(areas, "AREAS", {"canopy": (canopy._other_sail,)})
+    monkeypatch.setattr(canopy.datasets, "table", missing)
+    result = run()
+    assert result.exit_code == 1
+    assert result.stderr.strip().splitlines() == [
+        "fifesim: the data file 'verification/sail.csv' is missing from this installation: reinstall fifesim"
+    ]
+
+
+def test_python_gets_what_the_command_prints(only):
+    only("sensor")
+    found = fifesim.verify()
+    assert [each.what for each in found] == [each.what for each in areas.deviations()]
+    assert all(each.area == "sensor" and each.within for each in found)
+    assert len(run().stdout.splitlines()) == len(found) + 2
