@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
-
 from odc.geo.geobox import GeoBox
 
 from fifesim import chain, datasets, sites
