@@ -1,6 +1,7 @@
 """Noise of a detector: shot, thermal and fixed pattern, drawn by scan line from counters."""
 
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
@@ -211,7 +212,7 @@ def check_seed(seed):
     ValueError
         If it is out of range or not whole.
     """
-    if isinstance(seed, bool) or int(seed) != seed or not 0 <= seed < 2**64:
+    if isinstance(seed, bool) or not isinstance(seed, Integral) or not 0 <= seed < 2**64:
         raise ValueError(f"the seed of noise must be a whole number from 0 to 2**64 - 1, got {seed!r}")
 
 

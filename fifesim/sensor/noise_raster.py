@@ -1,5 +1,7 @@
 """The noise of an instrument on labelled rasters."""
 
+from collections.abc import Mapping
+
 from fifesim import chunks
 from fifesim.sensor.noise import NoiseModel, add_noise, check_kinds, check_seed
 
@@ -31,7 +33,7 @@ def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
     Raises
     ------
     ValueError
-        If a kind is unknown, or a band has no noise of that kind.
+        If a kind or the name of a band is unknown, or a band has no noise of that kind.
 
     See Also
     --------
@@ -41,6 +43,8 @@ def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
     if not kinds:
         return radiance
     check_seed(seed)
+    if isinstance(given, Mapping):
+        given = {instrument.select(name)[0].name: model for name, model in given.items()}
     models = [_model(instrument, band, kinds, given) for band in bands]
     numbers = [instrument.bands.index(band) for band in bands]
     first_row, first_column = first

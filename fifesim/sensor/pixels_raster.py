@@ -46,17 +46,18 @@ def matching_bands(array, instrument):
 
 
 def _band_at(wavelength, instrument):
-    """The band with the largest response at a wavelength, at least half of its peak."""
+    """The band whose centre is nearest to a wavelength, among those that respond there with half of their peak."""
     responses = [
         np.interp(wavelength, band.response.wavelength, band.response.response, left=0.0, right=0.0)
         / max(band.response.response)
         for band in instrument.bands
     ]
-    best = int(np.argmax(responses))
-    if responses[best] < 0.5:
+    # A panchromatic band may respond more than the narrow band that is meant.
+    found = [band for band, response in zip(instrument.bands, responses, strict=True) if response >= 0.5]
+    if not found:
         centres = ", ".join(f"{band.name} at {band.wavelength:.3f}" for band in instrument.bands)
         raise ValueError(f"no band of {instrument.name} responds at {wavelength:g} um: it has {centres} um")
-    return instrument.bands[best]
+    return min(found, key=lambda band: abs(band.wavelength - wavelength))
 
 
 def pixel_grid(scene, instrument, bands, onto=None, interval=None):
@@ -93,6 +94,10 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
         if interval != "native":
             raise ValueError(f"interval must be 'native', or metres between pixels, got {interval!r}")
         return grids.aligned(scene, common_size(instrument, bands, instrument.ground_intervals))
+    if np.shape(interval) not in ((), (2,)) or not np.all(np.isfinite(interval)) or np.min(interval) <= 0:
+        raise ValueError(
+            f"interval must be 'native', or positive metres between pixels, down and across, got {interval}"
+        )
     return grids.aligned(scene, interval)
 
 
@@ -159,6 +164,8 @@ def regularized(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_vali
     fifesim.footprints.regularize
     """
     scene = grids.geobox(array)
+    if not hasattr(offset, "__len__") or len(offset) != 2:
+        raise ValueError(f"offset must be two, of rows and of columns in pixels, such as (0.5, 0.0), got {offset!r}")
     axes = zip(offset, pixels.shape, grids.cell_size(pixels), ("rows", "columns"), strict=True)
     shifts = [_shift(*axis) for axis in axes]
     groups = {}

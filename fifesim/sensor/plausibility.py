@@ -13,7 +13,7 @@ _WIDEST = 0.02
 # three, is a unit that was taken for another.
 _UNITS = {
     1000.0: ("altitude", "metres", "kilometres, so multiply by 1000"),
-    1e-3: ("interval", "radians", "milliradians, so multiply by 1e-3"),
+    1e-3: ("interval", "radians", "milliradians, so multiply by 1e-3, unless gsd is in kilometres"),
     1e-6: ("interval", "radians", "microradians, so multiply by 1e-6"),
     np.pi / 180: ("interval", "radians", "degrees, so multiply by pi / 180"),
 }
@@ -21,14 +21,24 @@ _UNITS = {
 # The agencies' solar spectra differ from ASTM G173 by up to 6 % in a band; units differ by 10 and more.
 _SOLAR = 0.15
 
-# Radiance of the largest digital number, in those of a white surface below an overhead sun.
+# Radiance of the largest digital number, in those of a white surface below an overhead sun. Bands for the ocean
+# saturate early, but not all bands of an instrument do; Landsat's tables of 1986 in mW cm-2 sr-1 um-1 reach 0.06.
 _RADIANCE = (0.02, 5.0)
+_BRIGHTEST = 0.1
+
+# Share of the line spread within one interval of its centre, below which it is too wide, and narrowest support in
+# intervals. Detectors fill a third of their interval and more, and none spreads a sample over ten.
+_SHARE = 0.1
+_NARROWEST = 0.1
 
 # Response at the ends of its table, in its maximum, above which the table was cut inside the band.
 _END = 0.2
 
 # Published swaths are round numbers, and that of a plane is up to 20 % narrower than that of the sphere.
 _SWATH = 0.25
+
+# Samples times interval beside the angle of the scan: bands count their samples each, some overlap.
+_SAMPLED = 6.0
 
 
 def check_units(instrument):
@@ -51,9 +61,10 @@ def check_units(instrument):
         try:
             _check_response(band)
             _check_radiance(band)
-            instrument.line_spreads(band)
+            _check_spread(instrument, band)
         except ValueError as error:
             raise ValueError(f"{key}{error}") from None
+    _check_brightest(instrument)
     if instrument.scan is not None:
         _check_scan(instrument)
 
@@ -73,6 +84,22 @@ def _check_sampling(instrument, interval, gsd, key):
                     f"{place} = {value:g}: it is in {unit}. Samples would lie {angle * instrument.altitude:g} m apart "
                     f"beside pixels of {gsd:g} m; it looks like {remedy}"
                 )
+
+
+def _check_spread(instrument, band):
+    for field, step in zip(instrument.ground_fields(band), instrument.ground_intervals(band), strict=True):
+        if field is not None and not _NARROWEST < field / step < 1 / _NARROWEST:
+            raise ValueError(
+                f"ifov = {field / instrument.altitude:g}: it is in radians, and {field / step:.3g} times the interval; "
+                "degrees times pi / 180, milliradians times 1e-3, microradians times 1e-6"
+            )
+    for spread, step in zip(instrument.line_spreads(band), instrument.ground_intervals(band), strict=True):
+        within = float(spread.cumulative(step) - spread.cumulative(-step))
+        if within < _SHARE or 2 * spread.half_width < _NARROWEST * step:
+            raise ValueError(
+                f"lsf: its angles are in radians, and it is {2 * spread.half_width:g} m wide beside samples {step:g} m "
+                "apart; degrees times pi / 180, milliradians times 1e-3, microradians times 1e-6"
+            )
 
 
 def _check_response(band):
@@ -118,11 +145,33 @@ def _check_radiance(band):
         )
 
 
+def _check_brightest(instrument):
+    ratios = [band.full_scale_radiance / band.spectrum_irradiance * np.pi for band in instrument.bands]
+    if max(ratios) < _BRIGHTEST:
+        raise ValueError(
+            f"bands.full_scale_radiance: it is in W m-2 sr-1 um-1, and no band records more than {max(ratios):.0%} of "
+            "a white surface; mW cm-2 sr-1 um-1 times 10"
+        )
+
+
 def _check_scan(instrument):
     scan = instrument.scan
+    width = swath_width(instrument.altitude, scan.max_angle)
+    if not np.isfinite(width):
+        raise ValueError(
+            f"scan.max_angle = {scan.max_angle:g}: at that angle from nadir, in degrees, the line of sight misses the "
+            f"earth from an altitude of {instrument.altitude:g} m"
+        )
+    if scan.samples is not None:
+        first = instrument.bands[0]
+        half = np.degrees(scan.samples * by_axes(first.interval or instrument.interval).across / 2)
+        if not 1 / _SAMPLED < half / scan.max_angle < _SAMPLED:
+            raise ValueError(
+                f"scan.max_angle = {scan.max_angle:g}: it is in degrees from nadir, and {scan.samples} samples of the "
+                f"first band reach {half:.3g} degrees to either side; radians times 180 / pi"
+            )
     if scan.swath is None:
         return
-    width = swath_width(instrument.altitude, scan.max_angle)
     if abs(np.log(width / scan.swath)) > np.log(1 + _SWATH):
         raise ValueError(
             f"scan: max_angle = {scan.max_angle:g} degrees gives a swath of {width / 1000:.0f} km from this altitude, "

@@ -119,3 +119,7 @@ def test_noise_may_be_given():
     mixed = fifesim.sense(uniform(), NOISY, noise_models={"TM3": model}, **options)
     np.testing.assert_array_equal(mixed.sel(band="TM3"), both.sel(band="TM3"))
     np.testing.assert_array_equal(mixed.sel(band="TM4"), fifesim.sense(uniform(), NOISY, **options).sel(band="TM4"))
+    lower = fifesim.sense(uniform(), NOISY, noise_models={"tm3": model}, **options)
+    np.testing.assert_array_equal(lower, mixed)
+    with pytest.raises(ValueError, match="unknown band of TM 'TM33': did you mean TM3"):
+        fifesim.sense(uniform((90, 99)), NOISY, noise_models={"TM33": model}, **options)

@@ -12,6 +12,7 @@ from fifesim import cf
 from fifesim import grid as grids
 from fifesim.geometry import Geometry
 from fifesim.sensor.instruments import instrument
+from fifesim.sensor.pixels_raster import matching_bands
 from fifesim.sensor.spatial_response import BoxcarResponse, CosineResponse, GaussianResponse, TwoAxesResponse
 
 TM = instrument("TM")
@@ -35,6 +36,29 @@ def ramp(shape=(180, 198)):
     """Radiance that rises by one a metre eastward and by a hundredth southward."""
     y, x = np.meshgrid(np.arange(shape[0]) * 10 / 3, np.arange(shape[1]) * 10 / 3, indexing="ij")
     return scene(shape, np.stack([0.01 * y + x] * 2))
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("ETM+", {"TM2": "ETM2", "TM3": "ETM3", "TM4": "ETM4"}), ("OLI", {"TM2": "OLI3", "TM3": "OLI4"})],
+)
+def test_a_wavelength_finds_the_narrow_band_beside_a_panchromatic_one(name, expected):
+    """The panchromatic bands, 0.52 to 0.90 and 0.50 to 0.68 um, respond there too, and at some of them more."""
+    wavelengths = [band.wavelength for band in TM.select(list(expected))]
+    array = xr.DataArray(np.zeros(len(expected)), dims="band", coords={"wavelength": ("band", wavelengths)})
+    assert [band.name for band in matching_bands(array, instrument(name))] == list(expected.values())
+
+
+@pytest.mark.parametrize("interval", [0.0, -30.0, float("nan"), (30.0, 30.0, 30.0)])
+def test_an_interval_that_is_no_distance_is_refused(interval):
+    with pytest.raises(ValueError, match="interval must be 'native', or positive metres"):
+        sensed(scene(), interval=interval)
+
+
+@pytest.mark.parametrize("offset", [0.5, (0.5,), (1, 2, 3)])
+def test_an_offset_without_rows_and_columns_is_refused(offset):
+    with pytest.raises(ValueError, match="offset must be two, of rows and of columns"):
+        sensed(scene(), offset=offset)
 
 
 def test_own_interval_moves_the_coordinates():
