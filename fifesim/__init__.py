@@ -15,9 +15,11 @@ __version__ = version("fifesim")
 # Where each public name lives. They are imported when first used, so that the command line answers at once.
 _PUBLIC = {
     "Atmosphere": "atmosphere.models",
+    "Background": "ground.spectra",
     "Band": "bands",
     "Geometry": "geometry",
     "Instrument": "sensor.instruments",
+    "Leaf": "ground.prospect",
     "NoiseModel": "sensor.noise",
     "Regression": "analysis.regression",
     "Scenario": "scenario",

@@ -1,19 +1,14 @@
 """One scene through many instruments."""
 
-import numpy as np
 import xarray as xr
 
 from fifesim import chain
-from fifesim.ground import optics
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.instruments import instrument as find_instrument
 
 # Where the red and the near infrared band of an instrument lie, and the best place. [um]
 _RED = (0.60, 0.70, 0.66)
 _NIR = (0.75, 1.00, 0.84)
-
-# Bands further from those of the table of leaf optics are another part of the spectrum. [um]
-_NEAR = 0.06
 
 
 def compare(
@@ -43,11 +38,8 @@ def compare(
     instruments : sequence of str or Instrument
     bands : mapping of str to sequence of str, optional
         Bands by the name of an instrument; by default its red and its near infrared band.
-    dem, atmosphere, geometry, leaf_angles, hotspot : optional
-        As in `fifesim.chain.surface_reflectance`.
-    leaf_optics, background : mapping, optional
-        By band name, as in `fifesim.chain.surface_reflectance`. By default each band has those of the TM band that is
-        nearest to it, at most 0.06 um away.
+    dem, atmosphere, geometry, leaf_optics, background, leaf_angles, hotspot : optional
+        As in `fifesim.chain.surface_reflectance`; spectra, as by default, fit every instrument.
     interval, noise, seed, quantise : optional
         As in `fifesim.sensor.raster.sense`.
 
@@ -59,8 +51,8 @@ def compare(
     Raises
     ------
     ValueError
-        If an instrument is named twice, ``bands`` names one that is not asked for, no leaf optics are near a band, or a
-        step of the chain refuses its input.
+        If an instrument is named twice, ``bands`` names one that is not asked for, or a step of the chain refuses its
+        input.
 
     See Also
     --------
@@ -83,8 +75,8 @@ def compare(
             dem=dem,
             atmosphere=atmosphere,
             geometry=geometry,
-            leaf_optics=_nearest(selected, "leaf optics") if leaf_optics is None else leaf_optics,
-            background=_nearest(selected, "background") if background is None else background,
+            leaf_optics=leaf_optics,
+            background=background,
             leaf_angles=leaf_angles,
             hotspot=hotspot,
         )
@@ -108,24 +100,3 @@ def _bands(description, names):
             )
         found.append(min(inside, key=lambda band: abs(band.wavelength - best)))
     return tuple(found)
-
-
-def _nearest(bands, what):
-    """Optics of the nearest TM band for each band, by name."""
-    known = find_instrument("TM").bands
-    centres = np.array([band.wavelength for band in known])
-    values = {
-        "leaf optics": lambda name: tuple(float(each[0]) for each in optics.leaf_optics([name])),
-        "background": lambda name: float(optics.background([name])[0]),
-    }[what]
-    found = {}
-    for band in bands:
-        nearest = int(np.argmin(np.abs(centres - band.wavelength)))
-        distance = abs(centres[nearest] - band.wavelength)
-        if distance > _NEAR:
-            raise ValueError(
-                f"no {what} near {band.name} at {band.wavelength:.3f} um: the nearest are those of "
-                f"{known[nearest].name}, {distance:.3f} um away; give {what.replace(' ', '_')}={{{band.name!r}: ...}}"
-            )
-        found[band.name] = values(known[nearest].name)
-    return found

@@ -10,7 +10,7 @@ from lazy import in_chunks, no_compute
 
 import fifesim
 from fifesim import grid as grids
-from fifesim.ground.optics import background
+from fifesim.sensor.spectral_response import ResponseList
 
 NAMES = ["TM", "OLI", "MSI"]
 
@@ -23,9 +23,7 @@ def test_each_image_is_that_of_the_chain(lai):
     oli = images["OLI"]["dn"]
     names = ["OLI4", "OLI5"]
     assert oli.dtype == np.uint16 and oli["band"].values.tolist() == names
-    leaves = dict(zip(names, [(0.07, 0.04), (0.45, 0.42)], strict=True))
-    soil = dict(zip(names, background(["TM3", "TM4"]).tolist(), strict=True))
-    rho = fifesim.surface_reflectance(lai, "OLI", bands=names, leaf_optics=leaves, background=soil)
+    rho = fifesim.surface_reflectance(lai, "OLI", bands=names)
     xr.testing.assert_identical(oli, rho.fifesim.to_toa().fifesim.sense("OLI"))
 
 
@@ -85,8 +83,23 @@ def test_what_cannot_be_compared_is_refused(lai, instruments, options, message):
         fifesim.compare(lai, instruments, **options)
 
 
-def test_a_band_without_optics_is_named(lai):
+def test_one_leaf_and_one_soil_are_seen_by_all(lai):
+    """A leaf without red absorption on grey ground has no vegetation signal, in whichever bands."""
+    white = fifesim.Leaf(structure=2.0, chlorophyll=0, carotenoids=0, water=0, dry_matter=0)
+    images = fifesim.compare(
+        lai, NAMES, leaf_optics=white, background=0.3, atmosphere=fifesim.Atmosphere(aerosol="none")
+    )
+    green = fifesim.compare(lai, NAMES, leaf_optics=fifesim.Leaf(), background={"soil_wet": 1.0})
+    for name in NAMES:
+        assert (
+            float(fifesim.ndvi(images[name]["dn"]).mean()) < 0.1 < 0.4 < float(fifesim.ndvi(green[name]["dn"]).mean())
+        )
+
+
+def test_a_band_beyond_the_spectra_is_named(lai):
     tm = fifesim.instrument("TM")
-    odd = replace(tm.bands[0], name="odd", srf=fifesim.instrument("MODIS").bands[4].srf)
-    with pytest.raises(ValueError, match=r"no leaf optics near odd at 1\.2.*give leaf_optics="):
-        fifesim.compare(lai, [replace(tm, bands=(*tm.bands, odd))], bands={"TM": ["odd"]})
+    far = replace(tm.bands[0], name="far", srf=ResponseList((2.4, 2.5, 2.6), (0.0, 1.0, 0.0)))
+    with pytest.raises(
+        ValueError, match=r"spectrum for band far, 2\.4 to 2\.6 um: .*give leaf_optics= and background="
+    ):
+        fifesim.compare(lai, [replace(tm, bands=(*tm.bands, far))], bands={"TM": ["far"]})
