@@ -44,11 +44,24 @@ class DataArrayAccessor:
     to_toa = _Method("chain")
     to_surface = _Method("chain")
     sense = _Method("sensor.raster")
+    sense_swath = _Method("sensor.swath_raster")
+    compare = _Method("comparison")
     to_radiance = _Method("sensor.raster")
     to_reflectance = _Method("sensor.raster")
     ndvi = _Method("chain")
     aggregate = _Method("analysis.raster")
     regress = _Method("analysis.raster")
+    relative_equivalent_noise = _Method("analysis.uncertainty_raster")
+    invert = _Method("analysis.inversion_raster")
+    inversion_error = _Method("analysis.inversion_raster")
+    ndvi_bias = _Method("analysis.scaling_raster")
+    ndvi_linearity = _Method("analysis.scaling_raster")
+    fpar_bias = _Method("analysis.scaling_raster")
+    share_kept = _Method("analysis.scaling_raster")
+    density = _Method("analysis.scaling_raster")
+    autocovariance = _Method("analysis.variogram_raster")
+    variogram = _Method("analysis.variogram_raster")
+    regularized_variance = _Method("analysis.variogram_raster")
     to_geotiff = _Method("export")
 
 
@@ -59,4 +72,5 @@ class DatasetAccessor:
     def __init__(self, raster):
         self._raster = raster
 
+    inversion_error = _Method("analysis.inversion_raster")
     to_geotiff = _Method("export")

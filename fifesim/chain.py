@@ -13,6 +13,7 @@ from fifesim.geometry import Geometry, fife_geometry
 from fifesim.ground import optics
 from fifesim.ground import raster as ground
 from fifesim.ground import terrain_raster as terrain
+from fifesim.ground.spectra import Spectrum
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.instruments import instrument as find_instrument
 from fifesim.sensor.instruments import instrument_names
@@ -61,10 +62,12 @@ def surface_reflectance(
         above the sea. It travels on with the result.
     geometry : Geometry, optional
         Of sun and sensor; by default that of ``lai``, else the paper's.
-    leaf_optics : mapping of str to (float, float), optional
-        Reflectance and transmittance of a leaf by band name; by default the table of `ground.optics`. [1]
-    background : number, mapping of str to number, or xarray.DataArray, optional
-        Reflectance below the canopy: one, by band name, or a raster over ([band], y, x). [1]
+    leaf_optics : Leaf, or mapping of str to (float, float), optional
+        A leaf by what it is made of, or its reflectance and transmittance by band name; by default green tallgrass. [1]
+    background : optional
+        Reflectance below the canopy: a number, by band name, or a raster over ([band], y, x); a `Background` or
+        ``{spectrum: fraction}`` that mixes spectra; the path of a CSV file, or a Dataset, with ``wavelength`` [um] and
+        ``reflectance``. By default soil and litter of tallgrass. [1]
     leaf_angles : optional
         A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
     hotspot : float, optional
@@ -96,22 +99,20 @@ def surface_reflectance(
         raise ValueError("a horizon stands around a dem: give dem= too")
     _check_kinds(atmosphere, geometry)
     atmosphere = Atmosphere() if atmosphere is None else atmosphere
-    geometry = (geometry or cf.geometry_of(lai) or fife_geometry()).uniform("surface_reflectance")
+    geometry = geometry or cf.geometry_of(lai) or fife_geometry()
     description = find_instrument(instrument)
     selected = description.select(bands)
     names = [band.name for band in selected]
-    terms = engines.band_terms(
-        atmosphere, tuple(band.response for band in selected), geometry.sza, geometry.vza, geometry.raa
-    )
-    leaf_reflectance, leaf_transmittance = optics.leaf_optics(names, leaf_optics)
+    responses = tuple(band.response for band in selected)
+    leaf_reflectance, leaf_transmittance = optics.leaf_optics(responses, leaf_optics)
     level = ground.surface_reflectance(
         lai,
         bands=names,
         wavelengths=[band.wavelength for band in selected],
         leaf_reflectance=leaf_reflectance,
         leaf_transmittance=leaf_transmittance,
-        background=background if isinstance(background, xr.DataArray) else optics.background(names, background),
-        diffuse_fraction=terms.diffuse_fraction,
+        background=_background(responses, background),
+        diffuse_fraction=atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry),
         geometry=geometry,
         leaf_angles=leaf_angles,
         hotspot=hotspot,
@@ -121,6 +122,8 @@ def surface_reflectance(
     )
     if dem is None:
         return level
+    geometry.uniform("surface_reflectance on slopes")
+    terms = engines.band_terms(atmosphere, responses, geometry.sza, geometry.vza, geometry.raa)
     light = _sunlight(terms) | {"geometry": geometry, "horizon": horizon}
     return terrain.terrain_reflectance(level, dem, upwelling=upwelling, **light)
 
@@ -310,6 +313,18 @@ def planetary_reflectance(image):
     """
     is_radiance = image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
     return sensor.to_reflectance(image) if "gain" in image.coords or is_radiance else image
+
+
+def _background(responses, given):
+    """Reflectance below the canopy: a raster as it is, all else by band."""
+    if isinstance(given, xr.DataArray):
+        return given
+    if isinstance(given, xr.Dataset):
+        missing = {"wavelength", "reflectance"} - set(given.variables)
+        if missing:
+            raise ValueError(f"the background's Dataset has no {' nor '.join(sorted(missing))}: it is to have both")
+        given = Spectrum(given["wavelength"].values, given["reflectance"].values)
+    return optics.background(responses, given)
 
 
 def _sunlight(terms):

@@ -58,7 +58,7 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
         call, *arrays, join="exact", dask="parallelized", output_dtypes=[dtype], keep_attrs=True, **core
     )
     dims = [name for name in ("band", "y", "x") if name in out.dims]
-    return out.transpose(*dims)
+    return out.transpose(*dims, ...)
 
 
 # Edge of an automatic chunk, and tiles along it at most: 8 MB in double precision. [cell]
@@ -92,6 +92,31 @@ def tiles(kernel, grid, chunks=None, *, tile):
     lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal)), dims=("y", "x"))
     # xarray would take over dask's name.
     return grids.place(lazy.rename(None), grid)
+
+
+def located(kernel, array):
+    """
+    Apply a kernel that must know where its block lies.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(block, starts)`` gives an array like the block, whose first element lies at these indices of the whole.
+    array : xarray.DataArray
+
+    Returns
+    -------
+    array : xarray.DataArray
+        Float, lazy where the input is.
+    """
+
+    def call(block, block_info=None):
+        return kernel(block, tuple(start for start, _ in block_info[0]["array-location"]))
+
+    data = array.data
+    if isinstance(data, da.Array):
+        return array.copy(data=data.map_blocks(call, dtype=float, meta=np.empty((0,) * data.ndim)))
+    return array.copy(data=kernel(data, (0,) * data.ndim))
 
 
 def resample(kernel, rows, columns, array, grid):

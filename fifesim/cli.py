@@ -53,7 +53,8 @@ def simulate(
 ):
     """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
     from fifesim.estimates import describe, estimate
-    from fifesim.run import check_folder, scenario_to_resume, simulate_to_folder
+    from fifesim.folders import check_folder
+    from fifesim.run import scenario_to_resume, simulate_to_folder
     from fifesim.scenario import Scenario
     from fifesim.scenario_file import read_scenario
     from fifesim.workers import cluster
@@ -77,6 +78,27 @@ def simulate(
 
 
 @app.command()
+def reproduce(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("friedl1995"),
+    realisations: Annotated[int, typer.Option(help="How many of each of the nine scenes.")] = 20,
+    cells: Annotated[int, typer.Option(help="Along the edge of a scene, of 3.33 m each.")] = 333,
+    seed: Annotated[int, typer.Option(help="Of the first realisation; the others follow.")] = 1995,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+):
+    """Repeat the paper: table2.csv, figure3.png to figure9.png, report.html."""
+    from fifesim.experiments.reproduction import reproduce_to_folder
+
+    try:
+        files = reproduce_to_folder(output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite)
+    except ValueError as error:
+        _stop(error, Exit.MISTAKE)
+    except (OSError, MemoryError) as error:
+        _stop(error, Exit.FAILURE)
+    for path in files:
+        typer.echo(path)
+
+
+@app.command()
 def scenario():
     """Print the default scenario, every key with its unit, to edit."""
     from fifesim.scenario import Scenario
@@ -86,13 +108,24 @@ def scenario():
 
 
 @app.command()
-def sensors():
-    """List the instruments: bands, sampling, point spread, radiometry, source."""
-    from fifesim.sensor.instruments import instrument, instrument_names
-    from fifesim.sensor.listing import describe
+def sensors(
+    name: Annotated[str | None, typer.Argument(help="Name or alias of one, or its file; all by default.")] = None,
+    check: Annotated[Path | None, typer.Option("--check", help="Check a file of your own, and say what it is.")] = None,
+):
+    """List the instruments, or one in detail: bands, sampling, point spread, radiometry, noise, sources."""
+    from fifesim.sensor.instruments import instrument, instrument_names, read_instrument
+    from fifesim.sensor.listing import describe, list_instruments
 
-    for name in instrument_names():
-        typer.echo(describe(instrument(name)))
+    try:
+        if check is not None:
+            text = f"{describe(read_instrument(check))}\n{check} is right: every number has a source and its unit."
+        elif name is not None:
+            text = describe(instrument(name))
+        else:
+            text = list_instruments([instrument(each) for each in instrument_names()])
+    except (ValueError, FileNotFoundError) as error:
+        _stop(error, Exit.MISTAKE)
+    typer.echo(text)
 
 
 @app.command()

@@ -64,6 +64,24 @@ class Boxcar:
         """
         return np.clip(0.5 + np.asarray(x, float) / self.width, 0.0, 1.0)
 
+    def mtf(self, frequency):
+        r"""
+        Modulation transfer function, the Fourier transform of the line spread function.
+
+        .. math:: M(f) = \mathrm{sinc}(f W), \qquad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
+
+        Parameters
+        ----------
+        frequency : array
+            Spatial frequency. [cycles m-1]
+
+        Returns
+        -------
+        mtf : array, shape of frequency
+            Factor by which a sinusoid's amplitude is reduced, negative where bright and dark change places. [1]
+        """
+        return np.sinc(np.asarray(frequency, float) * self.width)
+
 
 def check_width(width):
     """
@@ -126,7 +144,7 @@ class AxisOperator:
         return AxisOperator(start, count, self.weights[pixels], self.share[pixels], window)
 
 
-def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_size, n_pixels):
+def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_size, n_pixels, shift=0.0):
     r"""
     Weights of ground cells in sensor pixels along one axis.
 
@@ -145,6 +163,8 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
         Both negative where the coordinate decreases with the index, as rows do on a north-up grid. [m]
     n_cells, n_pixels : int
         Numbers of cells and of pixels.
+    shift : float or array, shape (n_pixels,), optional
+        Distance from where a pixel should lie to where it does, positive toward higher indices. [m]
 
     Returns
     -------
@@ -177,6 +197,7 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
         raise ValueError(f"n_cells and n_pixels must be at least 1, got {n_cells} and {n_pixels}")
     # Distances are taken from the scene's edge: coordinates of millions of metres would cost digits.
     center = np.sign(cell_size) * (pixel_origin - cell_origin) + (np.arange(n_pixels) + 0.5) * abs(pixel_size)
+    center = center + np.asarray(shift, float)
     size = abs(cell_size)
     first = np.floor((center - lsf.half_width) / size).astype(np.int64)
     steps = np.arange(int(np.ceil(2 * lsf.half_width / size)) + 2)

@@ -6,7 +6,7 @@ import time
 
 import psutil
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn, track
 
 # Between two lines of JSON. [s]
 _PAUSE = 1.0
@@ -113,3 +113,21 @@ class CellProgress:
             "seconds_left": None if left is None else round(left, 1),
             "memory": memory(),
         }
+
+
+def steps(sequence, label):
+    """
+    Go through a sequence and show how far it is, on a terminal only.
+
+    Parameters
+    ----------
+    sequence : sequence
+    label : str
+        What is being done.
+
+    Returns
+    -------
+    sequence : iterator
+    """
+    console = Console(file=sys.stderr)
+    return track(sequence, label, console=console, disable=not sys.stderr.isatty(), transient=True)

@@ -18,6 +18,7 @@ from fifesim import report
 from fifesim.analysis.raster import regress
 from fifesim.chain import ndvi
 from fifesim.export import to_geotiff
+from fifesim.folders import UNFINISHED, check_folder
 from fifesim.products import make_scene_store, products_of, wanted_blocks
 from fifesim.progress import CellProgress
 from fifesim.saved import save_block, saved_array, saved_blocks
@@ -28,9 +29,6 @@ from fifesim.workers import found_client, usable_cores
 
 FILES = ("image.tif", "truth.tif", "quicklook.png", "report.html", "scenario.toml")
 SCENE = "scene.zarr"
-
-# Folder of a run that is not finished, in the folder of its results.
-UNFINISHED = ".unfinished"
 
 # GDAL's own limit is a share of the machine's memory. [byte]
 _GDAL_CACHE = 32 * 2**20
@@ -97,34 +95,6 @@ def simulate_to_folder(
         for name in names:
             _replace(unfinished / name, folder / name)
     return [folder / name for name in names]
-
-
-def check_folder(folder, overwrite, resume=False):
-    """
-    Refuse an output folder that is in use.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-    overwrite, resume : bool
-
-    Raises
-    ------
-    ValueError
-        If it is a file, or holds something and neither ``overwrite`` nor ``resume`` is on.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise ValueError(f"the output folder {str(folder)!r} is a file: name another with -o")
-    if not folder.is_dir() or overwrite:
-        return
-    held = {path.name for path in folder.iterdir()}
-    if UNFINISHED in held and not resume:
-        raise ValueError(
-            f"the output folder {str(folder)!r} holds a run that is not finished: go on with it by --resume, "
-            "begin again with --overwrite, or name another with -o"
-        )
-    if held - {UNFINISHED} and not resume:
-        raise ValueError(f"the output folder {str(folder)!r} is not empty: name another with -o, or add --overwrite")
 
 
 def scenario_to_resume(folder):

@@ -10,6 +10,7 @@ import pytest
 import rasterio
 from typer.testing import CliRunner
 
+from fifesim import datasets
 from fifesim.cli import app
 from fifesim.run import FILES
 from fifesim.scenario_file import read_scenario, write_scenario
@@ -71,10 +72,42 @@ def test_printed_scenario_is_the_default_one(invoke, tmp_path):
     assert write_scenario(read_scenario(tmp_path / "default.toml")) == printed
 
 
-def test_sensors_lists_bands_with_their_radiances(invoke):
-    printed = invoke("sensors").stdout
+def test_sensors_lists_every_instrument_in_a_line(invoke):
+    lines = invoke("sensors").stdout.splitlines()
+    names = [line.split()[0] for line in lines[1:]]
+    assert {"TM", "L4TM", "ETM+", "OLI", "OLI2", "MSI", "MSI-B", "HRV", "MODIS", "MODIS-Aqua", "AVHRR"} <= set(names)
+    assert max(map(len, lines)) <= 120
+
+
+def test_sensors_lists_the_bands_of_one_with_their_radiances(invoke):
+    printed = invoke("sensors", "Landsat-5 TM").stdout
     assert "TM4" in printed
     assert "206.20" in printed
+
+
+def test_sensors_check_says_what_a_file_is(invoke, tmp_path):
+    text = datasets.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text.replace('"AVHRR"', '"MINE"', 1), encoding="utf-8")
+    result = invoke("sensors", "--check", "mine.toml")
+    assert result.exit_code == 0, result.output
+    assert "own interval 1089.564 along x 791.350 across m" in result.stdout
+    assert "mine.toml is right" in result.stdout
+
+
+def test_sensors_check_names_file_key_and_remedy_with_exit_code_2(invoke, tmp_path):
+    text = datasets.path("instruments/oli.toml").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text.replace("altitude = 705000.0", "altitude = 705.0"), encoding="utf-8")
+    result = invoke("sensors", "--check", "mine.toml")
+    assert result.exit_code == 2
+    assert "mine.toml: altitude = 705: it is in metres" in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(("name", "said"), [("TN", "did you mean TM"), ("missing.toml", "no instrument file")])
+def test_sensors_of_no_such_instrument_is_a_mistake(invoke, name, said):
+    result = invoke("sensors", name)
+    assert result.exit_code == 2
+    assert said in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ import psutil
 import pytest
 import rasterio
 
-from fifesim.run import FILES, UNFINISHED
+from fifesim.folders import UNFINISHED
+from fifesim.run import FILES
 
 COMMAND = [sys.executable, "-c", "from fifesim.cli import app; app()", "simulate"]
 SCENARIO = """

@@ -16,7 +16,17 @@ LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 # From the bottom up: a file imports only files of lower tiers. Physics of one stage may import each other, and so may
 # its files on labelled rasters, whose names end in "raster".
 TIERS = (
-    {"blocks", "datasets", "footprints", "geometry", "lattice", "progress", "sites"},
+    {
+        "blocks",
+        "datasets",
+        "experiments.__init__",
+        "folders",
+        "footprints",
+        "geometry",
+        "lattice",
+        "progress",
+        "sites",
+    },
     {"bands"},
     {"cf", "grid", "saved", "schedule", "workers"},
     {"chunks"},
@@ -28,10 +38,16 @@ TIERS = (
     {"verification.areas"},
     {"export", "scenario"},
     {"chain", "scenario_file"},
-    {"products", "simulation"},
+    {"comparison", "products", "simulation"},
+    {"sweeps"},
     {"figures"},
     {"report"},
     {"estimates", "run"},
+    {"experiments.friedl1995"},
+    {"experiments.friedl1995_table"},
+    {"experiments.friedl1995_effects", "experiments.friedl1995_figures"},
+    {"experiments.friedl1995_report"},
+    {"experiments.reproduction"},
     {"cli"},
 )
 # What knows neither labels nor dask, beside the physics.

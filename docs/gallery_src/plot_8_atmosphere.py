@@ -55,8 +55,8 @@ left.legend(frameon=False, title="visibility; lines 5S, dots successive orders",
 
 # %%
 # Low suns and slant views look through more air. Against the light (left of 0 in the right panel) aerosol scatters
-# forward into the view, and NDVI falls most. The closed forms of 5S keep NDVI .01 too high in clear air and up to .05 in
-# haze against the light: they miss what molecules and aerosol scatter in turn, and polarization.
+# forward into the view, and NDVI falls most. The closed forms of 5S keep NDVI .01 too high in clear air and up to .05
+# in haze against the light: they miss what molecules and aerosol scatter in turn, and polarization.
 #
 # What an atmosphere does, wavelength by wavelength:
 

@@ -2,13 +2,12 @@
 
 from functools import partial
 
-import dask
-import dask.array as da
 import numpy as np
 
 from fifesim import cf, chunks
 from fifesim import grid as grids
 from fifesim.analysis import indices, regression
+from fifesim.analysis.pairs_raster import check_no_counts, matched, origins, sums_by_row
 from fifesim.footprints import Boxcar, axis_operator, regularize
 
 # The red chlorophyll absorption and the near infrared plateau: where a band must lie, and the best place. [um]
@@ -16,7 +15,7 @@ _RED = (0.60, 0.70, 0.66)
 _NIR = (0.75, 1.00, 0.84)
 
 
-def aggregate(array, pixel=30.0, *, min_valid=0.98):
+def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     """
     Means over square blocks of ground: the truth that a pixel is compared with.
 
@@ -27,6 +26,9 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98):
         Size of the blocks, any multiple of the cell or not. [m]
     min_valid : float, optional
         Share of its area that a block needs on valid cells; below it is NaN. [1]
+    lsf : line spread function, optional
+        As `fifesim.footprints` has it, to weight the cells about each block's middle; all within the block count the
+        same by default.
 
     Returns
     -------
@@ -42,16 +44,16 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98):
     --------
     fifesim.footprints.regularize
     """
-    _check_no_counts(array)
+    check_no_counts(array)
     scene = grids.geobox(array)
     blocks = grids.aligned(scene, pixel)
     (down, across), a, b = grids.cell_size(blocks), scene.affine, blocks.affine
     rows = axis_operator(
-        Boxcar(down), cell_origin=a.f, cell_size=a.e, n_cells=scene.shape.y, pixel_origin=b.f, pixel_size=b.e,
+        lsf or Boxcar(down), cell_origin=a.f, cell_size=a.e, n_cells=scene.shape.y, pixel_origin=b.f, pixel_size=b.e,
         n_pixels=blocks.shape.y,
     )  # fmt: skip
     columns = axis_operator(
-        Boxcar(across), cell_origin=a.c, cell_size=a.a, n_cells=scene.shape.x, pixel_origin=b.c, pixel_size=b.a,
+        lsf or Boxcar(across), cell_origin=a.c, cell_size=a.a, n_cells=scene.shape.x, pixel_origin=b.c, pixel_size=b.a,
         n_pixels=blocks.shape.x,
     )  # fmt: skip
     means = chunks.resample(partial(regularize, min_valid=min_valid), rows, columns, array, blocks)
@@ -88,12 +90,8 @@ def ndvi(reflectance):
     --------
     fifesim.analysis.indices.normalized_difference
     """
-    cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
-    red, nir = _nearest_band(reflectance, "red", *_RED), _nearest_band(reflectance, "near infrared", *_NIR)
-    grid = grids.geobox(reflectance)
-    per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
-    plain = [reflectance.isel(band=index).drop_vars([*per_band, "band"], errors="ignore") for index in (nir, red)]
-    out = grids.place(chunks.pointwise(indices.normalized_difference, *plain), grid)
+    red, nir = red_and_nir(reflectance)
+    out = grids.place(chunks.pointwise(indices.normalized_difference, nir, red), grids.geobox(reflectance))
     return cf.label(out, "ndvi", source=reflectance, history="ndvi")
 
 
@@ -122,25 +120,35 @@ def regress(y, x, *, pair="coordinates"):
     --------
     fifesim.analysis.regression.fit
     """
-    if pair not in ("coordinates", "index"):
-        raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
-    for array in (y, x):
-        _check_no_counts(array)
-        if set(array.dims) != {"y", "x"}:
-            raise ValueError(f"regress takes rasters over (y, x), got {array.dims}: select one band first")
-    y, x = (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
-    origins = _origins(y, x)
-    sums = _lazy_row_sums(y, x, *origins) if da.Array in (type(y.data), type(x.data)) else _row_sums(y, x, *origins)
-    return regression.fit(sums, *origins)
+    y, x = matched(y, x, pair)
+    y_origin, x_origin = origins(y, x)
+    sums = sums_by_row(regression.row_sums, y, x, count=6, y_origin=y_origin, x_origin=x_origin)
+    return regression.fit(sums, y_origin, x_origin)
 
 
-def _check_no_counts(array):
-    """Digital numbers hold 0 for no data, which would be taken for dark ground."""
-    if "gain" in array.coords:
-        raise ValueError(
-            f"{array.name or 'the array'} holds digital numbers, whose 0 is no data: convert it with "
-            ".fifesim.to_reflectance() or .fifesim.to_radiance() first"
-        )
+def red_and_nir(reflectance):
+    """
+    The red and the near infrared band of a raster.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        As `ndvi` takes it.
+
+    Returns
+    -------
+    red, nir : xarray.DataArray, dims (y, x)
+        Without the coordinates along band.
+
+    Raises
+    ------
+    ValueError
+        As in `ndvi`.
+    """
+    cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
+    numbers = (_nearest_band(reflectance, "red", *_RED), _nearest_band(reflectance, "near infrared", *_NIR))
+    per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
+    return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
 
 
 def _nearest_band(reflectance, what, low, high, best):
@@ -154,43 +162,3 @@ def _nearest_band(reflectance, what, low, high, best):
         found = ", ".join(f"{value:.3f}" for value in wavelength)
         raise ValueError(f"no {what} band between {low:g} and {high:g} um: the raster has {found} um")
     return int(inside[np.argmin(np.abs(wavelength[inside] - best))])
-
-
-def _common_index(y, x):
-    rows, columns = min(y.sizes["y"], x.sizes["y"]), min(y.sizes["x"], x.sizes["x"])
-    return y.isel(y=slice(rows), x=slice(columns)), x.isel(y=slice(rows), x=slice(columns))
-
-
-def _common_place(y, x):
-    """Both cut to the ground that they share."""
-    one, two = grids.geobox(y), grids.geobox(x)
-    rows, columns = grids.lattice_offset(one, two)
-    cut_y, cut_x = {}, {}
-    for axis, shift in (("y", rows), ("x", columns)):
-        start, stop = max(0, shift), min(y.sizes[axis], shift + x.sizes[axis])
-        if stop <= start:
-            raise ValueError("the rasters do not overlap")
-        cut_y[axis], cut_x[axis] = slice(start, stop), slice(start - shift, stop - shift)
-    return y.isel(cut_y), x.isel(cut_x)
-
-
-def _origins(y, x):
-    """Values near the means that leave digits to the sums; the first rows hold one unless they are empty."""
-    first = dask.compute(y.isel(y=slice(1)).data, x.isel(y=slice(1)).data)
-    return tuple(float(np.nan_to_num(row[np.isfinite(row)].mean())) if np.isfinite(row).any() else 0.0 for row in first)
-
-
-def _row_sums(y, x, y_origin, x_origin):
-    return regression.row_sums(
-        np.ascontiguousarray(y.values, float), np.ascontiguousarray(x.values, float), y_origin, x_origin
-    )
-
-
-def _lazy_row_sums(y, x, y_origin, x_origin):
-    """Sums of whole rows, so that the chunks do not change their rounding."""
-    rows = da.core.normalize_chunks("auto", shape=y.shape, dtype=float, previous_chunks=None)[0]
-    arrays = (da.asarray(array.data).astype(float).rechunk((rows, -1)) for array in (y, x))
-    sums = da.map_blocks(
-        regression.row_sums, *arrays, y_origin=y_origin, x_origin=x_origin, dtype=float, chunks=(rows, (6,))
-    )
-    return sums.compute()

@@ -35,6 +35,16 @@ class Regression:
     x_mean: float
     x_sum_of_squares: float
 
+    @property
+    def slope_error(self):
+        """Standard error of the slope."""
+        return self.residual_deviation / math.sqrt(self.x_sum_of_squares)
+
+    @property
+    def intercept_error(self):
+        """Standard error of the intercept."""
+        return self.residual_deviation * math.sqrt(1.0 / self.n + self.x_mean**2 / self.x_sum_of_squares)
+
     def predict(self, x):
         """
         Value of the line.

@@ -1,7 +1,7 @@
 """Coupling of surface and atmosphere: reflectance at the surface to apparent reflectance in space, and back."""
 
+import numba
 import numpy as np
-from numba import vectorize
 
 
 def apparent_reflectance(
@@ -113,7 +113,7 @@ def surface_reflectance(
     return _surface(toa_reflectance, *factors)
 
 
-@vectorize(["float64(float64, float64, float64, float64, float64, float64)"], cache=True)
+@numba.vectorize(["float64(float64, float64, float64, float64, float64, float64)"], cache=True)
 def _apparent(rho, path, down, up, albedo, gas):
     trapped = rho * albedo
     if trapped >= 1:
@@ -121,7 +121,7 @@ def _apparent(rho, path, down, up, albedo, gas):
     return gas * (path + down * rho / (1 - trapped) * up)
 
 
-@vectorize(["float64(float64, float64, float64, float64, float64, float64)"], cache=True)
+@numba.vectorize(["float64(float64, float64, float64, float64, float64, float64)"], cache=True)
 def _surface(toa, path, down, up, albedo, gas):
     ground = (toa / gas - path) / (down * up)
     return ground / (1 + albedo * ground)

@@ -1,12 +1,13 @@
 """Reflectance through an atmosphere whose sun, view or ground altitude varies from cell to cell."""
 
 import dataclasses
+import threading
 from functools import lru_cache
-from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from scipy.interpolate import CubicSpline
 
 from fifesim.atmosphere.engines import LARGEST_ZENITH, terms_at
 from fifesim.geometry import relative_azimuth
@@ -18,7 +19,7 @@ ALTITUDE_STEP = 0.5  # [km]
 HIGHEST = 4.0  # ground altitude that the profiles hold to [km]
 LINEAR, CUBIC = 2, 4  # nodes that an interpolation takes
 
-_lock = Lock()
+_lock = threading.Lock()
 
 
 class Tables(NamedTuple):
@@ -85,6 +86,38 @@ def varying_reflectance(reflectance, altitude, sza, saa, vza, vaa, *, atmosphere
     values = np.ascontiguousarray(reflectance, float).reshape(-1, reflectance.shape[-1])
     _through(values, *places, lattices, *tables, to_surface, out)
     return out.reshape(-1, *cells)
+
+
+def varying_diffuse_fraction(sza, *, atmosphere, bands):
+    """
+    Share of skylight in the irradiance of level ground, where the sun varies.
+
+    Parameters
+    ----------
+    sza : array, shape (...)
+        [degree]
+    atmosphere : models.Atmosphere
+    bands : tuple of Band
+
+    Returns
+    -------
+    diffuse_fraction : array, shape (band, ...)
+        A cubic spline through every 2.5 degrees; NaN where the angle is. [1]
+
+    Raises
+    ------
+    ValueError
+        If an angle is out of the range of the model.
+
+    References
+    ----------
+    [Tanre1990]_
+    """
+    sza = _in_range("sza", sza, LARGEST_ZENITH, "degrees")
+    nodes = np.arange(round(LARGEST_ZENITH / ZENITH_STEP) + 1) * ZENITH_STEP
+    terms = [_node(atmosphere, tuple(bands), node, (0.0,), (0.0,)) for node in nodes.tolist()]
+    spline = CubicSpline(nodes, [each.diffuse_fraction[0, 0] for each in terms])
+    return np.moveaxis(spline(sza), -1, 0)
 
 
 def _in_range(name, values, high, unit):

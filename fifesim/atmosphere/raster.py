@@ -81,6 +81,34 @@ def to_surface(reflectance, atmosphere, bands, geometry, *, elevation=None, adja
     return _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings)
 
 
+def diffuse_fraction(atmosphere, bands, geometry):
+    """
+    Share of skylight in the irradiance of level ground.
+
+    Parameters
+    ----------
+    atmosphere : fifesim.atmosphere.models.Atmosphere
+    bands : sequence of fifesim.bands.Band, length (band,)
+    geometry : fifesim.geometry.Geometry
+
+    Returns
+    -------
+    diffuse_fraction : array, shape (band,), or xarray.DataArray, dims (band, y, x)
+        The latter where the sun varies. [1]
+
+    See Also
+    --------
+    fifesim.atmosphere.lookup.varying_diffuse_fraction
+    """
+    if "sza" not in geometry.rasters:
+        return engines.band_terms(atmosphere, tuple(bands), geometry.sza, 0.0, 0.0).diffuse_fraction
+
+    def kernel(sza):
+        return lookup.varying_diffuse_fraction(sza, atmosphere=atmosphere, bands=tuple(bands))
+
+    return chunks.pointwise(kernel, geometry.sza, bands=len(bands))
+
+
 def _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings):
     name, verb = said
     if "band" not in reflectance.dims:

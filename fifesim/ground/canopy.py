@@ -214,10 +214,11 @@ def _scattering(rho, tau, sza, vza, raa, leaf_angles):
     inclination, fraction = np.asarray(leaf_angles.inclination), np.asarray(leaf_angles.fraction)
     sza, vza, raa = (np.asarray(angle, float)[..., None] for angle in (sza, vza, raa))
     mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))
-    ks = (leaf_projection(inclination, sza) / mu_s) @ fraction
-    ko = (leaf_projection(inclination, vza) / mu_v) @ fraction
+    ks = _over_leaves(leaf_projection(inclination, sza) / mu_s, fraction)
+    ko = _over_leaves(leaf_projection(inclination, vza) / mu_v, fraction)
     bf = np.cos(np.radians(inclination)) ** 2 @ fraction
     reflected, transmitted = volume_scattering(inclination, sza, vza, raa)
+    scattered = [_over_leaves(phase / (mu_s * mu_v), fraction) for phase in (reflected, transmitted)]
     sigma = ((1 + bf) * rho + (1 - bf) * tau) / 2
     absorbed = 1 - rho - tau
     return _Scattering(
@@ -231,8 +232,13 @@ def _scattering(rho, tau, sza, vza, raa, leaf_angles):
         sb=((ks + bf) * rho + (ks - bf) * tau) / 2,
         vf=((ko - bf) * rho + (ko + bf) * tau) / 2,
         vb=((ko + bf) * rho + (ko - bf) * tau) / 2,
-        w=np.pi * (((reflected / (mu_s * mu_v)) @ fraction) * rho + ((transmitted / (mu_s * mu_v)) @ fraction) * tau),
+        w=np.pi * (scattered[0] * rho + scattered[1] * tau),
     )
+
+
+def _over_leaves(values, fraction):
+    """Sum over leaf angles; a matrix product's last bits would depend on how many cells there are."""
+    return np.sum(values * fraction, axis=-1)
 
 
 def volume_scattering(inclination, sza, vza, raa):

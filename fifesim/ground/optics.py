@@ -6,9 +6,15 @@ from collections.abc import Mapping
 import numpy as np
 
 from fifesim import datasets
+from fifesim.bands import Band
+from fifesim.ground.prospect import Leaf, leaf_spectrum
+from fifesim.ground.spectra import Background, Spectrum, background_means, band_means, is_mixture
 
 LARGEST_LAI = 100.0
 """Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
+
+# What the tables of the TM bands were modelled with; see data/README.md.
+_DEFAULT_BACKGROUND = {"soil_dry": 0.475, "shade": 0.525}
 
 
 def leaf_optics(bands, given=None):
@@ -17,11 +23,11 @@ def leaf_optics(bands, given=None):
 
     Parameters
     ----------
-    bands : sequence of str
-        Names, such as ``["TM3", "TM4"]``.
-    given : mapping, or pair of arrays, optional
-        ``{band: (reflectance, transmittance)}``, or both as arrays of shape (band,). The default is the green
-        tallgrass of ``data/leaf_optics.csv``.
+    bands : sequence of str or fifesim.bands.Band
+        Names, such as ``["TM3", "TM4"]``, or responses, which spectra need.
+    given : Leaf, mapping, or pair of arrays, optional
+        What a leaf is made of; ``{band: (reflectance, transmittance)}``; or both as arrays of shape (band,). The
+        default is the green tallgrass of ``data/leaf_optics.csv``, for bands that are not in it that of ``Leaf()``.
 
     Returns
     -------
@@ -44,8 +50,11 @@ def leaf_optics(bands, given=None):
     if given is None:
         table = datasets.table("leaf_optics.csv").set_index("band")
         given = {band: tuple(row) for band, row in zip(table.index, table.to_numpy(), strict=True)}
+        given |= _leaf_means([band for band in _responses(bands) if band.name not in given], Leaf())
+    elif isinstance(given, Leaf):
+        given = _leaf_means(_responses(bands, "Leaf"), given)
     if isinstance(given, Mapping):
-        given = np.reshape([_of_band(given, band, "leaf optics") for band in bands], (-1, 2)).T
+        given = np.reshape([_of_band(given, band, "leaf optics") for band in _names(bands)], (-1, 2)).T
     reflectance, transmittance = (_for_bands(values, bands, "leaf optics") for values in given)
     check_leaf_optics(reflectance, transmittance)
     return reflectance, transmittance
@@ -57,11 +66,12 @@ def background(bands, given=None):
 
     Parameters
     ----------
-    bands : sequence of str
-        Names, such as ``["TM3", "TM4"]``.
-    given : mapping, float or array, optional
-        ``{band: reflectance}``, one number, or an array of shape (band,). The default is the soil and litter of
-        ``data/background.csv``.
+    bands : sequence of str or fifesim.bands.Band
+        As in `leaf_optics`.
+    given : Background, Spectrum, str, mapping, float or array, optional
+        Spectra that are mixed, also as ``{spectrum: fraction}``; one spectrum, or the path of its CSV file;
+        ``{band: reflectance}``; one number; or an array of shape (band,). The default is the soil and litter of
+        ``data/background.csv``, for bands that are not in it the dark soil that it was modelled with.
 
     Returns
     -------
@@ -78,14 +88,51 @@ def background(bands, given=None):
     >>> background(["TM3", "TM4"], 0.2).tolist()
     [0.2, 0.2]
     """
+    if isinstance(given, str):
+        given = Background({given: 1.0})
+    elif is_mixture(given) and not set(given) <= set(_names(bands)):
+        given = Background(given)
     if given is None:
         table = datasets.table("background.csv")
         given = dict(zip(table["band"], table["background"], strict=True))
+        given |= _background_means(
+            [band for band in _responses(bands) if band.name not in given], Background(_DEFAULT_BACKGROUND)
+        )
+    elif isinstance(given, Background | Spectrum):
+        given = _background_means(_responses(bands, type(given).__name__), given)
     if isinstance(given, Mapping):
-        given = [_of_band(given, band, "background") for band in bands]
+        given = [_of_band(given, band, "background") for band in _names(bands)]
     reflectance = _for_bands(given, bands, "background")
     check_background(reflectance)
     return reflectance
+
+
+def _names(bands):
+    return [band.name if isinstance(band, Band) else band for band in bands]
+
+
+def _responses(bands, needed_by=None):
+    """Bands whose response is known."""
+    known = [band for band in bands if isinstance(band, Band)]
+    if needed_by and len(known) < len(bands):
+        raise TypeError(f"a {needed_by} is a spectrum, it needs the bands' responses: give Band objects, not names")
+    return known
+
+
+def _leaf_means(bands, leaf):
+    """Leaf optics by band."""
+    if not bands:
+        return {}
+    wavelength, *spectra = leaf_spectrum(leaf)
+    means = band_means(bands, wavelength, spectra)
+    return {band.name: tuple(pair) for band, pair in zip(bands, means.T.tolist(), strict=True)}
+
+
+def _background_means(bands, mixture):
+    """Background by band."""
+    if not bands:
+        return {}
+    return dict(zip(_names(bands), background_means(bands, mixture).tolist(), strict=True))
 
 
 def _of_band(given, band, what):

@@ -9,12 +9,12 @@ import xarray as xr
 from fifesim import cf, warp
 from fifesim import chunks as chunking
 from fifesim import grid as grids
-from fifesim.geometry import fife_geometry
+from fifesim.geometry import ANGLES, fife_geometry, relative_azimuth
 from fifesim.ground import absorption, random_field
 from fifesim.ground.distribution import lai_distribution, quantile_map, quantile_table, rank_map
 from fifesim.ground.leaf_angles import leaf_angle_classes
 from fifesim.ground.optics import check_lai
-from fifesim.ground.reflectance_table import canopy_reflectance
+from fifesim.ground.reflectance_table import canopy_reflectance, directional_reflectance
 
 FIELD_METHODS = ("streaming", "periodic")
 
@@ -138,10 +138,10 @@ def surface_reflectance(
         [1]
     background : sequence of float, shape (band,), or xarray.DataArray, dims ([band], y, x)
         Reflectance below the canopy. [1]
-    diffuse_fraction : sequence of float, shape (band,)
+    diffuse_fraction : sequence of float, shape (band,), or xarray.DataArray, dims (band, y, x)
         Share of skylight in the irradiance. [1]
     geometry : fifesim.geometry.Geometry
-        Carried on as scalar coordinates.
+        Carried on as coordinates. Where an angle is a raster, SAIL is evaluated at every cell.
     leaf_angles : optional
         As `ground.leaf_angles.leaf_angle_classes` takes them.
     hotspot : float, optional
@@ -171,31 +171,32 @@ def surface_reflectance(
     parameters = {
         "leaf_reflectance": tuple(map(float, leaf_reflectance)),
         "leaf_transmittance": tuple(map(float, leaf_transmittance)),
-        "sza": geometry.sza,
-        "vza": geometry.vza,
-        "raa": geometry.raa,
         "leaf_angles": angles,
         "hotspot": float(hotspot),
-        "diffuse_fraction": tuple(map(float, diffuse_fraction)),
-        "exact": exact,
     }
     _check_scene(lai)
     if isinstance(background, xr.DataArray):
         cf.check_units(background, "surface_reflectance")
-        rasters = (lai, _background_bands(background, bands))
+        background = _background_bands(background, bands)
         described = "raster"
     else:
-        parameters["background"] = tuple(map(float, background))
-        rasters = (lai,)
-        described = ",".join(f"{value:g}" for value in parameters["background"])
-    out = chunking.pointwise(_reflectance, *rasters, bands=len(bands), **parameters)
+        background = tuple(map(float, background))
+        described = ",".join(f"{value:g}" for value in background)
+    if geometry.rasters:
+        out = _in_directions(lai, background, diffuse_fraction, geometry, parameters)
+    else:
+        parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
+        parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
+        rasters = (lai, background) if described == "raster" else (lai,)
+        parameters |= {} if described == "raster" else {"background": background}
+        out = chunking.pointwise(_reflectance, *rasters, bands=len(bands), **parameters)
     out = out.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
     out = cf.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
     return cf.label(
         out,
         "surface_reflectance",
         source=lai,
-        history=f"surface_reflectance: SAIL, {angles} leaves, sza {geometry.sza:.2f}, vza {geometry.vza:.2f}",
+        history=f"surface_reflectance: SAIL, {angles} leaves, {_directions(geometry)}",
         leaf_angles=str(angles),
         background=described,
         **provenance,
@@ -238,6 +239,8 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     if not 0 < fpar_inf <= 1:
         raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
     geometry = geometry or cf.geometry_of(lai) or fife_geometry()
+    if "sza" in geometry.rasters:
+        geometry.uniform("fpar")
     extinction = float(absorption.extinction_coefficient(geometry.sza, leaf_angles))
     _check_scene(lai)
     out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
@@ -292,6 +295,31 @@ def _reflectance(lai, background_raster=None, *, background=None, **parameters):
         # apply_ufunc hands the bands over as the last axis.
         background = np.moveaxis(background_raster, -1, 0)
     return canopy_reflectance(lai, background=background, **parameters)
+
+
+def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
+    """Reflectance where the directions of sun or sensor vary over the scene."""
+    per_band = [
+        values if isinstance(values, xr.DataArray) else xr.DataArray(np.asarray(values, float), dims="band")
+        for values in (background, diffuse_fraction)
+    ]
+    per_band = [values.drop_vars("band", errors="ignore") for values in per_band]
+    angles = [xr.DataArray(getattr(geometry, name)) for name in ANGLES]
+
+    def kernel(cells, ground, sky, sza, saa, vza, vaa):
+        directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
+        return directional_reflectance(cells, background=ground, diffuse_fraction=sky, **directions, **parameters)
+
+    plain = lai.drop_vars(ANGLES, errors="ignore")
+    return chunking.pointwise(kernel, plain, *per_band, *angles, bands=len(parameters["leaf_reflectance"]))
+
+
+def _directions(geometry):
+    """The zenith angles in words."""
+    return ", ".join(
+        f"{name} varying" if name in geometry.rasters else f"{name} {getattr(geometry, name):.2f}"
+        for name in ("sza", "vza")
+    )
 
 
 def _fpar(lai, **parameters):

@@ -94,6 +94,67 @@ def canopy_reflectance(
     return interpolate_over(_layer_table(scene), lai, background)
 
 
+def directional_reflectance(
+    lai, leaf_reflectance, leaf_transmittance, background, *, sza, vza, raa, leaf_angles, hotspot, diffuse_fraction
+):
+    r"""
+    Reflectance factor of a canopy where the directions of sun and view differ from cell to cell.
+
+    Parameters
+    ----------
+    lai : array, shape (...)
+        NaN gives NaN. [m2 m-2]
+    leaf_reflectance, leaf_transmittance : array, shape (band,)
+        [1]
+    background, diffuse_fraction : array, broadcastable to (..., band)
+        [1]
+    sza, vza, raa : array, broadcastable to (...)
+        NaN gives NaN. [degree]
+    leaf_angles, hotspot
+        As in `canopy_reflectance`.
+
+    Returns
+    -------
+    reflectance : array, shape (band, ...)
+        SAIL at every cell. [1]
+
+    Raises
+    ------
+    ValueError
+        As `canopy_reflectance`, or if a zenith angle is not below 90 degrees.
+
+    References
+    ----------
+    [Verhoef2007]_
+    """
+    check_lai(lai)
+    check_leaf_optics(leaf_reflectance, leaf_transmittance)
+    check_background(background)
+    for name, angle in (("sza", sza), ("vza", vza)):
+        wrong = (np.asarray(angle) < 0) | (np.asarray(angle) >= 90)
+        if np.any(wrong):
+            found = np.asarray(angle, float)[wrong].flat[0]
+            raise ValueError(f"{name} must be in [0, 90) degrees in every cell, got {found:g}")
+    cells, bands = np.shape(lai), len(leaf_reflectance)
+    lai, sza, vza, raa = (np.broadcast_to(np.asarray(v, float), cells).reshape(-1) for v in (lai, sza, vza, raa))
+    ground, sky = (
+        np.broadcast_to(np.asarray(v, float), (*cells, bands)).reshape(-1, bands).T
+        for v in (background, diffuse_fraction)
+    )
+    missing = np.isnan(sza + vza + raa)
+    sza, vza, raa = (np.where(missing, 0.0, angle) for angle in (sza, vza, raa))
+    rho, tau = (np.asarray(v, float)[:, None] for v in (leaf_reflectance, leaf_transmittance))
+    out = np.empty((bands, lai.size))
+    for start in range(0, lai.size, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        angles = {"sza": sza[block], "vza": vza[block], "raa": raa[block]}
+        canopy = sail(lai[block], rho, tau, **angles, leaf_angles=leaf_angle_classes(leaf_angles), hotspot=hotspot)
+        surface = with_background(canopy, ground[:, block])
+        out[:, block] = reflectance_factor(surface.rso, surface.rdo, sky[:, block])
+    out[:, missing] = np.nan
+    return out.reshape(bands, *cells)
+
+
 def _per_band(values, bands):
     """Values of each band as a tuple, which a cache can look up."""
     return tuple(np.broadcast_to(np.asarray(values, float), bands).tolist())

@@ -1,264 +1,35 @@
 """
-Instruments: bands, sampling, spatial response and radiometry, each number with its source.
+Instruments by name, and from files of one's own.
 
 The descriptions are the files ``data/instruments/*.toml``; a further instrument is a further file.
 """
 
 import tomllib
-from dataclasses import field
-from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Literal
 
-import numpy as np
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
-from pydantic.dataclasses import dataclass
-from pyrsr.rsr import RSR_reader
+from pydantic import TypeAdapter, ValidationError
 
 from fifesim import datasets
-from fifesim.bands import Band
-from fifesim.sensor.spatial import CosineSpread
+from fifesim.sensor.description import Instrument, InstrumentBand
+from fifesim.sensor.names import lookup
+from fifesim.sensor.plausibility import check_units
 
-_CONFIG = ConfigDict(extra="forbid")
+__all__ = ["Instrument", "InstrumentBand", "instrument", "instrument_names", "read_instrument"]
 
-# Strict: TOML has types, and text where a number belongs is a mistake.
-_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-_Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-_Name = Annotated[str, Field(strict=True, min_length=1)]
-
-_INSTRUMENT_NUMBERS = ("altitude", "gsd", "interval", "bits", "lsf")
-_BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance")
-
-
-@dataclass(frozen=True, config=_CONFIG)
-class CosineResponse:
-    """
-    Spatial response as tables of sensors give it: a cosine truncated at half amplitude, sampled at angles.
-
-    Parameters
-    ----------
-    kind : "cosine"
-    step : float
-        Angle between samples of the response. [rad]
-    count : int
-        Number of samples.
-    """
-
-    kind: Literal["cosine"]
-    step: _Positive
-    count: Annotated[int, Field(strict=True, gt=0)]
-
-    def spread(self, altitude):
-        """
-        Line spread function on the ground.
-
-        Parameters
-        ----------
-        altitude : float
-            Of the instrument. [m]
-
-        Returns
-        -------
-        lsf : fifesim.sensor.spatial.CosineSpread
-        """
-        return CosineSpread(self.count * self.step * altitude)
-
-
-@dataclass(frozen=True, config=_CONFIG)
-class PyrsrResponse:
-    """
-    Relative spectral response among those that pyrsr distributes.
-
-    Parameters
-    ----------
-    satellite, sensor, band : str
-        Names in pyrsr, such as ``"Landsat-5"``, ``"TM"``, ``"3"``.
-    """
-
-    satellite: _Name
-    sensor: _Name
-    band: _Name
-
-
-@dataclass(frozen=True, config=_CONFIG)
-class InstrumentBand:
-    """
-    One band of an instrument.
-
-    Parameters
-    ----------
-    name : str
-        Name, such as ``"TM3"``.
-    srf : PyrsrResponse
-        Where the relative spectral response is found.
-    full_scale_radiance, min_radiance : float
-        Radiances of the largest digital number and of digital number 0. [W m-2 sr-1 um-1]
-    solar_irradiance : float
-        Extraterrestrial irradiance that the agency publishes for planetary reflectance. [W m-2 um-1]
-    sources : dict
-        Key of the instrument's references for each number that has another source than the instrument says.
-
-    Raises
-    ------
-    pydantic.ValidationError
-        If a value is wrong; `read_instrument` names file and key.
-    """
-
-    name: _Name
-    srf: PyrsrResponse
-    full_scale_radiance: _Number
-    min_radiance: _Number
-    solar_irradiance: _Positive
-    sources: dict[Literal[_BAND_NUMBERS], str] = field(default_factory=dict, repr=False, hash=False)
-
-    def __post_init__(self):
-        if self.full_scale_radiance <= self.min_radiance:
-            raise ValueError(
-                f"full_scale_radiance must be above min_radiance, got {self.full_scale_radiance:g} "
-                f"and {self.min_radiance:g} W m-2 sr-1 um-1"
-            )
-
-    @property
-    def response(self):
-        """Relative spectral response, a `fifesim.bands.Band`."""
-        return _read_response(self.name, self.srf)
-
-    @property
-    def wavelength(self):
-        """Response-weighted mean wavelength [um]."""
-        return self.response.center
-
-
-@dataclass(frozen=True, config=_CONFIG)
-class Instrument:
-    """
-    Description of an instrument.
-
-    Parameters
-    ----------
-    name, title : str
-        Short name, such as ``"TM"``, and full name.
-    altitude : float
-        Above the ground. [m]
-    gsd : float
-        Pixel of the gridded product. [m]
-    interval : float
-        Angle between the instrument's own samples. [rad]
-    bits : int
-        Number of radiometric bits.
-    lsf : CosineResponse
-        Spatial response, the same along both axes.
-    bands : tuple of InstrumentBand
-    sources : dict
-        Key of ``references`` for each number; a band's own sources come first.
-    references : dict
-        Publications by key.
-
-    Raises
-    ------
-    pydantic.ValidationError
-        If a value is wrong or has no source; `read_instrument` names file and key.
-    """
-
-    name: _Name
-    title: _Name
-    altitude: _Positive
-    gsd: _Positive
-    interval: _Positive
-    bits: Annotated[int, Field(strict=True, ge=2, le=16)]
-    lsf: CosineResponse
-    bands: Annotated[tuple[InstrumentBand, ...], Field(min_length=1)] = field(repr=False)
-    sources: dict[Literal[_INSTRUMENT_NUMBERS + _BAND_NUMBERS], str] = field(repr=False, hash=False)
-    references: dict[str, str] = field(repr=False, hash=False)
-
-    def __post_init__(self):
-        names = [band.name for band in self.bands]
-        if len(set(names)) < len(names):
-            raise ValueError(f"bands: each name may occur once, got {', '.join(names)}")
-        for number in _INSTRUMENT_NUMBERS:
-            self.source(number)
-        for band in self.bands:
-            for number in _BAND_NUMBERS:
-                self.source(number, band)
-
-    @property
-    def line_spread(self):
-        """Line spread function on the ground."""
-        return self.lsf.spread(self.altitude)
-
-    @property
-    def ground_interval(self):
-        """Distance on the ground between the instrument's own samples at nadir [m]."""
-        return self.interval * self.altitude
-
-    def select(self, bands=None):
-        """
-        Bands by name.
-
-        Parameters
-        ----------
-        bands : str or sequence of str, optional
-            Names in any case; all bands by default.
-
-        Returns
-        -------
-        bands : tuple of InstrumentBand
-            In the order asked for.
-
-        Raises
-        ------
-        ValueError
-            If the instrument has no such band.
-
-        Examples
-        --------
-        >>> [band.name for band in instrument("TM").select(["TM4", "tm3"])]
-        ['TM4', 'TM3']
-        """
-        known = {band.name.lower(): band for band in self.bands}
-        names = known if bands is None else [bands] if isinstance(bands, str) else bands
-        found = tuple(_lookup(name, known, f"band of {self.name}") for name in names)
-        if not found or len(set(found)) < len(found):
-            raise ValueError(
-                f"bands of {self.name} must be at least one, each once, got {', '.join(map(str, names)) or 'none'}"
-            )
-        return found
-
-    def source(self, number, band=None):
-        """
-        Publication that a number comes from.
-
-        Parameters
-        ----------
-        number : str
-            Name of a parameter, such as ``"altitude"`` or ``"min_radiance"``.
-        band : InstrumentBand, optional
-            The band whose number it is.
-
-        Returns
-        -------
-        reference : str
-
-        Raises
-        ------
-        ValueError
-            If the number has no source, or its source is not among the references.
-        """
-        key = (band.sources if band else {}).get(number) or self.sources.get(number)
-        if key not in self.references:
-            raise ValueError(f"sources.{number}: must be one of {', '.join(self.references)}, got {key!r}")
-        return self.references[key]
+# Keys whose value has several forms: what follows them in the place of an error is the form's name.
+_FORMS = ("srf", "lsf", "interval", "ifov")
 
 
 def instrument(name):
     """
-    Description of an instrument by its name.
+    Description of an instrument by its name, or from a file.
 
     Parameters
     ----------
-    name : str or Instrument
-        Name in any case, such as ``"TM"``. An Instrument passes through.
+    name : str, path-like or Instrument
+        Name or alias in any case, such as ``"TM"`` or ``"Landsat-8 OLI"``; or the path of a file, which ends in
+        ``.toml``. An Instrument passes through.
 
     Returns
     -------
@@ -267,7 +38,9 @@ def instrument(name):
     Raises
     ------
     ValueError
-        If no instrument has this name; the message lists those there are.
+        If no instrument has this name; the message lists those there are. If the file is not right.
+    FileNotFoundError
+        If there is no such file.
 
     Examples
     --------
@@ -275,7 +48,11 @@ def instrument(name):
     >>> tm.name, round(tm.line_spread.width, 2), round(tm.ground_interval, 3)
     ('TM', 30.32, 30.315)
     """
-    return name if isinstance(name, Instrument) else _lookup(name, _catalogue(), "instrument")
+    if isinstance(name, Instrument):
+        return name
+    if isinstance(name, Path) or (isinstance(name, str) and name.lower().endswith(".toml")):
+        return _read_again(*_state(Path(name)))
+    return lookup(name, _catalogue(), "instrument")
 
 
 def instrument_names():
@@ -292,7 +69,7 @@ def instrument_names():
     >>> "TM" in instrument_names()
     True
     """
-    return tuple(sorted(item.name for item in _catalogue().values()))
+    return tuple(sorted({item.name for item in _catalogue().values()}))
 
 
 def read_instrument(path):
@@ -311,52 +88,100 @@ def read_instrument(path):
     Raises
     ------
     ValueError
-        If the file is no valid TOML, or a key is missing, unknown or has a wrong value; the message names it.
+        If the file is no valid TOML, a key is missing, unknown or has a wrong value, or a number cannot be in the unit
+        of its key; the message names file, key and remedy.
+    FileNotFoundError
+        If there is no such file.
     """
     path = Path(path)
+    found = _parse(path)
+    try:
+        check_units(found)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from None
+    return found
+
+
+def _parse(path):
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
+    except FileNotFoundError:
+        raise FileNotFoundError(f"there is no instrument file {path}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path.name} is not valid TOML: {error}") from None
     try:
-        return TypeAdapter(Instrument).validate_python(content)
+        return TypeAdapter(Instrument).validate_python(_with_folder(content, path.parent))
     except ValidationError as error:
         reasons = "; ".join(_explain(item) for item in error.errors())
         raise ValueError(f"{path.name}: {reasons}") from None
 
 
+def _with_folder(content, folder):
+    """The content of a file, whose tables of responses know the folder that they may lie in."""
+    bands = content.get("bands")
+    if not isinstance(bands, list):
+        return content
+    return {**content, "bands": [_placed(band, folder) for band in bands]}
+
+
+def _placed(band, folder):
+    srf = band.get("srf") if isinstance(band, dict) else None
+    if not (isinstance(srf, dict) and "table" in srf):
+        return band
+    return {**band, "srf": {**srf, "folder": str(folder)}}
+
+
 def _explain(error):
     """One line that names the key, its value and what is allowed; bands count from 1."""
-    key = ".".join(str(part + 1) if isinstance(part, int) else part for part in error["loc"])
+    key = ".".join(_key_parts(error["loc"]))
     if error["type"] == "unexpected_keyword_argument":
         return f"unknown key {key}"
     if error["type"] == "missing":
         return f"the key {key} is missing"
+    if error["type"] == "union_tag_invalid":
+        return f"{key}.kind = {error['ctx']['tag']!r}: it must be one of {error['ctx']['expected_tags']}"
+    if error["type"] == "union_tag_not_found":
+        return f"the key {key}.kind is missing"
     if error["type"] == "value_error":
         return ": ".join(filter(None, (key, str(error["ctx"]["error"]))))
     return f"{key} = {error['input']!r}: {error['msg']}"
 
 
+def _key_parts(places):
+    """Keys of a place in the file, without the names of the forms that a value may have."""
+    places = list(places)
+    while places:
+        part = places.pop(0)
+        yield str(part + 1) if isinstance(part, int) else part
+        if part in _FORMS and places:
+            form = places.pop(0)
+            if part == "lsf" and form == "axes" and places:
+                yield places.pop(0)
+            if part == "lsf" and places and places[0] in ("cosine", "boxcar", "gaussian", "table", "system"):
+                places.pop(0)
+
+
 @lru_cache
 def _catalogue():
-    files = sorted(datasets.path("instruments").glob("*.toml"))
-    return {item.name.lower(): item for item in map(read_instrument, files)}
+    """Instruments by names and aliases in lower case. The tests check the units of these files."""
+    found = {}
+    for item in map(_parse, sorted(datasets.path("instruments").glob("*.toml"))):
+        for name in (item.name, *item.aliases):
+            if name.lower() in found:
+                raise ValueError(f"two instruments are called {name}: {found[name.lower()].name} and {item.name}")
+            found[name.lower()] = item
+    return found
 
 
-def _lookup(name, known, kind):
-    if not isinstance(name, str):
-        raise TypeError(f"{kind}: the name must be text, got {name!r}")
-    if name.lower() in known:
-        return known[name.lower()]
-    nearest = [known[key].name for key in get_close_matches(name.lower(), known, n=2, cutoff=0.4)]
-    hint = f"did you mean {' or '.join(nearest)}? " if nearest else ""
-    raise ValueError(f"unknown {kind} {name!r}: {hint}There are {', '.join(v.name for v in known.values())}")
+def _state(path):
+    """A file and what tells whether it changed."""
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        raise FileNotFoundError(f"there is no instrument file {path}") from None
+    return path, status.st_mtime_ns, status.st_size
 
 
-@lru_cache
-def _read_response(name, response):
-    table = RSR_reader(response.satellite, response.sensor, LayerBandsAssignment=[response.band])[response.band]
-    # pyrsr holds some sensors in nanometres and others in micrometres; no band reaches 100 um.
-    wavelength = table[:, 0] / 1000 if table[-1, 0] > 100 else table[:, 0]
-    # Measured responses scatter around zero outside of the band.
-    return Band(name, wavelength, np.maximum(table[:, 1], 0))
+@lru_cache(maxsize=32)
+def _read_again(path, *state):
+    return read_instrument(path)

@@ -1,25 +1,38 @@
 """The sensor on labelled rasters: from light at the top of the atmosphere to digital numbers, and back."""
 
-from functools import partial
-
 import numpy as np
 import xarray as xr
 
 from fifesim import cf, chunks
 from fifesim import grid as grids
-from fifesim.footprints import axis_operator, regularize
-from fifesim.geometry import fife_geometry
+from fifesim.geometry import ANGLES, fife_geometry
 from fifesim.sensor import calibration
 from fifesim.sensor.instruments import instrument as find_instrument
+from fifesim.sensor.noise import check_kinds
+from fifesim.sensor.noise_raster import noisy
+from fifesim.sensor.pixels_raster import directions_on, matching_bands, pixel_grid, regularized
 
 # Share of its footprint's weight that a pixel needs on valid cells. The paper's footprint of 30.32 m leaves a
 # scene of whole 30 m pixels by 0.16 m.
 MIN_VALID = 0.98
 
 
-def sense(toa, instrument="TM", *, onto=None, min_valid=MIN_VALID, geometry=None):
+def sense(
+    toa,
+    instrument="TM",
+    *,
+    onto=None,
+    interval=None,
+    offset=(0.0, 0.0),
+    noise=(),
+    seed=0,
+    noise_models=None,
+    quantise=True,
+    min_valid=MIN_VALID,
+    geometry=None,
+):
     """
-    Image that an instrument records: regularized onto its pixels and digitised.
+    Image that an instrument records: regularized onto its pixels, with its noise, and digitised.
 
     Parameters
     ----------
@@ -30,6 +43,20 @@ def sense(toa, instrument="TM", *, onto=None, min_valid=MIN_VALID, geometry=None
     onto : odc.geo.geobox.GeoBox, optional
         North-up grid of pixels in the CRS of the scene, of any size and offset. By default the instrument's gridded
         product, with the upper left corner of the scene.
+    interval : "native", float or (float, float), optional
+        Distance between pixels instead of that of the gridded product: the instrument's own at nadir, or metres, down
+        and across. The coordinates move with it; footprints stay. [m]
+    offset : (float or array, float or array), optional
+        Registration error southward and eastward, a number or a drift of one for each row and each column. The pixels
+        see the ground beside them; the coordinates stay nominal. [pixel]
+    noise : str or sequence of str, optional
+        Among "shot", "thermal" and "fixed-pattern"; the instrument's description has their size.
+    seed : int, optional
+        Of the noise.
+    noise_models : fifesim.sensor.noise.NoiseModel, or mapping of str to NoiseModel, optional
+        Size of the noise for every band, or by name of a band, where the description lacks it or is not to count.
+    quantise : bool, optional
+        Whether to digitise; radiance otherwise.
     min_valid : float, optional
         Share of its footprint that a pixel needs on valid cells; below it is no data. [1]
     geometry : fifesim.geometry.Geometry, optional
@@ -39,23 +66,68 @@ def sense(toa, instrument="TM", *, onto=None, min_valid=MIN_VALID, geometry=None
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
         Digital numbers from 1; 0 is no data. ``gain``, ``offset``, ``wavelength`` and ``solar_irradiance`` are
-        coordinates along band.
+        coordinates along band. Without ``quantise``, radiance with the latter two. [1 or W m-2 sr-1 um-1]
 
     Raises
     ------
     ValueError
-        If the instrument is unknown or has none of the bands, or ``onto`` is no grid of the scene's CRS.
+        If the instrument is unknown, has none of the bands or no such noise, bands lie on different grids, ``onto`` is
+        no grid of the scene's CRS, or a point spread is wider than the scene.
 
     See Also
     --------
-    fifesim.footprints.regularize, fifesim.sensor.calibration.radiance_to_dn
+    fifesim.footprints.regularize, fifesim.sensor.noise.add_noise, fifesim.sensor.calibration.radiance_to_dn
     """
     cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
     description = find_instrument(instrument)
     toa = toa if "band" in toa.dims else toa.expand_dims("band")
     bands = matching_bands(toa, description)
-    geometry = (geometry or cf.geometry_of(toa) or fife_geometry()).uniform("sense")
-    radiance = _as_radiance(_regularized(toa, description, onto, min_valid), bands, geometry)
+    geometry = geometry or cf.geometry_of(toa) or fife_geometry()
+    pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
+    geometry = directions_on(pixels, geometry)
+    scene = toa.drop_vars(ANGLES, errors="ignore")
+    means = regularized(scene, description, bands, pixels, offset=offset, min_valid=min_valid)
+    # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
+    first = grids.lattice_position(pixels)
+    radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
+    history = _history(description, interval, offset, noise, seed, quantise)
+    image = recorded(radiance, description, bands, quantise)
+    image = cf.with_geometry(grids.place(image, pixels), geometry)
+    image = cf.label(
+        image, "dn" if quantise else "toa_radiance", source=toa, history=history, instrument=description.name
+    )
+    if quantise:
+        image.attrs["_FillValue"] = image.dtype.type(0)
+    return image
+
+
+def recorded(radiance, description, bands, quantise):
+    """
+    What an instrument records of a radiance, with the coordinates of its bands.
+
+    Parameters
+    ----------
+    radiance : xarray.DataArray
+        With a dimension band. [W m-2 sr-1 um-1]
+    description : fifesim.sensor.instruments.Instrument
+    bands : sequence of fifesim.sensor.instruments.InstrumentBand
+        One for each of the array.
+    quantise : bool
+        Whether as digital numbers.
+
+    Returns
+    -------
+    image : xarray.DataArray
+        Digital numbers, or the radiance itself.
+    """
+    if not quantise:
+        return radiance.assign_coords(
+            cf.band_coordinates(
+                band=[band.name for band in bands],
+                wavelength=[band.wavelength for band in bands],
+                solar_irradiance=[band.solar_irradiance for band in bands],
+            )
+        )
     gain, offset = calibration.gain_offset(
         [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands], description.bits
     )
@@ -66,7 +138,7 @@ def sense(toa, instrument="TM", *, onto=None, min_valid=MIN_VALID, geometry=None
         dtype=np.uint8 if description.bits <= 8 else np.uint16,
         bits=description.bits,
     )
-    dn = dn.assign_coords(
+    return dn.assign_coords(
         cf.band_coordinates(
             band=[band.name for band in bands],
             wavelength=[band.wavelength for band in bands],
@@ -75,11 +147,18 @@ def sense(toa, instrument="TM", *, onto=None, min_valid=MIN_VALID, geometry=None
             solar_irradiance=[band.solar_irradiance for band in bands],
         )
     )
-    dn = cf.with_geometry(grids.place(dn, grids.geobox(radiance)), geometry)
-    history = f"sense: {description.name}, {description.bits} bits"
-    image = cf.label(dn, "dn", source=toa, history=history, instrument=description.name)
-    image.attrs["_FillValue"] = image.dtype.type(0)
-    return image
+
+
+def _history(description, interval, offset, noise, seed, quantise):
+    """What was done, beside the defaults."""
+    kinds = check_kinds(noise)
+    parts = [
+        f"sense: {description.name}, {description.bits} bits" if quantise else f"sense: {description.name}, radiance",
+        f"interval {interval}" if interval is not None else "",
+        "offset" if any(np.any(np.asarray(each) != 0) for each in offset) else "",
+        f"noise {' '.join(kinds)}, seed {seed}" if kinds else "",
+    ]
+    return ", ".join(filter(None, parts))
 
 
 def to_radiance(image):
@@ -109,7 +188,7 @@ def to_radiance(image):
     if missing:
         raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
     out = chunks.pointwise(calibration.dn_to_radiance, image, *_plain(image, "gain", "offset"))
-    out = grids.place(out.drop_vars(["gain", "offset"]), grids.geobox(image))
+    out = _placed_as(out.drop_vars(["gain", "offset"]), image)
     return cf.label(out, "toa_radiance", source=image, history="to_radiance")
 
 
@@ -138,98 +217,43 @@ def to_reflectance(image):
     """
     radiance = to_radiance(image) if "gain" in image.coords else image
     cf.check_quantity(radiance, "toa_radiance")
-    geometry = cf.geometry_of(image)
+    # The sun alone counts, and a scan's view is an array.
+    geometry = cf.geometry_of(image.drop_vars(["vza", "vaa"], errors="ignore"))
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
-    geometry.uniform("to_reflectance")
     out = chunks.pointwise(
         calibration.radiance_to_reflectance,
         radiance,
         *_plain(image, "solar_irradiance"),
-        mu_s=geometry.mu_s,
+        xr.DataArray(geometry.mu_s),
         earth_sun_distance=geometry.earth_sun_distance,
     )
-    out = grids.place(out, grids.geobox(image))
+    out = _placed_as(out, image)
     return cf.label(out, "toa_reflectance", source=radiance, history="to_reflectance")
 
 
-def matching_bands(array, instrument):
+def _placed_as(array, image):
+    """On the grid of an image; the pixels of a scan have none, and keep their coordinates."""
+    return grids.place(array, grids.geobox(image)) if {"y", "x"} <= set(image.dims) else array
+
+
+def as_radiance(array, bands, geometry):
     """
-    Bands of an instrument that those of a raster stand for.
+    Radiance of a reflectance, once it is regularized: that is linear and leaves fewer numbers.
 
     Parameters
     ----------
     array : xarray.DataArray
-        With a coordinate ``band`` of the instrument's names, or ``wavelength`` [um].
-    instrument : fifesim.sensor.instruments.Instrument
+        Reflectance, or radiance by its units, with a dimension band.
+    bands : sequence of fifesim.sensor.instruments.InstrumentBand
+        One for each of the array.
+    geometry : fifesim.geometry.Geometry
 
     Returns
     -------
-    bands : tuple of fifesim.sensor.instruments.InstrumentBand
-
-    Raises
-    ------
-    ValueError
-        If a band matches none of the instrument's.
+    radiance : xarray.DataArray
+        [W m-2 sr-1 um-1]
     """
-    known = {band.name.lower() for band in instrument.bands}
-    names = [str(name) for name in np.atleast_1d(array["band"].values)] if "band" in array.coords else []
-    if names and {name.lower() for name in names} <= known:
-        return instrument.select(names)
-    if "wavelength" in array.coords:
-        wavelengths = np.atleast_1d(array["wavelength"].values).astype(float)
-        return instrument.select([_band_at(value, instrument).name for value in wavelengths])
-    if names:
-        return instrument.select(names)
-    raise ValueError(
-        f"the raster's bands have neither names of {instrument.name} ({', '.join(b.name for b in instrument.bands)}) "
-        "nor a wavelength: assign a coordinate 'band' or 'wavelength' [um] along band"
-    )
-
-
-def _band_at(wavelength, instrument):
-    """The band with the largest response at a wavelength, at least half of its peak."""
-    responses = [
-        np.interp(wavelength, band.response.wavelength, band.response.response, left=0.0, right=0.0)
-        / max(band.response.response)
-        for band in instrument.bands
-    ]
-    best = int(np.argmax(responses))
-    if responses[best] < 0.5:
-        centres = ", ".join(f"{band.name} at {band.wavelength:.3f}" for band in instrument.bands)
-        raise ValueError(f"no band of {instrument.name} responds at {wavelength:g} um: it has {centres} um")
-    return instrument.bands[best]
-
-
-def _regularized(toa, description, onto, min_valid):
-    scene = grids.geobox(toa)
-    pixels = grids.aligned(scene, description.gsd) if onto is None else grids.check_grid(onto)
-    if pixels.crs != scene.crs:
-        raise ValueError(f"onto must be in the CRS of the scene, {scene.crs}, got {pixels.crs}")
-    lsf = description.line_spread
-    rows = _operator(
-        lsf, scene.affine.f, scene.affine.e, scene.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y
-    )
-    columns = _operator(
-        lsf, scene.affine.c, scene.affine.a, scene.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x
-    )
-    return chunks.resample(partial(regularize, min_valid=min_valid), rows, columns, toa, pixels)
-
-
-def _operator(lsf, cell_origin, cell_size, n_cells, pixel_origin, pixel_size, n_pixels):
-    return axis_operator(
-        lsf,
-        cell_origin=cell_origin,
-        cell_size=cell_size,
-        n_cells=n_cells,
-        pixel_origin=pixel_origin,
-        pixel_size=pixel_size,
-        n_pixels=n_pixels,
-    )
-
-
-def _as_radiance(array, bands, geometry):
-    """Radiance of a reflectance; it is scaled once regularized, which is linear and leaves fewer numbers."""
     if str(array.attrs.get("units", "1")) == cf.QUANTITIES["toa_radiance"].units:
         return array
     irradiance = xr.DataArray([band.solar_irradiance for band in bands], dims="band")
@@ -238,7 +262,7 @@ def _as_radiance(array, bands, geometry):
         calibration.reflectance_to_radiance,
         plain,
         irradiance,
-        mu_s=geometry.mu_s,
+        xr.DataArray(geometry.mu_s),
         earth_sun_distance=geometry.earth_sun_distance,
     )
 

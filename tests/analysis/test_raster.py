@@ -44,6 +44,19 @@ def test_block_with_too_few_valid_cells_is_missing(lai):
     assert np.isfinite(fifesim.aggregate(lai, 30.0, min_valid=0.5)).all()
 
 
+def test_blocks_may_be_weighted_by_a_line_spread(lai):
+    """A matrix of the instrument's weights for each axis, without the package's operators."""
+    lsf = fifesim.instrument("TM").line_spread
+    weights = [
+        [[lsf.cumulative(CELL * (j + 1) - 30 * (i + 0.5)) - lsf.cumulative(CELL * j - 30 * (i + 0.5)) for j in range(n)]
+         for i in range(n // 9)]
+        for n in lai.shape
+    ]  # fmt: skip
+    rows, columns = (np.array(each) / np.sum(each, axis=1, keepdims=True) for each in weights)
+    found = fifesim.aggregate(lai, 30.0, lsf=lsf)
+    np.testing.assert_allclose(found, rows @ lai.values @ columns.T, rtol=1e-12)
+
+
 def test_block_larger_than_the_scene_is_refused(lai):
     with pytest.raises(ValueError, match="no pixel of 500 x 500 m fits"):
         fifesim.aggregate(lai, 500.0)

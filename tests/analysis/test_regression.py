@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import statsmodels.api
 from scipy import stats
 
 from fifesim.analysis.regression import fit, row_sums
@@ -23,6 +24,24 @@ def test_line_agrees_with_scipy():
     error = ours.residual_deviation / np.sqrt(ours.x_sum_of_squares)
     assert error == pytest.approx(theirs.stderr, rel=1e-10)
     assert ours.n == X.size
+
+
+@pytest.mark.parametrize("shift", [0.0, 300.0])
+def test_line_errors_and_intervals_agree_with_statsmodels(shift):
+    """To 1e-10, also where the values are a thousand times their spread."""
+    ours = line(Y + shift, X - shift, shift, -shift)
+    theirs = statsmodels.api.OLS((Y + shift).ravel(), statsmodels.api.add_constant((X - shift).ravel())).fit()
+    assert ours.slope == pytest.approx(theirs.params[1], rel=1e-10)
+    assert ours.intercept == pytest.approx(theirs.params[0], rel=1e-10)
+    assert ours.r2 == pytest.approx(theirs.rsquared, rel=1e-10)
+    np.testing.assert_allclose([ours.intercept_error, ours.slope_error], theirs.bse, rtol=1e-10)
+    at = np.array([0.0, 0.5, 1.3]) - shift
+    for level in (0.68, 0.95):
+        frame = theirs.get_prediction(statsmodels.api.add_constant(at)).summary_frame(1 - level)
+        for name, interval in (("mean_ci", ours.confidence_interval), ("obs_ci", ours.prediction_interval)):
+            low, high = interval(at, level)
+            np.testing.assert_allclose(low, frame[f"{name}_lower"], rtol=1e-10)
+            np.testing.assert_allclose(high, frame[f"{name}_upper"], rtol=1e-10)
 
 
 def normal_equations(x, y, at, own_scatter, level):

@@ -126,11 +126,6 @@ def test_angle_on_other_cells_is_refused(ground, swath):
         to_toa(ground, AIR, BANDS, dataclasses.replace(swath, vza=swath.vza[:-1]))
 
 
-def test_what_needs_one_direction_says_so(lai_with_hole, swath):
-    with pytest.raises(ValueError, match=r"surface_reflectance needs one direction .* rasters of sza, vza"):
-        fifesim.surface_reflectance(lai_with_hole, geometry=swath)
-
-
 def test_rasters_are_not_compared_cell_by_cell(swath):
     assert swath == swath
     assert swath != SUN

@@ -1,0 +1,1 @@
+"""Experiments: a question, its runs and its answer."""

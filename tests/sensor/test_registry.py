@@ -1,0 +1,422 @@
+"""Each instrument that is shipped reproduces its published figures from its file."""
+
+import pickle
+import tomllib
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fifesim import datasets
+from fifesim.sensor.calibration import gain_offset, radiance_to_reflectance, reflectance_to_radiance
+from fifesim.sensor.instruments import instrument, instrument_names, read_instrument
+from fifesim.sensor.listing import describe
+from fifesim.sensor.performance import swath_width
+from fifesim.sensor.plausibility import check_units
+
+FILES = sorted(datasets.path("instruments").glob("*.toml"))
+LANDSAT = ("TM", "L4TM", "ETM+", "OLI", "OLI2")
+
+
+def bands_of(*names):
+    return [pytest.param(name, band, id=f"{name}-{band.name}") for name in names for band in instrument(name).bands]
+
+
+def band(name, which):
+    return instrument(name).select(which)[0]
+
+
+# -------------------------------------------------------------------------------------------- the whole registry
+
+
+def test_registry_has_every_instrument_that_is_compared():
+    expected = {"TM", "L4TM", "ETM+", "OLI", "OLI2", "MSI", "MSI-B", "HRV"}
+    expected |= {"MODIS", "MODIS-Aqua", "AVHRR", "AVHRR10", "AVHRR11"}
+    assert expected <= set(instrument_names())
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_file_passes_the_check_that_users_files_get(path):
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert read_instrument(path) == instrument(content["name"])
+
+
+@pytest.mark.parametrize(
+    ("alias", "name"),
+    [
+        ("Landsat-5 TM", "TM"),
+        ("landsat-4 tm", "L4TM"),
+        ("Landsat-7 ETM+", "ETM+"),
+        ("Landsat-8 OLI", "OLI"),
+        ("Landsat-9 OLI", "OLI2"),
+        ("Sentinel-2A MSI", "MSI"),
+        ("Sentinel-2B MSI", "MSI-B"),
+        ("SPOT HRV", "HRV"),
+        ("Terra MODIS", "MODIS"),
+        ("Aqua MODIS", "MODIS-Aqua"),
+        ("NOAA-9 AVHRR", "AVHRR"),
+        ("NOAA-11", "AVHRR11"),
+    ],
+)
+def test_aliases_are_found_in_any_case(alias, name):
+    assert instrument(alias) is instrument(name)
+    assert instrument(alias.upper()) is instrument(name)
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_every_number_has_a_source_and_every_reference_is_used(name):
+    item = instrument(name)
+    used = {item.source(number) for number in ("altitude", "gsd", "interval", "bits", "lsf")}
+    used |= {item.references[key] for key in item.sources.values()}
+    for each in item.bands:
+        used |= {
+            item.source(number, each)
+            for number in ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance", *each.sources)
+        }
+    assert used == set(item.references.values())
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_instrument_travels_to_workers_and_is_a_key(name):
+    item = instrument(name)
+    again = pickle.loads(pickle.dumps(item))
+    assert again == item
+    assert {item: 1}[again] == 1
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_description_has_a_line_for_every_band_and_every_source(name):
+    item = instrument(name)
+    text = describe(item)
+    assert all(any(line.split()[:1] == [each.name] for line in text.splitlines()) for each in item.bands)
+    assert all(reference in text for reference in item.references.values())
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_bands_have_names_of_their_own_instrument(name):
+    """A raster of one instrument's bands is never taken for another's, MODIS1 (red) for MSI1 (aerosol) say."""
+    family = {"L4TM": "TM", "OLI2": "OLI", "MSI-B": "MSI", "MODIS-Aqua": "MODIS"}
+    family |= {"AVHRR10": "AVHRR", "AVHRR11": "AVHRR"}
+    own = {each.name for each in instrument(name).bands}
+    for other in instrument_names():
+        if family.get(other, other) != family.get(name, name):
+            assert not own & {each.name for each in instrument(other).bands}, other
+
+
+# -------------------------------------------------------------------------------------------- effective wavelength
+
+# Weighted wavelengths [nm] that ESA publishes (COPE-GSEG-EOPG-TN-15-0007, sheet "Equivalent wavelengths").
+ESA = {
+    "MSI": [442.695, 492.715, 559.849, 664.622, 704.115, 740.492, 782.753, 832.790, 864.711, 945.054, 1373.456]
+    + [1613.681, 2202.368],
+    "MSI-B": [442.246, 492.339, 558.949, 664.948, 703.824, 739.128, 779.706, 832.948, 863.972, 943.165, 1376.878]
+    + [1610.414, 2185.707],
+}
+
+
+@pytest.mark.parametrize("name", ESA)
+def test_wavelengths_of_msi_are_those_that_esa_publishes(name):
+    found = [1000 * each.wavelength for each in instrument(name).bands]
+    np.testing.assert_allclose(found, ESA[name], rtol=1e-3)
+
+
+# Mean wavenumbers [cm-1] of the same responses in the coefficient files of EUMETSAT's RTTOV, which reads them from the
+# agencies by itself (NOAA STAR's AVHRR1_SRF_only.xls, L7_ETM_RSR.xls, Ball_BA_RSR).
+RTTOV = {
+    ("AVHRR10", "AVHRR1"): 16004.736,
+    ("AVHRR10", "AVHRR2"): 12088.745,
+    ("ETM+", "ETM1"): 21013.599,
+    ("ETM+", "ETM2"): 17924.629,
+    ("ETM+", "ETM3"): 15152.702,
+    ("ETM+", "ETM4"): 12054.332,
+    ("ETM+", "ETM5"): 6083.658,
+    ("OLI", "OLI1"): 22582.527,
+    ("OLI", "OLI2"): 20804.752,
+    ("OLI", "OLI3"): 17862.873,
+    ("OLI2", "OLI1"): 22593.443,
+    ("OLI2", "OLI2"): 20816.761,
+    ("OLI2", "OLI3"): 17874.793,
+}
+
+
+def mean_wavenumber(response):
+    wavenumber = 1e4 / np.array(response.wavelength)[::-1]
+    weight = np.array(response.response)[::-1]
+    return np.trapezoid(weight * wavenumber, wavenumber) / np.trapezoid(weight, wavenumber)
+
+
+@pytest.mark.parametrize("key", RTTOV, ids=lambda key: "-".join(key))
+def test_mean_wavenumber_is_that_of_another_program(key):
+    """Within 0.1 %: RTTOV tabulates the same measurements on other steps."""
+    np.testing.assert_allclose(mean_wavenumber(band(*key).response), RTTOV[key], rtol=1e-3)
+
+
+@pytest.mark.parametrize(("name", "each"), bands_of("L4TM", "TM", "OLI", "OLI2", "MODIS", "MODIS-Aqua"))
+def test_wavelength_is_near_the_middle_of_the_nominal_band(name, each):
+    """
+    Filters as built are not centred on the nominal band: by a tenth of the width of TM's, and those of MODIS by up to
+    0.8 % of the wavelength.
+    """
+    nominal = {"TM1": (0.45, 0.52), "TM2": (0.52, 0.60), "TM3": (0.63, 0.69), "TM4": (0.76, 0.90)}
+    nominal |= {"TM5": (1.55, 1.75), "TM7": (2.08, 2.35)}
+    low, high = each.limits or nominal[each.name]
+    assert abs(each.wavelength - (low + high) / 2) < max(0.15 * (high - low), 0.008 * low)
+
+
+@pytest.mark.parametrize("number", [1, 2, 4, 5])
+def test_wavelengths_of_modis_are_within_half_a_percent_of_the_nominal_ones(number):
+    nominal = {1: 0.645, 2: 0.8585, 4: 0.555, 5: 1.240}
+    np.testing.assert_allclose(band("MODIS", f"MODIS{number}").wavelength, nominal[number], rtol=5e-3)
+
+
+# Equivalent widths W [um] that NOAA gives for the channels: area below the response over its maximum.
+WIDTH = {
+    ("AVHRR", "AVHRR1"): 0.117,
+    ("AVHRR", "AVHRR2"): 0.239,
+    ("AVHRR10", "AVHRR1"): 0.108,
+    ("AVHRR10", "AVHRR2"): 0.222,
+    ("AVHRR11", "AVHRR1"): 0.113,
+    ("AVHRR11", "AVHRR2"): 0.229,
+}
+
+
+@pytest.mark.parametrize("key", WIDTH, ids=lambda key: "-".join(key))
+def test_area_below_the_response_of_avhrr_is_the_equivalent_width(key):
+    """NOAA integrated other tables of the same measurements; channel 2 of NOAA-9 differs most, by 3.7 %."""
+    response = band(*key).response
+    area = np.trapezoid(response.response, response.wavelength)
+    np.testing.assert_allclose(area / max(response.response), WIDTH[key], rtol=0.04)
+
+
+def test_responses_of_avhrr_rise_from_nothing_and_fall_to_it():
+    table = pd.read_csv(datasets.path("avhrr_response.csv"), comment="#")
+    for (satellite, channel), rows in table.groupby(["satellite", "band"]):
+        ends = rows["response"].iloc[[0, -1]]
+        assert ends.max() <= 0.002, (satellite, channel)
+        assert 0.995 < rows["response"].max() <= 1.0, (satellite, channel)
+
+
+# -------------------------------------------------------------------------------------------- solar irradiance
+
+
+@pytest.mark.parametrize(("name", "each"), bands_of(*instrument_names()))
+def test_agencys_irradiance_agrees_with_the_integral_of_a_solar_spectrum(name, each):
+    """
+    The agencies use other spectra than ASTM G173: within 4.5 % up to 2.4 um, but for the coastal and cirrus bands of
+    OLI (5.1 and 4.5 %) and, in the short-wave infrared, MODIS 5 and 7 (5.9 %).
+    """
+    apart = {"OLI1": 0.055, "OLI9": 0.05, "MODIS5": 0.06, "MODIS7": 0.06}
+    np.testing.assert_allclose(each.solar_irradiance, each.spectrum_irradiance, rtol=apart.get(each.name, 0.045))
+
+
+@pytest.mark.parametrize("name", ["OLI", "OLI2"])
+def test_oli_has_the_scale_of_reflectance_of_its_products(name):
+    """REFLECTANCE_MAXIMUM and REFLECTANCE_MINIMUM of Level 1: 1.2107 and -0.09998 in every band, overhead sun."""
+    for each in instrument(name).bands:
+        ends = radiance_to_reflectance([each.full_scale_radiance, each.min_radiance], each.solar_irradiance, 1.0)
+        np.testing.assert_allclose(ends, [1.2107, -0.09998], rtol=5e-4)
+
+
+def test_oli_reproduces_the_radiance_scale_of_another_product():
+    """RADIANCE_MULT of a scene at another distance of the sun stands to that of 2 May 2024 as the distances squared."""
+    other = [1.2866e-2, 1.3175e-2, 1.2140e-2, 1.0237e-2, 6.2648e-3, 1.5580e-3, 5.2513e-4, 1.1586e-2, 2.4484e-3]
+    steps = [(each.full_scale_radiance - each.min_radiance) / 65534 for each in instrument("OLI").bands]
+    ratio = np.array(other) / steps
+    np.testing.assert_allclose(ratio, ratio.mean(), rtol=2e-4)
+    assert 1 / 1.0168**2 < ratio.mean() < 1 / 0.9832**2
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_radiance_and_reflectance_are_tied_by_the_agencys_irradiance_both_ways(name):
+    for each in instrument(name).bands:
+        radiance = reflectance_to_radiance(0.25, each.solar_irradiance, 0.5, 1.01)
+        np.testing.assert_allclose(radiance, 0.125 * each.solar_irradiance / (np.pi * 1.01**2), rtol=1e-12)
+        back = radiance_to_reflectance(radiance, each.solar_irradiance, 0.5, 1.01)
+        np.testing.assert_allclose(back, 0.25, rtol=1e-12)
+
+
+def test_avhrr_count_of_the_dark_is_no_albedo_and_full_scale_is_the_slope():
+    """PATMOS-x: albedo [%] = slope (count - dark)."""
+    known = {"AVHRR": [(0.107, 38.0), (0.121, 40.0)], "AVHRR10": [(0.111, 39.44), (0.137, 39.4)]}
+    for name, channels in known.items():
+        item = instrument(name)
+        for each, (slope, dark) in zip(item.bands, channels, strict=True):
+            gain, offset = gain_offset(each.full_scale_radiance, each.min_radiance, item.bits)
+            albedo = 100 * np.pi * (np.array([dark, 1023]) * gain + offset) / each.solar_irradiance
+            np.testing.assert_allclose(albedo, [0, slope * (1023 - dark)], atol=0.01)
+
+
+# -------------------------------------------------------------------------------------------- sampling
+
+
+@pytest.mark.parametrize(
+    ("name", "which", "along", "across"),
+    [
+        ("TM", "TM3", 30.315, 30.315),
+        ("L4TM", "TM3", 30.315, 30.315),
+        ("ETM+", "ETM3", 30.0, 30.0),
+        ("ETM+", "ETM8", 15.0, 15.0),
+        ("OLI", "OLI4", 30.0, 30.0),
+        ("OLI", "OLI8", 15.0, 15.0),
+        ("MSI", "MSI4", 10.0, 10.0),
+        ("MSI", "MSI8A", 20.0, 20.0),
+        ("MSI-B", "MSI9", 60.0, 60.0),
+        ("HRV", "XS2", 20.0, 20.0),
+        ("MODIS", "MODIS1", 250.0, 250.0),
+        ("MODIS-Aqua", "MODIS3", 500.0, 500.0),
+        ("AVHRR", "AVHRR1", 1090.0, 791.0),
+    ],
+)
+def test_ground_interval_is_the_published_one(name, which, along, across):
+    intervals = instrument(name).ground_intervals(band(name, which))
+    np.testing.assert_allclose(intervals, (along, across), rtol=1e-3)
+
+
+def test_avhrr_oversamples_by_the_published_1_362_and_its_field_is_1_09_km():
+    """KLM guide, J.1: 1.362 samples an instantaneous field of view; its 0.95 mrad are rounded (to 0.5 %)."""
+    item = instrument("AVHRR")
+    field, interval = item.ground_fields(item.bands[0]), item.ground_intervals(item.bands[0])
+    np.testing.assert_allclose(field.across / interval.across, 1.362, rtol=6e-3)
+    np.testing.assert_allclose(field.across, np.radians(0.07449) * 833e3, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("name", "bits"), [("TM", 8), ("ETM+", 8), ("HRV", 8), ("AVHRR", 10), ("MODIS", 12)])
+def test_bits(name, bits):
+    assert instrument(name).bits == bits
+    assert instrument("OLI").bits == instrument("MSI").bits == 12
+
+
+@pytest.mark.parametrize("name", [name for name in instrument_names() if not name.startswith("AVHRR")])
+def test_scan_covers_the_published_swath(name):
+    item = instrument(name)
+    np.testing.assert_allclose(swath_width(item.altitude, item.scan.max_angle), item.scan.swath, rtol=3e-3)
+
+
+def test_scan_of_avhrr_covers_more_than_the_plane_of_noaas_guide():
+    """2399 km in the guide is 2 h tan(55.4 degrees), within 1 %; stations that receive it say more than 2600 km."""
+    item = instrument("AVHRR")
+    np.testing.assert_allclose(2 * item.altitude * np.tan(np.radians(item.scan.max_angle)), 2399e3, rtol=0.01)
+    assert swath_width(item.altitude, item.scan.max_angle) > 2600e3
+
+
+# -------------------------------------------------------------------------------------------- spatial response
+
+
+def nyquist(name, which):
+    item = instrument(name)
+    each = band(name, which)
+    steps = item.ground_intervals(each)
+    return [float(lsf.mtf(0.5 / step)) for lsf, step in zip(item.line_spreads(each), steps, strict=True)]
+
+
+def test_tm_of_landsat_4_passes_half_at_the_measured_effective_field_of_view():
+    """Schowengerdt et al. 1985: 40.8 m. Of a Gaussian, the Nyquist frequency of 30 m keeps 2^-(40.8/30)^2."""
+    lsf = instrument("L4TM").line_spread
+    np.testing.assert_allclose(lsf.mtf(0.5 / 40.8), 0.5, rtol=1e-4)
+    np.testing.assert_allclose(lsf.mtf(0.5 / 30.0), 2.0 ** -((40.8 / 30) ** 2), rtol=1e-3)
+    assert lsf.fwhm > 30.0
+
+
+def test_tm_of_the_paper_keeps_its_cosine():
+    """By hand, Eq. of the cosine at half a cycle per interval: 0.69."""
+    tm = instrument("TM")
+    np.testing.assert_allclose(tm.line_spread.width, 30.31641, rtol=1e-12)
+    np.testing.assert_allclose(nyquist("TM", "TM4"), 0.6928, atol=1e-3)
+
+
+@pytest.mark.parametrize(("name", "which"), [("OLI", "OLI4"), ("MSI", "MSI8A"), ("HRV", "XS1"), ("ETM+", "ETM8")])
+def test_a_detector_alone_keeps_two_over_pi_at_the_nyquist_frequency(name, which):
+    np.testing.assert_allclose(nyquist(name, which), 2 / np.pi, rtol=1e-9)
+
+
+def test_modis_is_a_triangle_across_the_track_and_a_rectangle_along_it():
+    along, across = nyquist("MODIS", "MODIS1")
+    np.testing.assert_allclose(along, 2 / np.pi, rtol=1e-9)
+    # The table's cut and its lines between samples leave 1e-3 of the response.
+    np.testing.assert_allclose(across, (2 / np.pi) ** 2, atol=2e-3)
+    spread = instrument("MODIS").line_spreads(band("MODIS", "MODIS1")).across
+    inside = spread.cumulative(125.0) - spread.cumulative(-125.0)
+    np.testing.assert_allclose(inside, 0.75, atol=2e-3)
+
+
+def test_avhrr_transfer_differs_by_axis_because_the_interval_does():
+    along, across = nyquist("AVHRR", "AVHRR2")
+    np.testing.assert_allclose(along, np.sinc(0.5 * 1.3 / 1.308), rtol=1e-9)
+    np.testing.assert_allclose(across, np.sinc(0.5 * 1.3 / 0.95), rtol=1e-9)
+
+
+# -------------------------------------------------------------------------------------------- radiometry and noise
+
+
+@pytest.mark.parametrize(
+    ("name", "which", "step"),
+    [
+        # TM: (204.3 + 1.2) / 255. ETM+ handbook: (152.9 + 5.0) / 254 in high gain. MSI: 1 / PHYSICAL_GAINS.
+        # HRV: 1 / A, Schroeder et al. 2000.
+        ("TM", "TM3", 0.80588),
+        ("L4TM", "TM3", 0.80588),
+        ("ETM+", "ETM3", 0.62165),
+        ("MSI", "MSI4", 1 / 4.50915),
+        ("HRV", "XS1", 1 / 1.505),
+        ("HRV", "XS2", 1 / 1.073),
+        ("HRV", "XS3", 1 / 1.451),
+    ],
+)
+def test_quantisation_step_is_the_published_one(name, which, step):
+    each = band(name, which)
+    gain, _ = gain_offset(each.full_scale_radiance, each.min_radiance, instrument(name).bits)
+    np.testing.assert_allclose(gain, step, rtol=1e-3)
+
+
+def test_gain_states_of_etm_are_those_of_the_handbook():
+    """Radiances of digital numbers 1 and 255 after 1 July 2000."""
+    item = instrument("ETM+")
+    low = item.with_gain("low")
+    for state, full, first in ((item, 157.4, -5.1), (low, 241.1, -5.1)):
+        (each,) = state.select("ETM4")
+        gain, offset = gain_offset(each.full_scale_radiance, each.min_radiance, 8)
+        np.testing.assert_allclose([gain + offset, 255 * gain + offset], [first, full], atol=1e-3)
+    assert [each.gain for each in low.bands] == ["low"] * 7
+    assert low.with_gain({"ETM4": "high"}).select("ETM4") == item.select("ETM4")
+    assert [each.gain for each in item.bands] == ["high"] * 6 + ["low"]
+
+
+@pytest.mark.parametrize("which", ["XS1", "XS2", "XS3"])
+def test_each_gain_of_hrv_is_1_3_times_the_one_before(which):
+    each = band("HRV", which)
+    full = [each.with_gain(f"m{number}").full_scale_radiance for number in range(3, 9)]
+    np.testing.assert_allclose(np.array(full[:-1]) / full[1:], 1.3, rtol=1e-3)
+
+
+MODIS_SNR = {1: (21.8, 128), 2: (24.7, 201), 3: (35.3, 243), 4: (29.0, 228), 5: (5.4, 74), 6: (7.3, 275), 7: (1.0, 110)}
+
+
+@pytest.mark.parametrize("number", MODIS_SNR)
+def test_noise_of_modis_is_that_of_its_specification(number):
+    item, (radiance, snr) = instrument("MODIS"), MODIS_SNR[number]
+    model = item.noise_model(band("MODIS", f"MODIS{number}"))
+    np.testing.assert_allclose(model.snr(radiance), snr, rtol=1e-9)
+    assert model.detectors == (40 if number < 3 else 20)
+
+
+def test_noise_of_msi_is_that_of_its_requirement():
+    """ESA: 154, 168, 142 and 174 at 128, 128, 108 and 103 W m-2 sr-1 um-1; nearly all of it is shot noise."""
+    item = instrument("MSI")
+    for which, radiance, snr in (("MSI2", 128, 154), ("MSI3", 128, 168), ("MSI4", 108, 142), ("MSI8", 103, 174)):
+        model = item.noise_model(band("MSI", which))
+        np.testing.assert_allclose(model.snr(radiance), snr, rtol=1e-9)
+        np.testing.assert_allclose(model.snr(radiance / 4), snr / 2, rtol=0.02)
+        assert model.along == "columns"
+
+
+def test_what_was_not_found_is_left_out_and_said_so():
+    with pytest.raises(ValueError, match="OLI has no noise for OLI4: leave noise out"):
+        instrument("OLI").noise_model(band("OLI", "OLI4"))
+    for path in FILES:
+        text = " ".join(path.read_text(encoding="utf-8").replace("\n#", " ").split())
+        assert path.name == "tm.toml" or "left out" in text, path.name
+
+
+def test_check_of_units_passes_every_gain_state():
+    check_units(instrument("ETM+").with_gain("low"))
+    check_units(instrument("HRV").with_gain("m3"))

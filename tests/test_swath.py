@@ -1,0 +1,97 @@
+"""Directions of sun and sensor that vary over the scene, from leaf area to digital numbers."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from lazy import check_raster_function
+
+import fifesim
+from fifesim import cf
+
+BANDS = ["TM3", "TM4"]
+
+
+def ramp(lai, low, high):
+    """A raster on the cells that grows to the east."""
+    values = np.broadcast_to(np.linspace(low, high, lai.sizes["x"]), lai.shape)
+    return lai.copy(data=values).drop_attrs(deep=False)
+
+
+@pytest.fixture
+def swath(lai):
+    return fifesim.Geometry(ramp(lai, 25.0, 31.0), 117.0, ramp(lai, 0.0, 50.0), ramp(lai, 350.0, 370.0))
+
+
+def test_each_cell_has_its_own_direction(lai, swath):
+    """Against one geometry at a time; the share of skylight is interpolated over the sun's angle, to 1e-6."""
+    rho = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath)
+    for column in (0, 20, lai.sizes["x"] - 1):
+        own = fifesim.Geometry(
+            *(float(getattr(swath, n)[0, column]) if n != "saa" else 117.0 for n in ("sza", "saa", "vza", "vaa"))
+        )
+        alone = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=own, exact=True)
+        np.testing.assert_allclose(rho[..., column], alone[..., column], rtol=0, atol=1e-6)
+
+
+def test_reflectance_keeps_its_word(lai_with_hole, swath):
+    result = check_raster_function(
+        lambda array: fifesim.surface_reflectance(array, "TM", bands=BANDS, geometry=swath),
+        lai_with_hole,
+        quantity="surface_reflectance",
+    )
+    assert cf.geometry_of(result).rasters == ("sza", "vza", "vaa")
+    np.testing.assert_array_equal(np.isnan(result[0]), np.isnan(lai_with_hole))
+
+
+def test_background_may_be_a_raster_too(lai, swath):
+    litter = (lai * 0 + 0.2).drop_attrs(deep=False)
+    mapped = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, background=litter)
+    uniform = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, background=0.2)
+    np.testing.assert_allclose(mapped, uniform, rtol=1e-14)
+
+
+def test_image_of_a_swath_knows_its_directions(lai, swath):
+    toa = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath).fifesim.to_toa()
+    image = check_raster_function(lambda array: array.fifesim.sense("TM"), toa, quantity="dn")
+    there = cf.geometry_of(image)
+    assert there.rasters == ("sza", "vza", "vaa")
+    middle = toa["sza"].values.reshape(5, 9, 6, 9).mean((1, 3))
+    np.testing.assert_allclose(there.sza, middle, rtol=1e-12)
+    # North lies between 350 and 10 degrees, and a mean of numbers would be in the south.
+    assert np.all((there.vaa < 10.1) | (there.vaa > 349.9))
+
+
+def test_planetary_reflectance_of_a_swath_is_what_it_was(lai, swath):
+    """To half a count: the sun is that of the pixel there and back."""
+    toa = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath).fifesim.to_toa()
+    image = toa.fifesim.sense("TM")
+    means = toa.drop_vars(["sza", "vza", "vaa"]).fifesim.sense("TM", quantise=False)
+    one_sun = means.fifesim.to_reflectance()
+    count = (image["gain"] / image["solar_irradiance"]).values[:, None, None] * np.pi * 1.04 / np.cos(np.radians(31))
+    assert np.all(np.abs(image.fifesim.to_reflectance() - one_sun).values <= 0.5 * count + 1e-9)
+
+
+def test_one_direction_as_a_raster_is_that_direction(lai):
+    level = fifesim.Geometry(28.5, 117.0, ramp(lai, 20.0, 20.0), 200.0)
+    one = dataclasses.replace(level, vza=20.0)
+    images = [
+        lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=g).fifesim.to_toa().fifesim.sense("TM")
+        for g in (level, one)
+    ]
+    assert np.abs(images[0].astype(int) - images[1].astype(int)).max() <= 1
+
+
+@pytest.mark.parametrize("call", ["slopes", "fpar"])
+def test_what_needs_one_sun_says_so(lai, swath, call):
+    with pytest.raises(ValueError, match="needs one direction of sun and sensor, got rasters of sza, vza, vaa"):
+        if call == "fpar":
+            lai.fifesim.fpar(geometry=swath)
+        else:
+            lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, dem=ramp(lai, 0, 10))
+
+
+def test_a_low_view_is_named(lai):
+    low = fifesim.Geometry(28.5, 117.0, ramp(lai, 20.0, 95.0), 200.0)
+    with pytest.raises(ValueError, match=r"vza must be in \[0, 90\) degrees in every cell, got"):
+        lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=low)
