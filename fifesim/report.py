@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fifesim import grid as grids
+from fifesim.analysis.pairs_raster import matched
 from fifesim.scenario import Scenario, names_a_file
 from fifesim.sensor.raster import to_reflectance
 
@@ -38,7 +39,7 @@ def quicklook(path, image, truth, detail):
     path : pathlib.Path
         PNG file.
     image : xarray.Dataset
-        ``dn`` and perhaps ``ndvi``, in memory.
+        ``dn`` and perhaps ``ndvi``, in memory; with terrain ``level``, the digital numbers on level ground.
     truth : xarray.Dataset
         ``lai`` and ``fpar`` over the ground of the pixels.
     detail : xarray.DataArray, dims (y, x)
@@ -59,7 +60,7 @@ def page(scenario, image, truth, detail, terrain, fits, versions):
         As `quicklook` takes them.
     detail : xarray.DataArray
     terrain : xarray.Dataset or None
-        ``dem``, ``slope``, ``kt`` and ``level`` over the pixels, and how far the elevation is known; None if flat.
+        ``dem``, ``slope`` and ``kt`` over the pixels, and how far the elevation is known; None if flat.
     fits : mapping of str to fifesim.analysis.regression.Regression
         Of the true means on NDVI.
     versions : mapping of str to str
@@ -136,7 +137,7 @@ def _parameters(scenario):
             if isinstance(value, dict):
                 value = ", ".join(f"{band} {number:g}" for band, number in value.items())
             elif isinstance(value, list):
-                value = ", ".join(value)
+                value = ", ".join(map(str, value)) or "none"
             elif isinstance(value, float):
                 value = f"{value:.10g}"
             elif isinstance(value, bool):
@@ -204,7 +205,7 @@ def _terrain_figure(image, terrain):
     _map_axes(axes[0])
     axes[0].set_title("Shaded relief and elevation")
     figure.colorbar(tint, ax=axes[0], shrink=0.8, label="m")
-    change = reflectance_change(image["dn"], terrain["level"], band)
+    change = reflectance_change(image["dn"], image["level"], band)
     reach = max(float(np.nanmax(np.abs(_limits_of(change)))), 1e-6)
     for axis, array, title, label, style in (
         (
@@ -283,7 +284,7 @@ def _histogram_figure(image, truth, detail):
 def _fit_figure(image, truth, fits):
     figure = Figure(figsize=(11, 4.4), layout="constrained")
     for axis, (name, fit) in zip(figure.subplots(1, len(fits), squeeze=False)[0], fits.items(), strict=True):
-        x, y = image["ndvi"].values.ravel(), truth[name].values.ravel()
+        y, x = (each.values.ravel() for each in matched(truth[name], image["ndvi"], "index"))
         valid = np.isfinite(x) & np.isfinite(y)
         points = axis.hexbin(x[valid], y[valid], gridsize=70, mincnt=1, bins="log", cmap="Greys", linewidths=0.1)
         figure.colorbar(points, ax=axis, shrink=0.8, label="pixels")

@@ -4,10 +4,12 @@ import importlib.metadata
 import platform
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from fifesim import grid as grids
 from fifesim import report
+from fifesim.analysis.pairs_raster import matched
 from fifesim.analysis.raster import regress
 from fifesim.export import to_geotiff
 from fifesim.folders import check_folder, whole_files
@@ -50,13 +52,15 @@ def simulate_to_folder(scenario, folder, *, overwrite=False):
     check_folder(folder, overwrite)
     complete = scenario.complete()
     tree = simulate(complete)
-    wanted = {name: tree[name].to_dataset() for name in ("image", "truth", "terrain") if name in tree.children}
+    wanted = {name: tree[name].to_dataset() for name in ("image", "truth", "terrain", "level") if name in tree.children}
     wanted["detail"] = _detail(tree)
     with ProgressBar("simulating"):
         # One pass for all: the cells are made once.
         done = xr.DataTree.from_dict(wanted).compute()
     image, truth, detail = done["image"].to_dataset(), done["truth"].to_dataset(), done["detail"]["lai"]
     terrain = done["terrain"].to_dataset() if "terrain" in done.children else None
+    if terrain is not None:
+        image["level"] = done["level"]["dn"]
     with whole_files(folder) as partial:
         to_geotiff(image["dn"], partial / "image.tif")
         to_geotiff(truth, partial / "truth.tif")
@@ -90,9 +94,11 @@ def _fits(image, truth):
         return {}
     fits = {}
     for name in truth.data_vars:
-        valid = (truth[name].notnull() & image["ndvi"].notnull()).sum()
-        if valid > 2 and float(image["ndvi"].std()) > 0:
-            fits[name] = regress(truth[name], image["ndvi"])
+        # By row and column: with an interval of its own, the image lies on other places than its truth.
+        known, ndvi = matched(truth[name], image["ndvi"], "index")
+        valid = int((np.isfinite(known.values) & np.isfinite(ndvi.values)).sum())
+        if valid > 2 and float(ndvi.std()) > 0:
+            fits[name] = regress(known, ndvi, pair="index")
     return fits
 
 

@@ -1,11 +1,10 @@
 """The scenario of a run: every number with its unit and range."""
 
-import re
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from fifesim import geometry, warp
 from fifesim import grid as grids
@@ -15,42 +14,11 @@ from fifesim.ground.dem import metres_per_unit
 from fifesim.ground.distribution import lai_distribution
 from fifesim.ground.leaf_angles import leaf_angle_classes
 from fifesim.ground.random_field import LARGEST_STREAMING_ARP
+from fifesim.scenario_section import Section as _Section
+from fifesim.scenario_section import number as _number
+from fifesim.scenario_section import text as _text
+from fifesim.scenario_sensor import Sensor
 from fifesim.sensor.instruments import instrument
-
-_QUANTITY = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
-
-
-def _number(default, unit, text, **limits):
-    """A number with its unit; None is a number that need not be given."""
-    return Field(default, description=text, json_schema_extra={"unit": unit}, allow_inf_nan=False, **limits)
-
-
-def _text(default, text):
-    return Field(default, description=text, json_schema_extra={"unit": ""})
-
-
-class _Section(BaseModel):
-    """A table of the scenario. A number may be written with its unit, ``"45 km"``; another unit is a mistake."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _strip_units(cls, values):
-        if not isinstance(values, dict):
-            raise ValueError(f"expected a table of keys, got {values!r}")
-        return {key: cls._in_unit(key, value) for key, value in values.items()}
-
-    @classmethod
-    def _in_unit(cls, key, value):
-        known = cls.model_fields.get(key)
-        unit = (known.json_schema_extra or {}).get("unit") if known else None
-        if not unit or not isinstance(value, str):
-            return value
-        match = _QUANTITY.fullmatch(value)
-        if match is None or match[2] not in ("", unit):
-            raise ValueError(f"{key} = {value!r}: {key} is in {unit}; write a number, or a number and {unit!r}")
-        return float(match[1])
 
 
 class Grid(_Section):
@@ -240,27 +208,6 @@ class Air(_Section):
     def model(self):
         """The atmosphere that these keys describe, a `fifesim.atmosphere.models.Atmosphere`."""
         return models.Atmosphere(**self.model_dump(exclude={"adjacency"}))
-
-
-class Sensor(_Section):
-    """The instrument."""
-
-    instrument: str = _text("TM", "see: fifesim sensors")
-    bands: list[str] = Field(["TM3", "TM4"], description="names of bands")
-    pixel: float | None = _number(None, "m", "size of a pixel; by default the instrument's gridded product", gt=0)
-    min_valid: float = _number(0.98, "1", "share of its footprint that a pixel needs on valid cells", ge=0, le=1)
-
-    @field_validator("bands")
-    @classmethod
-    def _some_bands(cls, value):
-        if not value:
-            raise ValueError("name at least one band")
-        return value
-
-    @model_validator(mode="after")
-    def _known_bands(self):
-        instrument(self.instrument).select(self.bands)
-        return self
 
 
 class Scenario(_Section):

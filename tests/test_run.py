@@ -76,3 +76,10 @@ def test_a_report_with_terrain_shows_it_and_says_how_far_it_is_known(tmp_path):
     assert page.count("data:image/png;base64,") == 5
     assert "north 0.9 km, east 0.9 km, south 0.9 km, west 0.9 km" in page
     assert "flint-hills" in (tmp_path / "hills" / "scenario.toml").read_text(encoding="utf-8")
+
+
+def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_path):
+    """The image lies 30.315 m apart and the truth 30 m, so that no coordinate of one is in the other."""
+    scenario = parse_scenario(SMALL | {"sensor": {"interval": "native"}, "terrain": {"dem": "flat"}})
+    simulate_to_folder(scenario, tmp_path / "own")
+    assert "What NDVI tells" in (tmp_path / "own" / "report.html").read_text(encoding="utf-8")

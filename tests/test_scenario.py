@@ -42,6 +42,8 @@ def test_default_is_the_paper_case_on_the_whole_site():
         {"ground": {"arp": 0.24, "seed": 2**63 - 1, "method": "periodic", "leaf_angles": "verhoef(-0.35,-0.15)"}},
         {"ground": {"background": {"TM3": 0.1, "TM4": 0.2}}, "sensor": {"pixel": 15.0, "min_valid": 0.5}},
         {"grid": {"cell": 1 / 3, "width": 60.0, "height": 60.0}},
+        {"sensor": {"instrument": "L4TM", "interval": "native", "offset": [0.5, -1.0], "noise": ["shot"], "seed": 4}},
+        {"sensor": {"interval": "30.5 m"}},
     ],
 )
 @pytest.mark.parametrize("complete", [False, True])
@@ -103,6 +105,13 @@ def test_number_may_carry_its_unit(tmp_path, written, value):
         ("[sensor]\ninstrument = 'TN'", "TM"),
         ("[sensor]\nbands = ['TM9']", "TM9"),
         ("[sensor]\nbands = []", "name at least one band"),
+        ("[sensor]\ninterval = 'natve'", "interval = 'natve': must be product or native, or metres above 0"),
+        ("[sensor]\ninterval = '30 km'", "interval is in m"),
+        ("[sensor]\ninterval = -3", "sensor.interval = -3"),
+        ("[sensor]\noffset = [1.0]", "sensor.offset"),
+        ("[sensor]\noffset = [nan, 0.0]", "two finite numbers"),
+        ("[sensor]\nnoise = ['shto']", "sensor.noise"),
+        ("[sensor]\nnoise = ['shot']", "the description of TM has no noise for TM3"),
         ("atmosphere = 3", "atmosphere"),
         ("[atmosphere", "scenario.toml is not valid TOML"),
     ],
