@@ -2,18 +2,15 @@
 
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, field_validator, model_validator
 
 from fifesim import geometry, warp
 from fifesim import grid as grids
 from fifesim.atmosphere import aerosols, models
-from fifesim.ground import optics
 from fifesim.ground.dem import metres_per_unit
-from fifesim.ground.distribution import lai_distribution
-from fifesim.ground.leaf_angles import leaf_angle_classes
-from fifesim.ground.random_field import LARGEST_STREAMING_ARP
+from fifesim.scenario_ground import Ground
 from fifesim.scenario_section import Section as _Section
 from fifesim.scenario_section import number as _number
 from fifesim.scenario_section import text as _text
@@ -30,63 +27,6 @@ class Grid(_Section):
     width: float = _number(15000.0, "m", "west to east", gt=0)
     height: float = _number(15000.0, "m", "north to south", gt=0)
     cell: float = _number(30 / 9, "m", "size of a cell", gt=0)
-
-
-class Ground(_Section):
-    """Leaf area, leaves and what lies below them."""
-
-    distribution: str = _text("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples")
-    arp: float = _number(0.15, "1", "autoregressive parameter; larger is smoother", ge=0, lt=0.25)
-    seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = Field(
-        7, description="of the random field, a whole number"
-    )
-    method: Literal["streaming", "periodic"] = _text("streaming", "streaming, or the paper's periodic (in memory)")
-    lai_file: str | None = _text(None, "a LAI map to use instead of a random field")
-    leaf_angles: str = _text("spherical", "leaf angle distribution")
-    hotspot: float = _number(0.0, "1", "leaf size over canopy height", ge=0)
-    fpar_inf: float = _number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
-    leaf_reflectance: dict[str, float] = Field({}, description="by band [1]; all bands or none")
-    leaf_transmittance: dict[str, float] = Field({}, description="by band [1]; all bands or none")
-    background: dict[str, float] = Field({}, description="reflectance below the canopy by band [1]; all bands or none")
-
-    @field_validator("distribution")
-    @classmethod
-    def _known_distribution(cls, value):
-        if not value.lower().endswith(".csv"):
-            lai_distribution(value)
-        return value
-
-    @field_validator("leaf_angles")
-    @classmethod
-    def _known_leaf_angles(cls, value):
-        leaf_angle_classes(value)
-        return value
-
-    @model_validator(mode="after")
-    def _streaming_limit(self):
-        if self.method == "streaming" and self.arp > LARGEST_STREAMING_ARP:
-            raise ValueError(
-                f'arp = {self.arp:g}: at most {LARGEST_STREAMING_ARP} when streaming; or method = "periodic"'
-            )
-        return self
-
-    def leaf_optics(self):
-        """
-        Leaf optics by band.
-
-        Returns
-        -------
-        optics : dict of str to (float, float), or None
-            Reflectance and transmittance; None for the table's. [1]
-
-        Raises
-        ------
-        ValueError
-            If only one of the two is given for a band.
-        """
-        if set(self.leaf_reflectance) != set(self.leaf_transmittance):
-            raise ValueError("ground.leaf_reflectance and ground.leaf_transmittance must name the same bands")
-        return {band: (value, self.leaf_transmittance[band]) for band, value in self.leaf_reflectance.items()} or None
 
 
 LAND_FORMS = ("flint-hills", "flat")
@@ -285,7 +225,7 @@ class Scenario(_Section):
             If the image would have fewer than 2 x 2 pixels, or the grid, optics or bands are not possible.
         """
         box = self.geobox()
-        names = [band.name for band in instrument(self.sensor.instrument).select(self.sensor.bands)]
+        bands = [band.response for band in instrument(self.sensor.instrument).select(self.sensor.bands)]
         a = box.affine
         if min(grids.aligned(box, self._pixel()).shape) < 2:
             raise ValueError(
@@ -299,18 +239,14 @@ class Scenario(_Section):
             height=-a.e * box.shape.y,
             cell=a.a,
         )
-        leaf_reflectance, leaf_transmittance = optics.leaf_optics(names, self.ground.leaf_optics())
-        background = optics.background(names, self.ground.background or None)
         ground = self.ground.model_copy(
-            update={
-                "leaf_reflectance": _by_band(names, leaf_reflectance),
-                "leaf_transmittance": _by_band(names, leaf_transmittance),
-                "background": _by_band(names, background),
+            update=self.ground.complete_optics(bands)
+            | {
                 "lai_file": _resolved("lai_file", self.ground.lai_file),
                 "distribution": _resolved("distribution", self.ground.distribution),
             }
         )
-        sensor = self.sensor.model_copy(update={"pixel": self._pixel(), "bands": names})
+        sensor = self.sensor.model_copy(update={"pixel": self._pixel(), "bands": [band.name for band in bands]})
         terrain = self.terrain.model_copy(update={"dem": _resolved("dem", self.terrain.dem)})
         return self.model_copy(update={"grid": grid, "ground": ground, "terrain": terrain, "sensor": sensor})
 
@@ -321,7 +257,3 @@ class Scenario(_Section):
 def _resolved(key, value):
     """A file by its full path, so that the scenario can be run from elsewhere."""
     return str(Path(value).resolve()) if value and names_a_file(key, value) else value
-
-
-def _by_band(names, values):
-    return {name: float(value) for name, value in zip(names, values, strict=True)}

@@ -173,7 +173,7 @@ def surface_reflectance(scenario, lai, instrument, dem=None, horizon=None):
         atmosphere=scenario.model_atmosphere(),
         geometry=scenario.sun_and_view(),
         leaf_optics=land.leaf_optics(),
-        background=land.background or None,
+        background=land.below_canopy(),
         leaf_angles=land.leaf_angles,
         hotspot=land.hotspot,
         upwelling=scenario.terrain.upwelling,
