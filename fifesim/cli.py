@@ -118,12 +118,13 @@ def sensors(
 
     try:
         if check is not None:
-            text = f"{describe(read_instrument(check))}\n{check} is right: every number has a source and its unit."
+            found = describe(read_instrument(check))
+            text = f"{found}\n{check} is right: every number has a source, and none looks like another unit."
         elif name is not None:
             text = describe(instrument(name))
         else:
             text = list_instruments([instrument(each) for each in instrument_names()])
-    except (ValueError, FileNotFoundError) as error:
+    except (ValueError, OSError) as error:
         _stop(error, Exit.MISTAKE)
     typer.echo(text)
 

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fifesim import grid as grids
+from fifesim.analysis.pairs_raster import matched
 from fifesim.sensor.raster import to_reflectance
 
 _NO_DATA = (0.85, 0.85, 0.85)
@@ -87,16 +88,18 @@ def map_figure(image, truth):
     return figure
 
 
-def terrain_figure(image, terrain):
+def terrain_figure(image, terrain, level):
     """
     Shaded relief, slope, Kt, and the image less that of level ground.
 
     Parameters
     ----------
     image : xarray.Dataset
-        ``dn``, of at least the pixels of ``terrain``.
+        ``dn``, of at least the pixels of ``level``.
     terrain : xarray.Dataset
-        ``dem``, ``slope``, ``kt`` and ``level``, in memory.
+        ``dem``, ``slope`` and ``kt``, in memory.
+    level : xarray.DataArray, dims (band, y, x)
+        Digital numbers on level ground, in memory.
 
     Returns
     -------
@@ -117,8 +120,8 @@ def terrain_figure(image, terrain):
     _map_axes(axes[0])
     axes[0].set_title("Shaded relief and elevation")
     figure.colorbar(tint, ax=axes[0], shrink=0.8, label="m")
-    dn = image["dn"].sel(y=terrain["y"], x=terrain["x"]).compute()
-    change = reflectance_change(dn, terrain["level"], band)
+    dn = image["dn"].sel(y=level["y"], x=level["x"]).compute()
+    change = reflectance_change(dn, level, band)
     reach = max(float(np.nanmax(np.abs(_limits_of(change)))), 1e-6)
     for axis, array, title, label, style in (
         (
@@ -224,7 +227,7 @@ def fit_figure(image, truth, fits):
     """
     figure = Figure(figsize=(11, 4.4), layout="constrained")
     for axis, (name, fit) in zip(figure.subplots(1, len(fits), squeeze=False)[0], fits.items(), strict=True):
-        x, y = image["ndvi"].values.ravel(), truth[name].values.ravel()
+        y, x = (each.values.ravel() for each in matched(truth[name], image["ndvi"], "index"))
         valid = np.isfinite(x) & np.isfinite(y)
         points = axis.hexbin(x[valid], y[valid], gridsize=70, mincnt=1, bins="log", cmap="Greys", linewidths=0.1)
         figure.colorbar(points, ax=axis, shrink=0.8, label="pixels")

@@ -47,9 +47,9 @@ def products_of(tree, zarr_path=None):
     rasters = {"image": tree["image"]["dn"], "lai": tree["truth"]["lai"], "fpar": tree["truth"]["fpar"]}
     rasters["detail"] = _middle_cells(tree["scene"]["lai"], tree["image"]["dn"])
     if "terrain" in tree.children:
-        terrain = tree["terrain"].to_dataset()
-        cut = {axis: _middle(terrain.sizes[axis], _TERRAIN) for axis in ("y", "x")}
-        rasters |= {f"terrain-{name}": array for name, array in terrain.isel(cut).data_vars.items()}
+        terrain = _shown(tree["terrain"].to_dataset())
+        rasters |= {f"terrain-{name}": array for name, array in terrain.data_vars.items()}
+        rasters["level"] = _shown(tree["level"]["dn"])
     arrays = {name: _one_chunk_of_bands(raster.data) for name, raster in rasters.items()}
     scene = {str(name): array for name, array in tree["scene"].data_vars.items()} if zarr_path else {}
     arrays |= {f"scene-{name}": _written(array.data, zarr_path, name) for name, array in scene.items()}
@@ -116,6 +116,11 @@ def make_scene_store(path, scene):
 def _middle(size, shown):
     first = max(size - shown, 0) // 2
     return slice(first, first + min(size, shown))
+
+
+def _shown(terrain):
+    """The part of terrain that the report shows."""
+    return terrain.isel({axis: _middle(terrain.sizes[axis], _TERRAIN) for axis in ("y", "x")})
 
 
 def _middle_cells(lai, image):

@@ -31,11 +31,11 @@ def quicklook(path, image, truth, detail):
     detail : xarray.DataArray, dims (y, x)
         LAI of the cells in the middle.
     """
-    figure = detail_figure(_thinned(image), _below(image, detail), detail)
+    figure = detail_figure(_thinned(image, _step(image)), _below(image, detail), detail)
     figure.savefig(path, dpi=_DPI, metadata={"Software": None})
 
 
-def page(scenario, image, truth, detail, terrain, fits, versions):
+def page(scenario, image, truth, detail, terrain, level, fits, versions):
     """
     One self-contained HTML page on a run.
 
@@ -46,7 +46,9 @@ def page(scenario, image, truth, detail, terrain, fits, versions):
         As `quicklook` takes them.
     detail : xarray.DataArray
     terrain : xarray.Dataset or None
-        ``dem``, ``slope``, ``kt`` and ``level`` over pixels, and how far the elevation is known; None if flat.
+        ``dem``, ``slope`` and ``kt`` over pixels, and how far the elevation is known; None if flat.
+    level : xarray.DataArray or None
+        Digital numbers on level ground, over as many pixels; None if flat.
     fits : mapping of str to fifesim.analysis.regression.Regression
         Of the true means on NDVI.
     versions : mapping of str to str
@@ -57,14 +59,16 @@ def page(scenario, image, truth, detail, terrain, fits, versions):
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string((Path(__file__).parent / _TEMPLATE).read_text(encoding="utf-8"))
-    shown, means = _thinned(image), _thinned(truth)
+    # Pixels and their truth are paired by row and column.
+    step = max(_step(image), _step(truth))
+    shown, means = _thinned(image, step), _thinned(truth, step)
     figures = {
         "detail": detail_figure(shown, _below(image, detail), detail),
         "maps": map_figure(shown, means),
         "histograms": histogram_figure(shown, means, detail),
     }
     if terrain is not None:
-        figures["terrain"] = terrain_figure(image, terrain)
+        figures["terrain"] = terrain_figure(image, terrain, level)
     if fits:
         figures["fits"] = fit_figure(shown, means, fits)
     return template.render(
@@ -78,9 +82,12 @@ def page(scenario, image, truth, detail, terrain, fits, versions):
     )
 
 
-def _thinned(rasters):
+def _step(rasters):
+    return -(-max(rasters.sizes[axis] for axis in ("y", "x")) // _MOST)
+
+
+def _thinned(rasters, step):
     """Every so many pixels, in memory: a picture shows no more, and numbers in text are of all of them."""
-    step = -(-max(rasters.sizes[axis] for axis in ("y", "x")) // _MOST)
     return rasters.isel({axis: slice(step // 2, None, step) for axis in ("y", "x")}).compute()
 
 
@@ -130,7 +137,7 @@ def _parameters(scenario):
             if isinstance(value, dict):
                 value = ", ".join(f"{band} {number:g}" for band, number in value.items())
             elif isinstance(value, list):
-                value = ", ".join(value)
+                value = ", ".join(map(str, value)) or "none"
             elif isinstance(value, float):
                 value = f"{value:.10g}"
             elif isinstance(value, bool):

@@ -15,6 +15,7 @@ import xarray as xr
 
 from fifesim import grid as grids
 from fifesim import report
+from fifesim.analysis.pairs_raster import matched
 from fifesim.analysis.raster import regress
 from fifesim.chain import ndvi
 from fifesim.export import to_geotiff
@@ -208,13 +209,14 @@ def _write_files(scenario, tree, found, folder):
     truth = xr.Dataset({name: saved[name] for name in ("lai", "fpar")})
     to_geotiff(image["dn"], folder / "image.tif")
     to_geotiff(truth, folder / "truth.tif")
-    terrain = None
+    terrain = level = None
     if "terrain" in tree.children:
+        level = saved["level"].compute()
         terrain = xr.Dataset({name: saved[f"terrain-{name}"].compute() for name in tree["terrain"].data_vars})
         terrain.attrs = dict(tree["terrain"].attrs)
     detail = saved["detail"].compute()
     report.quicklook(folder / "quicklook.png", image, truth, detail)
-    page = report.page(scenario, image, truth, detail, terrain, _fits(image, truth), _versions())
+    page = report.page(scenario, image, truth, detail, terrain, level, _fits(image, truth), _versions())
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "scenario.toml").write_text(write_scenario(scenario), encoding="utf-8")
 
@@ -226,9 +228,11 @@ def _fits(image, truth):
     spread = float(image["ndvi"].std())
     fits = {}
     for name in truth.data_vars:
-        valid = int((truth[name].notnull() & image["ndvi"].notnull()).sum())
+        # By row and column: with an interval of its own, the image lies on other places than its truth.
+        known, found = matched(truth[name], image["ndvi"], "index")
+        valid = int((known.variable.notnull() & found.variable.notnull()).sum())
         if valid > 2 and spread > 0:
-            fits[name] = regress(truth[name], image["ndvi"])
+            fits[name] = regress(known, found, pair="index")
     return fits
 
 

@@ -1,56 +1,21 @@
 """The scenario of a run: every number with its unit and range."""
 
-import re
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from fifesim import geometry, warp
 from fifesim import grid as grids
 from fifesim.atmosphere import aerosols, models
-from fifesim.ground import optics
 from fifesim.ground.dem import metres_per_unit
-from fifesim.ground.distribution import lai_distribution
-from fifesim.ground.leaf_angles import leaf_angle_classes
-from fifesim.ground.random_field import LARGEST_STREAMING_ARP
+from fifesim.scenario_ground import Ground
+from fifesim.scenario_section import Section as _Section
+from fifesim.scenario_section import number as _number
+from fifesim.scenario_section import text as _text
+from fifesim.scenario_sensor import Sensor
 from fifesim.sensor.instruments import instrument
-
-_QUANTITY = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
-
-
-def _number(default, unit, text, **limits):
-    """A number with its unit; None is a number that need not be given."""
-    return Field(default, description=text, json_schema_extra={"unit": unit}, allow_inf_nan=False, **limits)
-
-
-def _text(default, text):
-    return Field(default, description=text, json_schema_extra={"unit": ""})
-
-
-class _Section(BaseModel):
-    """A table of the scenario. A number may be written with its unit, ``"45 km"``; another unit is a mistake."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _strip_units(cls, values):
-        if not isinstance(values, dict):
-            raise ValueError(f"expected a table of keys, got {values!r}")
-        return {key: cls._in_unit(key, value) for key, value in values.items()}
-
-    @classmethod
-    def _in_unit(cls, key, value):
-        known = cls.model_fields.get(key)
-        unit = (known.json_schema_extra or {}).get("unit") if known else None
-        if not unit or not isinstance(value, str):
-            return value
-        match = _QUANTITY.fullmatch(value)
-        if match is None or match[2] not in ("", unit):
-            raise ValueError(f"{key} = {value!r}: {key} is in {unit}; write a number, or a number and {unit!r}")
-        return float(match[1])
 
 
 class Grid(_Section):
@@ -62,63 +27,6 @@ class Grid(_Section):
     width: float = _number(15000.0, "m", "west to east", gt=0)
     height: float = _number(15000.0, "m", "north to south", gt=0)
     cell: float = _number(30 / 9, "m", "size of a cell", gt=0)
-
-
-class Ground(_Section):
-    """Leaf area, leaves and what lies below them."""
-
-    distribution: str = _text("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples")
-    arp: float = _number(0.15, "1", "autoregressive parameter; larger is smoother", ge=0, lt=0.25)
-    seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = Field(
-        7, description="of the random field, a whole number"
-    )
-    method: Literal["streaming", "periodic"] = _text("streaming", "streaming, or the paper's periodic (in memory)")
-    lai_file: str | None = _text(None, "a LAI map to use instead of a random field")
-    leaf_angles: str = _text("spherical", "leaf angle distribution")
-    hotspot: float = _number(0.0, "1", "leaf size over canopy height", ge=0)
-    fpar_inf: float = _number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
-    leaf_reflectance: dict[str, float] = Field({}, description="by band [1]; all bands or none")
-    leaf_transmittance: dict[str, float] = Field({}, description="by band [1]; all bands or none")
-    background: dict[str, float] = Field({}, description="reflectance below the canopy by band [1]; all bands or none")
-
-    @field_validator("distribution")
-    @classmethod
-    def _known_distribution(cls, value):
-        if not value.lower().endswith(".csv"):
-            lai_distribution(value)
-        return value
-
-    @field_validator("leaf_angles")
-    @classmethod
-    def _known_leaf_angles(cls, value):
-        leaf_angle_classes(value)
-        return value
-
-    @model_validator(mode="after")
-    def _streaming_limit(self):
-        if self.method == "streaming" and self.arp > LARGEST_STREAMING_ARP:
-            raise ValueError(
-                f'arp = {self.arp:g}: at most {LARGEST_STREAMING_ARP} when streaming; or method = "periodic"'
-            )
-        return self
-
-    def leaf_optics(self):
-        """
-        Leaf optics by band.
-
-        Returns
-        -------
-        optics : dict of str to (float, float), or None
-            Reflectance and transmittance; None for the table's. [1]
-
-        Raises
-        ------
-        ValueError
-            If only one of the two is given for a band.
-        """
-        if set(self.leaf_reflectance) != set(self.leaf_transmittance):
-            raise ValueError("ground.leaf_reflectance and ground.leaf_transmittance must name the same bands")
-        return {band: (value, self.leaf_transmittance[band]) for band, value in self.leaf_reflectance.items()} or None
 
 
 LAND_FORMS = ("flint-hills", "flat")
@@ -242,27 +150,6 @@ class Air(_Section):
         return models.Atmosphere(**self.model_dump(exclude={"adjacency"}))
 
 
-class Sensor(_Section):
-    """The instrument."""
-
-    instrument: str = _text("TM", "see: fifesim sensors")
-    bands: list[str] = Field(["TM3", "TM4"], description="names of bands")
-    pixel: float | None = _number(None, "m", "size of a pixel; by default the instrument's gridded product", gt=0)
-    min_valid: float = _number(0.98, "1", "share of its footprint that a pixel needs on valid cells", ge=0, le=1)
-
-    @field_validator("bands")
-    @classmethod
-    def _some_bands(cls, value):
-        if not value:
-            raise ValueError("name at least one band")
-        return value
-
-    @model_validator(mode="after")
-    def _known_bands(self):
-        instrument(self.instrument).select(self.bands)
-        return self
-
-
 class Scenario(_Section):
     """
     What a run simulates; the defaults are the paper's case on the whole FIFE site.
@@ -338,7 +225,7 @@ class Scenario(_Section):
             If the image would have fewer than 2 x 2 pixels, or the grid, optics or bands are not possible.
         """
         box = self.geobox()
-        names = [band.name for band in instrument(self.sensor.instrument).select(self.sensor.bands)]
+        bands = [band.response for band in instrument(self.sensor.instrument).select(self.sensor.bands)]
         a = box.affine
         if min(grids.aligned(box, self._pixel()).shape) < 2:
             raise ValueError(
@@ -352,18 +239,14 @@ class Scenario(_Section):
             height=-a.e * box.shape.y,
             cell=a.a,
         )
-        leaf_reflectance, leaf_transmittance = optics.leaf_optics(names, self.ground.leaf_optics())
-        background = optics.background(names, self.ground.background or None)
         ground = self.ground.model_copy(
-            update={
-                "leaf_reflectance": _by_band(names, leaf_reflectance),
-                "leaf_transmittance": _by_band(names, leaf_transmittance),
-                "background": _by_band(names, background),
+            update=self.ground.complete_optics(bands)
+            | {
                 "lai_file": _resolved("lai_file", self.ground.lai_file),
                 "distribution": _resolved("distribution", self.ground.distribution),
             }
         )
-        sensor = self.sensor.model_copy(update={"pixel": self._pixel(), "bands": names})
+        sensor = self.sensor.model_copy(update={"pixel": self._pixel(), "bands": [band.name for band in bands]})
         terrain = self.terrain.model_copy(update={"dem": _resolved("dem", self.terrain.dem)})
         return self.model_copy(update={"grid": grid, "ground": ground, "terrain": terrain, "sensor": sensor})
 
@@ -374,7 +257,3 @@ class Scenario(_Section):
 def _resolved(key, value):
     """A file by its full path, so that the scenario can be run from elsewhere."""
     return str(Path(value).resolve()) if value and names_a_file(key, value) else value
-
-
-def _by_band(names, values):
-    return {name: float(value) for name, value in zip(names, values, strict=True)}

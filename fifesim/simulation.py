@@ -36,9 +36,9 @@ def simulate(scenario, chunks="auto"):
     run : xarray.DataTree
         Lazy. ``scene`` holds ``lai`` and ``surface_reflectance`` by cells, and ``dem`` where the ground is not flat;
         ``image`` the digital numbers ``dn`` and their ``ndvi``; ``truth`` the means of ``lai`` and ``fpar`` over the
-        ground of the pixels. With terrain, ``terrain`` holds ``dem``, ``slope`` and ``kt`` over the ground of the
-        pixels, and ``level``, the digital numbers on level ground; its attributes say how far the elevation is known
-        beyond the scene.
+        ground of the pixels of the gridded product, whatever the interval. With terrain, ``terrain`` holds ``dem``,
+        ``slope`` and ``kt`` over the same ground; its attributes say how far the elevation is known beyond the scene.
+        ``level`` holds the digital numbers on level ground.
 
     Raises
     ------
@@ -50,29 +50,32 @@ def simulate(scenario, chunks="auto"):
     grid, geometry = scenario.geobox(), scenario.sun_and_view()
     instrument = find_instrument(scenario.sensor.instrument)
     pixels = grids.aligned(grid, scenario.sensor.pixel or instrument.gsd)
-    min_valid = scenario.sensor.min_valid
+    interval, min_valid = scenario.sensor.interval, scenario.sensor.min_valid
+    taken = {"offset": scenario.sensor.offset, "noise": scenario.sensor.noise, "seed": scenario.sensor.seed}
+    taken |= {"onto": pixels} if interval == "product" else {"interval": interval}
 
     def sensed(reflectance):
         toa = chain.to_toa(reflectance, adjacency=scenario.atmosphere.adjacency)
-        return sensor.sense(toa, instrument, onto=pixels, min_valid=min_valid)
+        return sensor.sense(toa, instrument, min_valid=min_valid, **taken)
 
     def means(array):
         return analysis.aggregate(array, grids.cell_size(pixels)[0], min_valid=min_valid)
 
-    lai = _leaf_area(scenario, grid, chunks)
+    lai = leaf_area(scenario, grid, chunks)
     land = scenario.ground
     fpar = ground.fpar(lai, geometry=geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
-    level = _reflectance(scenario, lai, instrument)
+    level = surface_reflectance(scenario, lai, instrument)
     nodes = {"scene": {"lai": lai}, "truth": {"lai": means(lai), "fpar": means(fpar)}}
     dem, horizon, reach = elevation(scenario, grid, chunks)
     if dem is None:
         reflectance = level
     else:
-        reflectance = _reflectance(scenario, lai, instrument, dem=dem, horizon=horizon)
+        reflectance = surface_reflectance(scenario, lai, instrument, dem=dem, horizon=horizon)
         kt = chain.kt(level, dem, horizon=horizon)
         dem, slope = (_cut(raster, grid) for raster in (dem, terrain_raster.slope(dem)))
         nodes["scene"]["dem"] = dem
-        nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt), "level": sensed(level)}
+        nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt)}
+        nodes["level"] = {"dn": sensed(level)}
     nodes["scene"]["surface_reflectance"] = reflectance
     image = sensed(reflectance)
     nodes["image"] = {"dn": image} | ({"ndvi": chain.ndvi(image)} if _has_ndvi(image) else {})
@@ -145,14 +148,47 @@ def _check_sun(middle, around, horizon, geometry):
     terrain_raster.illumination(around.compute(), geometry, horizon.compute())
 
 
-def _leaf_area(scenario, grid, chunks):
+def leaf_area(scenario, grid, chunks=None):
+    """
+    Leaf area of a scenario.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.Scenario
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells.
+    chunks : mapping or int, optional
+        Makes it lazy.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+    """
     land = scenario.ground
     if land.lai_file:
         return ground.open_lai(land.lai_file, grid, chunks=chunks)
     return ground.lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
 
 
-def _reflectance(scenario, lai, instrument, **terrain):
+def surface_reflectance(scenario, lai, instrument, dem=None, horizon=None):
+    """
+    Reflectance of the ground of a scenario in the bands of its sensor.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.Scenario
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+    instrument : fifesim.sensor.instruments.Instrument
+    dem, horizon : xarray.DataArray, optional
+        From `elevation`; level ground without.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        [1]
+    """
     land = scenario.ground
     return chain.surface_reflectance(
         lai,
@@ -161,11 +197,12 @@ def _reflectance(scenario, lai, instrument, **terrain):
         atmosphere=scenario.model_atmosphere(),
         geometry=scenario.sun_and_view(),
         leaf_optics=land.leaf_optics(),
-        background=land.background or None,
+        background=land.below_canopy(),
         leaf_angles=land.leaf_angles,
         hotspot=land.hotspot,
         upwelling=scenario.terrain.upwelling,
-        **terrain,
+        dem=dem,
+        horizon=horizon,
     )
 
 

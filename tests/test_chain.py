@@ -279,6 +279,24 @@ def test_scenario_options_reach_their_stages():
     assert fifesim.Atmosphere.parse(image.attrs["atmosphere"]).visibility == 23
 
 
+def test_leaf_and_spectra_of_a_scenario_reach_the_canopy():
+    options = SMALL | {
+        "ground": {"leaf": {"chlorophyll": 55.0}, "background_spectra": {"soil_wet": 0.5, "golden_grass": 0.5}},
+        "sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]},
+    }
+    scenario = fifesim.Scenario.model_validate(options)
+    tree = fifesim.simulate(scenario)
+    rho = fifesim.surface_reflectance(
+        tree["scene"]["lai"],
+        "OLI",
+        bands=["OLI4", "OLI5"],
+        geometry=scenario.sun_and_view(),
+        leaf_optics=fifesim.Leaf(chlorophyll=55.0),
+        background={"soil_wet": 0.5, "golden_grass": 0.5},
+    )
+    np.testing.assert_array_equal(tree["image"]["dn"], fifesim.to_toa(rho).fifesim.sense("OLI"))
+
+
 def test_every_key_of_a_scenario_reaches_its_stage():
     """Each key differs from its default, so that one that is left out changes the bits."""
     bands = ["TM3", "TM4"]

@@ -103,6 +103,13 @@ def test_sensors_check_names_file_key_and_remedy_with_exit_code_2(invoke, tmp_pa
     assert len(result.stderr.strip().splitlines()) == 1
 
 
+def test_sensors_check_of_what_is_no_file_is_a_mistake(invoke, tmp_path):
+    result = invoke("sensors", "--check", str(tmp_path))
+    assert result.exit_code == 2
+    assert str(tmp_path) in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
 @pytest.mark.parametrize(("name", "said"), [("TN", "did you mean TM"), ("missing.toml", "no instrument file")])
 def test_sensors_of_no_such_instrument_is_a_mistake(invoke, name, said):
     result = invoke("sensors", name)

@@ -36,6 +36,8 @@ TIERS = (
     {"verification.__init__", "verification.deviations", "verification.listing"},
     {f"verification.{area}" for area in ("atmosphere", "canopy", "landscape", "sensor", "terrain")},
     {"verification.areas"},
+    {"scenario_section"},
+    {"scenario_ground", "scenario_sensor"},
     {"export", "scenario"},
     {"chain", "scenario_file"},
     {"comparison", "products", "simulation"},

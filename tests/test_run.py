@@ -118,3 +118,10 @@ def test_the_scene_holds_the_cells_in_shards(hills):
 
 def test_nothing_unfinished_stays(hills):
     assert sorted(path.name for path in hills.iterdir()) == sorted([*FILES, "scene.zarr"])
+
+
+def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_path):
+    """The image lies 30.315 m apart and the truth 30 m, so that no coordinate of one is in the other."""
+    scenario = parse_scenario(SMALL | {"sensor": {"interval": "native"}, "terrain": {"dem": "flat"}})
+    simulate_to_folder(scenario, tmp_path / "own")
+    assert "What NDVI tells" in (tmp_path / "own" / "report.html").read_text(encoding="utf-8")

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -42,6 +43,10 @@ def test_default_is_the_paper_case_on_the_whole_site():
         {"ground": {"arp": 0.24, "seed": 2**63 - 1, "method": "periodic", "leaf_angles": "verhoef(-0.35,-0.15)"}},
         {"ground": {"background": {"TM3": 0.1, "TM4": 0.2}}, "sensor": {"pixel": 15.0, "min_valid": 0.5}},
         {"grid": {"cell": 1 / 3, "width": 60.0, "height": 60.0}},
+        {"ground": {"leaf": {"chlorophyll": 40.0}, "background_spectra": {"soil_wet": 0.5, "shade": 0.5}}},
+        {"sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}},
+        {"sensor": {"instrument": "L4TM", "interval": "native", "offset": [0.5, -1.0], "noise": ["shot"], "seed": 4}},
+        {"sensor": {"interval": "30.5 m"}},
     ],
 )
 @pytest.mark.parametrize("complete", [False, True])
@@ -61,6 +66,16 @@ def test_complete_scenario_runs_the_same():
     assert complete.sensor.pixel == 30.0
     assert set(complete.ground.background) == {"TM3", "TM4"}
     assert complete.complete() == complete
+
+
+def test_complete_scenario_keeps_what_the_ground_is_made_of():
+    """Chemistry and spectra stay, with their defaults; optics by band would hide them."""
+    values = {"ground": {"leaf": {"brown": 0.1}, "background_spectra": {"soil_dry": 1.0}}}
+    ground = parse_scenario(SMALL | values).complete().ground
+    assert ground.leaf_optics() == fifesim.Leaf(brown=0.1)
+    assert set(ground.leaf) == {field.name for field in fields(fifesim.Leaf)}
+    assert ground.below_canopy() == fifesim.Background({"soil_dry": 1.0})
+    assert (ground.leaf_reflectance, ground.background) == ({}, {})
 
 
 def test_every_key_has_a_meaning_and_every_number_a_unit():
@@ -97,12 +112,30 @@ def test_number_may_carry_its_unit(tmp_path, written, value):
         ("[ground]\nseed = -1", "ground.seed = -1"),
         ("[ground]\nseed = 1.5", "ground.seed = 1.5"),
         ("[ground]\ndistribution = 'burnt'", "did you mean 'burned-"),
+        (
+            "[ground.leaf]\nchlorofyll = 40",
+            "unknown key 'chlorofyll': did you mean 'chlorophyll'? allowed are structure",
+        ),
+        ("[ground.leaf]\nwater = 12", "water must be in [0, 0.2] cm, got 12"),
+        (
+            "[ground.leaf]\nwater = 0.01\n[ground.leaf_reflectance]\nTM3 = 0.1",
+            "ground.leaf and ground.leaf_reflectance are both given: drop one",
+        ),
+        ("[ground.background_spectra]\nsoil = 1.0", "unknown spectrum 'soil': allowed are soil_dry, "),
+        ("[ground.background_spectra]\nsoil_dry = 0.9", "must add up to 1, got 0.9"),
         ("[ground]\nleaf_angles = 'sphere'", "ground.leaf_angles = 'sphere'"),
         ("[geometry]\nsza = 95", "geometry.sza = 95"),
         ("[atmosphere]\naerosol = 'maritim'", "aerosol = 'maritim': aerosol must be one of"),
         ("[sensor]\ninstrument = 'TN'", "TM"),
         ("[sensor]\nbands = ['TM9']", "TM9"),
         ("[sensor]\nbands = []", "name at least one band"),
+        ("[sensor]\ninterval = 'natve'", "interval = 'natve': must be product or native, or metres above 0"),
+        ("[sensor]\ninterval = '30 km'", "interval is in m"),
+        ("[sensor]\ninterval = -3", "sensor.interval = -3"),
+        ("[sensor]\noffset = [1.0]", "sensor.offset"),
+        ("[sensor]\noffset = [nan, 0.0]", "two finite numbers"),
+        ("[sensor]\nnoise = ['shto']", "sensor.noise"),
+        ("[sensor]\nnoise = ['shot']", "the description of TM has no noise for TM3"),
         ("atmosphere = 3", "atmosphere"),
         ("[atmosphere", "scenario.toml is not valid TOML"),
     ],

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import rasterio
+import xarray as xr
 from lazy import no_compute
 
 import fifesim
@@ -61,7 +62,7 @@ def test_terrain_goes_through_the_chain_written_out(hill):
     horizon = fifesim.horizon(around, reach=900)
     sloped = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], dem=dem, horizon=horizon)
     np.testing.assert_array_equal(tree["image"]["dn"], fifesim.sense(fifesim.to_toa(sloped)))
-    np.testing.assert_array_equal(tree["terrain"]["level"], fifesim.sense(fifesim.to_toa(level)))
+    np.testing.assert_array_equal(tree["level"]["dn"], fifesim.sense(fifesim.to_toa(level)))
     np.testing.assert_array_equal(tree["terrain"]["dem"], fifesim.aggregate(dem, 30))
     kt = fifesim.kt(level, dem, horizon=horizon)
     np.testing.assert_array_equal(tree["terrain"]["kt"], fifesim.aggregate(kt, 30))
@@ -155,3 +156,12 @@ def test_elevation_of_a_file_goes_to_other_processes(hill):
 def test_what_is_for_a_file_is_refused_without_one(options):
     with pytest.raises(ValueError, match="elevation file"):
         scenario(**options)
+
+
+def test_keys_of_the_sensor_are_those_of_sense():
+    keys = {"instrument": "L4TM", "interval": 31.0, "offset": [0.25, -0.5], "noise": ["shot", "thermal"], "seed": 3}
+    case = parse_scenario({"grid": GRID, "terrain": {"dem": "flat"}, "sensor": keys})
+    lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
+    toa = fifesim.to_toa(fifesim.surface_reflectance(lai, "L4TM", bands=["TM3", "TM4"]), instrument="L4TM")
+    image = fifesim.sense(toa, "L4TM", interval=31.0, offset=(0.25, -0.5), noise=("shot", "thermal"), seed=3)
+    xr.testing.assert_identical(fifesim.simulate(case)["image"]["dn"].drop_attrs(), image.drop_attrs())

@@ -3,7 +3,7 @@ One scene through many sensors, and their noise
 ===============================================
 
 The same leaf area index, seen in red and near infrared by five instruments, each on its own pixels. Leaves and soil
-have the optics of the nearest TM band in each.
+are the same for all: their spectra, averaged over the response of each band.
 """
 
 import matplotlib.pyplot as plt

@@ -55,4 +55,5 @@ def snr(instrument, band, radiance):
 
 def _noise_of(instrument, band):
     description = find_instrument(instrument)
-    return description.noise_model(*description.select(band))
+    (found,) = description.select([band])
+    return description.noise_model(found)
