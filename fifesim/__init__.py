@@ -28,6 +28,7 @@ _PUBLIC = {
     "arp_for_length": "ground.random_field",
     "aspect": "ground.terrain_raster",
     "autocovariance": "analysis.variogram_raster",
+    "budget": "experiments.scatter",
     "compare": "comparison",
     "correlation_length": "ground.random_field",
     "density": "analysis.scaling_raster",

@@ -99,6 +99,31 @@ def reproduce(
 
 
 @app.command()
+def budget(
+    scenario: Annotated[Path | None, typer.Argument(help="TOML file; the paper's case by default.")] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("budget"),
+    realisations: Annotated[int, typer.Option(help="How many scenes.")] = 20,
+    cells: Annotated[int, typer.Option(help="Along the edge of a scene.")] = 333,
+    seed: Annotated[int | None, typer.Option(help="Of the first scene; the scenario's by default.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+):
+    """Find where the scatter comes from, stage by stage: budget.csv, budget.png, report.html, scenario.toml."""
+    from fifesim.experiments.scatter_run import budget_to_folder
+    from fifesim.scenario_file import read_scenario
+
+    try:
+        found = None if scenario is None else read_scenario(scenario)
+        options = {"realisations": realisations, "cells": cells, "seed": seed}
+        files = budget_to_folder(found, output, overwrite=overwrite, **options)
+    except ValueError as error:
+        _stop(error, Exit.MISTAKE)
+    except (OSError, MemoryError) as error:
+        _stop(error, Exit.FAILURE)
+    for path in files:
+        typer.echo(path)
+
+
+@app.command()
 def scenario():
     """Print the default scenario, every key with its unit, to edit."""
     from fifesim.scenario import Scenario

@@ -45,11 +45,11 @@ TIERS = (
     {"figures"},
     {"report"},
     {"estimates", "run"},
-    {"experiments.friedl1995"},
-    {"experiments.friedl1995_table"},
+    {"experiments.friedl1995", "experiments.stages"},
+    {"experiments.friedl1995_table", "experiments.scatter"},
     {"experiments.friedl1995_effects", "experiments.friedl1995_figures"},
-    {"experiments.friedl1995_report"},
-    {"experiments.reproduction"},
+    {"experiments.friedl1995_report", "experiments.scatter_report"},
+    {"experiments.reproduction", "experiments.scatter_run"},
     {"cli"},
 )
 # What knows neither labels nor dask, beside the physics.
