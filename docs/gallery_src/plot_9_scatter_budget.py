@@ -2,8 +2,8 @@
 Where the scatter comes from
 ============================
 
-A budget of what a line on NDVI leaves of the variance of LAI: each stage switched to its ideal, in every combination and
-with the same random numbers. Landsat-4's Thematic Mapper has published noise, so that every stage is at work.
+A budget of what a line on NDVI leaves of the variance of LAI: each stage switched to its ideal, in every combination
+and with the same random numbers. Landsat-4's Thematic Mapper has published noise, so that every stage is at work.
 """
 
 import matplotlib.pyplot as plt
@@ -23,7 +23,8 @@ budgets = {
 
 figure, axis = plt.subplots(figsize=(9, 5), layout="constrained")
 stages = budgets[arps[0]]["stage"].values
-for k, (arp, color, hatch) in enumerate(zip(arps, ("#0072B2", "#E69F00", "#009E73"), ("", "////", "...."), strict=True)):
+colors, hatches = ("#0072B2", "#E69F00", "#009E73"), ("", "////", "....")
+for k, (arp, color, hatch) in enumerate(zip(arps, colors, hatches, strict=True)):
     one = budgets[arp].sel(variable="lai")
     share, error = (100 * one["share"].mean("realisation"), 100 * one["share"].std("realisation", ddof=1) / np.sqrt(3))
     label = f"arp {arp:g}: {100 * float(one['total'].mean()):.0f} % in all"
