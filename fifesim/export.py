@@ -23,6 +23,7 @@ from rasterio.windows import Window
 
 from fifesim import cf
 from fifesim import grid as grids
+from fifesim.geometry import ANGLES
 
 # GDAL's own block size for cloud-optimised files.
 _BLOCK = 512
@@ -57,7 +58,7 @@ def to_geotiff(raster, path):
     Notes
     -----
     Bands have names, units, scale and offset, and ``CENTRAL_WAVELENGTH_UM`` in the ``IMAGERY`` domain where there is a
-    wavelength; attributes and the sun are tags.
+    wavelength; attributes and the sun are tags. Angles that vary over the cells are not written, which is a warning.
     """
     path = Path(path)
     array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
@@ -67,6 +68,13 @@ def to_geotiff(raster, path):
     array = array.transpose("band", "y", "x")
     grid = grids.geobox(array)
     _check_room(array, path)
+    varying = [name for name in ANGLES if name in array.coords and array.coords[name].ndim]
+    if varying:
+        warnings.warn(
+            f"{path.name} leaves out {', '.join(varying)}, which vary over the cells, and another geometry would be "
+            "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()",
+            stacklevel=2,
+        )
     with _whole(path) as (streamed, finished), _errors_of_gdal(path):
         _stream(array, grid, streamed, described=raster)
         rasterio.shutil.copy(

@@ -164,6 +164,12 @@ def test_write_that_fails_leaves_things_as_they_were(image, tmp_path, before):
     assert not before or path.read_text() == before
 
 
+def test_angles_that_a_geotiff_cannot_hold_are_said(image, tmp_path):
+    swath = image.assign_coords(vza=(("y", "x"), np.full(image.shape[1:], 20.0)))
+    with pytest.warns(UserWarning, match=r"swath.tif leaves out vza, which vary over the cells.* give geometry="):
+        export.to_geotiff(swath, tmp_path / "swath.tif")
+
+
 def test_what_is_no_raster_is_refused(image, lai, tmp_path):
     with pytest.raises(ValueError, match="no CRS"):
         fifesim.to_geotiff(lai.drop_vars("spatial_ref"), tmp_path / "lai.tif")

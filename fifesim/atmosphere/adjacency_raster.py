@@ -259,6 +259,8 @@ def _surroundings(surroundings, array, along):
     if isinstance(surroundings, xr.DataArray) and {"y", "x"} <= set(surroundings.dims):
         margin, outer = _outer(surroundings, array, along)
         return margin, [None] * bands, outer
+    if isinstance(surroundings, xr.DataArray) and "band" in surroundings.dims:
+        surroundings = _same_bands(surroundings, array)
     numbers = _per_band(surroundings, array, "surroundings")
     if not np.all((numbers >= 0) & (numbers <= 1)):
         raise ValueError(f"surroundings must be reflectances from 0 to 1, got {numbers.tolist()}")
@@ -309,7 +311,7 @@ def _outer_axis(along, origin, cell, outer_origin, outer_cell, outer_cells):
 
 
 def _same_bands(surroundings, array):
-    """A raster with the bands of the scene; one layer stands for all."""
+    """Surroundings with the bands of the scene; one layer stands for all."""
     if "band" not in surroundings.dims:
         surroundings = surroundings.drop_vars("band", errors="ignore")
         return surroundings.expand_dims(band=array.sizes["band"])

@@ -58,12 +58,15 @@ def varying_reflectance(reflectance, altitude, sza, saa, vza, vaa, *, atmosphere
     Raises
     ------
     ValueError
-        If an angle or altitude is out of the range of the model.
+        If an angle or altitude is out of the range of the model, or :math:`\rho S \ge 1`, where the multiple
+        reflections do not converge.
 
     Notes
     -----
     The terms of `terms.BandTerms` are interpolated, by cubics every 2.5 degrees of zenith and 5 of azimuth and
-    linearly every 0.5 km, which leaves less than 1e-4 of apparent reflectance for zenith angles within 70 degrees.
+    linearly every 0.5 km. For zenith angles within 70 degrees, continental aerosol and 45 km, that leaves less than
+    1e-4 of apparent reflectance further than 10 degrees from backscatter and 1e-3 nearer. The glory of the aerosol is
+    narrower than the lattice: in maritime haze of 5 km .002 are left within 20 degrees of backscatter and .01 at it.
 
     References
     ----------
@@ -85,6 +88,12 @@ def varying_reflectance(reflectance, altitude, sza, saa, vza, vaa, *, atmosphere
     out = np.empty((reflectance.shape[-1], int(np.prod(cells))))
     values = np.ascontiguousarray(reflectance, float).reshape(-1, reflectance.shape[-1])
     _through(values, *places, lattices, *tables, to_surface, out)
+    # The kernel marks what does not converge.
+    if np.any(np.isinf(out)):
+        raise ValueError(
+            "surface_reflectance times spherical_albedo must be below 1 in every cell, got a reflectance of "
+            f"{np.nanmax(values):g}: reflectance is a fraction, not a percentage"
+        )
     return out.reshape(-1, *cells)
 
 
@@ -233,5 +242,7 @@ def _through(reflectance, altitude, sza, vza, raa, lattices, path, down, up, alb
             if to_surface:
                 ground = (rho / terms[4, b] - terms[0, b]) / two_way
                 out[b, cell] = ground / (1 + terms[3, b] * ground)
+            elif terms[3, b] * rho >= 1:
+                out[b, cell] = np.inf
             else:
                 out[b, cell] = terms[4, b] * (terms[0, b] + two_way * rho / (1 - terms[3, b] * rho))

@@ -302,3 +302,5 @@ def test_surroundings_are_found_by_the_name_of_their_band(scene):
     around = raster(np.stack([np.full((9, 9), value) for value in (0.5, 0.1, 0.3)]), 3000.0)
     named = around.assign_coords(band=["TM4", "TM3", "TM1"])
     xr.testing.assert_identical(environment(scene, named), environment(scene, around[[2, 1]]))
+    numbers = xr.DataArray([0.1, 0.3], {"band": ["TM3", "TM1"]})
+    xr.testing.assert_identical(environment(scene, numbers), environment(scene, [0.3, 0.1]))

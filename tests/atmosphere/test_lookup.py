@@ -80,6 +80,13 @@ def test_a_cell_out_of_range_is_named(index, value, message):
         varying_reflectance(*scene, atmosphere=Atmosphere(), bands=BANDS)
 
 
+def test_reflectance_in_percent_is_refused():
+    """Beyond a reflectance of 1/S the formula gives finite numbers of no meaning."""
+    rho, *places = cells(4, 60)
+    with pytest.raises(ValueError, match=r"below 1 in every cell, got a reflectance of .*not a percentage"):
+        varying_reflectance(100 * rho, *places, atmosphere=Atmosphere(), bands=BANDS)
+
+
 def test_higher_ground_has_less_air_above():
     rho = np.full((2, len(BANDS)), 0.05)
     places = [np.array(value) for value in (30.0, 0.0, 0.0, 0.0)]
