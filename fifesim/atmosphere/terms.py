@@ -183,7 +183,7 @@ def _views_first(values):
 
 
 def _one_band(scattering, nodes, atmosphere, band, sza, vza):
-    wavelength, weight = _steps(band.limits)
+    wavelength, weight = _steps(band.limits, band.name)
     light = on_wavelengths(scattering, nodes, wavelength)
     air_mass = 1 / np.cos(np.radians(sza)) + 1 / np.cos(np.radians(vza))[:, None]
     gas, dry = (
@@ -218,9 +218,14 @@ def _one_band(scattering, nodes, atmosphere, band, sza, vza):
 
 
 @lru_cache(maxsize=256)
-def _steps(limits):
+def _steps(limits, name):
     """Wavelengths of the gas table that cover a band, and the solar irradiance of their steps."""
     table = gases.table_wavelengths()
+    if limits[0] < table[0] or limits[1] > table[-1]:
+        raise ValueError(
+            f"band {name} spans {limits[0]:g} to {limits[1]:g} um, "
+            f"the gas tables only {table[0]:g} to {table[-1]:g} um: leave it out"
+        )
     first, last = np.searchsorted(table, limits[0], side="right") - 1, np.searchsorted(table, limits[1])
-    used = slice(max(first, 0), last + 1)
+    used = slice(first, last + 1)
     return table[used], solar_irradiance_steps(table)[used]
