@@ -29,7 +29,8 @@ def sweep(scenario, axes, measures=None, *, pair="coordinates"):
     axes : mapping
         By name, the values of a key of the scenario, such as ``{"arp": [0.05, 0.15], "visibility": [10, 45]}``; a key
         that several sections have is written ``"ground.seed"``. Or by any name a pair of values and a function that
-        takes a Scenario and a value and gives a Scenario.
+        takes a Scenario and a value and gives a Scenario. Values that are lists, such as an ``offset``, stand in the
+        coordinate as text: "0.2, 0.0".
     measures : mapping of str to callable, optional
         Each takes the run, an `xarray.DataTree` with ``image`` and ``truth`` in memory, and gives a number. By default
         the regressions of true LAI and FPAR on NDVI.
@@ -45,7 +46,7 @@ def sweep(scenario, axes, measures=None, *, pair="coordinates"):
     Raises
     ------
     ValueError
-        If an axis is no key of the scenario, or a value is not allowed.
+        If an axis has no values or is no key
 
     Examples
     --------
@@ -71,7 +72,7 @@ def sweep(scenario, axes, measures=None, *, pair="coordinates"):
     # Statistics first, then the axes.
     found = da.stack(points, axis=1).reshape(shape[0], *sizes, *shape[1:])
     dims = (*steps, *(("variable",) if measures is None else ()))
-    coordinates = {name: (name, list(values), _meaning(name, axes[name])) for name, (values, _) in steps.items()}
+    coordinates = {name: (name, _labels(values), _meaning(name, axes[name])) for name, (values, _) in steps.items()}
     if measures is None:
         coordinates["variable"] = list(VARIABLES)
     return xr.Dataset({name: (dims, found[k]) for k, name in enumerate(names)}, coords=coordinates)
@@ -90,17 +91,27 @@ def _point(scenario, measures, pair):
 
 def _axis(name, given):
     """Values of an axis, and the function that puts one into a scenario."""
+    values = given[0] if _has_function(given) else given
+    if isinstance(values, str) or not np.iterable(values) or not len(list(values)):
+        raise ValueError(f"the axis {name!r} needs a list of values, got {values!r}: write [value], even for one")
     if _has_function(given):
-        return list(given[0]), given[1]
+        return list(values), given[1]
     section, key = _place(name)
 
     def change(scenario, value):
         values = scenario.model_dump(exclude_unset=True)
         # numpy's numbers are not what a scenario takes.
-        plain = value.item() if isinstance(value, np.generic) else value
+        plain = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
         return parse_scenario(values | {section: values.get(section, {}) | {key: plain}})
 
     return list(given), change
+
+
+def _labels(values):
+    """Values as a coordinate: text where they are lists, which have no place along one dimension."""
+    if all(np.ndim(value) == 0 for value in values):
+        return values
+    return [", ".join(str(part) for part in np.ravel(value).tolist()) or "none" for value in values]
 
 
 def _meaning(name, given):

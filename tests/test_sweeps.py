@@ -71,6 +71,9 @@ def test_axis_may_be_a_function(small):
         ({"seed": [1, 2]}, r"several sections: write ground\.seed or terrain\.seed"),
         ({"visibilty": [10]}, "'visibilty' is no key of a scenario"),
         ({"arp": [0.3]}, "less than 0.25"),
+        ({"arp": 0.15}, "needs a list of values, got 0.15"),
+        ({"instrument": "TM"}, "needs a list of values, got 'TM'"),
+        ({"arp": []}, "needs a list of values"),
         ({"sensor.arp": [0.1]}, "no key of a scenario"),
     ],
 )
@@ -87,3 +90,14 @@ def test_sections_are_named_where_a_key_is_in_several(small):
 def test_sweep_takes_a_scenario():
     with pytest.raises(TypeError, match="takes a Scenario, got dict"):
         fifesim.sweep({}, {"arp": [0.1]})
+
+
+@pytest.mark.parametrize("offsets", [[[0.0, 0.0], [0.3, 0.0]], np.array([[0.0, 0.0], [0.3, 0.0]])])
+def test_values_of_an_axis_may_be_lists(small, offsets):
+    sensor = {"sensor": {"instrument": "L4TM", "bands": ["TM3", "TM4"]}}
+    scenario = parse_scenario(small.model_dump(exclude_unset=True) | sensor)
+    found = fifesim.sweep(scenario, {"offset": offsets, "noise": [[], ["shot", "thermal"]]})
+    assert found["offset"].values.tolist() == ["0.0, 0.0", "0.3, 0.0"]
+    assert found["noise"].values.tolist() == ["none", "shot, thermal"]
+    r2 = found.r2.sel(variable="lai", noise="none")
+    assert float(r2.sel(offset="0.3, 0.0")) < float(r2.sel(offset="0.0, 0.0"))

@@ -81,13 +81,18 @@ def inversion_error(estimate, truth, *, pair="coordinates"):
     Raises
     ------
     ValueError
-        If the rasters do not match, or no pixel has both.
+        If the rasters do not match, no pixel has both, or a Dataset is not as `invert` gives it.
     """
     if isinstance(estimate, xr.DataArray):
         maps = [estimate] * 3
     else:
-        (variable,) = set(estimate.data_vars) - set(_LIMITS)
-        maps = [estimate[name] for name in (variable, *_LIMITS)]
+        variables = [name for name in estimate.data_vars if name not in _LIMITS]
+        if len(variables) != 1 or not set(_LIMITS) <= set(estimate.data_vars):
+            raise ValueError(
+                f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
+                "give a single map as a DataArray"
+            )
+        maps = [estimate[name] for name in (*variables, *_LIMITS)]
     matched_maps = [matched(each, truth, pair) for each in maps]
     arrays = [matched_maps[0][1], *(each for each, _ in matched_maps)]
     n, total, squares, inside = (

@@ -73,6 +73,11 @@ class Regression:
         -------
         low, high : array, shape of x
 
+        Raises
+        ------
+        ValueError
+            If the level is not between 0 and 1.
+
         References
         ----------
         [Draper1998]_, Section 3.1
@@ -93,6 +98,11 @@ class Regression:
         -------
         low, high : array, shape of x
 
+        Raises
+        ------
+        ValueError
+            If the level is not between 0 and 1.
+
         References
         ----------
         [Draper1998]_, Section 3.1
@@ -100,6 +110,8 @@ class Regression:
         return self._interval(x, level, 1.0)
 
     def _interval(self, x, level, own_scatter):
+        if not 0 < level < 1:
+            raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 is a confidence of 95 %")
         x = np.asarray(x, float)
         leverage = own_scatter + 1.0 / self.n + (x - self.x_mean) ** 2 / self.x_sum_of_squares
         half = stats.t.ppf(0.5 + level / 2, self.n - 2) * self.residual_deviation * np.sqrt(leverage)
@@ -114,7 +126,7 @@ def row_sums(y, x, y_origin, x_origin):
     Parameters
     ----------
     y, x : array, shape (rows, columns)
-        NaN where missing.
+        Not finite where missing.
     y_origin, x_origin : float
         Values near the means, subtracted first so that no digits cancel.
 
@@ -127,7 +139,7 @@ def row_sums(y, x, y_origin, x_origin):
     for i in range(y.shape[0]):
         for j in range(y.shape[1]):
             a, b = x[i, j] - x_origin, y[i, j] - y_origin
-            if a == a and b == b:
+            if np.isfinite(a) and np.isfinite(b):
                 sums[i, 0] += 1.0
                 sums[i, 1] += a
                 sums[i, 2] += b

@@ -46,7 +46,10 @@ def scale_bias(algorithm, array, pixel=30.0):
     bias = chunks.pointwise(np.subtract, of_cells, of_mean)
     found = {"mean_of_algorithm": of_cells, "algorithm_of_mean": of_mean, "bias": bias}
     out = xr.Dataset({name: values.rename(name) for name, values in found.items()})
-    out["bias"].attrs = {"long_name": "mean of the algorithm less the algorithm of the mean", "units": "1"}
+    out["bias"].attrs = {
+        "long_name": "mean of the algorithm less the algorithm of the mean",
+        "units": of_cells.attrs.get("units", "1"),
+    }
     return out
 
 
@@ -80,6 +83,8 @@ def ndvi_bias(reflectance, pixel=30.0):
     fifesim.analysis.scaling.ndvi_hessian
     """
     red, nir = red_and_nir(reflectance)
+    # Moments of the same cells: a cell that lacks one band has no NDVI.
+    red, nir = red.where(nir.notnull()), nir.where(red.notnull())
     means = [aggregate(array, pixel) for array in (red, nir, red * red, red * nir, nir * nir)]
     out = grids.place(chunks.pointwise(_ndvi_bias, *means), grids.geobox(means[0]))
     return cf.label(out, "ndvi_bias", source=reflectance, history=f"ndvi_bias: second order, {pixel:g} m")
@@ -105,11 +110,20 @@ def fpar_bias(lai, extinction, fpar_inf=0.94, pixel=30.0):
     bias : xarray.DataArray, dims (y, x)
         To second order; never positive. [1]
 
+    Raises
+    ------
+    ValueError
+        If the extinction or fpar_inf is not allowed.
+
     See Also
     --------
     fifesim.analysis.scaling.beer_bias
     """
     cf.check_quantity(lai, "lai")
+    if not 0 < extinction < np.inf:
+        raise ValueError(f"extinction must be positive, got {extinction:g}: it is K of Eq. 6, about 0.5")
+    if not 0 < fpar_inf <= 1:
+        raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
     means = [aggregate(array, pixel) for array in (lai, lai * lai)]
     bias = chunks.pointwise(_fpar_bias, *means, extinction=float(extinction), fpar_inf=float(fpar_inf))
     out = grids.place(bias, grids.geobox(means[0]))

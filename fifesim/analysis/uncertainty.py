@@ -70,7 +70,7 @@ def increment_sums(variable, ndvi, first, width, increments, ndvi_origin):
     for i in range(variable.shape[0]):
         for j in range(variable.shape[1]):
             value, index = variable[i, j], ndvi[i, j] - ndvi_origin
-            if value != value or index != index:
+            if not (np.isfinite(value) and np.isfinite(index)):
                 continue
             k = int(np.floor(value / width)) - first
             if 0 <= k < increments:

@@ -57,11 +57,13 @@ def relative_equivalent_noise(variable, ndvi, increment=0.1, *, slope=None, min_
     variable, ndvi = matched(variable, ndvi, pair)
     if slope is None:
         slope = regress(ndvi, variable, pair="index").slope
-    low, high = dask.compute(variable.min(), variable.max())
-    first, last = (int(np.floor(float(limit) / increment)) for limit in (low, high))
+    low, high = (float(limit) for limit in dask.compute(variable.min(), variable.max()))
+    if not (np.isfinite(low) and np.isfinite(high)):
+        raise ValueError(f"the variable goes from {low:g} to {high:g}: relative noise needs finite values")
+    first, last = (int(np.floor(limit / increment)) for limit in (low, high))
     if last - first >= _MOST_INCREMENTS:
         raise ValueError(
-            f"increment {increment:g} cuts {float(low):g} to {float(high):g} into {last - first + 1} parts: "
+            f"increment {increment:g} cuts {low:g} to {high:g} into {last - first + 1} parts: "
             f"take a larger one, at most {_MOST_INCREMENTS} parts"
         )
     increments = last - first + 1

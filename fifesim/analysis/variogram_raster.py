@@ -89,12 +89,15 @@ def variogram(array, reach):
     Raises
     ------
     ValueError
-        As in `autocovariance`, and if the cells are not square.
+        As in `autocovariance`, and if the cells are not square or their values do not vary.
     """
     down, across = grids.cell_size(grids.geobox(array))
     if abs(down - across) > 1e-6 * across:
         raise ValueError(f"a variogram by distance needs square cells, got {down:g} x {across:g} m: use autocovariance")
     lags = autocovariance(array, reach)
+    low, high = (float(limit) for limit in dask.compute(array.min(), array.max()))
+    if not high > low:
+        raise ValueError(f"a correlation needs values that vary, got {low:g} to {high:g}: use autocovariance")
     along = xr.concat(
         [
             lags.sel(lag_y=0.0, drop=True).sel(lag_x=slice(0, None)).rename(lag_x="lag"),

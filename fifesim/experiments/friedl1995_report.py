@@ -62,7 +62,7 @@ def page(case, table, text, effects, figures, run, versions):
         effects={name: each.to_dict("records") for name, each in effects.items()},
         figures=encoded, captions=CAPTIONS, run=run, versions=versions, readings=friedl1995.READINGS,
         used=friedl1995.USED, interval=case.instrument.ground_interval, cell=friedl1995.CELL, pixel=friedl1995.PIXEL,
-        optics=case.leaf_optics, drift=_drift(case),
+        standard_cells=friedl1995.CELLS, optics=case.leaf_optics, drift=_drift(case),
         relief=_named(effects["readings"], "native interval with relief"),
         aligned_relief=_named(effects["readings"], "aligned with relief"),
     )  # fmt: skip

@@ -112,3 +112,19 @@ def test_too_few_pairs_or_no_spread_are_refused():
         line(Y[:1, :2], X[:1, :2])
     with pytest.raises(ValueError, match=r"all 600 values of x are 0\.5"):
         line(Y, np.full_like(X, 0.5))
+
+
+def test_infinite_values_are_left_out():
+    """1 / 0 is no value of an index: it may not turn a whole line into NaN."""
+    x, y = X.copy(), Y.copy()
+    x[0, 0], y[3, 4], y[5, 6] = np.inf, np.inf, -np.inf
+    kept = np.isfinite(x) & np.isfinite(y)
+    theirs = stats.linregress(x[kept], y[kept])
+    assert line(y, x).n == kept.sum() == X.size - 3
+    assert line(y, x).slope == pytest.approx(theirs.slope, rel=1e-12)
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, 95])
+def test_impossible_levels_are_refused(level):
+    with pytest.raises(ValueError, match="level must be between 0 and 1"):
+        line(Y, X).confidence_interval(0.5, level)

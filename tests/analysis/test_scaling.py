@@ -153,3 +153,28 @@ def test_values_that_do_not_vary_have_no_density(lai):
         fifesim.density(lai * 0)
     with pytest.raises(ValueError, match="at least 2 values"):
         density.sample_density(np.array([1.0, np.nan]), np.array([0.0]))
+
+
+def test_cells_that_lack_one_band_count_in_neither(lai):
+    """A gap in red alone changes the prediction as a gap in both bands does."""
+    one = cube(lai).copy(deep=True)
+    both = one.copy(deep=True)
+    one[0, 0, 0] = both[:, 0, 0] = np.nan
+    xr.testing.assert_equal(fifesim.ndvi_bias(one), fifesim.ndvi_bias(both))
+    assert np.isfinite(fifesim.ndvi_bias(one)[0, 0])
+
+
+def test_bias_has_the_units_of_its_algorithm(lai):
+    def squared(array):
+        return (array**2).assign_attrs(units="m4 m-4")
+
+    assert fifesim.scale_bias(squared, lai)["bias"].attrs["units"] == "m4 m-4"
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [((-0.57, 0.94), "extinction must be positive"), ((0.57, 94), r"fpar_inf must be in \(0, 1\]")],
+)
+def test_impossible_beer_laws_are_refused(lai, numbers, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.fpar_bias(lai, *numbers)

@@ -113,3 +113,15 @@ def test_error_of_a_map_alone_and_of_nothing(pair):
 def test_impossible_inversion_is_refused(pair, options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.invert(pair[1], fifesim.regress(*pair), **options)
+
+
+def test_error_of_what_is_no_estimate_is_refused(pair):
+    estimate = fifesim.invert(pair[1], fifesim.regress(*pair))
+    for wrong in (estimate[["lai"]], estimate[["low", "high"]], estimate.assign(other=estimate["lai"])):
+        with pytest.raises(ValueError, match="one variable with low and high"):
+            fifesim.inversion_error(wrong, pair[0])
+
+
+def test_noise_of_nothing_is_refused(pair):
+    with pytest.raises(ValueError, match="needs finite values"):
+        fifesim.relative_equivalent_noise(pair[0] * np.nan, pair[1], slope=0.4)

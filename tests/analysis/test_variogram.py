@@ -135,3 +135,8 @@ def test_empty_raster_is_refused(lai):
 def test_correlation_that_stays_up_has_no_range():
     assert np.isnan(kernels.crossing(np.arange(3.0), np.array([1.0, 0.9, 0.8])))
     assert kernels.crossing(np.arange(3.0), np.array([1.0, 0.55, -0.45])) == pytest.approx(1.5)
+
+
+def test_values_that_do_not_vary_have_no_correlation(lai):
+    with pytest.raises(ValueError, match="needs values that vary"):
+        fifesim.variogram(lai * 0 + 0.3, 20)

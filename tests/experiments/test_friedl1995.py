@@ -170,6 +170,8 @@ def test_command_writes_table_figures_and_page(quick, tmp_path, monkeypatch):
     assert len(table) == 18 and wanted <= set(table.columns)
     page = (tmp_path / "out" / "report.html").read_text()
     assert page.count("data:image/png;base64,") == 7
+    # The argument rests on the size of the scene, which is another here.
+    assert f"argued for scenes of {friedl1995.CELLS} cells" in page
     assert USED.name in page and "http" not in page.replace("http-equiv", "")
     first = {name: (tmp_path / "out" / name).read_bytes() for name in reproduction.FILES}
     assert quick("-o", "out").exit_code == 2
