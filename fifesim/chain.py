@@ -224,7 +224,8 @@ def to_toa(
     """
     light = _light(reflectance, atmosphere, geometry, instrument)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
-    return atmosphere_raster.to_toa(reflectance, *light, **scene)
+    toa = atmosphere_raster.to_toa(reflectance, *light, **scene)
+    return toa if instrument is None else toa.assign_attrs(instrument=find_instrument(instrument).name)
 
 
 def to_surface(
@@ -264,7 +265,8 @@ def to_surface(
     reflectance = planetary_reflectance(reflectance)
     light = _light(reflectance, atmosphere, geometry, instrument)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
-    return atmosphere_raster.to_surface(reflectance, *light, **scene)
+    surface = atmosphere_raster.to_surface(reflectance, *light, **scene)
+    return surface if instrument is None else surface.assign_attrs(instrument=find_instrument(instrument).name)
 
 
 def ndvi(image):

@@ -17,7 +17,12 @@ class Sensor(Section):
 
     instrument: str = text("TM", "see: fifesim sensors")
     bands: list[str] = Field(["TM3", "TM4"], description="names of bands")
-    pixel: float | None = number(None, "m", "size of a pixel; by default the instrument's gridded product", gt=0)
+    pixel: float | None = number(
+        None,
+        "m",
+        "size of a pixel; by default the instrument's gridded product; the footprint stays the instrument's",
+        gt=0,
+    )
     interval: str | float = Field(
         "product",
         description="between pixels: product, that of their size; native, the instrument's own; or metres",

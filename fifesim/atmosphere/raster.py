@@ -149,6 +149,8 @@ def _varying(verb, reflectance, atmosphere, bands, geometry, elevation):
     else:
         cf.check_quantity(elevation, "dem")
         altitude = elevation / 1000
+    for name in geometry.rasters:
+        cf.check_units(getattr(geometry, name), name)
     angles = (xr.DataArray(getattr(geometry, name)) for name in ANGLES)
 
     def kernel(rho, *places):

@@ -131,3 +131,15 @@ def test_rasters_are_not_compared_cell_by_cell(swath):
     assert swath != SUN
     assert len({swath, SUN}) == 2
     assert xr.DataArray(swath.sza).identical(swath.sza)
+
+
+def test_angles_in_radians_are_refused(ground, swath):
+    radians = dataclasses.replace(swath, vza=np.radians(swath.vza).assign_attrs(units="radian"))
+    with pytest.raises(ValueError, match="has units 'radian', vza needs 'degree'"):
+        to_toa(ground, AIR, BANDS, radians)
+
+
+def test_instrument_that_is_given_is_carried(ground):
+    bare = ground.drop_attrs(deep=False).assign_attrs(units="1")
+    toa = bare.fifesim.to_toa(AIR, geometry=SUN, instrument="TM")
+    np.testing.assert_allclose(toa.fifesim.to_surface(), ground, rtol=0, atol=1e-12)
