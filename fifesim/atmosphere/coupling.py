@@ -113,7 +113,8 @@ def surface_reflectance(
     return _surface(toa_reflectance, *factors)
 
 
-@numba.vectorize(["float64(float64, float64, float64, float64, float64, float64)"], cache=True)
+# Not cached: processes that fill numba's cache of universal functions side by side can crash.
+@numba.vectorize(["float64(float64, float64, float64, float64, float64, float64)"])
 def _apparent(rho, path, down, up, albedo, gas):
     trapped = rho * albedo
     if trapped >= 1:
@@ -121,7 +122,7 @@ def _apparent(rho, path, down, up, albedo, gas):
     return gas * (path + down * rho / (1 - trapped) * up)
 
 
-@numba.vectorize(["float64(float64, float64, float64, float64, float64, float64)"], cache=True)
+@numba.vectorize(["float64(float64, float64, float64, float64, float64, float64)"])
 def _surface(toa, path, down, up, albedo, gas):
     ground = (toa / gas - path) / (down * up)
     return ground / (1 + albedo * ground)

@@ -71,7 +71,8 @@ def _series(x, start, count):
     return math.exp(centre) * total
 
 
-@numba.guvectorize(["(float64, float64[:], float64[:])"], "(),(n)->()", cache=True)
+# Not cached: processes that fill numba's cache of universal functions side by side can crash.
+@numba.guvectorize(["(float64, float64[:], float64[:])"], "(),(n)->()")
 def _chain(lai, rates, chain):
     """Divided difference of the exponential over all exponents, times the power of the depth."""
     count = rates.size
