@@ -50,7 +50,7 @@ axis.legend(frameon=False)
 model = fifesim.NoiseModel(thermal=0.5, shot=0.0, detectors=16, gain_spread=0.008)
 target = wrap_xr(np.full((900, 900), 40.0), fifesim.fife_site(30 / 9, window=((0, 900), (0, 900))))
 target = target.expand_dims(band=["TM3"]).assign_attrs(units="W m-2 sr-1 um-1")
-figure, axes = plt.subplots(1, 3, figsize=(12, 4), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(12, 4.6), layout="constrained")
 for axis, kinds in zip(axes, (["thermal"], ["fixed-pattern"], ["thermal", "fixed-pattern"]), strict=True):
     counts = target.fifesim.sense("TM", noise=kinds, seed=2, noise_models=model)[0]
     axis.imshow(counts, cmap="gray", vmin=48, vmax=54, interpolation="nearest")
