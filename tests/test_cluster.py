@@ -1,5 +1,6 @@
 """Workers of a cluster are other processes: what goes to them must pickle, and what they write must be whole."""
 
+import dask
 import numpy as np
 import pytest
 import rasterio
@@ -61,3 +62,13 @@ def test_a_run_on_workers_gives_the_same_files(client, tmp_path):
     simulate_to_folder(scenario, tmp_path / "workers")
     expected = simulate(scenario)["image"]["dn"].compute(scheduler="threads")
     np.testing.assert_array_equal(fifesim.open_image(tmp_path / "workers" / "image.tif").values, expected.values)
+
+
+def test_processes_without_a_cluster_give_the_same_bits():
+    grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
+    lai = fifesim.lai_scene(grid, arp=0.15, seed=7, chunks=CHUNKS)
+    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], dem=fifesim.flint_hills(grid, 3, chunks=CHUNKS))
+    image = rho.fifesim.to_toa().fifesim.sense("TM")
+    with dask.config.set(scheduler="processes", num_workers=2):
+        there = image.compute()
+    np.testing.assert_array_equal(there, image.compute(scheduler="synchronous"))
