@@ -158,6 +158,7 @@ def test_a_full_disk_leaves_what_is_finished_and_nothing_half_written(scenario, 
     assert resumed(scenario, out)[0] == whole
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_grow_is_not_there(scenario, whole, tmp_path):
     """A quota that GDAL meets in the middle of a file."""
     out = tmp_path / "out"
@@ -199,6 +200,7 @@ def test_a_dem_that_cannot_be_read_is_named(scenario, broken_dem, tmp_path):
     assert not any((tmp_path / "out" / name).exists() for name in FILES)
 
 
+@pytest.mark.slow
 def test_another_scenario_does_not_resume_a_run(scenario, tmp_path):
     out = tmp_path / "out"
     process = start(scenario, "-o", out, "--threads", 1)
