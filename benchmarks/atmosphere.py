@@ -11,8 +11,8 @@ import time
 import numpy as np
 
 import fifesim
-from fifesim.atmosphere import engines, six_s
-from fifesim.geometry import Geometry
+from fifesim.atmosphere.schemes import engines, six_s
+from fifesim.base.geometry import Geometry
 
 CELLS = 3000
 

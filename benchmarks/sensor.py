@@ -11,8 +11,8 @@ import argparse
 import numpy as np
 from chain import seconds
 
-from fifesim.footprints import Boxcar, axis_operator, regularize
-from fifesim.sensor.spatial import CosineSpread, GaussianSpread
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
 
 CELL = 30 / 9
 BANDS = 2

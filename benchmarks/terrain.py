@@ -14,9 +14,9 @@ import xarray as xr
 from chain import BANDS, own_peak, seconds
 
 import fifesim
-from fifesim import grid as grids
-from fifesim.geometry import fife_geometry
-from fifesim.ground import sky_raster
+from fifesim.base.geometry import fife_geometry
+from fifesim.ground.terrain.rasters import sky as sky_raster
+from fifesim.rasters import grid as grids
 
 
 def waves(grid):

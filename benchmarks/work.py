@@ -13,9 +13,9 @@ import numpy as np
 from chain import BANDS, floor
 
 import fifesim
-from fifesim.run import simulate_to_folder
-from fifesim.scenario_file import parse_scenario
-from fifesim.simulation import simulate
+from fifesim.output.run.folder import simulate_to_folder
+from fifesim.scenario.simulation import simulate
+from fifesim.scenario.toml import parse_scenario
 
 CELL = 30 / 9
 WEST, NORTH = 704970.0, 4334220.0

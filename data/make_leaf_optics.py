@@ -11,7 +11,7 @@ import prosail
 from pyrsr.rsr import RSR_reader
 from scipy.optimize import least_squares
 
-from fifesim.bands import Band, solar_spectrum
+from fifesim.base.bands import Band, solar_spectrum
 
 NAMES = ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
 CALIBRATED = [2, 3]

@@ -52,12 +52,12 @@ def simulate(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only estimate time, memory and disk.")] = False,
 ):
     """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
-    from fifesim.estimates import describe, estimate
-    from fifesim.folders import check_folder
-    from fifesim.run import scenario_to_resume, simulate_to_folder
-    from fifesim.scenario import Scenario
-    from fifesim.scenario_file import read_scenario
-    from fifesim.workers import cluster
+    from fifesim.output.folders import check_folder
+    from fifesim.output.run.estimates import describe, estimate
+    from fifesim.output.run.folder import scenario_to_resume, simulate_to_folder
+    from fifesim.output.run.workers import cluster
+    from fifesim.scenario.scenario import Scenario
+    from fifesim.scenario.toml import read_scenario
 
     with _errors_in_one_line(output):
         check_folder(output, overwrite, resume)
@@ -86,7 +86,7 @@ def reproduce(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
 ):
     """Repeat the paper: table2.csv, figure3.png to figure9.png, report.html."""
-    from fifesim.experiments.reproduction import reproduce_to_folder
+    from fifesim.experiments.friedl1995.folder import reproduce_to_folder
 
     try:
         files = reproduce_to_folder(output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite)
@@ -108,8 +108,8 @@ def budget(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
 ):
     """Find where the scatter comes from, stage by stage: budget.csv, budget.png, report.html, scenario.toml."""
-    from fifesim.experiments.scatter_run import budget_to_folder
-    from fifesim.scenario_file import read_scenario
+    from fifesim.experiments.scatter.folder import budget_to_folder
+    from fifesim.scenario.toml import read_scenario
 
     try:
         found = None if scenario is None else read_scenario(scenario)
@@ -126,8 +126,8 @@ def budget(
 @app.command()
 def scenario():
     """Print the default scenario, every key with its unit, to edit."""
-    from fifesim.scenario import Scenario
-    from fifesim.scenario_file import write_scenario
+    from fifesim.scenario.scenario import Scenario
+    from fifesim.scenario.toml import write_scenario
 
     typer.echo(write_scenario(Scenario().complete()), nl=False)
 
@@ -138,8 +138,8 @@ def sensors(
     check: Annotated[Path | None, typer.Option("--check", help="Check a file of your own, and say what it is.")] = None,
 ):
     """List the instruments, or one in detail: bands, sampling, point spread, radiometry, noise, sources."""
-    from fifesim.sensor.instruments import instrument, instrument_names, read_instrument
-    from fifesim.sensor.listing import describe, list_instruments
+    from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
+    from fifesim.sensor.description.listing import describe, list_instruments
 
     try:
         if check is not None:
@@ -157,8 +157,8 @@ def sensors(
 @app.command()
 def verify():
     """Check this installation against independent results; exit code 1 where one deviates more than it may."""
-    from fifesim.verification.areas import deviations
-    from fifesim.verification.listing import HEADING, line, summary
+    from fifesim.experiments.verification.areas import deviations
+    from fifesim.experiments.verification.listing import HEADING, line, summary
 
     found = []
     try:

@@ -10,10 +10,10 @@ import pytest
 import rasterio
 from typer.testing import CliRunner
 
-from fifesim import datasets
+from fifesim.base import datasets
 from fifesim.cli import app
-from fifesim.run import FILES
-from fifesim.scenario_file import read_scenario, write_scenario
+from fifesim.output.run.folder import FILES
+from fifesim.scenario.toml import read_scenario, write_scenario
 
 SMALL = """
 [grid]

@@ -8,9 +8,9 @@ import xarray as xr
 from distributed import Client, LocalCluster
 
 import fifesim
-from fifesim.run import simulate_to_folder
-from fifesim.scenario_file import parse_scenario
-from fifesim.simulation import simulate
+from fifesim.output.run.folder import simulate_to_folder
+from fifesim.scenario.simulation import simulate
+from fifesim.scenario.toml import parse_scenario
 
 CHUNKS = {"y": 100, "x": 80}
 

@@ -5,7 +5,7 @@ import re
 import pandas as pd
 import pytest
 
-from fifesim import datasets
+from fifesim.base import datasets
 
 DATA = datasets.path("lai_distributions.csv").parent
 TABLES = sorted(path for path in DATA.rglob("*") if path.suffix in (".csv", ".toml"))

@@ -12,8 +12,8 @@ import psutil
 import pytest
 import rasterio
 
-from fifesim.folders import UNFINISHED
-from fifesim.run import FILES
+from fifesim.output.folders import UNFINISHED
+from fifesim.output.run.folder import FILES
 
 COMMAND = [sys.executable, "-c", "from fifesim.cli import app; app()", "simulate"]
 SCENARIO = """

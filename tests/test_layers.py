@@ -2,7 +2,6 @@
 
 import ast
 import inspect
-from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -13,47 +12,9 @@ PACKAGE = Path(fifesim.__file__).parent
 STAGES = ("ground", "atmosphere", "sensor", "analysis")
 LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 
-# From the bottom up: a file imports only files of lower tiers. Physics of one stage may import each other, and so may
-# its files on labelled rasters, whose names end in "raster".
-TIERS = (
-    {
-        "blocks",
-        "datasets",
-        "experiments.__init__",
-        "folders",
-        "footprints",
-        "geometry",
-        "lattice",
-        "progress",
-        "sites",
-    },
-    {"bands"},
-    {"cf", "grid", "saved", "schedule", "workers"},
-    {"chunks"},
-    {"warp"},
-    {"physics"},
-    {"raster"},
-    {"verification.__init__", "verification.deviations", "verification.listing"},
-    {f"verification.{area}" for area in ("atmosphere", "canopy", "landscape", "sensor", "terrain")},
-    {"verification.areas"},
-    {"scenario_section"},
-    {"scenario_ground", "scenario_sensor"},
-    {"export", "scenario"},
-    {"chain", "scenario_file"},
-    {"comparison", "products", "simulation"},
-    {"sweeps"},
-    {"figures"},
-    {"report"},
-    {"estimates", "run"},
-    {"experiments.friedl1995", "experiments.stages"},
-    {"experiments.friedl1995_table", "experiments.scatter"},
-    {"experiments.friedl1995_effects", "experiments.friedl1995_figures"},
-    {"experiments.friedl1995_report", "experiments.scatter_report"},
-    {"experiments.reproduction", "experiments.scatter_run"},
-    {"cli"},
-)
-# What knows neither labels nor dask, beside the physics.
-PLAIN = {"bands", "datasets", "footprints", "geometry", "lattice"}
+# The rule of imports: a folder imports from those before it, and from itself. The four stages are one step.
+ORDER = ("base", "rasters", "stages", "chain", "scenario", "output", "experiments", "cli")
+
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix().replace("/", "."): path for path in PACKAGE.rglob("*.py")}
 TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
 
@@ -85,50 +46,68 @@ def libraries(name):
     return {dotted.split(".")[0] for dotted in imported(TREES[name])}
 
 
-def stage(name):
-    first = name.split(".")[0]
-    return first if first in STAGES else None
+def folder(name):
+    return name.split(".")[0]
+
+
+def step(name):
+    """Place of a file's folder in the order."""
+    return ORDER.index("stages" if folder(name) in STAGES else folder(name))
 
 
 def is_physics(name):
-    return stage(name) is not None and not name.endswith("raster")
-
-
-def tier(name):
-    if stage(name):
-        name = "physics" if is_physics(name) else "raster"
-    found = [number for number, names in enumerate(TIERS) if name in names]
-    assert found, f"{name} has no tier in {Path(__file__).name}: say what it may import"
-    return found[0]
+    """Files of a stage, but for those that label it: ``raster`` and the files of folders ``rasters``."""
+    labels = name.endswith(".raster") or "rasters" in name.split(".")
+    return folder(name) in STAGES and not labels
 
 
 ORDINARY = sorted(set(FILES) - {"__init__", "accessor"})
+PHYSICS = [name for name in ORDINARY if is_physics(name) or folder(name) == "base"]
 
 
 @pytest.mark.parametrize("name", ORDINARY)
 def test_imports_lead_down(name):
-    assert tier(name) >= 0
+    assert folder(name) in (*ORDER, *STAGES), f"{name} lies in no folder of {ORDER}"
     for other in own_imports(name):
-        same_layer = stage(name) is not None and stage(name) == stage(other) and tier(name) == tier(other)
-        assert tier(other) < tier(name) or same_layer, f"{name} imports {other}, which is not below it"
+        allowed = step(other) < step(name) or folder(other) == folder(name)
+        assert allowed, f"{name} imports {other}, which is not below it"
 
 
-@pytest.mark.parametrize("name", [name for name in ORDINARY if stage(name)])
-def test_stages_never_import_each_other(name):
-    others = {stage(other) for other in own_imports(name)} - {None, stage(name)}
-    assert not others, f"{name} imports the stage {others}: what it needs of it is an argument"
-
-
-@pytest.mark.parametrize("name", [name for name in ORDINARY if is_physics(name) or name in PLAIN])
+@pytest.mark.parametrize("name", PHYSICS)
 def test_physics_knows_no_labels_and_no_dask(name):
     assert not libraries(name) & LABEL_LIBRARIES
-    assert not own_imports(name) & {"cf", "chunks", "grid", "warp"}
+    assert {folder(other) for other in own_imports(name)} <= {"base", folder(name)}
+    assert all(is_physics(other) or folder(other) == "base" for other in own_imports(name))
+
+
+def circle():
+    """Files that import each other in a circle, an empty list where none do."""
+    done, path = set(), []
+
+    def visit(name):
+        if name in path:
+            return path[path.index(name) :]
+        if name in done:
+            return []
+        path.append(name)
+        for other in sorted(own_imports(name) & set(FILES)):
+            if found := visit(other):
+                return found
+        done.add(path.pop())
+        return []
+
+    return next(filter(None, map(visit, sorted(FILES))), [])
 
 
 def test_imports_have_no_circle():
-    list(TopologicalSorter({name: own_imports(name) for name in FILES}).static_order())
+    assert circle() == []
 
 
+def test_a_folder_is_read_at_a_glance():
+    """Whoever opens the package sees Figure 1: the four stages, what lies below them and what is built on them."""
+    shown = [path for path in PACKAGE.iterdir() if not path.name.startswith(("__pycache__", "."))]
+    assert len([path for path in shown if path.name != "data"]) <= 14
+    assert {path.name for path in shown if path.is_dir()} - {"data"} == {*ORDER, *STAGES} - {"stages", "cli"}
 def test_only_the_package_imports_the_accessor():
     assert [name for name in FILES if "accessor" in own_imports(name)] == ["__init__"]
 

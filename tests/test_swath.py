@@ -7,7 +7,7 @@ import pytest
 from lazy import check_raster_function
 
 import fifesim
-from fifesim import cf
+from fifesim.rasters import cf
 
 BANDS = ["TM3", "TM4"]
 

@@ -6,10 +6,12 @@ from typer.testing import CliRunner
 
 import fifesim
 from fifesim.cli import app
-from fifesim.ground import absorption, dem, terrain
-from fifesim.sensor import calibration
-from fifesim.verification import areas, atmosphere, canopy
-from fifesim.verification.deviations import Deviation, largest
+from fifesim.experiments.verification import areas, atmosphere, canopy
+from fifesim.experiments.verification.deviations import Deviation, largest
+from fifesim.ground.canopy import absorption
+from fifesim.ground.terrain import slope as terrain
+from fifesim.ground.terrain import spline as dem
+from fifesim.sensor.response import calibration
 
 
 def run():

@@ -1,1 +1,1 @@
-"""Analysis: vegetation indices and regression."""
+"""What an image tells: indices, regressions, noise and scale."""

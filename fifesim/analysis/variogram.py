@@ -152,7 +152,7 @@ def weight_correlation(operator, reach):
 
     Parameters
     ----------
-    operator : fifesim.footprints.AxisOperator
+    operator : fifesim.base.footprints.AxisOperator
         Pixels that lie partly outside the scene are left out.
     reach : int
         Largest lag. [cell]

@@ -8,4 +8,4 @@ __all__ = ["spectrum"]
 def __getattr__(name):
     if name != "spectrum":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return import_module("fifesim.atmosphere.spectrum_raster").spectrum
+    return import_module("fifesim.atmosphere.schemes.raster").spectrum

@@ -2,10 +2,11 @@
 
 import xarray as xr
 
-from fifesim import cf, chunks
-from fifesim import grid as grids
-from fifesim.atmosphere import adjacency_raster, coupling, engines, lookup
-from fifesim.geometry import ANGLES
+from fifesim.atmosphere.adjacency import raster as adjacency_raster
+from fifesim.atmosphere.schemes import coupling, engines, lookup
+from fifesim.base.geometry import ANGLES
+from fifesim.rasters import cf, chunks
+from fifesim.rasters import grid as grids
 
 _REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
 _UNIFORM = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
@@ -19,10 +20,10 @@ def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacenc
     ----------
     reflectance : xarray.DataArray, dims (band, y, x)
         Surface reflectance factor. [1]
-    atmosphere : fifesim.atmosphere.models.Atmosphere
-    bands : sequence of fifesim.bands.Band
+    atmosphere : fifesim.atmosphere.air.models.Atmosphere
+    bands : sequence of fifesim.base.bands.Band
         One for each band of the raster.
-    geometry : fifesim.geometry.Geometry
+    geometry : fifesim.base.geometry.Geometry
         Its angles may be rasters on the cells.
     elevation : xarray.DataArray, dims (y, x), optional
         Of the ground on the cells, 0 to 4000, in the place of the atmosphere's one altitude. [m]
@@ -44,7 +45,7 @@ def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacenc
 
     See Also
     --------
-    fifesim.atmosphere.coupling.apparent_reflectance, fifesim.atmosphere.adjacency.inhomogeneous_reflectance
+    fifesim.atmosphere.schemes.coupling.apparent_reflectance, fifesim.atmosphere.adjacency.environment.inhomogeneous_reflectance
     """
     cf.check_quantity(reflectance, "surface_reflectance")
     said = ("toa_reflectance", "to_toa")
@@ -74,7 +75,7 @@ def to_surface(reflectance, atmosphere, bands, geometry, *, elevation=None, adja
 
     See Also
     --------
-    fifesim.atmosphere.coupling.surface_reflectance
+    fifesim.atmosphere.schemes.coupling.surface_reflectance
     """
     cf.check_quantity(reflectance, "toa_reflectance")
     said = ("surface_reflectance", "to_surface")
@@ -87,9 +88,9 @@ def diffuse_fraction(atmosphere, bands, geometry):
 
     Parameters
     ----------
-    atmosphere : fifesim.atmosphere.models.Atmosphere
-    bands : sequence of fifesim.bands.Band, length (band,)
-    geometry : fifesim.geometry.Geometry
+    atmosphere : fifesim.atmosphere.air.models.Atmosphere
+    bands : sequence of fifesim.base.bands.Band, length (band,)
+    geometry : fifesim.base.geometry.Geometry
 
     Returns
     -------
@@ -98,7 +99,7 @@ def diffuse_fraction(atmosphere, bands, geometry):
 
     See Also
     --------
-    fifesim.atmosphere.lookup.varying_diffuse_fraction
+    fifesim.atmosphere.schemes.lookup.varying_diffuse_fraction
     """
     if "sza" not in geometry.rasters:
         return engines.band_terms(atmosphere, tuple(bands), geometry.sza, 0.0, 0.0).diffuse_fraction

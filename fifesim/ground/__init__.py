@@ -1,1 +1,1 @@
-"""Ground scene: leaf area, canopy reflectance and absorption."""
+"""The ground scene: leaf area, its reflectance, and the light on slopes."""

@@ -1,1 +1,1 @@
-"""Sensor: spatial response, calibration and the instruments."""
+"""The sensor: what an instrument makes of the light at the top of the atmosphere."""

@@ -3,14 +3,14 @@
 import numpy as np
 import xarray as xr
 
-from fifesim import cf, chunks
-from fifesim import grid as grids
-from fifesim.geometry import ANGLES, fife_geometry
-from fifesim.sensor import calibration
-from fifesim.sensor.instruments import instrument as find_instrument
-from fifesim.sensor.noise import check_kinds
-from fifesim.sensor.noise_raster import noisy
-from fifesim.sensor.pixels_raster import directions_on, matching_bands, pixel_grid, regularized
+from fifesim.base.geometry import ANGLES, fife_geometry
+from fifesim.rasters import cf, chunks
+from fifesim.rasters import grid as grids
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.response import calibration
+from fifesim.sensor.response.noise import check_kinds
+from fifesim.sensor.response.rasters.noise import noisy
+from fifesim.sensor.response.rasters.pixels import directions_on, matching_bands, pixel_grid, regularized
 
 # Share of its footprint's weight that a pixel needs on valid cells. The paper's footprint of 30.32 m leaves a
 # scene of whole 30 m pixels by 0.16 m.
@@ -39,7 +39,7 @@ def sense(
     toa : xarray.DataArray, dims (band, y, x)
         Reflectance or radiance at the top of the atmosphere, by cells. Bands are those of the instrument that have the
         same name, or else whose response is there at their ``wavelength``. [1 or W m-2 sr-1 um-1]
-    instrument : str or fifesim.sensor.instruments.Instrument, optional
+    instrument : str or fifesim.sensor.description.instruments.Instrument, optional
     onto : odc.geo.geobox.GeoBox, optional
         North-up grid of pixels in the CRS of the scene, of any size and offset. By default the instrument's gridded
         product, with the upper left corner of the scene.
@@ -53,13 +53,13 @@ def sense(
         Among "shot", "thermal" and "fixed-pattern"; the instrument's description has their size.
     seed : int, optional
         Of the noise.
-    noise_models : fifesim.sensor.noise.NoiseModel, or mapping of str to NoiseModel, optional
+    noise_models : fifesim.sensor.response.noise.NoiseModel, or mapping of str to NoiseModel, optional
         Size of the noise for every band, or by name of a band, where the description lacks it or is not to count.
     quantise : bool, optional
         Whether to digitise; radiance otherwise.
     min_valid : float, optional
         Share of its footprint that a pixel needs on valid cells; below it is no data. [1]
-    geometry : fifesim.geometry.Geometry, optional
+    geometry : fifesim.base.geometry.Geometry, optional
         By default that which the array carries, else the paper's.
 
     Returns
@@ -76,7 +76,7 @@ def sense(
 
     See Also
     --------
-    fifesim.footprints.regularize, fifesim.sensor.noise.add_noise, fifesim.sensor.calibration.radiance_to_dn
+    fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise, fifesim.sensor.response.calibration.radiance_to_dn
     """
     cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
     description = find_instrument(instrument)
@@ -109,8 +109,8 @@ def recorded(radiance, description, bands, quantise):
     ----------
     radiance : xarray.DataArray
         With a dimension band. [W m-2 sr-1 um-1]
-    description : fifesim.sensor.instruments.Instrument
-    bands : sequence of fifesim.sensor.instruments.InstrumentBand
+    description : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
         One for each of the array.
     quantise : bool
         Whether as digital numbers.
@@ -182,7 +182,7 @@ def to_radiance(image):
 
     See Also
     --------
-    fifesim.sensor.calibration.dn_to_radiance
+    fifesim.sensor.response.calibration.dn_to_radiance
     """
     missing = {"gain", "offset"} - set(image.coords)
     if missing:
@@ -213,7 +213,7 @@ def to_reflectance(image):
 
     See Also
     --------
-    fifesim.sensor.calibration.radiance_to_reflectance
+    fifesim.sensor.response.calibration.radiance_to_reflectance
     """
     radiance = to_radiance(image) if "gain" in image.coords else image
     cf.check_quantity(radiance, "toa_radiance")
@@ -245,9 +245,9 @@ def as_radiance(array, bands, geometry):
     ----------
     array : xarray.DataArray
         Reflectance, or radiance by its units, with a dimension band.
-    bands : sequence of fifesim.sensor.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
         One for each of the array.
-    geometry : fifesim.geometry.Geometry
+    geometry : fifesim.base.geometry.Geometry
 
     Returns
     -------

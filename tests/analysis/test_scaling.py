@@ -7,10 +7,10 @@ from lazy import CHUNKS, ODD_CHUNKS, check_raster_function, in_chunks, no_comput
 from scipy import integrate, stats
 
 import fifesim
-from fifesim import grid as grids
 from fifesim.analysis import density, scaling
 from fifesim.analysis.indices import normalized_difference
-from fifesim.ground import absorption
+from fifesim.ground.canopy import absorption
+from fifesim.rasters import grid as grids
 
 CELL = 30 / 9
 

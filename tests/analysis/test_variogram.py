@@ -6,10 +6,10 @@ import xarray as xr
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks
 
 import fifesim
-from fifesim import footprints
 from fifesim.analysis import variogram as kernels
-from fifesim.analysis import variogram_raster
-from fifesim.ground import random_field
+from fifesim.analysis.rasters import lags as variogram_raster
+from fifesim.base import footprints
+from fifesim.ground.landscape import field as random_field
 
 CELL = 30 / 9
 RNG = np.random.default_rng(11)

@@ -5,11 +5,11 @@ import pytest
 from lazy import check_raster_function
 
 import fifesim
-from fifesim import cf
-from fifesim.atmosphere import coupling, engines
 from fifesim.atmosphere.raster import to_surface, to_toa
-from fifesim.geometry import Geometry
-from fifesim.sensor.instruments import instrument
+from fifesim.atmosphere.schemes import coupling, engines
+from fifesim.base.geometry import Geometry
+from fifesim.rasters import cf
+from fifesim.sensor.description.instruments import instrument
 
 AIR = fifesim.Atmosphere(visibility=23.0)
 SUN = Geometry(40.0, 120.0, 5.0, 200.0)

@@ -8,11 +8,11 @@ import xarray as xr
 from lazy import check_raster_function, in_chunks
 
 import fifesim
-from fifesim import cf
-from fifesim.atmosphere import lookup
 from fifesim.atmosphere.raster import to_surface, to_toa
-from fifesim.geometry import Geometry
-from fifesim.sensor.instruments import instrument
+from fifesim.atmosphere.schemes import lookup
+from fifesim.base.geometry import Geometry
+from fifesim.rasters import cf
+from fifesim.sensor.description.instruments import instrument
 
 AIR = fifesim.Atmosphere(visibility=23.0)
 SUN = Geometry(40.0, 120.0, 5.0, 200.0)

@@ -6,12 +6,12 @@ import xarray as xr
 from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_compute
 
 import fifesim
-from fifesim import cf
-from fifesim import grid as grids
-from fifesim.footprints import axis_operator, regularize
-from fifesim.geometry import Geometry
-from fifesim.sensor import calibration
-from fifesim.sensor.instruments import instrument
+from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.geometry import Geometry
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.response import calibration
 
 TM = instrument("TM")
 RED_NIR = TM.select(["TM3", "TM4"])

@@ -7,12 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fifesim import datasets
-from fifesim.sensor.calibration import gain_offset, radiance_to_reflectance, reflectance_to_radiance
-from fifesim.sensor.instruments import instrument, instrument_names, read_instrument
-from fifesim.sensor.listing import describe
-from fifesim.sensor.performance import swath_width
-from fifesim.sensor.plausibility import check_units
+from fifesim.base import datasets
+from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
+from fifesim.sensor.description.listing import describe
+from fifesim.sensor.description.performance import swath_width
+from fifesim.sensor.description.plausibility import check_units
+from fifesim.sensor.response.calibration import gain_offset, radiance_to_reflectance, reflectance_to_radiance
 
 FILES = sorted(datasets.path("instruments").glob("*.toml"))
 LANDSAT = ("TM", "L4TM", "ETM+", "OLI", "OLI2")

@@ -1,0 +1,1 @@
+"""Analysis on labelled rasters."""

@@ -1,0 +1,110 @@
+"""Maps of a variable from an image by a fitted line, and their error against the truth."""
+
+import math
+
+import xarray as xr
+
+from fifesim.analysis import uncertainty
+from fifesim.analysis.rasters.pairs import matched, sums_by_row
+from fifesim.rasters import cf, chunks
+from fifesim.rasters import grid as grids
+
+_LIMITS = ("low", "high")
+
+
+def invert(ndvi, fit, quantity="lai", *, level=0.95):
+    """
+    Map of a variable from an index by a regression, with its prediction interval.
+
+    Parameters
+    ----------
+    ndvi : xarray.DataArray, dims (y, x)
+        What the variable was regressed on.
+    fit : fifesim.analysis.regression.Regression
+        From `regress`, of the variable on the index.
+    quantity : {"lai", "fpar"}, optional
+        The variable.
+    level : float, optional
+        Share of new values that the interval holds. [1]
+
+    Returns
+    -------
+    estimate : xarray.Dataset, dims (y, x)
+        The variable, and ``low`` and ``high``, the ends of its interval. Lazy where ``ndvi`` is. Values are as the line
+        gives them, and may be negative.
+
+    Raises
+    ------
+    ValueError
+        If the quantity or the level is not one allowed.
+
+    See Also
+    --------
+    fifesim.analysis.regression.Regression.prediction_interval
+    """
+    if quantity not in ("lai", "fpar"):
+        raise ValueError(f"quantity must be 'lai' or 'fpar', got {quantity!r}")
+    if not 0 < level < 1:
+        raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")
+    grid = grids.geobox(ndvi)
+    kernels = {quantity: fit.predict} | {name: _limit(fit, k, level) for k, name in enumerate(_LIMITS)}
+    found = {}
+    for name, kernel in kernels.items():
+        values = grids.place(chunks.pointwise(kernel, ndvi), grid)
+        line = f"invert: {fit.intercept:.6g} + {fit.slope:.6g} x {ndvi.name or 'index'}"
+        found[name] = cf.label(values, quantity, source=ndvi, history=line).rename(name)
+        # A standard name says that the values are the quantity, which the ends of an interval are not.
+        if name in _LIMITS:
+            found[name].attrs.pop("standard_name", None)
+            found[name].attrs["long_name"] += f", {name} end of the {100 * level:g} % prediction interval"
+    return xr.Dataset(found)
+
+
+def inversion_error(estimate, truth, *, pair="coordinates"):
+    """
+    Error of an estimated map against the truth; computes.
+
+    Parameters
+    ----------
+    estimate : xarray.Dataset or xarray.DataArray, dims (y, x)
+        From `invert`, or a map alone.
+    truth : xarray.DataArray, dims (y, x)
+    pair : {"coordinates", "index"}, optional
+        As in `regress`.
+
+    Returns
+    -------
+    error : xarray.Dataset
+        ``bias``, mean of estimate less truth; ``rmse``, the root of its mean square; ``n``, the pixels; of a Dataset
+        ``coverage`` also, the share of true values within the interval. The same to the bit under any chunking.
+
+    Raises
+    ------
+    ValueError
+        If the rasters do not match, no pixel has both, or a Dataset is not as `invert` gives it.
+    """
+    if isinstance(estimate, xr.DataArray):
+        maps = [estimate] * 3
+    else:
+        variables = [name for name in estimate.data_vars if name not in _LIMITS]
+        if len(variables) != 1 or not set(_LIMITS) <= set(estimate.data_vars):
+            raise ValueError(
+                f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
+                "give a single map as a DataArray"
+            )
+        maps = [estimate[name] for name in (*variables, *_LIMITS)]
+    matched_maps = [matched(each, truth, pair) for each in maps]
+    arrays = [matched_maps[0][1], *(each for each, _ in matched_maps)]
+    n, total, squares, inside = (
+        math.fsum(column) for column in sums_by_row(uncertainty.error_sums, *arrays, count=4).T
+    )
+    if n == 0:
+        raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
+    found = {"bias": total / n, "rmse": math.sqrt(squares / n), "n": int(n)}
+    if isinstance(estimate, xr.Dataset):
+        found["coverage"] = inside / n
+    return xr.Dataset(found)
+
+
+def _limit(fit, end, level):
+    return lambda values: fit.prediction_interval(values, level)[end]

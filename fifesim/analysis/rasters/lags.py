@@ -1,0 +1,189 @@
+"""Variograms of labelled rasters, and the variance that regularization leaves."""
+
+import dask
+import dask.array as da
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis import variogram as kernels
+from fifesim.analysis.rasters.pairs import check_no_counts, origins
+from fifesim.analysis.rasters.regression import aggregate
+from fifesim.base.footprints import Boxcar, axis_operator
+from fifesim.rasters import grid as grids
+
+# Blocks of cells that are transformed together, counted from the first cell of the raster: fixed, so that the chunks
+# change no rounding.
+_BLOCK = 512
+
+
+def autocovariance(array, reach):
+    """
+    Covariance and semivariance of a raster by lag; computes.
+
+    Parameters
+    ----------
+    array : xarray.DataArray, dims (y, x)
+        NaN is left out.
+    reach : float
+        Largest lag along each axis. [m]
+
+    Returns
+    -------
+    lags : xarray.Dataset, dims (lag_y, lag_x)
+        ``covariance`` about the mean of all cells, ``semivariance`` and the ``count`` of pairs; lags are in metres,
+        southward from 0 and from west to east: the other half is its mirror image. The same to the bit under any
+        chunking.
+
+    Raises
+    ------
+    ValueError
+        If the reach is less than a cell or more than half of the raster, or nothing is there.
+
+    See Also
+    --------
+    fifesim.analysis.variogram.lag_sums
+    """
+    check_no_counts(array)
+    if set(array.dims) != {"y", "x"}:
+        raise ValueError(f"a variogram is of a raster over (y, x), got {array.dims}: select one band first")
+    array = array.transpose("y", "x")
+    sizes = grids.cell_size(grids.geobox(array))
+    steps = tuple(int(reach / size + 1e-6) for size in sizes)
+    if min(steps) < 1 or any(2 * step > count for step, count in zip(steps, array.shape, strict=True)):
+        raise ValueError(
+            f"reach must be at least a cell ({max(sizes):g} m) and at most half of the raster "
+            f"({min(count * size / 2 for count, size in zip(array.shape, sizes, strict=True)):g} m), got {reach:g} m"
+        )
+    (origin,) = origins(array)
+    sums = np.sum(_block_sums(array.data, steps, origin), axis=0)
+    if not sums[0].any():
+        raise ValueError("the raster has no valid cells")
+    found = {
+        "covariance": kernels.covariance(sums),
+        "semivariance": kernels.semivariance(sums),
+        "count": sums[0].astype(np.int64),
+    }
+    lags = {"lag_y": np.arange(steps[0] + 1) * sizes[0], "lag_x": np.arange(-steps[1], steps[1] + 1) * sizes[1]}
+    out = xr.Dataset({name: (("lag_y", "lag_x"), values) for name, values in found.items()}, coords=lags)
+    for name in lags:
+        out[name].attrs = {"units": "m", "long_name": "lag southward" if name == "lag_y" else "lag eastward"}
+    return out
+
+
+def variogram(array, reach):
+    """
+    Variogram of a raster along rows and columns; computes.
+
+    Parameters
+    ----------
+    array : xarray.DataArray, dims (y, x)
+    reach : float
+        Largest lag. [m]
+
+    Returns
+    -------
+    variogram : xarray.Dataset, dims (direction, lag)
+        ``semivariance``, ``correlation`` and ``count`` along "x" and "y" by ``lag`` [m]; and ``practical_range`` by
+        direction, where the correlation has fallen to 0.05, NaN if not within the reach. [m]
+
+    Raises
+    ------
+    ValueError
+        As in `autocovariance`, and if the cells are not square or their values do not vary.
+    """
+    down, across = grids.cell_size(grids.geobox(array))
+    if abs(down - across) > 1e-6 * across:
+        raise ValueError(f"a variogram by distance needs square cells, got {down:g} x {across:g} m: use autocovariance")
+    lags = autocovariance(array, reach)
+    low, high = (float(limit) for limit in dask.compute(array.min(), array.max()))
+    if not high > low:
+        raise ValueError(f"a correlation needs values that vary, got {low:g} to {high:g}: use autocovariance")
+    along = xr.concat(
+        [
+            lags.sel(lag_y=0.0, drop=True).sel(lag_x=slice(0, None)).rename(lag_x="lag"),
+            lags.sel(lag_x=0.0, drop=True).rename(lag_y="lag"),
+        ],
+        dim=xr.Variable("direction", ["x", "y"]),
+        join="override",
+    )
+    variance = float(lags["covariance"].sel(lag_y=0.0, lag_x=0.0))
+    out = along[["semivariance", "count"]].assign(correlation=along["covariance"] / variance)
+    ranges = [kernels.crossing(out["lag"].values, values) for values in out["correlation"].values]
+    out["practical_range"] = ("direction", ranges, {"units": "m"})
+    out["lag"].attrs = {"units": "m", "long_name": "distance"}
+    out.attrs = {"variance": variance}
+    return out
+
+
+def regularized_variance(array, pixel=30.0, lsf=None):
+    """
+    Variance of pixels, predicted from that of cells and their variogram, beside the simulated; computes.
+
+    Parameters
+    ----------
+    array : xarray.DataArray, dims (y, x)
+        Of cells.
+    pixel : float, optional
+        Size of the pixels. [m]
+    lsf : line spread function, optional
+        As `fifesim.base.footprints` has it, such as ``instrument("TM").line_spread``; the mean over the pixel by default.
+
+    Returns
+    -------
+    variance : xarray.Dataset
+        Of the ``cells``, and of the pixels as ``predicted`` and ``simulated``, which differ by what the borders leave
+        out.
+
+    Raises
+    ------
+    ValueError
+        If the footprint is larger than half of the raster.
+
+    References
+    ----------
+    [Jupp1988]_
+
+    See Also
+    --------
+    fifesim.analysis.variogram.footprint_variance
+    """
+    scene = grids.geobox(array)
+    pixels = grids.aligned(scene, pixel)
+    lsf = Boxcar(pixel) if lsf is None else lsf
+    rows, columns = (
+        axis_operator(lsf, cell_origin=a, cell_size=b, n_cells=n, pixel_origin=c, pixel_size=d, n_pixels=m)
+        for a, b, n, c, d, m in (
+            (scene.affine.f, scene.affine.e, scene.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y),
+            (scene.affine.c, scene.affine.a, scene.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x),
+        )
+    )
+    lags = autocovariance(array, 2 * lsf.half_width + max(grids.cell_size(scene)))
+    reach = lags.sizes["lag_y"] - 1, lags.sizes["lag_x"] // 2
+    down, across = (kernels.weight_correlation(each, step) for each, step in zip((rows, columns), reach, strict=True))
+    predicted = kernels.footprint_variance(lags["covariance"].values, down, across)
+    # In memory, so that the chunks change no rounding.
+    simulated = float(aggregate(array, pixel, lsf=lsf).compute().var())
+    cells = float(lags["covariance"].sel(lag_y=0.0, lag_x=0.0))
+    return xr.Dataset({"cells": cells, "predicted": predicted, "simulated": simulated}, attrs={"pixel": float(pixel)})
+
+
+def _block_sums(data, reach, origin):
+    """Sums of the blocks of a raster."""
+    parts = []
+    for top in range(0, data.shape[0], _BLOCK):
+        for left in range(0, data.shape[1], _BLOCK):
+            window, margin = zip(
+                *(_reach(first, size, each) for first, size, each in zip((top, left), data.shape, reach, strict=True)),
+                strict=True,
+            )
+            part = data[window]
+            lazy = dask.delayed(kernels.lag_sums) if isinstance(data, da.Array) else kernels.lag_sums
+            parts.append(lazy(part, margin, reach, origin))
+    return dask.compute(*parts)
+
+
+def _reach(first, size, margin):
+    """Slice of a block with what there is of its margin, and how much that is before and after it."""
+    last = min(first + _BLOCK, size)
+    start, stop = max(first - margin, 0), min(last + margin, size)
+    return slice(start, stop), (first - start, stop - last)

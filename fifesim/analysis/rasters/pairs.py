@@ -1,0 +1,117 @@
+"""Pairs of pixels of two rasters, and sums over them by rows, the same to the bit under any chunking."""
+
+import dask
+import dask.array as da
+import numpy as np
+
+from fifesim.rasters import grid as grids
+
+PAIRINGS = ("coordinates", "index")
+
+
+def matched(y, x, pair="coordinates"):
+    """
+    Two rasters cut so that their pixels pair.
+
+    Parameters
+    ----------
+    y, x : xarray.DataArray, dims (y, x)
+    pair : {"coordinates", "index"}, optional
+        Match pixels that lie in the same place, or that have the same row and column.
+
+    Returns
+    -------
+    y, x : xarray.DataArray, dims (y, x)
+        Of one shape.
+
+    Raises
+    ------
+    ValueError
+        If the rasters do not match, are not over (y, x) alone, or hold digital numbers.
+    """
+    if pair not in PAIRINGS:
+        raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
+    for array in (y, x):
+        check_no_counts(array)
+        if set(array.dims) != {"y", "x"}:
+            raise ValueError(f"pairs are of rasters over (y, x), got {array.dims}: select one band first")
+    return (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
+
+
+def check_no_counts(array):
+    """
+    Refuse digital numbers, which hold 0 for no data: it would be taken for dark ground.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+
+    Raises
+    ------
+    ValueError
+        If it holds digital numbers.
+    """
+    if "gain" in array.coords:
+        raise ValueError(
+            f"{array.name or 'the array'} holds digital numbers, whose 0 is no data: convert it with "
+            ".fifesim.to_reflectance() or .fifesim.to_radiance() first"
+        )
+
+
+def origins(*arrays):
+    """
+    Values near the means that leave digits to sums; those of the first rows, or 0 where these are empty.
+
+    Parameters
+    ----------
+    *arrays : xarray.DataArray, dims (y, x)
+
+    Returns
+    -------
+    origins : tuple of float
+    """
+    first = dask.compute(*(array.isel(y=slice(1)).data for array in arrays))
+    return tuple(float(np.nan_to_num(row[np.isfinite(row)].mean())) if np.isfinite(row).any() else 0.0 for row in first)
+
+
+def sums_by_row(kernel, *arrays, count, **parameters):
+    """
+    Sums of whole rows, so that the chunks do not change their rounding; computes.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(*blocks, **parameters)`` gives ``count`` sums of each row of float arrays of shape (rows, columns).
+    *arrays : xarray.DataArray, dims (y, x)
+        Of one shape.
+    count : int
+    **parameters
+        Passed to the kernel.
+
+    Returns
+    -------
+    sums : array, shape (rows, count)
+    """
+    if not any(isinstance(array.data, da.Array) for array in arrays):
+        return kernel(*(np.ascontiguousarray(array.values, float) for array in arrays), **parameters)
+    rows = da.core.normalize_chunks("auto", shape=arrays[0].shape, dtype=float, previous_chunks=None)[0]
+    blocks = (da.asarray(array.data).astype(float).rechunk((rows, -1)) for array in arrays)
+    return da.map_blocks(kernel, *blocks, dtype=float, chunks=(rows, (count,)), **parameters).compute()
+
+
+def _common_index(y, x):
+    rows, columns = min(y.sizes["y"], x.sizes["y"]), min(y.sizes["x"], x.sizes["x"])
+    return y.isel(y=slice(rows), x=slice(columns)), x.isel(y=slice(rows), x=slice(columns))
+
+
+def _common_place(y, x):
+    """Both cut to the ground that they share."""
+    one, two = grids.geobox(y), grids.geobox(x)
+    rows, columns = grids.lattice_offset(one, two)
+    cut_y, cut_x = {}, {}
+    for axis, shift in (("y", rows), ("x", columns)):
+        start, stop = max(0, shift), min(y.sizes[axis], shift + x.sizes[axis])
+        if stop <= start:
+            raise ValueError("the rasters do not overlap")
+        cut_y[axis], cut_x[axis] = slice(start, stop), slice(start - shift, stop - shift)
+    return y.isel(cut_y), x.isel(cut_x)

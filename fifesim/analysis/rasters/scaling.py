@@ -1,0 +1,266 @@
+"""Scale invariance of labelled rasters."""
+
+import math
+
+import dask
+import dask.array as da
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis import density as densities
+from fifesim.analysis import scaling
+from fifesim.analysis.rasters.pairs import check_no_counts
+from fifesim.analysis.rasters.regression import aggregate, red_and_nir, regress
+from fifesim.rasters import cf, chunks
+from fifesim.rasters import grid as grids
+
+# Bins of the histogram that stands for the values of a raster: 1/2000 of their range is far less than a bandwidth.
+_BINS = 2000
+
+
+def scale_bias(algorithm, array, pixel=30.0):
+    """
+    Mean over pixels of an algorithm, less the algorithm of the mean.
+
+    Parameters
+    ----------
+    algorithm : callable
+        Takes a raster like ``array`` and gives one, such as ``fifesim.ndvi`` or ``fifesim.fpar``.
+    array : xarray.DataArray, dims (..., y, x)
+        Of cells.
+    pixel : float, optional
+        [m]
+
+    Returns
+    -------
+    bias : xarray.Dataset, dims (y, x)
+        ``mean_of_algorithm``, ``algorithm_of_mean`` and their difference ``bias``, which is zero everywhere only if the
+        algorithm is scale-invariant. Lazy where the array is.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 1; [Hall1992]_
+    """
+    of_cells = aggregate(algorithm(array), pixel)
+    of_mean = algorithm(aggregate(array, pixel))
+    bias = chunks.pointwise(np.subtract, of_cells, of_mean)
+    found = {"mean_of_algorithm": of_cells, "algorithm_of_mean": of_mean, "bias": bias}
+    out = xr.Dataset({name: values.rename(name) for name, values in found.items()})
+    out["bias"].attrs = {
+        "long_name": "mean of the algorithm less the algorithm of the mean",
+        "units": of_cells.attrs.get("units", "1"),
+    }
+    return out
+
+
+def ndvi_bias(reflectance, pixel=30.0):
+    """
+    Mean NDVI less NDVI of the mean reflectance, predicted from variances and covariance within the pixels.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Of cells.
+    pixel : float, optional
+        [m]
+
+    Returns
+    -------
+    bias : xarray.DataArray, dims (y, x)
+        To second order; that of ``scale_bias(fifesim.ndvi, reflectance)`` is the simulated one. [1]
+
+    Raises
+    ------
+    ValueError
+        As in `ndvi`.
+
+    References
+    ----------
+    [Garrigues2006]_
+
+    See Also
+    --------
+    fifesim.analysis.scaling.ndvi_hessian
+    """
+    red, nir = red_and_nir(reflectance)
+    # Moments of the same cells: a cell that lacks one band has no NDVI.
+    red, nir = red.where(nir.notnull()), nir.where(red.notnull())
+    means = [aggregate(array, pixel) for array in (red, nir, red * red, red * nir, nir * nir)]
+    out = grids.place(chunks.pointwise(_ndvi_bias, *means), grids.geobox(means[0]))
+    return cf.label(out, "ndvi_bias", source=reflectance, history=f"ndvi_bias: second order, {pixel:g} m")
+
+
+def fpar_bias(lai, extinction, fpar_inf=0.94, pixel=30.0):
+    """
+    Mean FPAR less FPAR of the mean LAI, predicted from the variance of LAI within the pixels.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x)
+        Of cells. [m2 m-2]
+    extinction : float
+        K of Eq. 6. [1]
+    fpar_inf : float, optional
+        FPAR of an infinitely thick canopy. [1]
+    pixel : float, optional
+        [m]
+
+    Returns
+    -------
+    bias : xarray.DataArray, dims (y, x)
+        To second order; never positive. [1]
+
+    Raises
+    ------
+    ValueError
+        If the extinction or fpar_inf is not allowed.
+
+    See Also
+    --------
+    fifesim.analysis.scaling.beer_bias
+    """
+    cf.check_quantity(lai, "lai")
+    if not 0 < extinction < np.inf:
+        raise ValueError(f"extinction must be positive, got {extinction:g}: it is K of Eq. 6, about 0.5")
+    if not 0 < fpar_inf <= 1:
+        raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
+    means = [aggregate(array, pixel) for array in (lai, lai * lai)]
+    bias = chunks.pointwise(_fpar_bias, *means, extinction=float(extinction), fpar_inf=float(fpar_inf))
+    out = grids.place(bias, grids.geobox(means[0]))
+    return cf.label(out, "fpar_bias", source=lai, history=f"fpar_bias: second order, {pixel:g} m")
+
+
+def ndvi_linearity(reflectance):
+    """
+    Correlation that must be zero for NDVI to be linear in reflectance; computes.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+
+    Returns
+    -------
+    r : float
+        [1]
+
+    Raises
+    ------
+    ValueError
+        As in `ndvi`.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 2
+
+    See Also
+    --------
+    fifesim.analysis.scaling.ndvi_linearity
+    """
+    red, nir = red_and_nir(reflectance)
+    fit = regress(nir - red, 1.0 / (nir + red), pair="index")
+    return math.copysign(math.sqrt(fit.r2), fit.slope)
+
+
+def share_kept(pixels, cells):
+    """
+    Share of the range and of the variance of cells that pixels keep.
+
+    Parameters
+    ----------
+    pixels, cells : xarray.DataArray
+        The same quantity at two scales.
+
+    Returns
+    -------
+    kept : xarray.Dataset
+        ``range`` and ``variance``; lazy where an input is, when the chunks may change the last digit of the variance.
+        [1]
+
+    References
+    ----------
+    [Friedl1995]_, Fig. 6
+
+    See Also
+    --------
+    fifesim.analysis.scaling.share_kept
+    """
+    for array in (pixels, cells):
+        check_no_counts(array)
+    extent = (pixels.max() - pixels.min()) / (cells.max() - cells.min())
+    kept = {"range": extent, "variance": pixels.var() / cells.var()}
+    # What is left of coordinates belongs to one of the two.
+    return xr.Dataset({name: value.drop_vars(list(value.coords)).drop_attrs() for name, value in kept.items()})
+
+
+def density(array, points=256, bandwidth=None):
+    """
+    Gaussian kernel density of the values of a raster; computes.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+        NaN is left out.
+    points : int, optional
+        Where it is given, evenly over the range of the values.
+    bandwidth : float, optional
+        Of the kernel, in units of the values; by the rule of thumb by default.
+
+    Returns
+    -------
+    density : xarray.DataArray, dims (value,)
+        Per unit of the values. From counts in 2000 bins, so that the raster need not fit in memory; the same under any
+        chunking.
+
+    Raises
+    ------
+    ValueError
+        If fewer than two values are left or they do not vary.
+
+    References
+    ----------
+    [Silverman1986]_; [Friedl1995]_, Figs. 3 and 6
+
+    See Also
+    --------
+    fifesim.analysis.density.gaussian_density
+    """
+    check_no_counts(array)
+    low, high = (float(limit) for limit in (array.min(), array.max()))
+    if not high > low:
+        raise ValueError(f"a density needs values that vary, got {low:g} to {high:g}")
+    edges = np.linspace(low, high, _BINS + 1)
+    counts = _counts(array.data, edges)
+    middles = (edges[1:] + edges[:-1]) / 2
+    if bandwidth is None:
+        bandwidth = _rule_of_thumb(middles, counts)
+    at = np.linspace(low, high, points)
+    found = densities.gaussian_density(middles, at, bandwidth, counts)
+    attrs = {"long_name": f"density of {array.name or 'values'}", "bandwidth": float(bandwidth)}
+    return xr.DataArray(found, dims="value", coords={"value": at}, name="density", attrs=attrs)
+
+
+def _ndvi_bias(red, nir, rr, rn, nn):
+    mixed = rn - red * nir
+    return scaling.second_order_bias(
+        scaling.ndvi_hessian(red, nir), np.array([[rr - red**2, mixed], [mixed, nn - nir**2]])
+    )
+
+
+def _fpar_bias(mean, square, **parameters):
+    return scaling.beer_bias(mean, np.maximum(square - mean**2, 0.0), **parameters)
+
+
+def _counts(data, edges):
+    """Histogram over all blocks; counts are whole, so that their order does not matter."""
+    if not isinstance(data, da.Array):
+        return np.histogram(data[np.isfinite(data)], edges)[0].astype(float)
+    blocks = [dask.delayed(_counts)(block, edges) for block in data.to_delayed().ravel()]
+    return np.sum(dask.compute(*blocks), axis=0)
+
+
+def _rule_of_thumb(middles, counts):
+    n = counts.sum()
+    mean = np.sum(counts * middles) / n
+    deviation = np.sqrt(np.sum(counts * (middles - mean) ** 2) / (n - 1))
+    lower, upper = np.interp((0.25, 0.75), np.cumsum(counts) / n, middles)
+    return densities.silverman_bandwidth(deviation, upper - lower, n)

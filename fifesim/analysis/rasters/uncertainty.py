@@ -1,0 +1,85 @@
+"""Relative equivalent noise of labelled rasters."""
+
+import dask
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis import uncertainty
+from fifesim.analysis.rasters.pairs import matched, origins, sums_by_row
+from fifesim.analysis.rasters.regression import regress
+from fifesim.rasters import cf
+
+# More increments than this are a width in other units than the variable.
+_MOST_INCREMENTS = 10_000
+
+
+def relative_equivalent_noise(variable, ndvi, increment=0.1, *, slope=None, min_count=3, pair="coordinates"):
+    """
+    Relative equivalent noise by increments of a variable; computes.
+
+    Parameters
+    ----------
+    variable, ndvi : xarray.DataArray, dims (y, x)
+        The truth, such as LAI or FPAR, and the index that it is inferred from; pairs with NaN are left out.
+    increment : float, optional
+        Width of an increment, in units of the variable. NDVI varies within it by the slope too, which alone makes a
+        relative noise of ``increment / (sqrt(12) variable)``.
+    slope : float, optional
+        Of NDVI on the variable; by default that of its least-squares line.
+    min_count : int, optional
+        Pairs that an increment needs, at least 2; with fewer its noise is NaN.
+    pair : {"coordinates", "index"}, optional
+        As in `regress`.
+
+    Returns
+    -------
+    noise : xarray.Dataset, dims (increment,)
+        ``ren`` at the mean of the variable in each increment, that ``mean``, the ``deviation`` of NDVI and the
+        ``count`` of pairs, with the middle of the increments as coordinate. The same to the bit under any chunking.
+
+    Raises
+    ------
+    ValueError
+        If the rasters do not match, the increment is not positive, or nothing is left.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 7 and Fig. 7
+
+    See Also
+    --------
+    fifesim.analysis.uncertainty.equivalent_noise
+    """
+    if not 0 < increment < np.inf:
+        raise ValueError(f"increment must be positive, got {increment:g}: it is a width in units of the variable")
+    if min_count < 2:
+        raise ValueError(f"min_count must be at least 2, got {min_count}: one value has no deviation")
+    variable, ndvi = matched(variable, ndvi, pair)
+    if slope is None:
+        slope = regress(ndvi, variable, pair="index").slope
+    low, high = (float(limit) for limit in dask.compute(variable.min(), variable.max()))
+    if not (np.isfinite(low) and np.isfinite(high)):
+        raise ValueError(f"the variable goes from {low:g} to {high:g}: relative noise needs finite values")
+    first, last = (int(np.floor(limit / increment)) for limit in (low, high))
+    if last - first >= _MOST_INCREMENTS:
+        raise ValueError(
+            f"increment {increment:g} cuts {low:g} to {high:g} into {last - first + 1} parts: "
+            f"take a larger one, at most {_MOST_INCREMENTS} parts"
+        )
+    increments = last - first + 1
+    (origin,) = origins(ndvi)
+    sums = sums_by_row(
+        uncertainty.increment_sums, variable, ndvi, count=uncertainty.SUMS * increments, first=first, width=increment,
+        increments=increments, ndvi_origin=origin,
+    )  # fmt: skip
+    count, mean, deviation = uncertainty.increment_moments(sums)
+    ren = np.where(count >= min_count, uncertainty.equivalent_noise(deviation, slope, mean), np.nan)
+    middle = (first + 0.5 + np.arange(increments)) * increment
+    out = xr.Dataset(
+        {name: ("increment", values) for name, values in {
+            "ren": ren, "mean": mean, "deviation": deviation, "count": count}.items()},
+        coords={"increment": ("increment", middle, {"long_name": f"middle of increments of {variable.name}"})},
+        attrs={"slope": float(slope), "width": float(increment)},
+    )  # fmt: skip
+    out["ren"].attrs = cf.attributes("ren")
+    return out

@@ -1,0 +1,1 @@
+"""What the ground around a cell adds to what is seen of it."""

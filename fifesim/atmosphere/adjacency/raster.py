@@ -1,0 +1,326 @@
+"""The adjacency effect on labelled rasters: what the ground around each cell adds to it, and how to take it off."""
+
+from functools import partial
+
+import dask.array as da
+import numpy as np
+import xarray as xr
+from affine import Affine
+from dask.graph_manipulation import bind
+from odc.geo.geobox import GeoBox
+
+from fifesim.atmosphere.adjacency import blocks, environment_grid
+from fifesim.atmosphere.adjacency import environment as adjacency
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.rasters import chunks
+from fifesim.rasters import grid as grids
+
+# How far from the scene a raster of its surroundings counts at its place. Beyond it lies 3e-4 of what molecules scatter
+# into the view, and nothing of what aerosol does. [m]
+REACH = 100_000.0
+
+
+def environment(reflectance, weight_molecules, weight_aerosol, vza, *, surroundings=None):
+    """
+    Mean reflectance of the ground around each cell, as the atmosphere blurs it.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims ([band], y, x)
+        Of the surface; NaN is left out. [1]
+    weight_molecules, weight_aerosol : float or array, shape (band,)
+        As `adjacency.environment_weights` gives them. [1]
+    vza : float or array, shape (band,)
+        [degree]
+    surroundings : float or sequence or xarray.DataArray, optional
+        Reflectance outside of the scene: a number, one for each band, or a raster ([band], y, x) in the CRS of the
+        scene, with cells of any size, whose mean lies beyond it. By default the scene's mean. [1]
+
+    Returns
+    -------
+    environment : xarray.DataArray, dims (band, y, x)
+        Lazy where an input is; the same bits in any chunks. [1]
+
+    Raises
+    ------
+    ValueError
+        If the surroundings are no reflectance, or do not fit the scene or its bands.
+
+    See Also
+    --------
+    fifesim.atmosphere.adjacency.environment_grid.environment
+    """
+    reflectance = _banded(reflectance)
+    return _on_cells(_environment(reflectance, (weight_molecules, weight_aerosol), vza, surroundings), reflectance)
+
+
+def apparent_reflectance(reflectance, terms, vza, surroundings=None):
+    """
+    Apparent reflectance at the top of the atmosphere, with the light that the surroundings of each cell add.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims ([band], y, x)
+        Of the surface. [1]
+    terms : object
+        With ``path_reflectance``, ``transmittance_down``, ``transmittance_up``, ``direct_transmittance_up``,
+        ``diffuse_up_molecules``, ``diffuse_up_aerosol``, ``spherical_albedo`` and ``gas_transmittance``, each of shape
+        (band,). [1]
+    vza : float or array, shape (band,)
+        [degree]
+    surroundings : float or sequence or xarray.DataArray, optional
+        As in `environment`. [1]
+
+    Returns
+    -------
+    toa_reflectance : xarray.DataArray, dims (band, y, x)
+        Lazy where an input is. A lazy reflectance is computed twice: holding it until the environment of its first
+        cell is known would take the memory of the whole scene. [1]
+
+    Raises
+    ------
+    ValueError
+        As `environment`; or, when it is computed, if the reflectance is no fraction.
+
+    See Also
+    --------
+    fifesim.atmosphere.adjacency.environment.inhomogeneous_reflectance
+    """
+    reflectance = _banded(reflectance)
+    weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
+    coarse = _environment(reflectance, weights, vza, surroundings)
+    return _couple(adjacency.inhomogeneous_reflectance, reflectance, coarse, terms)
+
+
+def surface_reflectance(toa_reflectance, terms, vza, surroundings=None):
+    """
+    Surface reflectance without the light that the surroundings of each cell add; the inverse of `apparent_reflectance`.
+
+    Parameters
+    ----------
+    toa_reflectance : xarray.DataArray, dims ([band], y, x)
+        [1]
+    terms : object
+        As in `apparent_reflectance`. [1]
+    vza : float or array, shape (band,)
+        [degree]
+    surroundings : float or sequence or xarray.DataArray, optional
+        Surface reflectance, as in `environment`. [1]
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Lazy where an input is; computes a lazy input twice, as `apparent_reflectance`. [1]
+
+    Raises
+    ------
+    ValueError
+        As `environment`.
+    RuntimeError
+        When it is computed, if too little light comes from a target unscattered to tell it from its surroundings.
+
+    See Also
+    --------
+    fifesim.atmosphere.adjacency.environment_grid.environment_of_target, fifesim.atmosphere.adjacency.environment.target_reflectance
+    """
+    toa_reflectance = _banded(toa_reflectance)
+    weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
+    factors = _per_band(np.stack(np.broadcast_arrays(*_factors(terms)), axis=-1), toa_reflectance, "a term")
+    solve = [partial(environment_grid.environment_of_target, factors=tuple(row)) for row in factors.tolist()]
+    coarse = _on_blocks(blocks.block_moments, solve, toa_reflectance, weights, vza, surroundings)
+    return _couple(adjacency.target_reflectance, toa_reflectance, coarse, terms)
+
+
+def _banded(array):
+    array = array if "band" in array.dims else array.expand_dims("band")
+    if set(array.dims) != {"band", "y", "x"}:
+        raise ValueError(f"a reflectance has dimensions (band, y, x), got {array.dims}: select one layer first")
+    return array.transpose("band", "y", "x")
+
+
+def _factors(terms):
+    """Those of the kernels of `adjacency`, in their order."""
+    diffuse = np.asarray(terms.transmittance_up) - terms.direct_transmittance_up
+    before = terms.path_reflectance, terms.transmittance_down, terms.direct_transmittance_up
+    return (*before, diffuse, terms.spherical_albedo, terms.gas_transmittance)
+
+
+def _per_band(values, array, what):
+    """Values for each band along the first axis, from one for all or one for each."""
+    values, bands = np.asarray(values, float), array.sizes["band"]
+    if values.ndim and len(values) not in (1, bands):
+        raise ValueError(f"{what} must be one number, or one for each of the {bands} bands, got {len(values)}")
+    return np.broadcast_to(values, (bands, *values.shape[1:]))
+
+
+def _environment(reflectance, weights, vza, surroundings):
+    solve = [environment_grid.environment] * reflectance.sizes["band"]
+    return _on_blocks(blocks.block_sums, solve, reflectance, weights, vza, surroundings)
+
+
+def _on_blocks(summarize, solve, array, weights, vza, surroundings):
+    """Environment at the blocks and a ring around them, shape (band, y, x): one task for each band."""
+    grid = grids.geobox(array)
+    cell = grids.cell_size(grid)
+    along = _blocks(grid)
+    margin, fars, outer = _surroundings(surroundings, array, along)
+    molecules, aerosol = (_per_band(values, array, "a weight") for values in weights)
+    vza = _per_band(vza, array, "vza")
+    lazy = array.chunks is not None or (outer is not None and outer.chunks is not None)
+    pieces, sums = _sums(summarize, array.data, along)
+    shape = tuple(axis.count + 2 for axis in along)
+    sizes = tuple((size,) for size in shape) if lazy else None
+    bands = []
+    for band, each in enumerate(solve):
+        spread = (*along, cell, margin, *(float(values[band]) for values in (vza, molecules, aerosol)))
+        kernel = partial(_whole, each, pieces, spread, fars[band])
+        reads = [sums[band]] if outer is None else [sums[band], outer.data[band]]
+        bands.append(chunks.windows(kernel, [_all_of(part, shape) for part in reads], shape, sizes))
+    return da.stack(bands) if lazy else np.stack(bands)
+
+
+def _blocks(grid):
+    place = zip(grids.lattice_position(grid), grids.cell_size(grid), grid.shape, strict=True)
+    return tuple(blocks.blocks_along(*axis) for axis in place)
+
+
+def _whole(solve, pieces, spread, far, rows, columns, sums, outer=None):
+    """Environment at all blocks of one band."""
+    return solve(
+        blocks.whole_blocks(sums, *pieces),
+        far if outer is None else outer,
+        environment_grid.spread_over(*spread),
+    )
+
+
+def _all_of(array, shape):
+    """Reads of the whole array by every cell of a result."""
+    rows, columns = ((np.zeros(size, int), np.full(size, n)) for size, n in zip(shape, array.shape[-2:], strict=True))
+    return chunks.Reads(array, rows, columns)
+
+
+def _sums(summarize, data, along):
+    """Sums over pieces of blocks, and these; each chunk is let go before the next is made."""
+    lazy = isinstance(data, da.Array)
+    cuts = data.chunks[1:] if lazy else [(size,) for size in data.shape[1:]]
+    pieces, sizes = zip(*(axis.pieces(cut) for axis, cut in zip(along, cuts, strict=True)), strict=True)
+    kernel = partial(summarize, along_y=pieces[0], along_x=pieces[1])
+    leading = (2, 1, 1) if summarize is blocks.block_sums else (2, 3, 3)
+    shape = (*leading, *(len(each.start) for each in pieces))
+    edges = [(each.start, each.stop) for each in pieces]
+    if lazy:
+        return pieces, _by_bands(kernel, data, data.chunks[0], edges, shape, sizes)
+    return pieces, chunks.windows(kernel, [chunks.Reads(data, *edges)], (len(data), *shape))
+
+
+def _by_bands(kernel, data, bands, edges, shape, sizes):
+    """Windows of the bands of one chunk at a time."""
+    parts = []
+    for end, count in zip(np.cumsum(bands).tolist(), bands, strict=True):
+        reads = [chunks.Reads(data[end - count : end], *edges)]
+        parts.append(chunks.windows(kernel, reads, (count, *shape), sizes))
+    return da.concatenate(parts)
+
+
+def _on_cells(coarse, array):
+    """Raster of the environment on the cells, in the chunks of the array."""
+    along_y, along_x = (axis.interpolation for axis in _blocks(grids.geobox(array)))
+    kernel = partial(blocks.on_cells, along_y=along_y, along_x=along_x)
+    edges = [(axis.start, axis.start + axis.count) for axis in (along_y, along_x)]
+    if isinstance(coarse, da.Array):
+        sizes = array.chunks or tuple((size,) for size in array.shape)
+        data = _by_bands(kernel, coarse, sizes[0], edges, array.shape[1:], sizes[1:])
+    else:
+        data = chunks.windows(kernel, [chunks.Reads(coarse, *edges)], array.shape)
+    place = {name: value for name, value in array.coords.items() if not {"y", "x"} & set(value.dims)}
+    # xarray would take over dask's name.
+    out = xr.DataArray(data, dims=("band", "y", "x"), coords=place).rename(None)
+    return grids.place(out, grids.geobox(array))
+
+
+def _couple(kernel, array, coarse, terms):
+    """Apply a kernel of `adjacency` to the cells and their environment."""
+    around = _on_cells(coarse, array)
+    if array.chunks is not None:
+        # Made afresh once the environment is known, or all cells would be held until then.
+        array = array.copy(data=bind(array.data, coarse, seed=coarse.name))
+    per_band = [xr.DataArray(_per_band(values, array, "a term"), dims="band") for values in _factors(terms)]
+    plain = [each.drop_vars("band", errors="ignore") for each in (array, around)]
+    out = chunks.pointwise(kernel, *plain, *per_band)
+    if "band" in array.coords:
+        out = out.assign_coords(band=array["band"])
+    return grids.place(out, grids.geobox(array))
+
+
+def _surroundings(surroundings, array, along):
+    """Blocks of margin, what lies beyond them in each band, and what lies on them: dims (band, y, x), or None."""
+    bands = array.sizes["band"]
+    if surroundings is None:
+        return (1, 1), [None] * bands, None
+    if isinstance(surroundings, xr.DataArray) and {"y", "x"} <= set(surroundings.dims):
+        margin, outer = _outer(surroundings, array, along)
+        return margin, [None] * bands, outer
+    if isinstance(surroundings, xr.DataArray) and "band" in surroundings.dims:
+        surroundings = _same_bands(surroundings, array)
+    numbers = _per_band(surroundings, array, "surroundings")
+    if not np.all((numbers >= 0) & (numbers <= 1)):
+        raise ValueError(f"surroundings must be reflectances from 0 to 1, got {numbers.tolist()}")
+    return (1, 1), numbers.tolist(), None
+
+
+def _outer(surroundings, array, along):
+    """Margin of blocks, and the means of a raster on them and the scene's."""
+    there, here = grids.geobox(surroundings), grids.geobox(array)
+    if there.crs != here.crs:
+        raise ValueError(
+            f"the surroundings must be in the CRS of the scene, {here.crs}, got {there.crs}: reproject them"
+        )
+    a, b = here.affine, there.affine
+    rows = _outer_axis(along[0], a.f, a.e, b.f, b.e, there.shape.y)
+    columns = _outer_axis(along[1], a.c, a.a, b.c, b.a, there.shape.x)
+    if rows is None or columns is None:
+        raise ValueError(
+            f"the surroundings must lie within {REACH / 1000:g} km of the scene, {grids.extent(here)}, "
+            f"got {grids.extent(there)}"
+        )
+    north, down, above, rows = rows
+    west, across, left, columns = columns
+    grid = GeoBox((len(rows), len(columns)), Affine(across, 0.0, west, 0.0, down, north), here.crs)
+    wanted = _same_bands(surroundings, array)
+    return (above, left), chunks.resample(partial(regularize, min_valid=0.0), rows, columns, wanted, grid)
+
+
+def _outer_axis(along, origin, cell, outer_origin, outer_cell, outer_cells):
+    """First edge, signed size and margin of the blocks that a raster is brought onto, and the operator; or None."""
+    direction, size = np.sign(cell), along.cells * abs(cell)
+    before = direction * (origin - outer_origin)
+    behind = abs(outer_cells * outer_cell) - before - abs(along.n_cells * cell)
+    if min(before + abs(along.n_cells * cell), behind + abs(along.n_cells * cell)) <= -REACH:
+        return None
+    margin = max(1, int(np.ceil(min(max(before, behind), REACH) / size)))
+    first = origin - direction * (along.offset * abs(cell) + margin * size)
+    operator = axis_operator(
+        Boxcar(size),
+        cell_origin=outer_origin,
+        cell_size=outer_cell,
+        n_cells=outer_cells,
+        pixel_origin=first,
+        pixel_size=direction * size,
+        n_pixels=along.count + 2 * margin,
+    )
+    return first, direction * size, margin, operator
+
+
+def _same_bands(surroundings, array):
+    """Surroundings with the bands of the scene; one layer stands for all."""
+    if "band" not in surroundings.dims:
+        surroundings = surroundings.drop_vars("band", errors="ignore")
+        return surroundings.expand_dims(band=array.sizes["band"])
+    if "band" in surroundings.coords and "band" in array.coords:
+        wanted, found = ([str(name) for name in each["band"].values] for each in (array, surroundings))
+        if set(wanted) <= set(found):
+            return surroundings.isel(band=[found.index(name) for name in wanted])
+        raise ValueError(f"the surroundings have the bands {', '.join(found)}, the scene {', '.join(wanted)}")
+    if surroundings.sizes["band"] != array.sizes["band"]:
+        raise ValueError(f"the surroundings have {surroundings.sizes['band']} bands, the scene {array.sizes['band']}")
+    return surroundings

@@ -1,0 +1,1 @@
+"""What is in the air: profiles, molecules, aerosol and gases."""

@@ -1,0 +1,392 @@
+"""Amount and optics of the aerosol."""
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from numbers import Real
+
+import numpy as np
+
+from fifesim.atmosphere.air import components
+from fifesim.atmosphere.air.components import COMPONENTS
+from fifesim.base import datasets
+
+# Volume fractions of the components. [1] World Climate Programme WCP-55 (1983); Tanre et al. (1990).
+MODELS = {
+    "continental": {"dust": 0.70, "water_soluble": 0.29, "soot": 0.01},
+    "maritime": {"water_soluble": 0.05, "oceanic": 0.95},
+    "urban": {"dust": 0.17, "water_soluble": 0.61, "soot": 0.22},
+}
+
+WAVELENGTH_RANGE = (0.35, 3.75)  # of the tables [um]
+REFERENCE_WAVELENGTH = 0.55  # at which the amount is given [um]
+
+# Extinction per particle at 0.55 um with which the number profiles give the visibility at the ground. [km-1 cm3]
+_EXTINCTION_PER_PARTICLE = 5.6032e-5
+
+_EXAMPLE = "dust:0.5+water_soluble:0.5"
+
+
+def aerosol_optical_thickness(visibility):
+    r"""
+    Aerosol optical thickness at 0.55 um of the whole atmosphere.
+
+    .. math::
+
+        \tau = \sigma \sum_i \sqrt{N_i N_{i+1}} \, \Delta z_i, \qquad N(z, V) = \frac{a(z)}{V} + b(z)
+
+    Parameters
+    ----------
+    visibility : float
+        Meteorological range at the ground, :math:`V`. [km]
+
+    Returns
+    -------
+    aot : float
+        [1]
+
+    Notes
+    -----
+    :math:`a` and :math:`b` make the number profile pass through the two tabulated ones, for 5 and 23 km.
+    The column stands on the ground, whatever its altitude.
+
+    References
+    ----------
+    [McClatchey1972]_, number profiles; [Tanre1990]_
+
+    Examples
+    --------
+    >>> aerosol_optical_thickness(10.0) > aerosol_optical_thickness(50.0)
+    True
+    """
+    levels = datasets.table("aerosol_profile.csv")
+    hazy, clear = levels["visibility_5km"].to_numpy(), levels["visibility_23km"].to_numpy()
+    slope = (hazy - clear) / (1 / 5 - 1 / 23)
+    number = clear + slope * (1 / visibility - 1 / 23)
+    layers = np.sqrt(number[1:] * number[:-1]) * np.diff(levels["altitude"])
+    return float(_EXTINCTION_PER_PARTICLE * layers.sum())
+
+
+def mixture(aerosol):
+    """
+    Volume fractions of the components of an aerosol.
+
+    Parameters
+    ----------
+    aerosol : str or mapping
+        One of `MODELS`; or a text like ``"dust:0.5+water_soluble:0.5"``, or a mapping of components to fractions.
+
+    Returns
+    -------
+    fractions : dict
+        In the order of `COMPONENTS`, without those that are 0. [1]
+
+    Raises
+    ------
+    ValueError
+        If a model or a component is unknown, a fraction is negative, or their sum is not 1 within 1e-6.
+    TypeError
+        If the aerosol is neither text nor mapping, or a fraction is not a number.
+
+    Examples
+    --------
+    >>> mixture({"soot": 0.25, "dust": 0.75})
+    {'dust': 0.75, 'soot': 0.25}
+    >>> mixture("urban") == MODELS["urban"]
+    True
+    """
+    if isinstance(aerosol, Mapping):
+        return _checked_fractions(aerosol, aerosol)
+    if not isinstance(aerosol, str):
+        raise TypeError(f"aerosol must be a text or a mapping, got {aerosol!r}: type aerosol={_EXAMPLE!r}")
+    if aerosol in MODELS:
+        return dict(MODELS[aerosol])
+    if ":" not in aerosol:
+        nearest = get_close_matches(aerosol, MODELS, n=1, cutoff=0.0)[0]
+        raise ValueError(
+            f"aerosol must be one of {', '.join(MODELS)}, or a mixture such as {_EXAMPLE}, got {aerosol!r}: "
+            f"type aerosol={nearest!r}"
+        )
+    return _checked_fractions(_parsed(aerosol), aerosol)
+
+
+def canonical(aerosol):
+    """
+    The one text that names an aerosol.
+
+    Parameters
+    ----------
+    aerosol : str or mapping
+        As in `mixture`.
+
+    Returns
+    -------
+    name : str
+        One of `MODELS` where the fractions are a model's; else the mixture, its components in order.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `mixture`.
+
+    Examples
+    --------
+    >>> canonical({"soot": 0.25, "dust": 0.75})
+    'dust:0.75+soot:0.25'
+    >>> canonical(mixture("maritime"))
+    'maritime'
+    """
+    fractions = mixture(aerosol)
+    for name, model in MODELS.items():
+        if fractions == model:
+            return name
+    return "+".join(f"{name}:{np.format_float_positional(value, trim='-')}" for name, value in fractions.items())
+
+
+def aerosol_optics(aerosol, wavelength):
+    r"""
+    Optical properties of an aerosol.
+
+    .. math::
+
+        \sigma = \sum_j c_j \sigma_j, \qquad \omega = \frac{\sum_j c_j \omega_j \sigma_j}{\sigma}, \qquad
+        g = \frac{\sum_j c_j \omega_j \sigma_j g_j}{\sum_j c_j \omega_j \sigma_j}
+
+    Parameters
+    ----------
+    aerosol : str or mapping
+        As in `mixture`; its volume fractions are :math:`c_j`.
+    wavelength : array, shape (n,)
+        0.35 to 3.75. [um]
+
+    Returns
+    -------
+    extinction : array, shape (n,)
+        :math:`\sigma` relative to 0.55 um. [1]
+    single_scattering_albedo : array, shape (n,)
+        :math:`\omega` [1]
+    asymmetry : array, shape (n,)
+        Mean cosine of the scattering angle, :math:`g`. [1]
+
+    Raises
+    ------
+    ValueError
+        If a wavelength lies outside the tables, or the aerosol is not allowed.
+
+    Notes
+    -----
+    Cross sections of a component, for a unit of its particles' volume, follow a power law between the tabulated
+    wavelengths; its asymmetry is linear in their logarithm.
+
+    References
+    ----------
+    [dAlmeida1991]_ micro-physics, by Mie theory; [Tanre1990]_, mixtures
+
+    Examples
+    --------
+    >>> [float(values) for values in aerosol_optics("continental", 0.55)][0]
+    1.0
+    """
+    wavelength = _checked_wavelength(wavelength)
+    fractions = mixture(aerosol)
+    extinction, scattering, directed = _cross_sections(fractions, wavelength)
+    reference, _, _ = _cross_sections(fractions, REFERENCE_WAVELENGTH)
+    return extinction / reference, scattering / extinction, directed / scattering
+
+
+def aerosol_phase(aerosol, scattering_cosine, wavelength):
+    r"""
+    Phase function of an aerosol.
+
+    .. math:: P = \frac{\sum_j c_j \omega_j \sigma_j P_j}{\sum_j c_j \omega_j \sigma_j}
+
+    Parameters
+    ----------
+    aerosol : str or mapping
+        As in `mixture`; its volume fractions are :math:`c_j`.
+    scattering_cosine : array, broadcastable with wavelength
+        Cosine of the scattering angle. [1]
+    wavelength : array
+        0.35 to 3.75. [um]
+
+    Returns
+    -------
+    phase : array, shape of the broadcast inputs
+        Its mean over the sphere is 1. [1]
+
+    Raises
+    ------
+    ValueError
+        If a wavelength lies outside the tables, or the aerosol is not allowed.
+
+    Notes
+    -----
+    That of a component is linear in the logarithm of the wavelength, which keeps its mean, and its logarithm
+    is linear in the angle.
+
+    References
+    ----------
+    [dAlmeida1991]_ micro-physics, by Mie theory; [Tanre1990]_, mixtures
+
+    Examples
+    --------
+    >>> bool(aerosol_phase("continental", 1.0, 0.55) > aerosol_phase("continental", 0.0, 0.55))
+    True
+    """
+    wavelength = _checked_wavelength(wavelength)
+    return _weighted_mean(
+        mixture(aerosol), wavelength, lambda name: components.phase(name, scattering_cosine, wavelength)
+    )
+
+
+def aerosol_polarization(aerosol, scattering_cosine, wavelength):
+    r"""
+    Degree of linear polarization of natural light that an aerosol scatters once.
+
+    .. math:: q = -\frac{P_{12}}{P_{11}}
+
+    Parameters
+    ----------
+    aerosol : str or mapping
+        As in `mixture`.
+    scattering_cosine : array, broadcastable with wavelength
+        Cosine of the scattering angle. [1]
+    wavelength : array
+        0.35 to 3.75. [um]
+
+    Returns
+    -------
+    polarization : array, shape of the broadcast inputs
+        Positive where the light vibrates across the plane of scattering, as in molecular scattering. [1]
+
+    Raises
+    ------
+    ValueError
+        If a wavelength lies outside the tables, or the aerosol is not allowed.
+
+    References
+    ----------
+    [dAlmeida1991]_ micro-physics, by Mie theory
+
+    Examples
+    --------
+    Straight on and straight back no direction is preferred:
+
+    >>> [float(value) for value in aerosol_polarization("urban", [-1.0, 1.0], 0.55)]
+    [0.0, 0.0]
+    """
+    wavelength = _checked_wavelength(wavelength)
+    fractions = mixture(aerosol)
+    first, second = (
+        _weighted_mean(fractions, wavelength, lambda name: element(name, scattering_cosine, wavelength))  # noqa: B023
+        for element in (components.phase, components.polarized_phase)
+    )
+    return second / first
+
+
+def phase_moments(aerosol, wavelength, count):
+    r"""
+    Legendre moments of the phase function.
+
+    .. math:: \chi_l = \frac{1}{2} \int_{-1}^{1} P(\mu) P_l(\mu) \, \mathrm{d}\mu, \qquad
+        P(\mu) = \sum_l (2 l + 1) \chi_l P_l(\mu)
+
+    Parameters
+    ----------
+    aerosol : str or mapping
+        As in `mixture`.
+    wavelength : array, shape (n,)
+        0.35 to 3.75. [um]
+    count : int
+        Number of moments, from :math:`\chi_0 = 1` on; the tables carry a hundred within 1e-3. [1]
+
+    Returns
+    -------
+    moments : array, shape (n, count)
+        Those of `aerosol_phase`. [1]
+
+    Raises
+    ------
+    ValueError
+        If a wavelength lies outside the tables, or the aerosol is not allowed.
+
+    References
+    ----------
+    [dAlmeida1991]_ micro-physics, by Mie theory
+
+    Examples
+    --------
+    The second is the asymmetry:
+
+    >>> _, second = phase_moments("continental", 0.55, 2)[0]
+    >>> bool(abs(second - aerosol_optics("continental", 0.55)[2]) < 1e-3)
+    True
+    """
+    wavelength = np.atleast_1d(_checked_wavelength(wavelength))
+    return _weighted_mean(
+        mixture(aerosol), wavelength[:, None], lambda name: components.phase_moments(name, wavelength, count)
+    )
+
+
+def _parsed(text):
+    """Fractions of a mixture text, as yet unchecked."""
+    fractions = {}
+    for part in text.split("+"):
+        name, _, number = part.partition(":")
+        try:
+            value = float(number)
+        except ValueError:
+            raise ValueError(
+                f"aerosol must give each component a number after a colon, got {part.strip()!r} in {text!r}: "
+                f"type aerosol={_EXAMPLE!r}"
+            ) from None
+        if name.strip() in fractions:
+            raise ValueError(f"aerosol must name each component once, got {name.strip()!r} twice in {text!r}: add up")
+        fractions[name.strip()] = value
+    return fractions
+
+
+def _checked_fractions(fractions, given):
+    for name, value in fractions.items():
+        if name not in COMPONENTS:
+            nearest = get_close_matches(str(name), COMPONENTS, n=1, cutoff=0.0)[0]
+            raise ValueError(
+                f"aerosol component must be one of {', '.join(COMPONENTS)}, got {name!r} in {given!r}: type {nearest!r}"
+            )
+        if not isinstance(value, Real) or isinstance(value, bool):
+            raise TypeError(f"aerosol fraction of {name} must be a number from 0 to 1, got {value!r}: type 0.5")
+        if not value >= 0:
+            raise ValueError(f"aerosol fraction of {name} must be from 0 to 1, got {value:g}: type 0 to leave it out")
+    total = sum(fractions.values())
+    if not abs(total - 1) <= 1e-6:
+        scaled = "+".join(f"{name}:{value / total:.4g}" for name, value in fractions.items()) if total > 0 else _EXAMPLE
+        raise ValueError(f"aerosol fractions must add up to 1, got {total:g} in {given!r}: type aerosol={scaled!r}")
+    return {name: float(fractions[name]) for name in COMPONENTS if fractions.get(name, 0) > 0}
+
+
+def _checked_wavelength(wavelength):
+    wavelength = np.asarray(wavelength, float)
+    low, high = WAVELENGTH_RANGE
+    outside = wavelength[(wavelength < low) | (wavelength > high)]
+    if outside.size:
+        raise ValueError(
+            f"wavelength must be from {low:g} to {high:g} um, got {outside.flat[0]:g}: give it in micrometres, "
+            "inside the aerosol tables"
+        )
+    return wavelength
+
+
+def _cross_sections(fractions, wavelength):
+    """Extinction, scattering, and scattering times asymmetry of a mixture [um-1]."""
+    return sum(
+        fraction * np.stack(components.cross_sections(component, wavelength))
+        for component, fraction in fractions.items()
+    )
+
+
+def _weighted_mean(fractions, wavelength, values):
+    """Mean over the components, by their scattering."""
+    total = amount = 0.0
+    for component, fraction in fractions.items():
+        _, scattering, _ = components.cross_sections(component, wavelength)
+        total, amount = total + fraction * scattering * values(component), amount + fraction * scattering
+    return total / amount

@@ -1,0 +1,279 @@
+"""The state of the atmosphere: profile of the air, aerosol and how much there is of each."""
+
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import numpy as np
+
+from fifesim.atmosphere.air import aerosols, molecules
+from fifesim.atmosphere.air.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
+from fifesim.atmosphere.air.summary import describe
+
+ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
+
+_NUMBER = r"([-+.\deE]+)"
+_TEXT = re.compile(
+    rf"profile=(\S+) aerosol=(\S+) (?:visibility={_NUMBER} km|aot={_NUMBER}) altitude={_NUMBER} km"
+    rf"(?: h2o={_NUMBER} g cm-2)?(?: o3={_NUMBER} cm-atm)?(?: engine=(\S+))?"
+)
+
+
+@dataclass(frozen=True)
+class Atmosphere:
+    """
+    A plane-parallel atmosphere, and the scheme by which light goes through it.
+
+    Parameters
+    ----------
+    profile : str, optional
+        Pressure, temperature, water vapour and ozone by altitude, one of `PROFILES`.
+    aerosol : str or mapping, optional
+        Optical properties of the aerosol: one of `aerosols.MODELS`, "none", or a mixture of
+        `aerosols.COMPONENTS` by volume, such as ``{"dust": 0.5, "water_soluble": 0.5}``.
+    visibility : float, optional
+        Meteorological range at the ground, 5 to 100; 45 where there is no ``aot``. [km]
+    altitude : float, optional
+        Of the ground, 0 to 4. [km]
+    aot : float, optional
+        Aerosol optical thickness at 0.55 um, 0 to 2, in the place of ``visibility``. [1]
+    h2o : float, optional
+        Column of water vapour, 0 to 10; by default that of the profile. [g cm-2]
+    o3 : float, optional
+        Column of ozone, 0 to 1; by default that of the profile. [cm-atm]
+    engine : str, optional
+        One of `ENGINES`: the closed forms of 5S, successive orders of scattering with or without polarization, or
+        6SV itself, which is an extra.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, or a number out of its range.
+
+    Notes
+    -----
+    Raising the ground cuts the profile of the air off below; the aerosol stands on the ground and keeps its amount.
+    The columns of the user scale the profile at all levels. `aot` is known afterwards in either case, `visibility` is
+    None where the user gave `aot`.
+
+    References
+    ----------
+    [McClatchey1972]_, profiles; [Tanre1990]_
+
+    Examples
+    --------
+    The text that travels with the data says all:
+
+    >>> Atmosphere.parse(Atmosphere(visibility=23).text) == Atmosphere(visibility=23)
+    True
+    """
+
+    profile: str = "midlatitude-summer"
+    aerosol: str = "continental"
+    visibility: float | None = None
+    altitude: float = 0.4
+    aot: float | None = None
+    h2o: float | None = None
+    o3: float | None = None
+    engine: str = "5S"
+
+    def __post_init__(self):
+        _check_name("profile", self.profile, PROFILES)
+        _check_name("engine", self.engine, ENGINES)
+        aerosol = self.aerosol if self.aerosol == "none" else aerosols.canonical(self.aerosol)
+        self._set(aerosol=aerosol, altitude=_checked("altitude", self.altitude, 0, 4, "km"))
+        for name, high, unit in (("h2o", 10, "g cm-2"), ("o3", 1, "cm-atm")):
+            if getattr(self, name) is not None:
+                self._set(**{name: _checked(name, getattr(self, name), 0, high, unit)})
+        self._set_amount()
+
+    def _set_amount(self):
+        visibility, aot = self.visibility, self.aot
+        if aot is not None:
+            aot = _checked("aot", aot, 0, 2, "optical thickness at 0.55 um")
+        if visibility is not None or aot is None:
+            visibility = _checked("visibility", 45.0 if visibility is None else visibility, 5, 100, "km")
+            follows = 0.0 if self.aerosol == "none" else aerosols.aerosol_optical_thickness(visibility)
+            if aot not in (None, follows):
+                raise ValueError(
+                    f"give visibility or aot, not both: {visibility:g} km is an aot of {follows:.4g}, got {aot:g}; "
+                    "type None for the other"
+                )
+            aot = follows
+        if self.aerosol == "none" and aot:
+            raise ValueError(f"aot must be 0 without aerosol, got {aot:g}: name an aerosol, or leave aot out")
+        self._set(visibility=visibility, aot=aot)
+
+    def _set(self, **values):
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __str__(self):
+        return describe(self)
+
+    @property
+    def text(self):
+        """One line that says all, for `parse`."""
+        by_aot = self.visibility is None
+        amount = f"aot={_shortest(self.aot)}" if by_aot else f"visibility={_shortest(self.visibility)} km"
+        return " ".join(
+            [
+                f"profile={self.profile} aerosol={self.aerosol} {amount} altitude={_shortest(self.altitude)} km",
+                *([] if self.h2o is None else [f"h2o={_shortest(self.h2o)} g cm-2"]),
+                *([] if self.o3 is None else [f"o3={_shortest(self.o3)} cm-atm"]),
+                *([] if self.engine == "5S" else [f"engine={self.engine}"]),
+            ]
+        )
+
+    @classmethod
+    def parse(cls, text):
+        """
+        Atmosphere that a text describes.
+
+        Parameters
+        ----------
+        text : str
+            As `text` says it.
+
+        Returns
+        -------
+        atmosphere : Atmosphere
+
+        Raises
+        ------
+        ValueError
+            If the text has another form, or names an atmosphere that is not allowed.
+        """
+        match = _TEXT.fullmatch(text.strip())
+        if match is None:
+            raise ValueError(f"atmosphere must read like {cls().text!r}, got {text!r}")
+        profile, aerosol, *numbers, engine = match.groups()
+        visibility, aot, altitude, h2o, o3 = (None if number is None else float(number) for number in numbers)
+        return cls(profile, aerosol, visibility, altitude, aot, h2o, o3, engine or "5S")
+
+    @property
+    def levels(self):
+        """Profile above the ground with the user's columns, as `profiles.Levels`."""
+        levels = profile_above(self.profile, self.altitude)
+        columns = {"h2o": (self.h2o, water_vapour_column), "o3": (self.o3, ozone_column)}
+        scaled = {
+            name: getattr(levels, name) * wanted / measure(levels)
+            for name, (wanted, measure) in columns.items()
+            if wanted is not None
+        }
+        return levels._replace(**scaled)
+
+    @property
+    def pressure(self):
+        """Pressure at the ground [hPa]."""
+        return float(self.levels.pressure[0])
+
+    @property
+    def water_vapour(self):
+        """Column of water vapour above the ground [g cm-2]."""
+        return water_vapour_column(self.levels)
+
+    @property
+    def ozone(self):
+        """Column of ozone above the ground [cm-atm]."""
+        return ozone_column(self.levels)
+
+    def rayleigh_optical_depth(self, wavelength):
+        """
+        Optical depth of the molecules.
+
+        Parameters
+        ----------
+        wavelength : array
+            [um]
+
+        Returns
+        -------
+        tau : array
+            [1]
+        """
+        number = self.levels.pressure * 100 / (BOLTZMANN * self.levels.temperature)
+        return molecules.rayleigh_cross_section(wavelength) * np.trapezoid(number, self.levels.altitude * 1000)
+
+    def aerosol_optical_depth(self, wavelength):
+        """
+        Extinction optical depth of the aerosol.
+
+        Parameters
+        ----------
+        wavelength : array
+            0.35 to 3.75. [um]
+
+        Returns
+        -------
+        tau : array
+            [1]
+        """
+        if self.aot == 0:
+            return np.zeros(np.shape(wavelength))
+        extinction, _, _ = aerosols.aerosol_optics(self.aerosol, wavelength)
+        return self.aot * extinction
+
+
+def water_vapour_column(levels):
+    """
+    Column of water vapour.
+
+    Parameters
+    ----------
+    levels : profiles.Levels
+
+    Returns
+    -------
+    h2o : float
+        [g cm-2]
+
+    Examples
+    --------
+    >>> round(water_vapour_column(profile_above("midlatitude-summer", 0.0)), 2)
+    2.93
+    """
+    return float(column(levels, levels.h2o).sum() / 10)
+
+
+def ozone_column(levels):
+    """
+    Column of ozone.
+
+    Parameters
+    ----------
+    levels : profiles.Levels
+
+    Returns
+    -------
+    o3 : float
+        [cm-atm]
+
+    Examples
+    --------
+    >>> round(ozone_column(profile_above("midlatitude-summer", 0.0)), 2)
+    0.32
+    """
+    return float(100 * column(levels, levels.o3).sum() / MOLAR_MASS_OZONE * MOLAR_VOLUME)
+
+
+def _shortest(value):
+    return np.format_float_positional(value, trim="-")
+
+
+def _check_name(what, value, allowed):
+    if value in allowed:
+        return
+    nearest = get_close_matches(str(value), allowed, n=1, cutoff=0.0)[0]
+    raise ValueError(f"{what} must be one of {', '.join(allowed)}, got {value!r}: type {what}={nearest!r}")
+
+
+def _checked(what, value, low, high, unit):
+    if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
+        raise TypeError(f"{what} must be a number from {low} to {high} [{unit}], got {value!r}: leave the unit out")
+    if not low <= value <= high:
+        nearest = low if value < low else high
+        raise ValueError(
+            f"{what} must be from {low} to {high} {unit}, got {value:g}: type {what}={nearest}, the nearest allowed"
+        )
+    return float(value)

@@ -1,0 +1,108 @@
+"""Molecules and aerosol mixed: what successive orders of scattering say of an atmosphere."""
+
+from functools import lru_cache, partial
+
+import numpy as np
+
+from fifesim.atmosphere.air import aerosols
+from fifesim.atmosphere.schemes import successive_orders
+from fifesim.atmosphere.schemes.phase_expansion import matrix_moments
+from fifesim.atmosphere.schemes.terms import Scattering
+from fifesim.base.geometry import scattering_angle_cosine
+
+_MOMENTS = 48  # of the aerosol's scattering matrix: the solver uses the first 33
+_COSINES, _WEIGHTS = np.polynomial.legendre.leggauss(500)  # fine enough for the forward peak of coarse particles
+
+
+def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
+    """
+    Scattering by wavelength after successive orders, in an atmosphere that mixes molecules and aerosol.
+
+    Parameters
+    ----------
+    atmosphere : models.Atmosphere
+    wavelength : array, shape (n,)
+        [um]
+    sza : float
+    vza, raa : array, shape (V,) and (R,)
+        raa of 0 has sun and sensor on the same side. [degree]
+    polarized : bool, optional
+        Whether light is polarized, by molecules and aerosol.
+
+    Returns
+    -------
+    scattering : terms.Scattering
+
+    See Also
+    --------
+    fifesim.atmosphere.schemes.successive_orders.path_reflectance, fifesim.atmosphere.schemes.successive_orders.flux_transmittance
+
+    Examples
+    --------
+    >>> from fifesim.atmosphere.air.models import Atmosphere
+    >>> air = mixed_scattering(Atmosphere(), np.array([0.55]), 30.0, np.zeros(1), np.zeros(1))
+    >>> bool(air.reflectance[0, 0, 0] > air.molecules_reflectance[0, 0, 0])
+    True
+    """
+    views = tuple(np.asarray(vza, float).tolist()), tuple(np.asarray(raa, float).tolist())
+    found = [_at_wavelength(atmosphere, float(w), float(sza), *views, polarized) for w in wavelength]
+    return Scattering(*(np.stack(values, axis=-1) for values in zip(*found, strict=True)))
+
+
+@lru_cache(maxsize=1024)
+def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
+    at = np.array([wavelength])
+    tau_r, tau_a = (
+        float(depth[0]) for depth in (atmosphere.rayleigh_optical_depth(at), atmosphere.aerosol_optical_depth(at))
+    )
+    albedo, moments, phase = _aerosol(
+        atmosphere, at, scattering_angle_cosine(sza, np.array(vza)[:, None], np.array(raa)), polarized
+    )
+
+    def reflectance(tau_aerosol):
+        return successive_orders.path_reflectance(
+            tau_r, tau_aerosol, albedo, moments, phase, sza, vza, raa, polarized=polarized
+        )
+
+    flux = partial(
+        successive_orders.flux_transmittance,
+        single_scattering_albedo=albedo,
+        moments=moments,
+        zenith=(sza, *vza),
+        polarized=polarized,
+    )
+    (total, spherical_albedo), (molecules, _), (aerosol, _) = (
+        flux(*depths) for depths in ((tau_r, tau_a), (tau_r, 0.0), (0.0, tau_a))
+    )
+    mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))[:, None]
+    tau = tau_r + tau_a
+    return Scattering(
+        reflectance=reflectance(tau_a),
+        molecules_reflectance=reflectance(0.0),
+        transmittance_down=total[0],
+        transmittance_up=total[1:, None],
+        spherical_albedo=spherical_albedo,
+        optical_depth=tau,
+        direct_transmittance_down=np.exp(-tau / mu_s),
+        direct_transmittance_up=np.exp(-tau / mu_v),
+        diffuse_up_molecules=molecules[1:, None] - np.exp(-tau_r / mu_v),
+        diffuse_up_aerosol=aerosol[1:, None] - np.exp(-tau_a / mu_v),
+    )
+
+
+def _aerosol(atmosphere, wavelength, cosine, polarized):
+    """Single scattering albedo, moments of the scattering matrix, and phase function of the aerosol."""
+    if atmosphere.aot == 0:
+        return 0.0, np.eye(1, _MOMENTS)[0], np.zeros(cosine.shape)
+    _, albedo, _ = aerosols.aerosol_optics(atmosphere.aerosol, wavelength)
+    phase = aerosols.aerosol_phase(atmosphere.aerosol, cosine, wavelength[0])
+    return float(albedo[0]), _moments(atmosphere.aerosol, float(wavelength[0]), polarized), phase
+
+
+@lru_cache(maxsize=256)
+def _moments(aerosol, wavelength, polarized):
+    if not polarized:
+        return aerosols.phase_moments(aerosol, np.array([wavelength]), _MOMENTS)[0]
+    functions = aerosols.aerosol_phase, aerosols.aerosol_polarization
+    matrix = (function(aerosol, _COSINES, wavelength) for function in functions)
+    return matrix_moments(*matrix, _COSINES, _WEIGHTS, _MOMENTS)

@@ -1,0 +1,243 @@
+"""Phase functions and matrices as series of generalized spherical functions."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fifesim.atmosphere.air.molecules import DEPOLARIZATION
+
+# Columns of an expansion: of F11 (the phase function), of F22 and F33 together, and of F12.
+INTENSITY, LINEAR, DIAGONAL, POLARIZING = range(4)
+
+
+def rayleigh_expansion(count):
+    r"""
+    Expansion of the scattering matrix of the molecules.
+
+    .. math::
+
+        \beta_0 = 1, \qquad \beta_2 = \frac{c}{2}, \qquad \alpha_2 = 3 c, \qquad \gamma_2 = \frac{\sqrt 6}{2} c, \qquad
+        c = \frac{2 (1 - \delta)}{2 + \delta}
+
+    Parameters
+    ----------
+    count : int
+        Number of terms, at least 3.
+
+    Returns
+    -------
+    expansion : array, shape (count, 4)
+        :math:`\beta, \alpha, \zeta, \gamma` of each order. [1]
+
+    References
+    ----------
+    [Siewert2000]_; depolarization of [Young1980]_
+
+    Examples
+    --------
+    >>> float(rayleigh_expansion(4)[0, 0])
+    1.0
+    """
+    anisotropy = 2 * (1 - DEPOLARIZATION) / (2 + DEPOLARIZATION)
+    expansion = np.zeros((count, 4))
+    expansion[0, INTENSITY] = 1
+    expansion[2] = anisotropy * np.array([0.5, 3, 0, math.sqrt(6) / 2])
+    return expansion
+
+
+def matrix_moments(phase, polarization, scattering_cosine, weights, count):
+    r"""
+    Moments of the scattering matrix of spheres.
+
+    .. math::
+
+        \frac{\alpha_l + \zeta_l}{2 l + 1} = \frac{1}{2} \int_{-1}^{1} (F_{22} + F_{33}) \, d^l_{2 2} \, \mathrm{d}x,
+        \qquad \frac{\gamma_l}{2 l + 1} = -\frac{1}{2} \int_{-1}^{1} F_{12} \, d^l_{0 2} \, \mathrm{d}x
+
+    and those of :math:`F_{11}` with :math:`d^l_{0 0} = P_l`.
+
+    Parameters
+    ----------
+    phase : array, shape (angles,)
+        Phase function, :math:`F_{11}`. [1]
+    polarization : array, shape (angles,)
+        Degree of linear polarization of natural light scattered once, :math:`-F_{12} / F_{11}`. [1]
+    scattering_cosine, weights : array, shape (angles,)
+        Cosines of the scattering angles, and weights of the integration over the cosine. [1]
+    count : int
+        Number of moments.
+
+    Returns
+    -------
+    moments : array, shape (count, 4)
+        For `truncated_expansion`; the first is 1. [1]
+
+    Notes
+    -----
+    :math:`F_{22}` of spheres is :math:`F_{11}`. :math:`F_{33}` is taken as that, too: it carries only what is already
+    polarized. Beside the whole matrices of continental, maritime and urban aerosol, of optical depth up to 0.9 at
+    0.49 to 0.86 um, that moves the path reflectance by less than .06 %. 500 Gauss points carry the moments of dust and
+    sea salt to 1e-5; 200 do not, to 1e-3.
+
+    References
+    ----------
+    [Hovenier2004]_, Chapter 2
+
+    Examples
+    --------
+    >>> cosine, weights = np.polynomial.legendre.leggauss(8)
+    >>> matrix_moments(np.ones(8), np.zeros(8), cosine, weights, 3)[:, 0].round(12).tolist()
+    [1.0, 0.0, 0.0]
+    """
+    amount = phase * weights / np.sum(phase * weights)
+    linear = wigner(2, 2, scattering_cosine, count) @ amount
+    polarizing = wigner(0, 2, scattering_cosine, count) @ (amount * polarization)
+    return np.stack([wigner(0, 0, scattering_cosine, count) @ amount, linear, linear, polarizing], axis=1)
+
+
+def truncated_expansion(moments, count):
+    r"""
+    Expansion without the forward peak that `count` terms cannot follow.
+
+    .. math:: f = \chi_n, \qquad \chi'_l = \frac{\chi_l - f}{1 - f}, \qquad \beta_l = (2 l + 1) \chi'_l
+
+    Parameters
+    ----------
+    moments : array, shape (terms,) or (terms, 4)
+        Legendre moments :math:`\chi_l` of the phase function, or those divided by :math:`2 l + 1` of the whole
+        scattering matrix, in the columns of `rayleigh_expansion`. [1]
+    count : int
+        Number of terms kept, :math:`n`.
+
+    Returns
+    -------
+    expansion : array, shape (count, 4)
+        Of what is left, as in `rayleigh_expansion`. [1]
+    peak : float
+        Share of the scattered light in the forward peak, :math:`f`. [1]
+
+    Notes
+    -----
+    Moments of the phase function alone stand for particles that do not polarize, and depolarize what they scatter out
+    of the peak.
+
+    References
+    ----------
+    [Wiscombe1977]_
+
+    Examples
+    --------
+    A series short enough is kept as it is:
+
+    >>> expansion, peak = truncated_expansion(np.array([1.0, 0.5]), 4)
+    >>> [float(value) for value in expansion[:, 0]], float(peak)
+    ([1.0, 1.5, 0.0, 0.0], 0.0)
+    """
+    moments = np.asarray(moments, float)
+    whole = np.zeros((max(count + 1, len(moments)), 4))
+    if moments.ndim == 1:
+        whole[: len(moments), INTENSITY] = moments
+    else:
+        whole[: len(moments)] = moments
+    peak = whole[count, INTENSITY]
+    kept = whole[:count].copy()
+    kept[:, INTENSITY] -= peak
+    if moments.ndim == 2:
+        kept[2:, [LINEAR, DIAGONAL]] -= peak
+    return kept * (2 * np.arange(count)[:, None] + 1) / (1 - peak), float(peak)
+
+
+@njit(nogil=True, cache=True)
+def wigner(order, spin, cosine, count):
+    r"""
+    Wigner functions of all degrees, by recurrence.
+
+    Parameters
+    ----------
+    order, spin : int
+        :math:`m \ge 0` and :math:`n`. Spin 0 gives the Legendre functions, normalized and without their sign.
+    cosine : array, shape (directions,)
+        :math:`\cos \theta`. [1]
+    count : int
+        Number of degrees, from 0.
+
+    Returns
+    -------
+    functions : array, shape (count, directions)
+        :math:`d^l_{m n}(\theta)`; 0 where the degree is below order or spin. [1]
+
+    References
+    ----------
+    [Mishchenko2002]_, Eqs. B.22 to B.24
+
+    Examples
+    --------
+    >>> wigner(0, 0, np.array([0.5]), 3)[:, 0].tolist()
+    [1.0, 0.5, -0.125]
+    """
+    functions = np.zeros((count, cosine.size))
+    lowest = max(order, abs(spin))
+    if lowest >= count:
+        return functions
+    apart, together = abs(order - spin), abs(order + spin)
+    start = math.exp(0.5 * (math.lgamma(2 * lowest + 1) - math.lgamma(apart + 1) - math.lgamma(together + 1)))
+    if spin < order and (order - spin) % 2 == 1:
+        start = -start
+    for j in range(cosine.size):
+        x = cosine[j]
+        functions[lowest, j] = start * ((1 - x) / 2) ** (apart / 2) * ((1 + x) / 2) ** (together / 2)
+        for s in range(lowest, count - 1):
+            if s == 0:
+                functions[1, j] = x
+                continue
+            before = functions[s - 1, j] * (s + 1) * math.sqrt((s**2 - order**2) * (s**2 - spin**2))
+            here = functions[s, j] * (2 * s + 1) * (s * (s + 1) * x - order * spin)
+            scale = s * math.sqrt(((s + 1) ** 2 - order**2) * ((s + 1) ** 2 - spin**2))
+            functions[s + 1, j] = (here - before) / scale
+    return functions
+
+
+def stokes_basis(order, cosine, count, components):
+    r"""
+    Functions of one Fourier order in which the Stokes parameters I, Q and U of the light are expanded.
+
+    .. math::
+
+        \Pi^m_l = \begin{pmatrix} P & 0 & 0 \\ 0 & R & -T \\ 0 & -T & R \end{pmatrix}, \qquad
+        R, T = \tfrac{1}{2} (d^l_{m, 2} \pm d^l_{m, -2})
+
+    I and Q go with the cosine of :math:`m` times the azimuth, U with the sine.
+
+    Parameters
+    ----------
+    order : int
+        :math:`m`
+    cosine : array, shape (directions,)
+        Of the zenith angle in which the light travels. [1]
+    count : int
+        Number of degrees, from 0.
+    components : int
+        3, or 1 for I alone.
+
+    Returns
+    -------
+    basis : array, shape (components * directions, components * (count - order))
+        [1]
+
+    References
+    ----------
+    [Siewert2000]_
+
+    Examples
+    --------
+    >>> stokes_basis(1, np.array([0.0, 0.5]), 5, 3).shape
+    (6, 12)
+    """
+    scalar = wigner(order, 0, cosine, count)[order:].T
+    if components == 1:
+        return np.ascontiguousarray(scalar)
+    plus, minus = (wigner(order, spin, cosine, count)[order:].T for spin in (2, -2))
+    same, cross = (plus + minus) / 2, (plus - minus) / 2
+    none = np.zeros_like(scalar)
+    return np.block([[scalar, none, none], [none, same, -cross], [none, -cross, same]])

@@ -1,0 +1,76 @@
+"""The spectral terms of an atmosphere, labelled."""
+
+import numpy as np
+import xarray as xr
+
+from fifesim.atmosphere.air import gases
+from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.atmosphere.schemes import engines
+from fifesim.atmosphere.schemes.terms import on_wavelengths, spectral_nodes
+from fifesim.base.geometry import fife_geometry
+from fifesim.rasters import cf
+
+_LONG_NAMES = {
+    "path_reflectance": "reflectance of molecules and aerosol over a black ground, without gases",
+    "molecules_reflectance": "reflectance of the molecules alone over a black ground, without gases",
+    "transmittance_down": "total scattering transmittance from the sun to the ground",
+    "transmittance_up": "total scattering transmittance from the ground to the sensor",
+    "direct_transmittance_down": "transmittance of the sunbeam, without gases",
+    "direct_transmittance_up": "direct transmittance from the ground to the sensor, without gases",
+    "spherical_albedo": "spherical albedo of the atmosphere seen from below",
+    "molecules_optical_depth": "vertical optical depth of the molecules",
+    "aerosol_optical_depth": "vertical optical depth of the aerosol",
+    "gas_transmittance": "transmittance of the absorbing gases from the sun to the ground and to the sensor",
+}
+
+
+def spectrum(atmosphere=None, geometry=None):
+    """
+    What an atmosphere does to light, wavelength by wavelength.
+
+    Parameters
+    ----------
+    atmosphere : Atmosphere, optional
+        By default midlatitude summer, continental aerosol, 45 km visibility.
+    geometry : fifesim.base.geometry.Geometry, optional
+        Of sun and sensor; by default the paper's.
+
+    Returns
+    -------
+    spectrum : xarray.Dataset, dims (wavelength) and (gas, wavelength)
+        Path reflectance, transmittances, spherical albedo, optical depths and the transmittance of each gas, at the
+        841 wavelengths of the gas tables, 0.4 to 2.5 um. [1]
+
+    Raises
+    ------
+    ValueError
+        If sun or sensor stand too low, or vary, or if the engine is 6S, which knows bands only.
+
+    See Also
+    --------
+    fifesim.atmosphere.schemes.engines.band_terms
+    """
+    atmosphere = Atmosphere() if atmosphere is None else atmosphere
+    geometry = (fife_geometry() if geometry is None else geometry).uniform("spectrum")
+    for name in ("sza", "vza"):
+        engines.check_zenith(name, getattr(geometry, name))
+    wavelength = gases.table_wavelengths()
+    nodes = spectral_nodes(wavelength[0], wavelength[-1])
+    views = np.array([geometry.vza]), np.array([geometry.raa])
+    light = on_wavelengths(engines.scattering(atmosphere, nodes, geometry.sza, *views), nodes, wavelength)
+    air_mass = 1 / geometry.mu_s + 1 / geometry.mu_v
+    by_gas = [gases.gas_transmittance(wavelength, atmosphere, air_mass, gases=(gas,)) for gas in gases.GASES]
+    values = {
+        "path_reflectance": light.reflectance,
+        "molecules_optical_depth": atmosphere.rayleigh_optical_depth(wavelength),
+        "aerosol_optical_depth": atmosphere.aerosol_optical_depth(wavelength),
+        "gas_transmittance": np.prod(by_gas, axis=0),
+    }
+    values = {name: values.get(name, getattr(light, name, None)).reshape(-1) for name in _LONG_NAMES}
+    found = {
+        name: ("wavelength", array, {"long_name": _LONG_NAMES[name], "units": "1"}) for name, array in values.items()
+    }
+    each = ("gas", "wavelength"), np.stack(by_gas).reshape(len(gases.GASES), -1)
+    found["transmittance_of_gas"] = (*each, {"long_name": "transmittance of each gas, two ways", "units": "1"})
+    coords = {"wavelength": ("wavelength", wavelength, cf.attributes("wavelength")), "gas": list(gases.GASES)}
+    return cf.with_geometry(xr.Dataset(found, coords, {"atmosphere": atmosphere.text}), geometry)

@@ -1,0 +1,1 @@
+"""What all stages speak in: directions, bands, footprints, tables. numpy only."""

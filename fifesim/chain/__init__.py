@@ -1,0 +1,1 @@
+"""The steps of Figure 1 that need several stages."""

@@ -1,0 +1,388 @@
+"""The steps of Figure 1 that need more than one stage: what a stage needs of another is handed to it here."""
+
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis.rasters import regression as analysis
+from fifesim.atmosphere import raster as atmosphere_raster
+from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.atmosphere.schemes import engines
+from fifesim.base.bands import Band
+from fifesim.base.geometry import Geometry, fife_geometry
+from fifesim.ground.canopy import optics
+from fifesim.ground.canopy import raster as ground
+from fifesim.ground.canopy.spectra import Spectrum
+from fifesim.ground.terrain.rasters import light as terrain
+from fifesim.rasters import cf
+from fifesim.sensor import raster as sensor
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.description.instruments import instrument_names
+
+# Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
+# tables. [um]
+_NARROW = 0.0025
+
+
+def surface_reflectance(
+    lai,
+    instrument="TM",
+    *,
+    bands=None,
+    dem=None,
+    horizon=None,
+    upwelling=True,
+    atmosphere=None,
+    geometry=None,
+    leaf_optics=None,
+    background=None,
+    leaf_angles="spherical",
+    hotspot=0.0,
+    exact=False,
+):
+    """
+    Reflectance factor of the ground in the bands of an instrument.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x)
+        Leaf area index. [m2 m-2]
+    instrument : str or Instrument, optional
+        Whose bands are simulated.
+    bands : sequence of str, optional
+        Names of its bands; all by default.
+    dem : xarray.DataArray, dims (y, x), optional
+        Elevation on the cells of ``lai``, or on more of them, whose horizons then count; without it the ground is
+        level. The reflectance is that of level ground times Kt (Eq. 4) and the view's cosine (Eq. 5). [m]
+    horizon : xarray.DataArray, dims (direction, y, x), optional
+        Of an elevation model that reaches further than ``dem``, from `horizon`. [degree]
+    upwelling : bool, optional
+        Whether with the view's cosine on slopes, Eq. 5.
+    atmosphere : Atmosphere, optional
+        Decides the share of skylight; by default midlatitude summer, continental aerosol, 45 km visibility, 0.4 km
+        above the sea. It travels on with the result.
+    geometry : Geometry, optional
+        Of sun and sensor; by default that of ``lai``, else the paper's.
+    leaf_optics : Leaf, or mapping of str to (float, float), optional
+        A leaf by what it is made of, or its reflectance and transmittance by band name; by default green tallgrass. [1]
+    background : optional
+        Reflectance below the canopy: a number, by band name, or a raster over ([band], y, x); a `Background` or
+        ``{spectrum: fraction}`` that mixes spectra; the path of a CSV file, or a Dataset, with ``wavelength`` [um] and
+        ``reflectance``. By default soil and litter of tallgrass. [1]
+    leaf_angles : optional
+        A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
+    hotspot : float, optional
+        Leaf size over canopy height; 0 is none, as in the paper. [1]
+    exact : bool, optional
+        Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Lazy where ``lai`` is. [1]
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of its range; on lazy data, a negative LAI when it computes. If the dem is not in metres,
+        does not cover ``lai``, or lies on other cells.
+
+    References
+    ----------
+    [Verhoef1984]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5
+
+    See Also
+    --------
+    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.raster.surface_reflectance,
+    fifesim.ground.terrain.rasters.light.terrain_reflectance
+    """
+    if dem is None and horizon is not None:
+        raise ValueError("a horizon stands around a dem: give dem= too")
+    _check_kinds(atmosphere, geometry)
+    atmosphere = Atmosphere() if atmosphere is None else atmosphere
+    geometry = geometry or cf.geometry_of(lai) or fife_geometry()
+    description = find_instrument(instrument)
+    selected = description.select(bands)
+    names = [band.name for band in selected]
+    responses = tuple(band.response for band in selected)
+    leaf_reflectance, leaf_transmittance = optics.leaf_optics(responses, leaf_optics)
+    level = ground.surface_reflectance(
+        lai,
+        bands=names,
+        wavelengths=[band.wavelength for band in selected],
+        leaf_reflectance=leaf_reflectance,
+        leaf_transmittance=leaf_transmittance,
+        background=_background(responses, background),
+        diffuse_fraction=atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry),
+        geometry=geometry,
+        leaf_angles=leaf_angles,
+        hotspot=hotspot,
+        exact=exact,
+        atmosphere=atmosphere.text,
+        instrument=description.name,
+    )
+    if dem is None:
+        return level
+    geometry.uniform("surface_reflectance on slopes")
+    terms = engines.band_terms(atmosphere, responses, geometry.sza, geometry.vza, geometry.raa)
+    light = _sunlight(terms) | {"geometry": geometry, "horizon": horizon}
+    return terrain.terrain_reflectance(level, dem, upwelling=upwelling, **light)
+
+
+def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instrument=None):
+    """
+    Topographic correction factor Kt: what terrain does to the irradiance in each band.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Of level ground, from `surface_reflectance` without a dem. [1]
+    dem : xarray.DataArray, dims (y, x)
+        As in `surface_reflectance`. [m]
+    horizon : xarray.DataArray, dims (direction, y, x), optional
+        As in `surface_reflectance`. [degree]
+    atmosphere, geometry, instrument : optional
+        As in `to_toa`.
+
+    Returns
+    -------
+    kt : xarray.DataArray, dims (band, y, x)
+        Lazy where an input is. [1]
+
+    Raises
+    ------
+    ValueError
+        As in `surface_reflectance`.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 4; [Dubayah1992]_
+
+    See Also
+    --------
+    fifesim.ground.terrain.light.kt
+    """
+    atmosphere, bands, geometry = _light(reflectance, atmosphere, geometry, instrument)
+    geometry.uniform("kt")
+    terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
+    return terrain.kt(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
+
+
+def to_toa(
+    reflectance,
+    atmosphere=None,
+    *,
+    geometry=None,
+    instrument=None,
+    elevation=None,
+    adjacency=False,
+    surroundings=None,
+):
+    """
+    Apparent reflectance at the top of the atmosphere.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Surface reflectance factor, with band names of an instrument or a coordinate ``wavelength`` [um] along band. [1]
+    atmosphere : Atmosphere, optional
+        By default that which the array carries, else midlatitude summer, continental aerosol, 45 km visibility.
+    geometry : Geometry, optional
+        Its angles are numbers or rasters; by default that which the array carries, else the paper's.
+    instrument : str or Instrument, optional
+        Whose spectral response the bands have; by default that which the array carries. Without one, each band is as
+        narrow as the gas tables, 2.5 nm.
+    elevation : xarray.DataArray, dims (y, x), optional
+        Of the ground, in the place of the atmosphere's one altitude, where relief matters. [m]
+    adjacency : bool, optional
+        Whether light that the surroundings reflect is scattered into the view of a cell.
+    surroundings : number, sequence or xarray.DataArray, optional
+        Reflectance around the scene, for adjacency: one number, one for each band, or a raster on a larger grid; by
+        default the scene's mean. [1]
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Lazy where the input is. [1]
+
+    Raises
+    ------
+    ValueError
+        If the array was made for another atmosphere, or units, bands or angles are not usable.
+
+    Notes
+    -----
+    Without ``elevation`` all of the scene lies at the altitude of the atmosphere: 100 m of relief is 1 % of the
+    molecules, .001 of reflectance in the blue and less elsewhere.
+
+    References
+    ----------
+    [Tanre1990]_
+
+    See Also
+    --------
+    fifesim.atmosphere.schemes.coupling.apparent_reflectance
+    """
+    light = _light(reflectance, atmosphere, geometry, instrument)
+    scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
+    toa = atmosphere_raster.to_toa(reflectance, *light, **scene)
+    return toa if instrument is None else toa.assign_attrs(instrument=find_instrument(instrument).name)
+
+
+def to_surface(
+    reflectance,
+    atmosphere=None,
+    *,
+    geometry=None,
+    instrument=None,
+    elevation=None,
+    adjacency=False,
+    surroundings=None,
+):
+    """
+    Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Reflectance at the top of the atmosphere; radiance and digital numbers are converted first.
+    atmosphere, geometry, instrument, elevation, adjacency, surroundings : optional
+        As in `to_toa`.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Negative values are kept. [1]
+
+    Raises
+    ------
+    ValueError
+        As in `to_toa`.
+
+    See Also
+    --------
+    fifesim.atmosphere.schemes.coupling.surface_reflectance
+    """
+    reflectance = planetary_reflectance(reflectance)
+    light = _light(reflectance, atmosphere, geometry, instrument)
+    scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
+    surface = atmosphere_raster.to_surface(reflectance, *light, **scene)
+    return surface if instrument is None else surface.assign_attrs(instrument=find_instrument(instrument).name)
+
+
+def ndvi(image):
+    """
+    Normalized difference vegetation index, from planetary reflectance as in the paper.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+        Digital numbers, radiance or reflectance, with a coordinate ``wavelength`` [um] along band.
+
+    Returns
+    -------
+    ndvi : xarray.DataArray, dims (y, x)
+        NaN where there are no data. [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no red or no near infrared band, or no calibration.
+
+    See Also
+    --------
+    fifesim.analysis.rasters.regression.ndvi
+    """
+    return analysis.ndvi(planetary_reflectance(image))
+
+
+def planetary_reflectance(image):
+    """
+    Reflectance of an image, converted where it holds digital numbers or radiance.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If it carries no calibration.
+    """
+    is_radiance = image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
+    return sensor.to_reflectance(image) if "gain" in image.coords or is_radiance else image
+
+
+def _background(responses, given):
+    """Reflectance below the canopy: a raster as it is, all else by band."""
+    if isinstance(given, xr.DataArray):
+        return given
+    if isinstance(given, xr.Dataset):
+        missing = {"wavelength", "reflectance"} - set(given.variables)
+        if missing:
+            raise ValueError(f"the background's Dataset has no {' nor '.join(sorted(missing))}: it is to have both")
+        given = Spectrum(given["wavelength"].values, given["reflectance"].values)
+    return optics.background(responses, given)
+
+
+def _sunlight(terms):
+    """What Kt needs of the atmosphere."""
+    return {
+        "direct_transmittance": terms.direct_transmittance_down,
+        "transmittance_down": terms.transmittance_down,
+    }
+
+
+def _light(array, atmosphere, geometry, instrument):
+    """Atmosphere, spectral bands and geometry: as given, else as the array carries them, else the paper's."""
+    _check_kinds(atmosphere, geometry)
+    carried = array.attrs.get("atmosphere")
+    if carried is not None:
+        carried = Atmosphere.parse(carried)
+        if atmosphere is not None and atmosphere != carried:
+            raise ValueError(
+                f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
+                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
+            )
+    return (
+        atmosphere or carried or Atmosphere(),
+        _responses(array, instrument),
+        geometry or cf.geometry_of(array) or fife_geometry(),
+    )
+
+
+def _check_kinds(atmosphere, geometry):
+    for name, value, kind in (("atmosphere", atmosphere, Atmosphere), ("geometry", geometry, Geometry)):
+        if value is not None and not isinstance(value, kind):
+            raise TypeError(f"{name} must be a fifesim.{kind.__name__}, got {value!r}: see fifesim.{kind.__name__}")
+
+
+def _responses(array, instrument):
+    """Spectral responses of an instrument that is given, or carried by name and with the same wavelengths."""
+    carried = array.attrs.get("instrument")
+    if instrument is not None:
+        return tuple(band.response for band in sensor.matching_bands(array, find_instrument(instrument)))
+    if carried is not None:
+        bands = sensor.matching_bands(array, find_instrument(carried)) if carried in instrument_names() else ()
+        centres = [band.wavelength for band in bands]
+        if not bands or ("wavelength" in array.coords and not np.allclose(array["wavelength"], centres, rtol=1e-6)):
+            raise ValueError(
+                f"the raster was made for an instrument {carried!r} of your own, whose response it does not carry: "
+                "give it as instrument="
+            )
+        return tuple(band.response for band in bands)
+    if "wavelength" not in array.coords:
+        raise ValueError(
+            "the raster has neither an instrument nor a wavelength: give instrument=, or assign a coordinate "
+            "'wavelength' [um] along band"
+        )
+    centres = np.atleast_1d(array["wavelength"].values).astype(float)
+    if np.max(centres) > 100:
+        raise ValueError(f"wavelengths are in um, got {np.max(centres):g}: divide nanometres by 1000")
+    return tuple(
+        Band(f"{centre:g} um", (centre - _NARROW, centre, centre + _NARROW), (0.0, 1.0, 0.0)) for centre in centres
+    )

@@ -1,0 +1,1 @@
+"""The experiment of Friedl et al. (1995)."""

@@ -1,0 +1,95 @@
+"""The repeated experiment as a folder of files."""
+
+import importlib.metadata
+import platform
+from pathlib import Path
+
+from fifesim.experiments.friedl1995 import effects, figures
+from fifesim.experiments.friedl1995 import report as friedl1995_report
+from fifesim.experiments.friedl1995 import table as friedl1995_table
+from fifesim.experiments.friedl1995.case import Case
+from fifesim.ground.landscape.field import check_seed
+from fifesim.output.folders import check_folder, whole_files
+from fifesim.output.progress import steps
+
+NUMBERS = range(3, 10)
+FILES = ("table2.csv", *(f"figure{number}.png" for number in NUMBERS), "report.html")
+
+# Differences between cases share their random numbers, and need few realisations.
+_EFFECT_REALISATIONS = 2
+_DPI = 200
+_VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "numba", "matplotlib")
+
+
+def reproduce_to_folder(folder, *, realisations=20, cells=333, seed=1995, overwrite=False):
+    """
+    Repeat the experiment of Friedl et al. (1995): table2.csv, figure3.png to figure9.png and report.html.
+
+    Parameters
+    ----------
+    folder : str or path
+        Made where it does not exist.
+    realisations : int, optional
+        Of each of the nine scenes.
+    cells : int, optional
+        Along the edge of a scene, of 3.33 m each.
+    seed : int, optional
+        Of the first realisation, whose scenes the figures show; the others follow.
+    overwrite : bool, optional
+        Replace these files where the folder holds something; other files stay.
+
+    Returns
+    -------
+    files : list of pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        If a number is not allowed, or the folder holds something; nothing is written then.
+    OSError
+        If a file cannot be written; no half-written file is left.
+
+    References
+    ----------
+    [Friedl1995]_
+    """
+    folder = Path(folder)
+    check_folder(folder, overwrite)
+    if realisations < 1:
+        raise ValueError(f"realisations must be at least 1, got {realisations}")
+    case = Case(cells=cells)
+    check_seed(seed)
+    seeds = range(seed, seed + realisations)
+    outcome = friedl1995_table.realise(case, seeds, each=_shown("nine scenes"))
+    table, text = friedl1995_table.table2(outcome), friedl1995_table.text_table(outcome)
+    few = range(seed, seed + _EFFECT_REALISATIONS)
+    tables = {
+        "readings": effects.readings(case, few, each=_shown("readings of Table 1")),
+        "sizes": effects.sizes(case, few, each=_shown("sizes of the scene")),
+        "sensitivity": effects.sensitivity(case, few, each=_shown("numbers chosen")),
+    }
+    run = {"realisations": realisations, "effect_realisations": _EFFECT_REALISATIONS, "cells": cells, "seed": seed}
+    with whole_files(folder) as partial:
+        table.to_csv(partial / "table2.csv", index=False, float_format="%.6g")
+        drawn = _draw(case, seed, partial)
+        page = friedl1995_report.page(case, table, text, tables, drawn, run, _versions())
+        (partial / "report.html").write_text(page, encoding="utf-8")
+    return [folder / name for name in FILES]
+
+
+def _draw(case, seed, folder):
+    """The figures as files, by number."""
+    scenes = figures.pixels(case, figures.BURNED_GRAZED, seed)
+    drawn = {3: figures.figure3(case)} | {number: getattr(figures, f"figure{number}")(scenes) for number in NUMBERS[1:]}
+    paths = {number: folder / f"figure{number}.png" for number in NUMBERS}
+    for number, path in paths.items():
+        drawn[number].savefig(path, dpi=_DPI, metadata={"Software": None})
+    return paths
+
+
+def _shown(label):
+    return lambda sequence: steps(sequence, label)
+
+
+def _versions():
+    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _VERSIONS}

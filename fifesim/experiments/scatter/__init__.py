@@ -1,0 +1,1 @@
+"""Where the scatter between NDVI and LAI or FPAR comes from."""

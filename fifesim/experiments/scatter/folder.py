@@ -1,0 +1,69 @@
+"""A budget as a folder of files."""
+
+import importlib.metadata
+import platform
+from pathlib import Path
+
+from fifesim.experiments.scatter import report as scatter_report
+from fifesim.experiments.scatter import shares as scatter
+from fifesim.output.folders import check_folder, whole_files
+from fifesim.output.progress import steps
+from fifesim.scenario.toml import write_scenario
+
+FILES = ("budget.csv", "budget.png", "report.html", "scenario.toml")
+
+_DPI = 200
+_VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "numba", "matplotlib")
+
+
+def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None, overwrite=False):
+    """
+    Where the scatter of a scenario comes from: budget.csv, budget.png, report.html and scenario.toml.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario or None
+        None is the paper's case.
+    folder : str or path
+        Made where it does not exist.
+    realisations, cells, seed : optional
+        As in `scatter.budget`.
+    overwrite : bool, optional
+        Replace these files where the folder holds something; other files stay.
+
+    Returns
+    -------
+    files : list of pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        If a number is not allowed, or the folder holds something; nothing is written then.
+    OSError
+        If a file cannot be written; no half-written file is left.
+    """
+    folder = Path(folder)
+    check_folder(folder, overwrite)
+    complete = (scatter.default_scenario() if scenario is None else scenario).complete()
+    found = scatter.budget(
+        complete, realisations=realisations, cells=cells, seed=seed, each=lambda cases: steps(cases, "stage by stage")
+    )
+    table = scatter.table(found)
+    shape = complete.geobox().shape
+    run = {
+        "realisations": found.sizes["realisation"],
+        "rows": min(cells, shape.y),
+        "columns": min(cells, shape.x),
+        "seed": complete.ground.seed if seed is None else seed,
+    }
+    with whole_files(folder) as partial:
+        table.to_csv(partial / "budget.csv", index=False, float_format="%.6g")
+        scatter_report.chart(table).savefig(partial / "budget.png", dpi=_DPI, metadata={"Software": None})
+        page = scatter_report.page(complete, found, table, partial / "budget.png", run, _versions())
+        (partial / "report.html").write_text(page, encoding="utf-8")
+        (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
+    return [folder / name for name in FILES]
+
+
+def _versions():
+    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _VERSIONS}

@@ -1,0 +1,272 @@
+"""Where the scatter between NDVI and LAI or FPAR comes from: the share of each stage of a scenario."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from odc.geo.geobox import GeoBox
+
+from fifesim.analysis.attribution import by_itself, shapley, taken_away
+from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
+from fifesim.ground.landscape.field import check_seed
+from fifesim.rasters import grid as grids
+from fifesim.scenario.scenario import Grid, Scenario
+from fifesim.scenario.simulation import leaf_area
+from fifesim.sensor.description.instruments import instrument
+
+# Rows of the table beside the stages: what is left when all of them are ideal, and all together.
+CURVATURE, TOTAL = "curvature", "total"
+# What the ground itself brings, in the shares of several stages.
+VARIATION = "sub-pixel variation"
+
+# With fewer pixels along an edge a line through them says little.
+_FEWEST = 10
+# Share of a window of a LAI map that must have data.
+_FILLED = 0.5
+
+
+def budget(scenario=None, *, realisations=20, cells=333, seed=None, each=iter):
+    r"""
+    Shares of the stages of a scenario in the scatter of LAI and FPAR about their lines on NDVI.
+
+    Scatter is :math:`v = 1 - R^2`, the share of the variance of the truth that a line on NDVI does not explain. It is
+    found for every set of stages at work while the others are ideal, from the same random numbers. A stage's share is
+    its Shapley value, the mean of what it adds over all orders; shares and the curvature add up to the scatter. It is
+    negative where the stage makes the relation straighter.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario, optional
+        By default the paper's case, with pixels at the interval of Table 1.
+    realisations : int, optional
+        Each lies in another window of the scenario's grid as far as there are, and has seeds of its own; a LAI map has
+        as many as windows.
+    cells : int, optional
+        Along the edge of a window; the whole grid where that is smaller.
+    seed : int, optional
+        Of the first random field; the others follow, and so do those of the noise. By default the scenario's.
+    each : callable, optional
+        Wraps the sequence of realisations, to show how far it is.
+
+    Returns
+    -------
+    budget : xarray.Dataset
+        Over (realisation, variable, stage): ``share``, which adds up; ``alone``, by how much the scatter falls where
+        the stage alone becomes ideal; ``first``, the scatter where it alone is at work, less curvature. Over
+        (realisation, variable): ``total``; ``curvature``, what is left where all stages are ideal: the curve of the
+        truth against NDVI beside a line; ``variation``, by how much the total falls over ground that is uniform within
+        each pixel. [1]
+
+    Raises
+    ------
+    ValueError
+        If a number is not allowed, the bands have no red or near infrared, or a window holds fewer than 10 pixels
+        along an edge.
+
+    References
+    ----------
+    [Shapley1953]_; [Friedl1995]_, Discussion
+
+    See Also
+    --------
+    fifesim.analysis.attribution.shapley
+    """
+    scenario = default_scenario() if scenario is None else scenario
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"budget takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+    cases = realise(scenario, realisations=realisations, cells=cells, seed=seed)
+    found = [_one(case) for case in each(cases)]
+    names = {"stage": list(STAGES), "variable": list(VARIABLES)}
+    stacked = {name: np.stack([one[name] for one in found]) for name in found[0]}
+    dims = {3: ("realisation", "variable", "stage"), 2: ("realisation", "variable")}
+    attrs = {"units": "1", "long_name": "share of the variance"}
+    return xr.Dataset({name: (dims[values.ndim], values, attrs) for name, values in stacked.items()}, coords=names)
+
+
+def default_scenario():
+    """
+    The paper's case, with pixels at the interval of Table 1.
+
+    Returns
+    -------
+    scenario : fifesim.scenario.scenario.Scenario
+    """
+    return Scenario(sensor={"interval": "native"})
+
+
+def realise(scenario, *, realisations, cells, seed=None):
+    """
+    Scenarios of the realisations of a budget.
+
+    Parameters
+    ----------
+    scenario, realisations, cells, seed
+        As in `budget`.
+
+    Returns
+    -------
+    scenarios : list of fifesim.scenario.scenario.Scenario
+        Complete.
+
+    Raises
+    ------
+    ValueError
+        As in `budget`.
+    """
+    if realisations < 1:
+        raise ValueError(f"realisations must be at least 1, got {realisations}")
+    scenario = scenario.complete()
+    windows = _windows(scenario, cells)
+    land, own = scenario.ground, scenario.sensor
+    first = land.seed if seed is None else seed
+    check_seed(first)
+    if land.lai_file:
+        # A map has no seed: another realisation is another place.
+        realisations = min(realisations, len(windows))
+    places = np.linspace(0, len(windows) - 1, min(realisations, len(windows))).round().astype(int)
+    found = []
+    for number in range(realisations):
+        ground = land.model_copy(update={"seed": first + number})
+        sensor = own.model_copy(update={"seed": own.seed + number})
+        window = _as_section(windows[places[number % len(places)]])
+        found.append(scenario.model_copy(update={"grid": window, "ground": ground, "sensor": sensor}))
+    return found
+
+
+def table(budget):
+    """
+    Means and standard errors of a budget over its realisations.
+
+    Parameters
+    ----------
+    budget : xarray.Dataset
+        From `budget`.
+
+    Returns
+    -------
+    table : pandas.DataFrame
+        Columns stage, variable, alone, alone_error, first, first_error, share and share_error. Rows of stages and
+        curvature have shares that add up to that of the row total; the row of sub-pixel variation has alone only.
+        Errors are NaN with one realisation. [1]
+    """
+    rows = []
+    for variable in VARIABLES:
+        one = budget.sel(variable=variable)
+        for stage in STAGES:
+            columns = {name: one[name].sel(stage=stage) for name in ("alone", "first", "share")}
+            rows.append({"stage": stage, "variable": variable} | _statistics(columns))
+        for stage, columns in (
+            (CURVATURE, {"share": one["curvature"]}),
+            (TOTAL, {"share": one["total"]}),
+            (VARIATION, {"alone": one["variation"]}),
+        ):
+            rows.append({"stage": stage, "variable": variable} | _statistics(columns))
+    order = [f"{name}{suffix}" for name in ("alone", "first", "share") for suffix in ("", "_error")]
+    return pd.DataFrame(rows, columns=["stage", "variable", *order])
+
+
+def standard_error(values):
+    """
+    Standard error of the mean over realisations.
+
+    Parameters
+    ----------
+    values : xarray.DataArray, dims (realisation, ...)
+
+    Returns
+    -------
+    error : xarray.DataArray
+        NaN with one realisation.
+    """
+    count = values.sizes["realisation"]
+    if count < 2:
+        return values.mean("realisation") * np.nan
+    return values.std("realisation", ddof=1) / np.sqrt(count)
+
+
+def unexplained(truth, ndvi):
+    """
+    Share of the variance of a truth that its line on NDVI leaves.
+
+    Parameters
+    ----------
+    truth, ndvi : array, shape (..., n)
+
+    Returns
+    -------
+    unexplained : array, shape (...)
+        1 - R2. [1]
+
+    Raises
+    ------
+    ValueError
+        If one of them does not vary.
+
+    Examples
+    --------
+    >>> float(unexplained(np.array([0.0, 1.0, 2.0]), np.array([0.2, 0.4, 0.6])).round(12))
+    0.0
+    """
+    truth, ndvi = (values - values.mean(axis=-1, keepdims=True) for values in (truth, ndvi))
+    squares = (truth**2).sum(axis=-1) * (ndvi**2).sum(axis=-1)
+    if not np.all(squares > 0):
+        raise ValueError("LAI, FPAR or NDVI does not vary over the pixels: there is no scatter to share")
+    return 1 - (truth * ndvi).sum(axis=-1) ** 2 / squares
+
+
+def _one(scenario):
+    """Results of one realisation, by name: arrays of shape (variable, stage) or (variable,)."""
+    seen, found = pixels(scenario), {}
+    place = [list(STAGES).index(stage) for stage in seen.stages]
+    count = len(place)
+    for variable in VARIABLES:
+        values = unexplained(seen.truth[variable], seen.ndvi)
+        total, curvature = values[(1,) * count], values[(0,) * count]
+        uniform = unexplained(seen.homogeneous_truth[variable], seen.homogeneous_ndvi)
+        one = {"total": total, "curvature": curvature, "variation": total - uniform}
+        for name, attribute in (("share", shapley), ("alone", taken_away), ("first", by_itself)):
+            # A stage that is ideal already changes nothing.
+            one[name] = np.zeros(len(STAGES))
+            one[name][place] = attribute(values, count)
+        for name, value in one.items():
+            found.setdefault(name, []).append(value)
+    return {name: np.array(values) for name, values in found.items()}
+
+
+def _statistics(columns):
+    """Means and standard errors by name of a column."""
+    found = {}
+    for name, values in columns.items():
+        found[name] = float(values.mean("realisation"))
+        found[f"{name}_error"] = float(standard_error(values))
+    return found
+
+
+def _windows(scenario, cells):
+    """Windows of a scenario's grid side by side, whole ones only."""
+    box = scenario.geobox()
+    size = tuple(min(cells, count) for count in box.shape)
+    pixel = scenario.sensor.pixel or instrument(scenario.sensor.instrument).gsd
+    held = tuple(int(count * cell / pixel + 1e-6) for count, cell in zip(size, grids.cell_size(box), strict=True))
+    if min(held) < _FEWEST:
+        raise ValueError(
+            f"a scene of {size[0]} x {size[1]} cells holds {held[0]} x {held[1]} pixels of {pixel:g} m, and a budget "
+            f"needs {_FEWEST} x {_FEWEST}: take more cells, a larger grid, or a larger grid.cell"
+        )
+    rows, columns = (range(count // edge) for count, edge in zip(box.shape, size, strict=True))
+    found = [
+        GeoBox(size, box[row * size[0] :, column * size[1] :].affine, box.crs) for row in rows for column in columns
+    ]
+    if not scenario.ground.lai_file:
+        return found
+    # A map may be empty in its corners.
+    filled = [window for window in found if float(leaf_area(scenario, window).notnull().mean()) > _FILLED]
+    if not filled:
+        raise ValueError(f"no scene of {size[0]} x {size[1]} cells of the LAI map holds enough data: take fewer cells")
+    return filled
+
+
+def _as_section(box):
+    """A grid as the scenario's section has it."""
+    a = box.affine
+    crs = f"EPSG:{box.crs.epsg}" if box.crs.epsg else box.crs.to_wkt()
+    return Grid(crs=crs, west=a.c, north=a.f, width=a.a * box.shape.x, height=-a.e * box.shape.y, cell=a.a)

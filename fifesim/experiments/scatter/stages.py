@@ -1,0 +1,286 @@
+"""Images of a scene with any of its stages at their ideal."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import xarray as xr
+from odc.geo.geobox import GeoBox
+
+from fifesim.analysis import indices
+from fifesim.analysis.rasters import regression as analysis
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.chain import steps as chain
+from fifesim.ground.canopy import raster as ground
+from fifesim.rasters import grid as grids
+from fifesim.scenario.scenario import Scenario
+from fifesim.scenario.simulation import elevation, leaf_area, surface_reflectance
+from fifesim.sensor import raster as sensor
+from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.response import calibration
+from fifesim.sensor.response.rasters.noise import noisy
+from fifesim.sensor.response.rasters.pixels import pixel_grid
+
+# In this order along the axes of what `pixels` gives.
+STAGES = {
+    "non-linearity": "reflectance and FPAR of a cell go with its LAI along the tangent at the mean LAI of its pixel",
+    "NDVI scaling": "mean of the NDVI of the cells instead of the NDVI of their mean reflectance",
+    "point spread": "all cells of a pixel count the same",
+    "registration": "pixels lie on the blocks of the truth",
+    "quantisation": "radiance instead of digital numbers",
+    "noise": "none",
+    "topography": "level ground",
+    "atmosphere": "reflectance at the ground",
+}
+VARIABLES = ("lai", "fpar")
+
+# Half of the step of LAI by which tangents are taken: wide beside the error of the table of reflectance, 1e-6. [1]
+_STEP = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Pixels:
+    """
+    Pixels of a scene under every set of its stages.
+
+    Parameters
+    ----------
+    stages : tuple of str
+        Those that are not ideal already, in the order of `STAGES`.
+    ndvi : array, shape (2,) * len(stages) + (n,)
+        Index 1 where the stage is at work, 0 where it is ideal. [1]
+    truth : dict of str to array, shape as ``ndvi`` or 1 along its axes
+        True LAI and FPAR.
+    homogeneous_ndvi : array, shape (n,)
+        With all stages, over ground that is uniform within each pixel.
+    homogeneous_truth : dict of str to array, shape (n,)
+    """
+
+    stages: tuple
+    ndvi: np.ndarray
+    truth: dict
+    homogeneous_ndvi: np.ndarray
+    homogeneous_truth: dict
+
+
+def working_stages(scenario):
+    """
+    Stages of a scenario that are not ideal already.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Returns
+    -------
+    stages : tuple of str
+        In the order of `STAGES`.
+    """
+    own, instrument = scenario.sensor, find_instrument(scenario.sensor.instrument)
+    size = own.pixel or instrument.gsd
+    spreads = [spread for name in own.bands for spread in instrument.line_spreads(instrument.select([name])[0])]
+    ideal = {
+        "point spread": all(isinstance(spread, Boxcar) and spread.width == size for spread in spreads),
+        "registration": own.interval in ("product", size) and not any(own.offset),
+        "noise": not own.noise,
+        "topography": scenario.terrain.dem == "flat",
+    }
+    return tuple(stage for stage in STAGES if not ideal.get(stage, False))
+
+
+def pixels(scenario):
+    """
+    Pixels of a scene with each set of its stages at work and the others ideal, from the same random numbers.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Returns
+    -------
+    pixels : Pixels
+        Those with data in every image, paired by row and column.
+
+    Raises
+    ------
+    ValueError
+        If the bands have no red or no near infrared, or fewer than three pixels have data.
+    """
+    scene, stages = _scene(scenario), working_stages(scenario)
+    # False is ideal, True at work.
+    switches = {name: (False, True) if name in stages else (False,) for name in STAGES}
+    first, *sensed, relief, air = switches.values()
+    truth = [_truth(scene, scene.lai, curve) for curve in first]
+    images = [
+        [[_images(scene, _cells(scene, scene.lai, curve, *light), sensed) for light in product([slope], air)]
+         for slope in relief]
+        for curve in first
+    ]  # fmt: skip
+    # Axes come as non-linearity, topography, atmosphere, the sensor's, y and x.
+    images = np.moveaxis(np.array(images), (1, 2), (-4, -3))
+    light = relief[-1], air[-1]
+    even = _images(scene, _cells(scene, scene.middle, True, *light), [each[-1:] for each in sensed])
+    return _with_data(stages, images, np.array(truth), even.reshape(scene.shape), _truth(scene, scene.middle, True))
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """Ground of a scenario, and the instrument over it."""
+
+    scenario: Scenario
+    instrument: Instrument
+    bands: tuple
+    lai: xr.DataArray
+    middle: xr.DataArray
+    dem: xr.DataArray | None
+    horizon: xr.DataArray | None
+    blocks: GeoBox
+    image: GeoBox
+
+    @property
+    def shape(self):
+        """Rows and columns that the image and the blocks of the truth share."""
+        return tuple(min(pair) for pair in zip(self.blocks.shape, self.image.shape, strict=True))
+
+
+def _scene(scenario):
+    instrument, own, grid = find_instrument(scenario.sensor.instrument), scenario.sensor, scenario.geobox()
+    bands = _red_and_nir(instrument.select(own.bands))
+    blocks = grids.aligned(grid, own.pixel or instrument.gsd)
+    image = blocks if own.interval == "product" else pixel_grid(grid, instrument, bands, None, own.interval)
+    lai = leaf_area(scenario, grid).compute()
+    middle = _spread_out(analysis.aggregate(lai, grids.cell_size(blocks)[0], min_valid=own.min_valid), lai)
+    dem, horizon, _ = elevation(scenario, grid)
+    return _Scene(scenario, instrument, bands, lai, middle, dem, horizon, blocks, image)
+
+
+def _red_and_nir(bands):
+    """The two bands of NDVI."""
+    wavelength = ("band", [band.wavelength for band in bands])
+    numbers = xr.DataArray(
+        np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords={"wavelength": wavelength}
+    )
+    return tuple(bands[number.item()] for number in analysis.red_and_nir(numbers))
+
+
+def _spread_out(means, cells):
+    """Means of blocks over their cells; a cell of no block keeps its own, and one without data has none."""
+    rows, columns = (
+        np.floor((np.arange(cells.sizes[axis]) + 0.5) * cell / block + 1e-9).astype(int)
+        for axis, cell, block in zip(
+            ("y", "x"), grids.cell_size(grids.geobox(cells)), grids.cell_size(grids.geobox(means)), strict=True
+        )
+    )
+    inside = (rows < means.sizes["y"])[:, None] & (columns < means.sizes["x"])
+    spread = means.values[np.minimum(rows, means.sizes["y"] - 1)][:, np.minimum(columns, means.sizes["x"] - 1)]
+    return cells.copy(data=np.where(inside & np.isfinite(spread) & np.isfinite(cells.values), spread, cells.values))
+
+
+def _tangent(function, lai, middle):
+    """A function of leaf area along its tangent at the middle."""
+    low, high = np.maximum(middle - _STEP, 0.0), middle + _STEP
+    at = function(middle)
+    return at.copy(data=at.data + ((function(high) - function(low)) / (high - low) * (lai - middle)).data)
+
+
+def _truth(scene, lai, curve):
+    """LAI and FPAR by blocks."""
+    land, geometry = scene.scenario.ground, scene.scenario.sun_and_view()
+
+    def fpar(area):
+        return ground.fpar(area, geometry=geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
+
+    size, (rows, columns) = grids.cell_size(scene.blocks)[0], scene.shape
+    return [
+        analysis.aggregate(array, size, min_valid=scene.scenario.sensor.min_valid).values[:rows, :columns]
+        for array in (lai, fpar(lai) if curve else _tangent(fpar, lai, scene.middle))
+    ]
+
+
+def _cells(scene, lai, curve, relief, air):
+    """Red, near infrared and NDVI of the cells, as light leaves the ground or the air, shape (3, y, x)."""
+    terrain = {"dem": scene.dem, "horizon": scene.horizon} if relief else {}
+
+    def reflectance(area):
+        return surface_reflectance(scene.scenario, area, scene.instrument, **terrain)
+
+    seen = reflectance(lai) if curve else _tangent(reflectance, lai, scene.middle)
+    if air:
+        seen = chain.to_toa(seen, adjacency=scene.scenario.atmosphere.adjacency)
+    red, nir = (band.values for band in analysis.red_and_nir(seen))
+    return np.stack([red, nir, indices.normalized_difference(nir, red)])
+
+
+def _images(scene, cells, switches):
+    """NDVI with the stages of the sensor at work or ideal, shape (one axis for each of them, y, x)."""
+    scaling, spread, registration, quantisation, noise = switches
+    found = np.empty((*map(len, switches), *scene.shape))
+    for (i, blurred), (j, displaced) in product(enumerate(spread), enumerate(registration)):
+        means = _means(scene, cells, blurred, displaced)
+        red, nir, of_cells = means
+        of_means = indices.normalized_difference(nir, red)
+        for (k, counts), (m, grains) in product(enumerate(quantisation), enumerate(noise)):
+            recorded = _recorded(scene, means[:2], counts, grains)
+            for n, of_reflectance in enumerate(scaling):
+                # What the detector did stays as it is.
+                found[n, i, j, k, m] = recorded if of_reflectance else of_cells + (recorded - of_means)
+    return found
+
+
+def _means(scene, cells, blurred, displaced):
+    """Means over footprints, shape (3, y, x)."""
+    red, nir = scene.bands
+    own, grid = scene.scenario.sensor, scene.scenario.geobox()
+    box = scene.image if displaced else scene.blocks
+    sizes = grids.cell_size(box)
+    shifts = [offset * size for offset, size in zip(own.offset, sizes, strict=True)] if displaced else (0.0, 0.0)
+    ideal = [Boxcar(size) for size in grids.cell_size(scene.blocks)]
+    a, b, (rows, columns) = grid.affine, box.affine, scene.shape
+    means = np.empty((len(cells), rows, columns))
+    for layer, band in enumerate((red, nir, red)):
+        down, across = scene.instrument.line_spreads(band) if blurred else ideal
+        operators = (
+            axis_operator(down, cell_origin=a.f, cell_size=a.e, n_cells=grid.shape.y, pixel_origin=b.f, pixel_size=b.e,
+                          n_pixels=rows, shift=shifts[0]),
+            axis_operator(across, cell_origin=a.c, cell_size=a.a, n_cells=grid.shape.x, pixel_origin=b.c,
+                          pixel_size=b.a, n_pixels=columns, shift=shifts[1]),
+        )  # fmt: skip
+        means[layer] = regularize(cells[layer], *operators, min_valid=own.min_valid)
+    return means
+
+
+def _recorded(scene, means, counts, grains):
+    """NDVI of what the detectors record of the mean reflectances."""
+    own, geometry, bands = scene.scenario.sensor, scene.scenario.sun_and_view(), scene.bands
+    radiance = sensor.as_radiance(xr.DataArray(means, dims=("band", "y", "x")), bands, geometry)
+    if grains:
+        first = grids.lattice_position(scene.image)
+        radiance = noisy(radiance, scene.instrument, bands, own.noise, own.seed, first)
+    radiance = radiance.values
+    if counts:
+        gain, offset = calibration.gain_offset(
+            [[[band.full_scale_radiance]] for band in bands], [[[band.min_radiance]] for band in bands],
+            scene.instrument.bits,
+        )  # fmt: skip
+        dn = calibration.radiance_to_dn(radiance, gain, offset, scene.instrument.bits)
+        radiance = calibration.dn_to_radiance(dn, gain, offset)
+    red, nir = calibration.radiance_to_reflectance(
+        radiance, np.array([[[band.solar_irradiance]] for band in bands]), geometry.mu_s, geometry.earth_sun_distance
+    )
+    return indices.normalized_difference(nir, red)
+
+
+def _with_data(stages, images, truth, even, even_truth):
+    """The pixels that have data in every image and truth, on one axis."""
+    rasters = (images, truth, even, np.array(even_truth))
+    found = np.logical_and.reduce([np.isfinite(each).reshape(-1, *even.shape).all(axis=0) for each in rasters])
+    if found.sum() < 3:
+        raise ValueError(f"{found.sum()} pixels have data in every image, and a line needs 3: simulate a larger scene")
+    axes = len(stages)
+    # Stages that are ideal already have an axis of one.
+    ndvi = images[..., found].reshape(*(2,) * axes, -1)
+    by_name = dict(zip(VARIABLES, np.moveaxis(truth[..., found], 1, 0), strict=True))
+    truths = {name: values.reshape(-1, *(1,) * (axes - 1), values.shape[-1]) for name, values in by_name.items()}
+    even_truths = {name: values[found] for name, values in zip(VARIABLES, even_truth, strict=True)}
+    return Pixels(stages, ndvi, truths, even[found], even_truths)

@@ -1,0 +1,150 @@
+"""Checks of the canopy: limits that any canopy keeps, theory, and other codes."""
+
+from functools import partial
+
+import numpy as np
+from scipy.integrate import quad
+
+from fifesim.base import datasets
+from fifesim.experiments.verification.deviations import Deviation, largest
+from fifesim.ground.canopy import absorption
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes, leaf_projection
+from fifesim.ground.canopy.sail_model import sail, volume_scattering, with_background
+
+_deviation = partial(Deviation, "canopy")
+
+# Canopies from bare to closed, leaves from white to black, sun and view from the zenith to grazing.
+_LAI = np.array([0, 0.01, 0.5, 2, 8, 20])[:, None, None, None]
+_RHO = np.linspace(0, 1, 6)[:, None, None]
+_SZA = np.array([0, 28.5, 60, 85])[:, None]
+_VZA = np.array([0, 30, 75])
+_SHAPES = ("spherical", "planophile", "erectophile")
+
+
+def _limits():
+    """Rounding, of up to 20 optical thicknesses of leaves."""
+    bare = with_background(sail(0.0, _RHO, 1 - _RHO, sza=_SZA, vza=_VZA, hotspot=0.05), 0.15)
+    yield _deviation("no leaves show the background", np.max([largest(r, 0.15) for r in bare]), 0.0, "1", "theory")
+    white = [sail(_LAI, _RHO, 1 - _RHO, sza=_SZA, vza=_VZA, raa=50, leaf_angles=shape) for shape in _SHAPES]
+    lost = np.max(
+        [largest(out, 1) for c in white for out in (c.rdd + c.tdd, c.rsd + c.tsd + c.tss, c.rdo + c.tdo + c.too)]
+    )
+    yield _deviation("leaves that absorb nothing lose no light", lost, 1e-12, "1", "energy budget")
+    over_white = [with_background(canopy, 1.0) for canopy in white]
+    kept = np.max([largest(r, 1) for surface in over_white for r in (surface.rdd, surface.rsd, surface.rdo)])
+    yield _deviation("and reflect all of it over white ground", kept, 1e-12, "1", "energy budget")
+
+
+def _reciprocity():
+    given = {"raa": 50, "hotspot": 0.05}
+    there, back = (
+        with_background(sail(_LAI, 0.9 * _RHO, 0.9 - 0.9 * _RHO, sza=s, vza=v, **given), 0.2).rso
+        for s, v in ((_SZA, _VZA), (_VZA, _SZA))
+    )
+    yield _deviation("sun and view may be exchanged", largest(there, back, relative=True), 1e-12, "1", "reciprocity")
+
+
+def _half_space():
+    """Light by light through leaves of one inclination, whose mean squared cosine is that of their inclination."""
+    rho, tau = np.array([[0.07, 0.45, 0.6], [0.04, 0.42, 0.1]])
+    worst = 0.0
+    for inclination in (0.0, 35.0, 57.0, 90.0):
+        squared = np.cos(np.radians(inclination)) ** 2
+        back = ((1 + squared) * rho + (1 - squared) * tau) / 2
+        loss = 1 - ((1 + squared) * tau + (1 - squared) * rho) / 2
+        thick = sail(400.0, rho, tau, sza=30.0, leaf_angles=f"{inclination:g}: 1")
+        worst = np.maximum(worst, largest(thick.rdd, (loss - np.sqrt(loss**2 - back**2)) / back))
+    yield _deviation("reflectance of a canopy without end", worst, 1e-12, "1", "Kubelka and Munk (1931)")
+
+
+def _spherical_leaves():
+    """The closed form holds for leaves of all inclinations; 900 classes of them are good to 1e-5."""
+    leaves = leaf_angle_classes("spherical", classes=900)
+    inclination, fraction = np.array(leaves.inclination), np.array(leaves.fraction)
+    worst = 0.0
+    for sza, vza, raa in ((28.5, 0, 0), (60, 45, 90), (75, 75, 180), (30, 30, 0)):
+        found = np.pi * (np.array(volume_scattering(inclination, sza, vza, raa)) @ fraction)
+        s, v, azimuth = np.radians([sza, vza, raa])
+        cosine = np.cos(s) * np.cos(v) + np.sin(s) * np.sin(v) * np.cos(azimuth)
+        between = np.arccos(np.clip(cosine, -1, 1))
+        ross = np.sin(between) - between * np.cos(between)
+        worst = np.maximum(worst, largest(found, np.array([ross + np.pi * np.cos(between), ross]) / (3 * np.pi)))
+    yield _deviation("single scattering by spherical leaves", worst, 1e-5, "1", "Ross (1981), closed form")
+
+
+def _hot_spot():
+    """What a hot spot adds to single scattering, by adaptive quadrature over the depth."""
+    leaves = leaf_angle_classes("spherical")
+    inclination, fraction = np.array(leaves.inclination), np.array(leaves.fraction)
+    worst = 0.0
+    for sza, vza, raa, lai, size in ((28.5, 0, 0, 2, 0.1), (45, 30, 10, 0.5, 0.3), (60, 60, 0, 5, 0.05)):
+        mu_s, mu_v = np.cos(np.radians([sza, vza]))
+        ks, ko = (leaf_projection(inclination, a) @ fraction / mu for a, mu in ((sza, mu_s), (vza, mu_v)))
+        w = [0.5, 0.3] @ (np.pi / (mu_s * mu_v) * (np.array(volume_scattering(inclination, sza, vza, raa)) @ fraction))
+        tan_s, tan_v = np.tan(np.radians([sza, vza]))
+        apart = 2 * abs(tan_s - tan_v * np.exp(1j * np.radians(raa))) / (size * (ks + ko))
+        seen = lai * quad(_gap, 0, 1, args=(ks, ko, lai, apart), epsabs=1e-14, epsrel=1e-11, limit=200)[0]
+        plain = -np.expm1(-(ks + ko) * lai) / (ks + ko)
+        spot, none = (sail(lai, 0.5, 0.3, sza=sza, vza=vza, raa=raa, hotspot=h).rso for h in (size, 0.0))
+        worst = np.maximum(worst, largest(spot - none, w * (seen - plain)))
+    yield _deviation("hot spot", worst, 1e-9, "1", "Kuusk (1991), by quadrature")
+
+
+def _gap(depth, ks, ko, lai, apart):
+    """Chance that sun and observer both reach a relative depth."""
+    overlap = depth if apart < 1e-9 else -np.expm1(-apart * depth) / apart
+    return np.exp(-(ks + ko) * lai * depth + np.sqrt(ks * ko) * lai * overlap)
+
+
+def _other_sail():
+    """Leaf angle classes of the other code come from an iteration that stops at 1e-8."""
+    table = datasets.table("verification/sail.csv")
+    worst = 0.0
+    for row in table.itertuples():
+        leaves = leaf_angle_classes(("verhoef", row.a, row.b), classes=18)
+        angles = {"sza": row.sza, "vza": row.vza, "raa": row.raa}
+        canopy = sail(row.lai, row.leaf_reflectance, row.leaf_transmittance, **angles, leaf_angles=leaves)
+        surface = with_background(canopy, row.background)
+        found = [surface.rdd, surface.rsd, surface.rdo, surface.rso, canopy.tss]
+        worst = np.maximum(worst, largest(found, [row.rdd, row.rsd, row.rdo, row.rso, row.tss]))
+    yield _deviation(f"{len(table)} canopies of any leaf angles", worst, 1e-7, "1", "SAIL of prosail 2.0.5")
+
+
+def _exact_transfer():
+    """Four streams for a continuum of directions: what the model itself leaves, as the documentation says."""
+    table = datasets.table("verification/canopy_transfer.csv")
+    angles = {name: table[name].to_numpy() for name in ("sza", "vza", "raa")}
+    canopy = sail(table["lai"], table["leaf_reflectance"], table["leaf_transmittance"], **angles)
+    found = 100 * (with_background(canopy, table["background"].to_numpy()).rso / table["reflectance"] - 1)
+    infrared, nadir = table["band"] == "nir", table["vza"] == 0
+    parts = (
+        ("red reflectance at nadir and 45 degrees", ~infrared, 0.5),
+        ("near infrared reflectance at nadir", infrared & nadir, 3.0),
+        ("near infrared reflectance at 45 degrees", infrared & ~nadir, 5.0),
+    )
+    for what, rows, bound in parts:
+        yield _deviation(what, largest(found[rows], 0), bound, "%", "exact radiative transfer")
+
+
+def _absorption():
+    sza = np.array([0, 25, 28.5, 45, 60, 80])
+    cosine, tangent = np.cos(np.radians(sza)), np.tan(np.radians(sza))
+    spherical = largest(absorption.extinction_coefficient(sza), 0.5 / cosine)
+    yield _deviation("extinction by spherical leaves", spherical, 0.0, "1", "theory, 0.5 / cos(sza)")
+    vertical = largest(absorption.extinction_coefficient(sza, "90: 1"), 2 / np.pi * tangent)
+    yield _deviation("extinction by vertical leaves", vertical, 1e-12, "1", "theory, 2 tan(sza) / pi")
+    taken = [0.94 * quad(lambda depth: 0.569 * np.exp(-0.569 * depth), 0, lai)[0] for lai in (0.5, 2.5, 8)]
+    fpar = largest(absorption.fpar([0.5, 2.5, 8], 0.569), taken)
+    yield _deviation("light that leaves take, layer by layer", fpar, 1e-12, "1", "quadrature of Beer's law")
+
+
+CHECKS = (
+    _limits,
+    _reciprocity,
+    _half_space,
+    _spherical_leaves,
+    _hot_spot,
+    _other_sail,
+    _exact_transfer,
+    _absorption,
+)

@@ -1,0 +1,1 @@
+"""Light in leaves and on what lies below them."""

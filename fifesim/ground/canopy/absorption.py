@@ -1,0 +1,80 @@
+"""Absorbed photosynthetically active radiation."""
+
+import numpy as np
+
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes, leaf_projection
+
+FPAR_INF = 0.94
+"""FPAR of an infinitely thick canopy [1]; Friedl et al. (1995), below Eq. 6."""
+
+
+def extinction_coefficient(sza, leaf_angles="spherical"):
+    r"""
+    Extinction coefficient of the direct beam per leaf area.
+
+    .. math:: K = G(\theta_s) / \mu_s
+
+    Parameters
+    ----------
+    sza : array
+        Below 90. [degree]
+    leaf_angles : optional
+        Whatever `leaf_angle_classes` accepts. Spherical leaves have exactly :math:`G = 1/2`; others are summed over
+        their classes.
+
+    Returns
+    -------
+    extinction : array, shape of sza
+        :math:`K`. [1]
+
+    References
+    ----------
+    [Monteith1990]_
+
+    Examples
+    --------
+    Horizontal leaves hide their own area, wherever the sun stands:
+
+    >>> float(round(extinction_coefficient(60.0, "0: 1"), 12))
+    1.0
+    """
+    leaf_angles = leaf_angle_classes(leaf_angles)
+    mu_s = np.cos(np.radians(np.asarray(sza, float)))
+    if leaf_angles == leaf_angle_classes("spherical"):
+        return 0.5 / mu_s
+    projection = leaf_projection(np.asarray(leaf_angles.inclination), np.asarray(sza, float)[..., None])
+    return projection @ np.asarray(leaf_angles.fraction) / mu_s
+
+
+def fpar(lai, extinction, fpar_inf=FPAR_INF):
+    r"""
+    Fraction of photosynthetically active radiation that a canopy absorbs, by Beer's law.
+
+    .. math:: \mathrm{FPAR} = \mathrm{FPAR}_\infty \left[ 1 - e^{-K \, \mathrm{LAI}} \right]
+
+    Parameters
+    ----------
+    lai : array
+        Leaf area index. NaN gives NaN. [m2 m-2]
+    extinction : array
+        Extinction coefficient :math:`K`; `extinction_coefficient` gives it. [1]
+    fpar_inf : array, optional
+        FPAR of an infinitely thick canopy. [1]
+
+    Returns
+    -------
+    fpar : array, shape of the broadcast inputs
+        [1]
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 6
+
+    Examples
+    --------
+    Bare ground absorbs nothing:
+
+    >>> float(fpar(0.0, 0.57))
+    0.0
+    """
+    return -fpar_inf * np.expm1(-np.asarray(extinction, float) * np.asarray(lai, float))

@@ -1,0 +1,179 @@
+"""Tables over leaf area index: exact functions on nodes, cubic splines between them."""
+
+from dataclasses import dataclass, field
+
+import numba
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from fifesim.ground.canopy.optics import LARGEST_LAI
+
+LIMIT = LARGEST_LAI
+"""Largest leaf area index in a table."""
+
+_COARSEST = 32
+_FINEST = 2**16
+
+
+@dataclass(frozen=True, eq=False)
+class LaiTable:
+    """
+    Cubic splines of functions of leaf area index, on nodes that are equidistant in rate LAI / (1 + rate LAI).
+
+    Parameters
+    ----------
+    rate : float
+        Of the nodes. [1]
+    coefficients : array, shape (interval, column, 4)
+        Polynomial coefficients over the unit interval, constant term first.
+    """
+
+    rate: float
+    coefficients: np.ndarray = field(repr=False)
+
+    @property
+    def step(self):
+        """Intervals per unit of rate LAI / (1 + rate LAI)."""
+        return len(self.coefficients) / _length(self.rate)
+
+
+def tabulate(function, rate, combine=None, tolerance=1e-6):
+    """
+    Table of smooth functions of leaf area index, as fine as it must be.
+
+    Nodes are doubled until the spline through every second one meets the others within the tolerance. A cubic
+    spline's error falls with the fourth power of the step: that of the table is some sixteen times smaller.
+
+    Parameters
+    ----------
+    function : callable
+        Of LAI, shape (n,), to values, shape (column, n).
+    rate : float
+        Largest decay rate of the functions. [1]
+    combine : callable, optional
+        Of the values, shape (column, n), to that which must meet the tolerance; the values by default.
+    tolerance : float, optional
+
+    Returns
+    -------
+    table : LaiTable
+
+    Raises
+    ------
+    ValueError
+        If no table fine enough is found.
+
+    Examples
+    --------
+    >>> table = tabulate(lambda lai: np.exp(-lai)[None], rate=1.0)
+    >>> bool(abs(interpolate(table, np.array([0.7]))[0, 0] - np.exp(-0.7)) < 1e-7)
+    True
+    """
+    combine = combine or (lambda values: values)
+    # Nodes for the slow decay of dense canopies too, which is of the order of 1.
+    rate = float(np.sqrt(rate))
+    length = _length(rate)
+    values = function(_lai(np.linspace(0, 1, _COARSEST + 1), rate, length))
+    while values.shape[1] <= _FINEST:
+        position = np.linspace(0, 1, values.shape[1])
+        between = (position[1:] + position[:-1]) / 2
+        exact = function(_lai(between, rate, length))
+        coarse = CubicSpline(position, values, axis=1)(between)
+        values = np.insert(values, np.arange(1, values.shape[1]), exact, axis=1)
+        if np.abs(combine(coarse) - combine(exact)).max() < tolerance:
+            spline = CubicSpline(np.arange(values.shape[1]), values, axis=1)
+            return LaiTable(rate, np.ascontiguousarray(spline.c[::-1].transpose(1, 2, 0)))
+    raise ValueError(f"no table of {_FINEST} nodes reaches {tolerance:g}: use exact=True")
+
+
+def _length(rate):
+    return rate * LIMIT / (1 + rate * LIMIT)
+
+
+def _lai(position, rate, length):
+    # Rounding must not lead past the last node.
+    return np.minimum(position * length / (1 - position * length) / rate, LIMIT)
+
+
+def interpolate(table, lai):
+    """
+    Values of a table.
+
+    Parameters
+    ----------
+    table : LaiTable
+    lai : array
+        NaN, and all outside 0 to `LIMIT`, gives NaN. [m2 m-2]
+
+    Returns
+    -------
+    values : array, shape (column,) + lai.shape
+    """
+    lai = np.asarray(lai, float)
+    values = np.empty((table.coefficients.shape[1], lai.size))
+    _interpolate(np.ascontiguousarray(lai).ravel(), table.coefficients, table.rate, table.step, values)
+    return values.reshape(-1, *lai.shape)
+
+
+def interpolate_over(table, lai, background):
+    r"""
+    Reflectance of a canopy over a background that varies from cell to cell, from a table of its layer.
+
+    .. math:: \rho = A + B \, r + C \, \frac{r}{1 - r \, D}
+
+    Parameters
+    ----------
+    table : LaiTable
+        Columns A, B, C, D of each band in turn; D is the layer's rdd.
+    lai : array
+        NaN, and all outside 0 to `LIMIT`, gives NaN. [m2 m-2]
+    background : array, shape (band,) + lai.shape or broadcastable
+        Reflectance :math:`r` of the background. [1]
+
+    Returns
+    -------
+    reflectance : array, shape (band,) + lai.shape
+        [1]
+    """
+    lai = np.asarray(lai, float)
+    bands = table.coefficients.shape[1] // 4
+    background = np.broadcast_to(np.asarray(background, float), (bands, *lai.shape)).reshape(bands, -1)
+    values = np.empty((bands, lai.size))
+    _interpolate_over(np.ascontiguousarray(lai).ravel(), background, table.coefficients, table.rate, table.step, values)
+    return values.reshape(-1, *lai.shape)
+
+
+@numba.njit(nogil=True, cache=True)
+def _interpolate(lai, coefficients, rate, step, values):
+    last, columns = coefficients.shape[0] - 1, coefficients.shape[1]
+    for i in range(lai.size):
+        if not 0 <= lai[i] <= LIMIT:
+            for column in range(columns):
+                values[column, i] = np.nan
+            continue
+        position = rate * lai[i] / (1 + rate * lai[i]) * step
+        interval = min(int(position), last)
+        share = position - interval
+        for column in range(columns):
+            c = coefficients[interval, column]
+            values[column, i] = c[0] + share * (c[1] + share * (c[2] + share * c[3]))
+
+
+@numba.njit(nogil=True, cache=True)
+def _interpolate_over(lai, background, coefficients, rate, step, values):
+    last = coefficients.shape[0] - 1
+    terms = np.empty(4)
+    for i in range(lai.size):
+        if not 0 <= lai[i] <= LIMIT:
+            for band in range(values.shape[0]):
+                values[band, i] = np.nan
+            continue
+        position = rate * lai[i] / (1 + rate * lai[i]) * step
+        interval = min(int(position), last)
+        share = position - interval
+        for band in range(values.shape[0]):
+            for k in range(4):
+                c = coefficients[interval, 4 * band + k]
+                terms[k] = c[0] + share * (c[1] + share * (c[2] + share * c[3]))
+            r = background[band, i]
+            values[band, i] = terms[0] + r * (terms[1] + terms[2] / (1 - r * terms[3]))

@@ -1,0 +1,244 @@
+"""Leaf and background optics of bands, and the ranges that SAIL accepts."""
+
+import difflib
+from collections.abc import Mapping
+
+import numpy as np
+
+from fifesim.base import datasets
+from fifesim.base.bands import Band
+from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
+from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, is_mixture
+
+LARGEST_LAI = 100.0
+"""Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
+
+# What the tables of the TM bands were modelled with; see data/README.md.
+_DEFAULT_BACKGROUND = {"soil_dry": 0.475, "shade": 0.525}
+
+
+def leaf_optics(bands, given=None):
+    """
+    Leaf reflectance and transmittance of bands.
+
+    Parameters
+    ----------
+    bands : sequence of str or fifesim.base.bands.Band
+        Names, such as ``["TM3", "TM4"]``, or responses, which spectra need.
+    given : Leaf, mapping, or pair of arrays, optional
+        What a leaf is made of; ``{band: (reflectance, transmittance)}``; or both as arrays of shape (band,). The
+        default is the green tallgrass of ``data/leaf_optics.csv``, for bands that are not in it that of ``Leaf()``.
+
+    Returns
+    -------
+    leaf_reflectance, leaf_transmittance : array, shape (band,)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If a band has no optics, or they are outside their range.
+
+    Examples
+    --------
+    Leaves absorb red light and scatter near infrared:
+
+    >>> reflectance, transmittance = leaf_optics(["TM3", "TM4"])
+    >>> (reflectance + transmittance).round(2).tolist()
+    [0.11, 0.87]
+    """
+    if given is None:
+        table = datasets.table("leaf_optics.csv").set_index("band")
+        given = {band: tuple(row) for band, row in zip(table.index, table.to_numpy(), strict=True)}
+        given |= _leaf_means([band for band in _responses(bands) if band.name not in given], Leaf())
+    elif isinstance(given, Leaf):
+        given = _leaf_means(_responses(bands, "Leaf"), given)
+    if isinstance(given, Mapping):
+        given = np.reshape([_of_band(given, band, "leaf optics") for band in _names(bands)], (-1, 2)).T
+    reflectance, transmittance = (_for_bands(values, bands, "leaf optics") for values in given)
+    check_leaf_optics(reflectance, transmittance)
+    return reflectance, transmittance
+
+
+def background(bands, given=None):
+    """
+    Background reflectance of bands.
+
+    Parameters
+    ----------
+    bands : sequence of str or fifesim.base.bands.Band
+        As in `leaf_optics`.
+    given : Background, Spectrum, str, mapping, float or array, optional
+        Spectra that are mixed, also as ``{spectrum: fraction}``; one spectrum, or the path of its CSV file;
+        ``{band: reflectance}``; one number; or an array of shape (band,). The default is the soil and litter of
+        ``data/background.csv``, for bands that are not in it the dark soil that it was modelled with.
+
+    Returns
+    -------
+    background : array, shape (band,)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If a band has no reflectance, or it is outside its range.
+
+    Examples
+    --------
+    >>> background(["TM3", "TM4"], 0.2).tolist()
+    [0.2, 0.2]
+    """
+    if isinstance(given, str):
+        given = Background({given: 1.0})
+    elif is_mixture(given) and not set(given) <= set(_names(bands)):
+        given = Background(given)
+    if given is None:
+        table = datasets.table("background.csv")
+        given = dict(zip(table["band"], table["background"], strict=True))
+        given |= _background_means(
+            [band for band in _responses(bands) if band.name not in given], Background(_DEFAULT_BACKGROUND)
+        )
+    elif isinstance(given, Background | Spectrum):
+        given = _background_means(_responses(bands, type(given).__name__), given)
+    if isinstance(given, Mapping):
+        given = [_of_band(given, band, "background") for band in _names(bands)]
+    reflectance = _for_bands(given, bands, "background")
+    check_background(reflectance)
+    return reflectance
+
+
+def _names(bands):
+    return [band.name if isinstance(band, Band) else band for band in bands]
+
+
+def _responses(bands, needed_by=None):
+    """Bands whose response is known."""
+    known = [band for band in bands if isinstance(band, Band)]
+    if needed_by and len(known) < len(bands):
+        raise TypeError(f"a {needed_by} is a spectrum, it needs the bands' responses: give Band objects, not names")
+    return known
+
+
+def _leaf_means(bands, leaf):
+    """Leaf optics by band."""
+    if not bands:
+        return {}
+    wavelength, *spectra = leaf_spectrum(leaf)
+    means = band_means(bands, wavelength, spectra)
+    return {band.name: tuple(pair) for band, pair in zip(bands, means.T.tolist(), strict=True)}
+
+
+def _background_means(bands, mixture):
+    """Background by band."""
+    if not bands:
+        return {}
+    return dict(zip(_names(bands), background_means(bands, mixture).tolist(), strict=True))
+
+
+def _of_band(given, band, what):
+    if band in given:
+        return given[band]
+    near = difflib.get_close_matches(str(band), map(str, given), n=1, cutoff=0.4)
+    nearest = f", did you mean {near[0]!r}?" if near else "."
+    typed = "(reflectance, transmittance)" if what == "leaf optics" else "reflectance"
+    raise ValueError(
+        f"no {what} for band {band!r}{nearest} There are {', '.join(map(str, given))}; "
+        f"for another band pass its own as {{{band!r}: {typed}, ...}}"
+    )
+
+
+def _for_bands(values, bands, what):
+    values = np.asarray(values, float)
+    if values.shape not in ((), (1,), (len(bands),)):
+        raise ValueError(f"{what} of shape {values.shape} for {len(bands)} bands: give one value for each band")
+    return np.broadcast_to(values, len(bands)).copy()
+
+
+def check_leaf_optics(reflectance, transmittance):
+    """
+    Refuse leaf optics that no leaf can have.
+
+    Parameters
+    ----------
+    reflectance, transmittance : array
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If one is outside 0 to 1, or they add up to more than 1.
+
+    Examples
+    --------
+    >>> check_leaf_optics(0.45, 0.42)
+    """
+    for name, values in (("reflectance", reflectance), ("transmittance", transmittance)):
+        _check_fraction(f"leaf {name}", values)
+    total = np.max(np.add(reflectance, transmittance))
+    # Decimal fractions that add up to 1 may exceed it by rounding.
+    if not total <= 1 + 1e-12:
+        raise ValueError(
+            f"leaf reflectance and transmittance must not add up to more than 1, got {total:g}: "
+            "what a leaf does not reflect or transmit it absorbs; lower one of them"
+        )
+
+
+def check_background(reflectance):
+    """
+    Refuse a background reflectance outside 0 to 1; NaN passes.
+
+    Parameters
+    ----------
+    reflectance : array
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If one is outside 0 to 1.
+
+    Examples
+    --------
+    >>> check_background(0.15)
+    """
+    values = np.asarray(reflectance, float)
+    if np.isnan(values).any():
+        values = values[~np.isnan(values)]
+    _check_fraction("background reflectance", values)
+
+
+def check_lai(lai):
+    """
+    Refuse a leaf area index that is negative or above 100; NaN passes.
+
+    Parameters
+    ----------
+    lai : array
+        [m2 m-2]
+
+    Raises
+    ------
+    ValueError
+        If one is negative or above 100, which no canopy has: it is a fill value, or needs a scale.
+
+    Examples
+    --------
+    >>> check_lai(2.5)
+    """
+    lai = np.asarray(lai, float)
+    # Two passes without a temporary; NaN is passed over.
+    if np.fmin.reduce(lai, axis=None, initial=0.0) < 0 or np.fmax.reduce(lai, axis=None, initial=0.0) > LARGEST_LAI:
+        wrong = (lai < 0) | (lai > LARGEST_LAI)
+        raise ValueError(
+            f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {lai[wrong].flat[0]:g} in "
+            f"{wrong.sum()} of {lai.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
+        )
+
+
+def _check_fraction(name, values):
+    values = np.asarray(values, float)
+    wrong = ~((values >= 0) & (values <= 1))
+    if wrong.any():
+        raise ValueError(
+            f"{name} must be in [0, 1], got {values[wrong].flat[0]:g}: give a fraction, not percent or digital numbers"
+        )

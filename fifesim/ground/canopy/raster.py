@@ -1,0 +1,339 @@
+"""The ground scene on labelled rasters: leaf area, its reflectance and the light that it absorbs."""
+
+from pathlib import Path
+
+import numpy as np
+import psutil
+import xarray as xr
+
+from fifesim.base.geometry import ANGLES, fife_geometry, relative_azimuth
+from fifesim.ground.canopy import absorption
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.ground.canopy.optics import check_lai
+from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
+from fifesim.ground.landscape import field as random_field
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
+from fifesim.rasters import cf, warp
+from fifesim.rasters import chunks as chunking
+from fifesim.rasters import grid as grids
+
+FIELD_METHODS = ("streaming", "periodic")
+
+_REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
+
+
+def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="streaming", chunks=None):
+    """
+    Leaf area index of a simulated landscape.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells, in a projected CRS.
+    distribution : str, path or frozen scipy distribution, optional
+        As `ground.distribution.lai_distribution` takes it.
+    arp : float, optional
+        Autoregressive parameter in [0, 0.25). [1]
+    seed : int, optional
+        In [0, 2**64).
+    method : {"streaming", "periodic"}, optional
+        ``streaming`` is a function of (seed, row, column): a window is a slice of the whole, and chunks change nothing.
+        ``periodic`` is the paper's: one Fourier transform of the whole scene and exact ranks, in memory.
+    chunks : mapping or int, optional
+        Makes the streaming scene lazy.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+
+    Raises
+    ------
+    ValueError
+        If the grid, arp, seed, distribution or method is not one allowed.
+
+    References
+    ----------
+    [Friedl1995]_, Fig. 2
+
+    See Also
+    --------
+    fifesim.ground.landscape.field.streaming_field, fifesim.ground.landscape.distribution.lai_distribution
+    """
+    grids.check_grid(grid)
+    random_field.check_arp(arp)
+    random_field.check_seed(seed)
+    density = lai_distribution(distribution)
+    if method not in FIELD_METHODS:
+        raise ValueError(f"method must be one of {', '.join(FIELD_METHODS)}, got {method!r}")
+    make = _streaming_scene if method == "streaming" else _periodic_scene
+    lai = make(grid, density, arp, int(seed), chunks)
+    return cf.label(
+        lai,
+        "lai",
+        history=f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}",
+        arp=float(arp),
+        rng_seed=str(int(seed)),
+        lai_distribution=_distribution_name(distribution),
+        method=method,
+        references=_REFERENCE,
+    )
+
+
+def open_lai(path, grid, chunks=None):
+    """
+    A user's own map of leaf area index on a grid.
+
+    Parameters
+    ----------
+    path : str or path
+        Any raster that GDAL opens; its first band is LAI. [m2 m-2]
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells. Cells no larger than the map's are interpolated bilinearly, larger ones hold means.
+    chunks : mapping or int, optional
+        Makes the result lazy.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+        NaN where the map has no data. [m2 m-2]
+
+    Raises
+    ------
+    ValueError
+        If the file is missing, has no CRS, does not overlap the grid, or needs a change of datum whose accuracy is
+        unknown; and, when computed, if LAI is negative.
+    """
+    lai = chunking.pointwise(_checked, warp.file_onto_grid(path, grid, chunks))
+    name = Path(path).name
+    return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
+
+
+def surface_reflectance(
+    lai,
+    *,
+    bands,
+    wavelengths,
+    leaf_reflectance,
+    leaf_transmittance,
+    background,
+    diffuse_fraction,
+    geometry,
+    leaf_angles="spherical",
+    hotspot=0.0,
+    exact=False,
+    **provenance,
+):
+    """
+    Reflectance factor of a canopy over its background, for flat ground.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+    bands : sequence of str, shape (band,)
+        Names.
+    wavelengths : sequence of float, shape (band,)
+        [um]
+    leaf_reflectance, leaf_transmittance : sequence of float, shape (band,)
+        [1]
+    background : sequence of float, shape (band,), or xarray.DataArray, dims ([band], y, x)
+        Reflectance below the canopy. [1]
+    diffuse_fraction : sequence of float, shape (band,), or xarray.DataArray, dims (band, y, x)
+        Share of skylight in the irradiance. [1]
+    geometry : fifesim.base.geometry.Geometry
+        Carried on as coordinates. Where an angle is a raster, SAIL is evaluated at every cell.
+    leaf_angles : optional
+        As `ground.leaf_angles.leaf_angle_classes` takes them.
+    hotspot : float, optional
+        Leaf size over canopy height; 0 is none. [1]
+    exact : bool, optional
+        Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it.
+    **provenance : str or number
+        Further attributes.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If the optics or the hotspot are not possible, or LAI is negative.
+
+    See Also
+    --------
+    fifesim.ground.canopy.sail_model.sail
+    """
+    if not 0 <= hotspot < np.inf:
+        raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
+    angles = leaf_angle_classes(leaf_angles)
+    parameters = {
+        "leaf_reflectance": tuple(map(float, leaf_reflectance)),
+        "leaf_transmittance": tuple(map(float, leaf_transmittance)),
+        "leaf_angles": angles,
+        "hotspot": float(hotspot),
+    }
+    _check_scene(lai)
+    if isinstance(background, xr.DataArray):
+        cf.check_units(background, "surface_reflectance")
+        background = _background_bands(background, bands)
+        described = "raster"
+    else:
+        background = tuple(map(float, background))
+        described = ",".join(f"{value:g}" for value in background)
+    if geometry.rasters:
+        out = _in_directions(lai, background, diffuse_fraction, geometry, parameters)
+    else:
+        parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
+        parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
+        rasters = (lai, background) if described == "raster" else (lai,)
+        parameters |= {} if described == "raster" else {"background": background}
+        out = chunking.pointwise(_reflectance, *rasters, bands=len(bands), **parameters)
+    out = out.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
+    out = cf.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
+    return cf.label(
+        out,
+        "surface_reflectance",
+        source=lai,
+        history=f"surface_reflectance: SAIL, {angles} leaves, {_directions(geometry)}",
+        leaf_angles=str(angles),
+        background=described,
+        **provenance,
+    )
+
+
+def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPAR_INF):
+    """
+    Fraction of photosynthetically active radiation that a canopy absorbs.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+    geometry : fifesim.base.geometry.Geometry, optional
+        The sun's; by default that which the array carries, else the paper's.
+    leaf_angles : optional
+        As `ground.leaf_angles.leaf_angle_classes` takes them.
+    fpar_inf : float, optional
+        Of an infinitely thick canopy. [1]
+
+    Returns
+    -------
+    fpar : xarray.DataArray, dims (y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If LAI is negative.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 6
+
+    See Also
+    --------
+    fifesim.ground.canopy.absorption.fpar
+    """
+    if not 0 < fpar_inf <= 1:
+        raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
+    geometry = geometry or cf.geometry_of(lai) or fife_geometry()
+    if "sza" in geometry.rasters:
+        geometry.uniform("fpar")
+    extinction = float(absorption.extinction_coefficient(geometry.sza, leaf_angles))
+    _check_scene(lai)
+    out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
+    out = grids.place(out, grids.geobox(lai))
+    return cf.label(out, "fpar", source=lai, history=f"fpar: Beer's law, K {extinction:.4f}, limit {fpar_inf:g}")
+
+
+def _check_scene(lai):
+    cf.check_quantity(lai, "lai")
+    if set(lai.dims) != {"y", "x"}:
+        raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
+
+
+def _streaming_scene(grid, density, arp, seed, chunks):
+    row, column = grids.lattice_position(grid)
+    table = quantile_table(density)
+
+    def cells(first_row, first_column, shape):
+        field = random_field.streaming_field(seed, arp, row + first_row, column + first_column, shape)
+        return quantile_map(field, table)
+
+    # A first window raises what streaming_field refuses before anything lazy is built.
+    cells(0, 0, (0, 0))
+    return chunking.tiles(cells, grid, chunks, tile=random_field.TILE)
+
+
+def _periodic_scene(grid, density, arp, seed, chunks):
+    # Noise, spectrum, field, ranks, quantiles and result are in memory together.
+    needed, free = 48 * grid.shape.x * grid.shape.y, psutil.virtual_memory().available
+    if needed > free:
+        raise ValueError(
+            f"a periodic field of {grid.shape.y} x {grid.shape.x} cells needs {needed / 1e9:.1f} GB of memory, "
+            f'{free / 1e9:.1f} GB are free: use method="streaming", which needs no more for a larger scene'
+        )
+    field = xr.DataArray(rank_map(random_field.periodic_field(seed, arp, tuple(grid.shape)), density), dims=("y", "x"))
+    return grids.place(field if chunks is None else field.chunk(chunks), grid)
+
+
+def _distribution_name(source):
+    if hasattr(source, "dist"):
+        return f"{source.dist.name}({', '.join(f'{value:g}' for value in [*source.args, *source.kwds.values()])})"
+    return Path(source).name
+
+
+def _checked(lai):
+    check_lai(lai)
+    return lai
+
+
+def _reflectance(lai, background_raster=None, *, background=None, **parameters):
+    if background is None:
+        # apply_ufunc hands the bands over as the last axis.
+        background = np.moveaxis(background_raster, -1, 0)
+    return canopy_reflectance(lai, background=background, **parameters)
+
+
+def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
+    """Reflectance where the directions of sun or sensor vary over the scene."""
+    per_band = [
+        values if isinstance(values, xr.DataArray) else xr.DataArray(np.asarray(values, float), dims="band")
+        for values in (background, diffuse_fraction)
+    ]
+    per_band = [values.drop_vars("band", errors="ignore") for values in per_band]
+    angles = [xr.DataArray(getattr(geometry, name)) for name in ANGLES]
+
+    def kernel(cells, ground, sky, sza, saa, vza, vaa):
+        directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
+        return directional_reflectance(cells, background=ground, diffuse_fraction=sky, **directions, **parameters)
+
+    plain = lai.drop_vars(ANGLES, errors="ignore")
+    return chunking.pointwise(kernel, plain, *per_band, *angles, bands=len(parameters["leaf_reflectance"]))
+
+
+def _directions(geometry):
+    """The zenith angles in words."""
+    return ", ".join(
+        f"{name} varying" if name in geometry.rasters else f"{name} {getattr(geometry, name):.2f}"
+        for name in ("sza", "vza")
+    )
+
+
+def _fpar(lai, **parameters):
+    return absorption.fpar(_checked(lai), **parameters)
+
+
+def _background_bands(background, bands):
+    """A background raster with one band for each of the canopy's."""
+    if "band" not in background.dims:
+        return background.expand_dims(band=list(bands))
+    missing = [name for name in bands if name not in background["band"].to_numpy().tolist()]
+    if missing:
+        raise ValueError(
+            f"the background lacks band {', '.join(missing)}, it has {', '.join(map(str, background['band'].values))}"
+        )
+    return background.sel(band=list(bands))

@@ -1,0 +1,220 @@
+"""Canopy reflectance of many cells: SAIL once per scene, then a table over leaf area index."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from fifesim.ground.canopy.absorption import extinction_coefficient
+from fifesim.ground.canopy.lai_table import interpolate, interpolate_over, tabulate
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.ground.canopy.optics import check_background, check_lai, check_leaf_optics
+from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
+
+_BLOCK = 2**15  # cells evaluated exactly at a time, to bound memory
+
+
+def canopy_reflectance(
+    lai,
+    leaf_reflectance,
+    leaf_transmittance,
+    background,
+    *,
+    sza,
+    vza=0.0,
+    raa=0.0,
+    leaf_angles="spherical",
+    hotspot=0.0,
+    diffuse_fraction=0.0,
+    exact=False,
+):
+    r"""
+    Reflectance factor of a canopy over its background, for every cell and band.
+
+    .. math:: \rho = (1 - f) \, r_{so}^* + f \, r_{do}^*
+
+    Parameters
+    ----------
+    lai : array
+        Leaf area index. NaN gives NaN. [m2 m-2]
+    leaf_reflectance, leaf_transmittance : array, shape (band,)
+        [1]
+    background : float, or array of shape (band,), (band,) + lai.shape or broadcastable
+        One dimension is bands, more are cells; NaN gives NaN. [1]
+    sza, vza, raa : float
+        [degree]
+    leaf_angles : optional
+        Whatever `leaf_angle_classes` accepts.
+    hotspot : float, optional
+        Ratio of leaf size to canopy height; 0 for none. [1]
+    diffuse_fraction : float or array, shape (band,), optional
+        Share of skylight in the irradiance. [1]
+    exact : bool, optional
+        Compute each cell instead of interpolating.
+
+    Returns
+    -------
+    reflectance : array, shape (band,) + lai.shape
+        Within 1e-6 of the exact values. [1]
+
+    Raises
+    ------
+    ValueError
+        If leaf area index, leaf optics or background are outside their range.
+
+    Notes
+    -----
+    Where the background is a number, its reflectance with the canopy is tabulated; where it is a raster, the layer's
+    reflectances and transmittances are, and each cell combines its own.
+
+    References
+    ----------
+    [Verhoef2007]_
+
+    Examples
+    --------
+    Without leaves the background is seen as it is:
+
+    >>> float(canopy_reflectance(0.0, [0.07], [0.04], 0.15, sza=30)[0])
+    0.15
+    """
+    check_lai(lai)
+    check_leaf_optics(leaf_reflectance, leaf_transmittance)
+    check_background(background)
+    lai, background = np.asarray(lai, float), np.asarray(background, float)
+    bands = np.broadcast_shapes((1,), *(np.shape(v) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction)))
+    uniform = background.ndim < 2
+    if uniform:
+        bands = np.broadcast_shapes(bands, background.shape)
+    optics = tuple(_per_band(v, bands) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction))
+    scene = (*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
+    if exact:
+        return _exact(lai, background, scene, bands)
+    if uniform:
+        return interpolate(_surface_table(_per_band(background, bands), scene), lai)
+    return interpolate_over(_layer_table(scene), lai, background)
+
+
+def directional_reflectance(
+    lai, leaf_reflectance, leaf_transmittance, background, *, sza, vza, raa, leaf_angles, hotspot, diffuse_fraction
+):
+    r"""
+    Reflectance factor of a canopy where the directions of sun and view differ from cell to cell.
+
+    Parameters
+    ----------
+    lai : array, shape (...)
+        NaN gives NaN. [m2 m-2]
+    leaf_reflectance, leaf_transmittance : array, shape (band,)
+        [1]
+    background, diffuse_fraction : array, broadcastable to (..., band)
+        [1]
+    sza, vza, raa : array, broadcastable to (...)
+        NaN gives NaN. [degree]
+    leaf_angles, hotspot
+        As in `canopy_reflectance`.
+
+    Returns
+    -------
+    reflectance : array, shape (band, ...)
+        SAIL at every cell. [1]
+
+    Raises
+    ------
+    ValueError
+        As `canopy_reflectance`, or if a zenith angle is not below 90 degrees.
+
+    References
+    ----------
+    [Verhoef2007]_
+    """
+    check_lai(lai)
+    check_leaf_optics(leaf_reflectance, leaf_transmittance)
+    check_background(background)
+    for name, angle in (("sza", sza), ("vza", vza)):
+        wrong = (np.asarray(angle) < 0) | (np.asarray(angle) >= 90)
+        if np.any(wrong):
+            found = np.asarray(angle, float)[wrong].flat[0]
+            raise ValueError(f"{name} must be in [0, 90) degrees in every cell, got {found:g}")
+    cells, bands = np.shape(lai), len(leaf_reflectance)
+    lai, sza, vza, raa = (np.broadcast_to(np.asarray(v, float), cells).reshape(-1) for v in (lai, sza, vza, raa))
+    ground, sky = (
+        np.broadcast_to(np.asarray(v, float), (*cells, bands)).reshape(-1, bands).T
+        for v in (background, diffuse_fraction)
+    )
+    missing = np.isnan(sza + vza + raa)
+    sza, vza, raa = (np.where(missing, 0.0, angle) for angle in (sza, vza, raa))
+    rho, tau = (np.asarray(v, float)[:, None] for v in (leaf_reflectance, leaf_transmittance))
+    out = np.empty((bands, lai.size))
+    for start in range(0, lai.size, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        angles = {"sza": sza[block], "vza": vza[block], "raa": raa[block]}
+        canopy = sail(lai[block], rho, tau, **angles, leaf_angles=leaf_angle_classes(leaf_angles), hotspot=hotspot)
+        surface = with_background(canopy, ground[:, block])
+        out[:, block] = reflectance_factor(surface.rso, surface.rdo, sky[:, block])
+    out[:, missing] = np.nan
+    return out.reshape(bands, *cells)
+
+
+def _per_band(values, bands):
+    """Values of each band as a tuple, which a cache can look up."""
+    return tuple(np.broadcast_to(np.asarray(values, float), bands).tolist())
+
+
+def _sail(lai, scene):
+    """SAIL of cells, shape (band, n) from (n,), and the sky's share, shape (band, 1)."""
+    rho, tau, sky, sza, vza, raa, leaf_angles, hotspot = scene
+    rho, tau, sky = (np.array(v)[:, None] for v in (rho, tau, sky))
+    return sail(lai, rho, tau, sza=sza, vza=vza, raa=raa, leaf_angles=leaf_angles, hotspot=hotspot), sky
+
+
+def _surface(lai, background, scene):
+    """Exact reflectance of cells, shape (band, n)."""
+    canopy, sky = _sail(lai, scene)
+    surface = with_background(canopy, background)
+    return reflectance_factor(surface.rso, surface.rdo, sky)
+
+
+def _exact(lai, background, scene, bands):
+    """Reflectance of every cell computed exactly, shape (band,) + lai.shape."""
+    shape = bands + lai.shape
+    if background.ndim < 2:
+        background = np.reshape(background, (-1,) + (1,) * lai.ndim)
+    background = np.broadcast_to(background, shape).reshape(*bands, -1)
+    cells = lai.reshape(-1)
+    result = np.empty(background.shape)
+    for start in range(0, cells.size, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        result[:, block] = _surface(cells[block], background[:, block], scene)
+    return result.reshape(shape)
+
+
+def _rate(scene):
+    """Fastest decay with leaf area: sunbeam and view together, or diffuse light."""
+    sza, vza, leaf_angles = scene[3], scene[4], scene[6]
+    return max(1.0, extinction_coefficient(sza, leaf_angles) + extinction_coefficient(vza, leaf_angles))
+
+
+@lru_cache(maxsize=32)
+def _surface_table(background, scene):
+    """Table of the reflectance of each band."""
+    ground = np.array(background)[:, None]
+    return tabulate(lambda lai: _surface(lai, ground, scene), _rate(scene))
+
+
+@lru_cache(maxsize=32)
+def _layer_table(scene):
+    """Table of the terms of `interpolate_over`; the reflectance must hold for every background."""
+
+    def terms(lai):
+        c, sky = _sail(lai, scene)
+        scattered = reflectance_factor(c.rso, c.rdo, sky)
+        hot = (1 - sky) * (c.tsstoo - c.tss * c.too)
+        through = reflectance_factor(c.tss + c.tsd, c.tdd, sky) * (c.too + c.tdo)
+        columns = np.broadcast_arrays(scattered, hot, through, c.rdd)
+        return np.stack(columns, axis=1).reshape(-1, lai.size)
+
+    def reflectances(values):
+        scattered, hot, through, rdd = values.reshape(-1, 4, values.shape[1]).swapaxes(0, 1)
+        return np.stack([scattered + r * (hot + through / (1 - r * rdd)) for r in (0.0, 0.5, 1.0)])
+
+    return tabulate(terms, _rate(scene), reflectances)

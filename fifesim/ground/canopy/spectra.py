@@ -1,0 +1,248 @@
+"""Spectra of leaves and of what lies below them, mixed and averaged over bands."""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from fifesim.base import datasets
+from fifesim.base.bands import solar_spectrum
+
+SHADE = "shade"
+"""Part of a mixture that reflects nothing."""
+
+# Decimal fractions may miss 1 by rounding.
+_WHOLE = 1e-6
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """
+    A reflectance spectrum.
+
+    Parameters
+    ----------
+    wavelength : sequence of float, shape (n,)
+        Increasing. [um]
+    reflectance : sequence of float, shape (n,)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If the wavelengths do not increase or are not in micrometres, or a reflectance is outside 0 to 1.
+    """
+
+    wavelength: tuple = field(repr=False)
+    reflectance: tuple = field(repr=False)
+
+    def __post_init__(self):
+        wavelength, reflectance = (np.asarray(each, float) for each in (self.wavelength, self.reflectance))
+        if wavelength.ndim != 1 or wavelength.shape != reflectance.shape or wavelength.size < 2:
+            raise ValueError("a spectrum needs two wavelengths or more, and one reflectance for each")
+        if not np.all(np.diff(wavelength) > 0):
+            raise ValueError("the wavelengths of a spectrum must increase, and none be missing: sort them")
+        if wavelength[-1] > 100:
+            raise ValueError(f"wavelengths are in um, got {wavelength[-1]:g}: divide nanometres by 1000")
+        wrong = ~((reflectance >= 0) & (reflectance <= 1))
+        if wrong.any():
+            raise ValueError(
+                f"the reflectance of a spectrum must be in [0, 1], got {reflectance[wrong][0]:g} at "
+                f"{wavelength[wrong][0]:g} um: give a fraction, not percent"
+            )
+        object.__setattr__(self, "wavelength", tuple(wavelength.tolist()))
+        object.__setattr__(self, "reflectance", tuple(reflectance.tolist()))
+
+
+@dataclass(frozen=True)
+class Background:
+    """
+    What lies below a canopy, a mixture of spectra.
+
+    Parameters
+    ----------
+    fractions : mapping of str to float
+        Share of the ground of each spectrum, by its name in ``data/ground_spectra.csv``, or by the path of a CSV file
+        of your own with columns ``wavelength`` [um] and ``reflectance`` [1]; ``"shade"`` reflects nothing. They add up
+        to 1. [1]
+
+    Raises
+    ------
+    ValueError
+        If a spectrum is unknown, or the fractions are negative or do not add up to 1.
+
+    Examples
+    --------
+    >>> Background({"soil_dry": 0.6, "dead_grass": 0.4}).fractions["soil_dry"]
+    0.6
+    """
+
+    fractions: Mapping
+
+    def __post_init__(self):
+        if not isinstance(self.fractions, Mapping):
+            raise TypeError(f"Background takes {{spectrum: fraction}}, got {self.fractions!r}")
+        fractions = {str(name): float(value) for name, value in self.fractions.items()}
+        for name, value in fractions.items():
+            _check_name(name)
+            if not 0 <= value <= 1:
+                raise ValueError(f"Background: the fraction of {name!r} must be in [0, 1], got {value:g}")
+        total = sum(fractions.values())
+        if not abs(total - 1) <= _WHOLE:
+            raise ValueError(
+                f"Background: the fractions must add up to 1, got {total:g}: what reflects nothing is {SHADE!r}"
+            )
+        object.__setattr__(self, "fractions", fractions)
+
+    def spectra(self):
+        """Spectrum and share of each part that reflects, a list of (Spectrum, float)."""
+        return [(_spectrum(name), value) for name, value in self.fractions.items() if name != SHADE and value > 0]
+
+
+def spectrum_names():
+    """
+    Names of the spectra that a background may be mixed from.
+
+    Returns
+    -------
+    names : tuple of str
+
+    Examples
+    --------
+    >>> "soil_dry" in spectrum_names()
+    True
+    """
+    return (*datasets.table("ground_spectra.csv").columns.drop("wavelength"), SHADE)
+
+
+def is_mixture(given):
+    """
+    Whether a mapping names spectra, and not bands.
+
+    Parameters
+    ----------
+    given : object
+
+    Returns
+    -------
+    answer : bool
+
+    Examples
+    --------
+    >>> is_mixture({"soil_dry": 1.0}), is_mixture({"TM3": 0.2})
+    (True, False)
+    """
+    names = spectrum_names()
+    return isinstance(given, Mapping) and bool(given) and all(str(name) in names or _is_file(name) for name in given)
+
+
+def band_means(bands, wavelength, values):
+    """
+    Means of spectra over the response of bands, weighted by the extraterrestrial sun.
+
+    Parameters
+    ----------
+    bands : sequence of fifesim.base.bands.Band
+    wavelength : array, shape (n,)
+        Increasing, and covering the bands. [um]
+    values : array, shape (..., n)
+
+    Returns
+    -------
+    means : array, shape (..., band)
+
+    Raises
+    ------
+    ValueError
+        If the spectrum does not cover a band.
+
+    Examples
+    --------
+    >>> from fifesim.base.bands import Band
+    >>> band_means([Band("red", (0.6, 0.65, 0.7), (0, 1, 0))], [0.5, 0.8], [0.3, 0.3]).round(12).tolist()
+    [0.3]
+    """
+    wavelength, values = np.asarray(wavelength, float), np.asarray(values, float)
+    for band in bands:
+        if band.limits[0] < wavelength[0] or band.limits[1] > wavelength[-1]:
+            raise ValueError(
+                f"no leaf or background spectrum for band {band.name}, {band.limits[0]:g} to {band.limits[1]:g} um: it "
+                f"has {wavelength[0]:g} to {wavelength[-1]:g} um; give leaf_optics= and background= by band"
+            )
+    sun_wavelength, sun = solar_spectrum()
+    inside = (sun_wavelength > wavelength[0]) & (sun_wavelength < wavelength[-1])
+    nodes = np.union1d(wavelength, sun_wavelength[inside])
+    weight = np.interp(nodes, sun_wavelength, sun)
+    index = np.clip(np.searchsorted(wavelength, nodes, side="right") - 1, 0, wavelength.size - 2)
+    share = (nodes - wavelength[index]) / (wavelength[index + 1] - wavelength[index])
+    fine = values[..., index] * (1 - share) + values[..., index + 1] * share
+    return np.stack([band.mean(fine, nodes, weight) for band in bands], axis=-1)
+
+
+def background_means(bands, given):
+    """
+    Reflectance of a background in bands.
+
+    Parameters
+    ----------
+    bands : sequence of fifesim.base.bands.Band
+    given : Background or Spectrum
+
+    Returns
+    -------
+    reflectance : array, shape (band,)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If a spectrum does not cover a band.
+
+    Examples
+    --------
+    >>> from fifesim.base.bands import Band
+    >>> red = Band("red", (0.6, 0.65, 0.7), (0, 1, 0))
+    >>> half = background_means([red], Background({"soil_dry": 0.5, "shade": 0.5}))
+    >>> bool(abs(2 * half - background_means([red], Background({"soil_dry": 1.0}))) < 1e-15)
+    True
+    """
+    parts = [(given, 1.0)] if isinstance(given, Spectrum) else given.spectra()
+    means = [share * band_means(bands, part.wavelength, part.reflectance) for part, share in parts]
+    return np.sum([np.zeros(len(bands)), *means], axis=0)
+
+
+def _is_file(name):
+    return Path(str(name)).suffix.lower() == ".csv"
+
+
+def _check_name(name):
+    names = spectrum_names()
+    if name not in names and not _is_file(name):
+        near = difflib.get_close_matches(name, names, n=1, cutoff=0.4)
+        hint = f", did you mean {near[0]!r}?" if near else "."
+        raise ValueError(
+            f"Background: no spectrum {name!r}{hint} There are {', '.join(names)}, or the path of a .csv file"
+        )
+
+
+def _spectrum(name):
+    if not _is_file(name):
+        table = datasets.table("ground_spectra.csv")
+        return Spectrum(table["wavelength"], table[name])
+    try:
+        table = pd.read_csv(name, comment="#", skipinitialspace=True)
+    except OSError as error:
+        raise ValueError(f"cannot read the spectrum {name}: {error.strerror}") from None
+    missing = {"wavelength", "reflectance"} - set(table.columns)
+    if missing:
+        raise ValueError(
+            f"{name} has no column {' nor '.join(sorted(missing))}: its first line must name wavelength [um] and "
+            f"reflectance [1], it has {', '.join(map(str, table.columns))}"
+        )
+    try:
+        return Spectrum(table["wavelength"], table["reflectance"])
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None

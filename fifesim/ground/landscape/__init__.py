@@ -1,0 +1,1 @@
+"""Where leaves are: random fields of leaf area with a given density."""

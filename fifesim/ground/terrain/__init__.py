@@ -1,0 +1,1 @@
+"""The shape of the land, and the light that falls on it."""

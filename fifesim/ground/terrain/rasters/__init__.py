@@ -1,0 +1,1 @@
+"""Terrain on labelled rasters."""

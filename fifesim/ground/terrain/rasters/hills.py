@@ -1,0 +1,67 @@
+"""The synthetic Flint Hills on a labelled raster."""
+
+from fifesim.ground.landscape.field import check_seed
+from fifesim.ground.terrain.flint_hills import elevation
+from fifesim.rasters import cf
+from fifesim.rasters import chunks as chunking
+from fifesim.rasters import grid as grids
+
+# Chunks of "auto" are of some of these. [cell]
+_TILE = 504
+
+# Coarser cells lose the valleys. [m]
+_LARGEST_CELL = 100.0
+
+_REFERENCE = "terrain after the statistics of Kings Creek, Konza Prairie (USGS 3DEP)"
+
+
+def flint_hills(grid, seed=0, *, chunks=None):
+    """
+    Synthetic elevation model of the dissected Flint Hills.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells.
+    seed : int, optional
+        In [0, 2**64).
+    chunks : mapping or int or "auto", optional
+        Makes the result lazy.
+
+    Returns
+    -------
+    dem : xarray.DataArray, dims (y, x)
+        A function of the seed and of easting and northing: a window is a slice of the whole, chunks change nothing, and
+        other cells show the same hills. [m]
+
+    Raises
+    ------
+    ValueError
+        If the grid or the seed is not one allowed, or cells are larger than 100 m, which lose the valleys.
+
+    See Also
+    --------
+    fifesim.ground.terrain.flint_hills.elevation
+    """
+    grids.check_grid(grid)
+    check_seed(seed)
+    if max(grids.cell_size(grid)) > _LARGEST_CELL:
+        raise ValueError(
+            f"cells must be at most {_LARGEST_CELL:g} m for the valleys to show, got "
+            f"{max(grids.cell_size(grid)):g} m: make the terrain on smaller cells and .coarsen() it"
+        )
+    seed = int(seed)
+    northing, easting = (grids.coordinates(grid)[axis].values for axis in ("y", "x"))
+
+    def cells(row, column, shape):
+        return elevation(seed, northing[row : row + shape[0]], easting[column : column + shape[1]])
+
+    dem = chunking.tiles(cells, grid, chunks, tile=_TILE)
+    return cf.label(
+        dem,
+        "dem",
+        history=f"flint_hills: seed {seed}",
+        rng_seed=str(seed),
+        source_resolution=30.0,
+        references=_REFERENCE,
+    )

@@ -1,0 +1,293 @@
+"""Where elevations come from: a raster file or array, read by the window, in metres, and its place under a grid."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import dask.array as da
+import numpy as np
+import odc.geo.xr  # noqa: F401  registers .odc
+import pyproj
+import rasterio
+import rasterio.errors
+import rasterio.windows
+import rioxarray  # noqa: F401  registers .rio
+import xarray as xr
+from affine import Affine
+
+from fifesim.ground.terrain.spline import metres_per_unit
+from fifesim.rasters import grid as grids
+from fifesim.rasters import warp
+
+# Positions in another CRS are a polynomial through those at so many Chebyshev nodes along each axis of a tile.
+_NODES = 12
+
+# Heights that land has, with room to spare. [m]
+LAND = (-500, 9000)
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """An elevation model: what holds its cells, their size and place, and metres in one unit of theirs."""
+
+    name: str
+    cells: str | np.ndarray | da.Array
+    shape: tuple[int, int]
+    affine: Affine
+    crs: pyproj.CRS
+    metres: float
+    nodata: float | None = None
+    origin: tuple[int, int] = (0, 0)
+
+    def read(self, top, left, rows, columns):
+        """
+        Elevations of a window, which may reach beyond the model.
+
+        Parameters
+        ----------
+        top, left : int
+            Row and column of its first cell.
+        rows, columns : int
+            Its size.
+
+        Returns
+        -------
+        values : array, shape (rows, columns)
+            NaN where unknown. [m]
+        """
+        out = np.full((rows, columns), np.nan)
+        (first, last), (west, east) = (
+            (min(max(start, 0), size), max(min(start + length, size), 0))
+            for start, length, size in ((top, rows, self.shape[0]), (left, columns, self.shape[1]))
+        )
+        if first < last and west < east:
+            window = slice(first, last), slice(west, east)
+            found = _file_window(self.cells, *window) if isinstance(self.cells, str) else self._array_window(*window)
+            out[first - top : last - top, west - left : east - left] = found * self.metres
+        return out
+
+    def _array_window(self, rows, columns):
+        values = np.asarray(
+            self.cells[
+                rows.start - self.origin[0] : rows.stop - self.origin[0],
+                columns.start - self.origin[1] : columns.stop - self.origin[1],
+            ],
+            float,
+        )
+        return values if self.nodata is None else np.where(values == self.nodata, np.nan, values)
+
+
+def open_source(raster, vertical_units=None):
+    """
+    Elevation model of a file or an array.
+
+    Parameters
+    ----------
+    raster : str, path or xarray.DataArray
+    vertical_units : str, optional
+        Wins over what the file says.
+
+    Returns
+    -------
+    source : Source
+
+    Raises
+    ------
+    ValueError
+        If there is no such file, no CRS or more than one band, or elevations are said to be in other units than metres.
+    TypeError
+        If it is neither.
+    """
+    if isinstance(raster, xr.DataArray):
+        return _array_source(raster, vertical_units)
+    if not isinstance(raster, str | Path):
+        raise TypeError(f"an elevation model is a path or an xarray.DataArray, got {type(raster).__name__}")
+    path = str(raster)
+    try:
+        with rasterio.open(path) as file:
+            crs, unit = file.crs, file.units[0]
+            source = Source(Path(path).name, path, file.shape, file.transform, None, 1.0)
+    except rasterio.errors.RasterioIOError as error:
+        raise ValueError(f"cannot read {path!r} as a raster: {error}") from None
+    return _in_metres(source, crs.to_wkt() if crs else None, unit, vertical_units)
+
+
+def _array_source(raster, vertical_units):
+    raster = raster.squeeze([name for name in raster.dims if raster.sizes[name] == 1 and name == "band"], drop=True)
+    name = str(raster.name or "the elevation model")
+    if raster.ndim != 2:
+        raise ValueError(f"an elevation model has one band of rows and columns, got dimensions {raster.dims}")
+    crs = raster.rio.crs
+    if crs is None:
+        return _in_metres(Source(name, None, raster.shape, Affine.identity(), None, 1.0), None, None, vertical_units)
+    found = raster.odc.geobox
+    if found is None:
+        raise ValueError(f"the x and y of {name} are not the centres of a regular grid")
+    scale, offset = raster.attrs.get("scale_factor", 1.0), raster.attrs.get("add_offset", 0.0)
+    if (scale, offset) != (1.0, 0.0):
+        raise ValueError(
+            f"{name} holds packed values, scale {scale:g}, offset {offset:g}: open it with mask_and_scale=True"
+        )
+    cells = raster.transpose(*raster.odc.spatial_dims).data
+    nodata = raster.rio.nodata
+    nodata = None if nodata is None or np.isnan(nodata) else float(nodata)
+    source = Source(name, cells, cells.shape, found.affine, None, 1.0, nodata)
+    return _in_metres(source, crs.to_wkt(), raster.attrs.get("units"), vertical_units)
+
+
+def _in_metres(source, wkt, unit, vertical_units):
+    """The source with its horizontal CRS and the metres in its unit."""
+    if wkt is None:
+        raise ValueError(
+            f"{source.name} has no CRS: give it one, for instance with gdal_edit.py -a_srs EPSG:26914 or "
+            ".rio.write_crs('EPSG:26914')"
+        )
+    crs = pyproj.CRS.from_wkt(wkt)
+    parts = crs.sub_crs_list or [crs]
+    vertical = [axis.unit_name for part in (crs, *parts) for axis in part.axis_info if axis.direction in ("up", "down")]
+    said = unit or (vertical[0] if vertical else "metre")
+    if vertical_units is None:
+        try:
+            metres = metres_per_unit(said)
+        except ValueError:
+            metres = None
+        if metres != 1.0:
+            raise ValueError(
+                f"{source.name} says that its elevations are in {said!r}, not in metres: give their units, for "
+                f"instance vertical_units='us-ft', and they are converted, or vertical_units='m' if it is wrong"
+            )
+    horizontal = parts[0].to_2d() if len(parts[0].axis_info) > 2 else parts[0]
+    metres = metres_per_unit(vertical_units or said)
+    return Source(source.name, source.cells, source.shape, source.affine, horizontal, metres, source.nodata)
+
+
+def _file_window(path, rows, columns):
+    window = rasterio.windows.Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
+    try:
+        with rasterio.open(path) as file:
+            values = file.read(1, window=window, masked=True).astype(float).filled(np.nan)
+            return values * file.scales[0] + file.offsets[0]
+    except rasterio.errors.RasterioIOError as error:
+        raise OSError(
+            f"cannot read rows {rows.start} to {rows.stop} and columns {columns.start} to {columns.stop} of {path}: "
+            f"{error.__cause__ or error}"
+        ) from error
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where the cells of a grid lie in a source, counted in its cells from the centre of the first."""
+
+    source: Source
+    grid: object
+    pipeline: str | None
+
+    @property
+    def parallel(self):
+        """Whether rows and columns of the grid are those of the source."""
+        return self.pipeline is None and not (self.source.affine.b or self.source.affine.d)
+
+    def positions(self, rows, columns):
+        """
+        Positions of cells of the grid in the source.
+
+        Parameters
+        ----------
+        rows, columns : array of int, shape (m,), (n,)
+            Of the grid; they may lie outside it.
+
+        Returns
+        -------
+        rows, columns : array, shape (m, 1), (1, n) where the two are parallel, else (m, n)
+            [source cell]
+        """
+        y, x = _centres(self.grid, 0, rows), _centres(self.grid, 1, columns)
+        if self.parallel:
+            inverse = ~self.source.affine
+            return (inverse.e * y + inverse.f - 0.5)[:, None], (inverse.a * x + inverse.c - 0.5)[None, :]
+        (y_nodes, from_y), (x_nodes, from_x) = _chebyshev(y), _chebyshev(x)
+        across, down = self._source_cells(*np.meshgrid(x_nodes, y_nodes))
+        return from_y @ (down - 0.5) @ from_x.T, from_y @ (across - 0.5) @ from_x.T
+
+    def cell_size(self):
+        """
+        Size of a source cell in the middle of the grid.
+
+        Returns
+        -------
+        down, across : float
+            Distance of its rows and of its columns. [m]
+        """
+        x, y = grids.transform_points(self.grid.affine, self.grid.shape.x / 2, self.grid.shape.y / 2)
+        step = 10.0
+        columns, rows = self._source_cells(np.array([x, x + step, x]), np.array([y, y, y + step]))
+        return tuple(float(step / np.hypot(*(axis[1:] - axis[0]))) for axis in (rows, columns))
+
+    def _source_cells(self, x, y):
+        if self.pipeline is not None:
+            x, y = warp.carry(self.pipeline, self.grid.crs.to_wkt(), self.source.crs, x, y)
+        return grids.transform_points(~self.source.affine, x, y)
+
+
+def placement(source, grid):
+    """
+    Place of a grid in a source, by a coordinate operation of known accuracy.
+
+    Parameters
+    ----------
+    source : Source
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    placement : Placement
+
+    Raises
+    ------
+    ValueError
+        If a change of datum has no known accuracy.
+    """
+    return Placement(source, grid, warp.operation(grid.crs.to_wkt(), source.crs, warp.degrees(grid))[0])
+
+
+def _centres(grid, axis, cells):
+    """Coordinates of cell centres, counted from the origin of the CRS: the same bits in a window and in the whole."""
+    cell = (grid.affine.e, grid.affine.a)[axis]
+    index = grids.lattice_position(grid)[axis]
+    offset = round((grid.affine.f, grid.affine.c)[axis] - index * cell, 6)
+    return (index + np.asarray(cells) + 0.5) * cell + offset
+
+
+def _chebyshev(values):
+    """Nodes over the range of some values, and the matrix that interpolates from nodes to values."""
+    middle, half = (values.max() + values.min()) / 2, max(np.ptp(values) / 2, 1.0)
+    nodes = np.polynomial.chebyshev.chebpts1(_NODES)
+    matrix = np.linalg.solve(
+        np.polynomial.chebyshev.chebvander(nodes, _NODES - 1).T,
+        np.polynomial.chebyshev.chebvander((values - middle) / half, _NODES - 1).T,
+    ).T
+    return middle + half * nodes, matrix
+
+
+def check_heights(name, values):
+    """
+    Refuse heights that land does not have.
+
+    Parameters
+    ----------
+    name : str
+        Of the elevation model.
+    values : array
+        NaN passes. [m]
+
+    Raises
+    ------
+    ValueError
+        If one is below the Dead Sea or above Mount Everest: a mark for no data, or another unit.
+    """
+    low, high = LAND
+    wrong = values[(values < low) | (values > high)]
+    if wrong.size:
+        raise ValueError(
+            f"{name} holds elevations such as {wrong.flat[0]:.0f} m, land has {low} to {high} m: if it marks no data, "
+            "declare it (gdal_edit.py -a_nodata); if the unit is another, give vertical_units="
+        )

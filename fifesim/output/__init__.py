@@ -1,0 +1,1 @@
+"""What people get: figures, pages and folders."""

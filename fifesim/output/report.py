@@ -1,0 +1,161 @@
+"""Pictures and the HTML page of a run."""
+
+import base64
+import io
+from pathlib import Path
+
+import jinja2
+
+from fifesim.output.figures import NAMES, detail_figure, fit_figure, histogram_figure, map_figure, terrain_figure
+from fifesim.rasters import grid as grids
+from fifesim.scenario.scenario import Scenario, names_a_file
+
+_TEMPLATE = "report.html.j2"
+_DPI = 130
+# Figures show every so many pixels of an image that has more rows or columns. [pixel]
+_MOST = 600
+
+
+def quicklook(path, image, truth, detail):
+    """
+    Picture of the scene and of its image.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        PNG file.
+    image : xarray.Dataset
+        ``dn`` and perhaps ``ndvi``, lazy or in memory.
+    truth : xarray.Dataset
+        ``lai`` and ``fpar`` over the ground of the pixels.
+    detail : xarray.DataArray, dims (y, x)
+        LAI of the cells in the middle.
+    """
+    figure = detail_figure(_thinned(image, _step(image)), _below(image, detail), detail)
+    figure.savefig(path, dpi=_DPI, metadata={"Software": None})
+
+
+def page(scenario, image, truth, detail, terrain, level, fits, versions):
+    """
+    One self-contained HTML page on a run.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    image, truth : xarray.Dataset
+        As `quicklook` takes them.
+    detail : xarray.DataArray
+    terrain : xarray.Dataset or None
+        ``dem``, ``slope`` and ``kt`` over pixels, and how far the elevation is known; None if flat.
+    level : xarray.DataArray or None
+        Digital numbers on level ground, over as many pixels; None if flat.
+    fits : mapping of str to fifesim.analysis.regression.Regression
+        Of the true means on NDVI.
+    versions : mapping of str to str
+
+    Returns
+    -------
+    html : str
+    """
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string((Path(__file__).parent / _TEMPLATE).read_text(encoding="utf-8"))
+    # Pixels and their truth are paired by row and column.
+    step = max(_step(image), _step(truth))
+    shown, means = _thinned(image, step), _thinned(truth, step)
+    figures = {
+        "detail": detail_figure(shown, _below(image, detail), detail),
+        "maps": map_figure(shown, means),
+        "histograms": histogram_figure(shown, means, detail),
+    }
+    if terrain is not None:
+        figures["terrain"] = terrain_figure(image, terrain, level)
+    if fits:
+        figures["fits"] = fit_figure(shown, means, fits)
+    return template.render(
+        title=_title(scenario),
+        summary=_summary(scenario, image, truth, fits) + _ground(terrain),
+        figures={name: _png(figure) for name, figure in figures.items()},
+        fits=[(NAMES[name], fit) for name, fit in fits.items()],
+        parameters=_parameters(scenario),
+        history=image["dn"].attrs.get("history", "").splitlines(),
+        versions=versions,
+    )
+
+
+def _step(rasters):
+    return -(-max(rasters.sizes[axis] for axis in ("y", "x")) // _MOST)
+
+
+def _thinned(rasters, step):
+    """Every so many pixels, in memory: a picture shows no more, and numbers in text are of all of them."""
+    return rasters.isel({axis: slice(step // 2, None, step) for axis in ("y", "x")}).compute()
+
+
+def _title(scenario):
+    ground = scenario.ground
+    scene = Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
+    return f"{scene}, seen by {scenario.sensor.instrument}"
+
+
+def _summary(scenario, image, truth, fits):
+    """Rows of a small table: what a reader wants to know first."""
+    grid, pixels = scenario.grid, image["dn"]
+    valid = float((pixels != 0).all("band").mean())
+    size = f"{pixels.sizes['y']} x {pixels.sizes['x']}"
+    rows = [
+        ("Scene", f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m, {grid.crs}"),
+        ("Image", f"{size} pixels of {scenario.sensor.pixel:g} m, {100 * valid:.1f} % of them with data"),
+        ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
+    ]
+    for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
+        label = f"{NAMES[name][0].upper()}{NAMES[name][1:]} of the pixels"
+        rows.append((label, f"mean {float(values.mean()):.3f}, standard deviation {float(values.std()):.3f}"))
+    return rows + [(f"R² of {NAMES[name]} on NDVI", f"{fit.r2:.3f}") for name, fit in fits.items()]
+
+
+def _ground(terrain):
+    """Rows on the elevation."""
+    if terrain is None:
+        return [("Ground", "flat")]
+    dem, kt = terrain["dem"], terrain["kt"]
+    known = ", ".join(f"{side[6:]} {distance / 1000:.3g} km" for side, distance in terrain.attrs.items())
+    return [
+        ("Elevation of the pixels", f"{float(dem.min()):.0f} to {float(dem.max()):.0f} m"),
+        ("Elevation known beyond the scene, for horizons", known),
+        ("Kt of the pixels", f"{float(kt.min()):.3f} to {float(kt.max()):.3f}"),
+    ]
+
+
+def _parameters(scenario):
+    """Key, value, unit and meaning of every parameter, by section."""
+    sections = []
+    for name in Scenario.model_fields:
+        section = getattr(scenario, name)
+        rows = []
+        for key, known in type(section).model_fields.items():
+            value, unit = getattr(section, key), (known.json_schema_extra or {}).get("unit", "")
+            if isinstance(value, dict):
+                value = ", ".join(f"{band} {number:g}" for band, number in value.items())
+            elif isinstance(value, list):
+                value = ", ".join(map(str, value)) or "none"
+            elif isinstance(value, float):
+                value = f"{value:.10g}"
+            elif isinstance(value, bool):
+                value = "yes" if value else "no"
+            elif isinstance(value, str) and names_a_file(key, value):
+                value = Path(value).name
+            rows.append((key, "not given" if value is None else value, unit, known.description))
+        sections.append((name, rows))
+    return sections
+
+
+def _below(image, detail):
+    """The pixels of some cells, in memory."""
+    box = grids.geobox(detail).boundingbox
+    return image["dn"].sel(x=slice(box.left, box.right), y=slice(box.top, box.bottom)).compute()
+
+
+def _png(figure):
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+    return base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -1,0 +1,1 @@
+"""A scenario into a folder, block by block."""

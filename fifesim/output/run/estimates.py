@@ -1,0 +1,123 @@
+"""What a run will take on this machine, from a small piece of it."""
+
+import json
+import time
+
+import numpy as np
+from dask.utils import format_bytes, format_time
+
+from fifesim.output.progress import memory
+from fifesim.output.run.products import products_of, wanted_blocks
+from fifesim.output.run.schedule import ordered_blocks, run_on_threads
+from fifesim.output.run.workers import usable_cores
+from fifesim.rasters import grid as grids
+from fifesim.scenario.simulation import simulate
+
+# Side of the piece that is simulated to see how fast this machine is: a few chunks of the field. [cell]
+_PIECE = 2016
+
+# Waiting for a thread to be free and writing files costs up to so much more than the computing alone. [1]
+_SLACK = 1.1
+
+
+def estimate(scenario, *, threads=None, scene=False):
+    """
+    Cells, tasks, memory, disk and time of a run.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    threads : int, optional
+        Or workers; by default one for each core that this process may use.
+    scene : bool, optional
+        With the products of the scene.
+
+    Returns
+    -------
+    estimate : dict
+        ``cells``, ``pixels``, ``tasks``, ``threads``, ``memory`` and ``disk`` [byte], ``seconds``.
+
+    Raises
+    ------
+    ValueError
+        If the scenario cannot be simulated.
+
+    Notes
+    -----
+    A piece of up to 2016 x 2016 cells of the same ground is simulated twice; the second time counts.
+    """
+    complete = scenario.complete()
+    threads = threads or usable_cores()
+    tree = simulate(complete)
+    found = products_of(tree)
+    lai, image = tree["scene"]["lai"], found.arrays["image"]
+    tasks = ordered_blocks(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))[0]
+    rate, used = _calibrate(complete, threads)
+    bands = image.shape[0]
+    pixels = image.shape[-2] * image.shape[-1]
+    kept = pixels * (bands * image.dtype.itemsize + 16)
+    in_scene = sum(array.nbytes for array in tree["scene"].data_vars.values()) if scene else 0
+    return {
+        "cells": lai.size,
+        "pixels": pixels,
+        "tasks": len(tasks),
+        "threads": threads,
+        "memory": used,
+        # Blocks, the stream, its copy with overviews.
+        "disk": round(3.4 * kept + in_scene),
+        "seconds": _SLACK * lai.size / rate,
+    }
+
+
+def describe(found, as_json=False):
+    """
+    An estimate in words.
+
+    Parameters
+    ----------
+    found : dict
+        From `estimate`.
+    as_json : bool, optional
+
+    Returns
+    -------
+    text : str
+    """
+    if as_json:
+        return json.dumps({"event": "estimate"} | found)
+    return "\n".join(
+        [
+            f"cells    {found['cells'] / 1e6:.1f} million, seen by {found['pixels'] / 1e6:.2f} million pixels",
+            f"tasks    {found['tasks']}",
+            f"memory   about {format_bytes(found['memory'])} with {found['threads']} threads or workers",
+            f"disk     at most {format_bytes(found['disk'])} while it runs",
+            f"time     about {format_time(found['seconds'])} on this machine as busy as it is now",
+        ]
+    )
+
+
+def _calibrate(scenario, threads):
+    """Cells a second, and memory, of a piece in the middle of the scene."""
+    piece = _piece(scenario)
+    for _ in range(2):
+        tree = simulate(piece)
+        found = products_of(tree)
+        lai = tree["scene"]["lai"]
+        tasks = ordered_blocks(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))
+        start = time.monotonic()
+        run_on_threads(*tasks, lambda name, index, block: None, threads)
+        taken = time.monotonic() - start
+    return lai.size / taken, memory()
+
+
+def _piece(scenario):
+    """The same scenario on a smaller grid in its middle, of whole pixels."""
+    grid, pixel = scenario.grid, scenario.sensor.pixel
+    sizes = {}
+    for name in ("width", "height"):
+        size = getattr(grid, name)
+        sizes[name] = min(size, max(np.floor(_PIECE * grid.cell / pixel), 2) * pixel)
+    west = grid.west + np.floor((grid.width - sizes["width"]) / 2 / pixel) * pixel
+    north = grid.north - np.floor((grid.height - sizes["height"]) / 2 / pixel) * pixel
+    update = {name: float(value) for name, value in {**sizes, "west": west, "north": north}.items()}
+    return scenario.model_copy(update={"grid": grid.model_copy(update=update)})

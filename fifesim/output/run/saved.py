@@ -1,0 +1,104 @@
+"""Finished blocks of a run on disk, from which it can go on when it was stopped."""
+
+import io
+import os
+from pathlib import Path
+
+import numpy as np
+
+from fifesim.rasters.windows import array_from_windows
+
+_SUFFIX = ".npy"
+
+
+def save_block(folder, name, index, block):
+    """
+    Save a block; it is there when it is whole.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+    name : str
+        Of the array.
+    index : tuple of int
+        Of the block.
+    block : numpy.ndarray
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; nothing is left of it.
+    """
+    path = _path(folder, name, index)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial_path = path.with_suffix(".partial")
+    # numpy would not say why a file cannot be written.
+    content = io.BytesIO()
+    np.save(content, block)
+    try:
+        partial_path.write_bytes(content.getbuffer())
+        os.replace(partial_path, path)
+    except OSError as error:
+        partial_path.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def saved_blocks(folder, name, array):
+    """
+    Which blocks of an array are saved.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+    name : str
+    array : dask.array.Array
+        The one that they are of.
+
+    Returns
+    -------
+    indices : set of tuple of int
+        Those whose file is whole and of the block's shape and type.
+    """
+    return {index for index in np.ndindex(array.numblocks) if _is_whole(_path(folder, name, index), array, index)}
+
+
+def saved_array(folder, name, array):
+    """
+    An array whose blocks are read from disk.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+    name : str
+    array : dask.array.Array, shape (..., y, x)
+        The one that was saved, with one chunk along its leading axes.
+
+    Returns
+    -------
+    array : dask.array.Array
+        In the same chunks.
+    """
+    leading = array.shape[:-2]
+    edges = [{start: number for number, start in enumerate(np.cumsum((0, *sizes)).tolist())} for sizes in array.chunks]
+
+    def ask(rows, columns):
+        index = (*(0 for _ in leading), edges[-2][rows.start], edges[-1][columns.start])
+        return (str(_path(folder, name, index)),), ()
+
+    return array_from_windows(
+        np.load, [], array.chunks[-2:], ask, token=f"saved-{folder}-{name}", leading=leading, dtype=array.dtype
+    )
+
+
+def _path(folder, name, index):
+    return Path(folder) / name / ("-".join(f"{number:05d}" for number in index) + _SUFFIX)
+
+
+def _is_whole(path, array, index):
+    try:
+        # The header alone is read, and the size of the file is compared with it.
+        block = np.load(path, mmap_mode="r")
+    except (OSError, ValueError, EOFError):
+        return False
+    shape = tuple(sizes[number] for sizes, number in zip(array.chunks, index, strict=True))
+    return block.shape == shape and block.dtype == array.dtype

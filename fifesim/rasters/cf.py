@@ -1,0 +1,271 @@
+"""Names, units and provenance of what fifesim makes, after the CF conventions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from fifesim.base.geometry import Geometry
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a variable is: units in CF spelling, CF standard name ("" where none exists), a long name and a comment."""
+
+    units: str
+    standard_name: str
+    long_name: str
+    comment: str = ""
+
+
+QUANTITIES = {
+    "lai": Quantity("1", "leaf_area_index", "leaf area index", "one-sided leaf area per ground area"),
+    "fpar": Quantity(
+        "1",
+        "fraction_of_surface_downwelling_photosynthetic_radiative_flux_absorbed_by_vegetation",
+        "fraction of absorbed photosynthetically active radiation",
+    ),
+    "surface_reflectance": Quantity(
+        "1", "surface_bidirectional_reflectance", "surface reflectance factor", "direct and diffuse light mixed"
+    ),
+    "dem": Quantity("m", "surface_altitude", "elevation of the ground"),
+    "slope": Quantity("degree", "ground_slope_angle", "slope of the ground"),
+    "aspect": Quantity(
+        "degree",
+        "ground_slope_direction",
+        "aspect of the ground",
+        "down the slope, clockwise from north; 0 where level",
+    ),
+    "horizon": Quantity(
+        "degree", "", "zenith angle of the horizon", "of the land around, 90 where open; direction clockwise from north"
+    ),
+    "sky_view": Quantity("1", "", "sky view factor", "diffuse light over that on an open plain"),
+    "terrain_view": Quantity("1", "", "terrain configuration factor"),
+    "illumination": Quantity("1", "", "cosine of the solar zenith angle on the slope", "0 in shadow"),
+    "shadow": Quantity("1", "", "shadow", "1 where the sun does not reach the slope"),
+    "kt": Quantity("1", "", "topographic correction factor", "irradiance on the slope over that on level ground"),
+    "toa_reflectance": Quantity(
+        "1",
+        "toa_bidirectional_reflectance",
+        "apparent reflectance at the top of the atmosphere",
+        "the cosine of the solar zenith angle is divided out",
+    ),
+    "toa_radiance": Quantity(
+        "W m-2 sr-1 um-1", "toa_outgoing_radiance_per_unit_wavelength", "radiance at the top of the atmosphere"
+    ),
+    "dn": Quantity("1", "", "digital number", "0 is no data; radiance = gain * dn + offset"),
+    "ndvi": Quantity("1", "normalized_difference_vegetation_index", "normalized difference vegetation index"),
+    "ndvi_bias": Quantity("1", "", "mean NDVI less NDVI of the mean reflectance"),
+    "fpar_bias": Quantity("1", "", "mean FPAR less FPAR of the mean leaf area index"),
+    "ren": Quantity("1", "", "relative equivalent noise", "uncertainty of an inferred variable over its value"),
+    "sza": Quantity("degree", "solar_zenith_angle", "solar zenith angle"),
+    "saa": Quantity("degree", "solar_azimuth_angle", "solar azimuth angle", "toward the sun, clockwise from north"),
+    "vza": Quantity("degree", "sensor_zenith_angle", "sensor zenith angle"),
+    "vaa": Quantity(
+        "degree", "sensor_azimuth_angle", "sensor azimuth angle", "toward the sensor, clockwise from north"
+    ),
+    "earth_sun_distance": Quantity("astronomical_unit", "", "distance of Earth and Sun"),
+    "wavelength": Quantity(
+        "um", "sensor_band_central_radiation_wavelength", "response-weighted wavelength of the band"
+    ),
+    "solar_irradiance": Quantity(
+        "W m-2 um-1", "solar_irradiance_per_unit_wavelength", "extraterrestrial solar irradiance of the band at 1 AU"
+    ),
+    "gain": Quantity("W m-2 sr-1 um-1", "", "radiance of one digital count"),
+    "offset": Quantity("W m-2 sr-1 um-1", "", "radiance of digital number 0"),
+}
+
+# What a result keeps of its inputs' attributes; everything else is replaced.
+PROVENANCE = (
+    "rng_seed",
+    "arp",
+    "lai_distribution",
+    "method",
+    "leaf_angles",
+    "background",
+    "atmosphere",
+    "instrument",
+    "references",
+)
+
+# Other spellings of units.
+_SAME_UNITS = dict.fromkeys(("", "m2 m-2", "dimensionless"), "1") | dict.fromkeys(
+    ("metre", "metres", "meter", "meters"), "m"
+)
+
+_GEOMETRY = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
+
+
+def attributes(name):
+    """
+    CF attributes of a quantity.
+
+    Parameters
+    ----------
+    name : str
+        A key of `QUANTITIES`.
+
+    Returns
+    -------
+    attributes : dict of str
+    """
+    quantity = QUANTITIES[name]
+    found = {
+        "standard_name": quantity.standard_name,
+        "long_name": quantity.long_name,
+        "units": quantity.units,
+        "comment": quantity.comment,
+    }
+    return {key: value for key, value in found.items() if value}
+
+
+def label(array, name, *, history, source=None, **provenance):
+    """
+    Name an array and replace its attributes.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    name : str
+        A key of `QUANTITIES`.
+    history : str
+        One line on the step just done.
+    source : xarray.DataArray, optional
+        Input whose history and provenance carry on.
+    **provenance : str or number
+        Further attributes; win over those of the source.
+
+    Returns
+    -------
+    array : xarray.DataArray
+        A new object.
+    """
+    attrs = attributes(name)
+    before = source.attrs if source is not None else {}
+    attrs |= {key: before[key] for key in PROVENANCE if key in before} | provenance
+    cited = [*before.get("references", "").split("; "), *provenance.get("references", "").split("; ")]
+    attrs |= {"references": "; ".join(dict.fromkeys(filter(None, cited)))} if any(cited) else {}
+    attrs["history"] = "\n".join(filter(None, [before.get("history", ""), history]))
+    # A renamed array shares its attributes with the one it came from, a copy does not.
+    array = array.copy(deep=False).rename(name)
+    array.attrs = attrs
+    return array
+
+
+def check_quantity(array, *names):
+    """
+    Refuse an array that says it is something else than what is needed; what it does not say is taken as right.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    *names : str
+        Keys of `QUANTITIES`.
+
+    Raises
+    ------
+    ValueError
+        If the units or the standard name differ, or it holds digital numbers.
+    """
+    check_units(array, *names)
+    if "gain" in array.coords and "dn" not in names:
+        raise ValueError(
+            f"{array.name or 'the array'} holds digital numbers, where {QUANTITIES[names[0]].long_name} is needed: "
+            "convert it with .fifesim.to_reflectance()"
+        )
+    says = array.attrs.get("standard_name")
+    known = {quantity.standard_name: quantity.long_name for quantity in QUANTITIES.values() if quantity.standard_name}
+    if says in known and says not in {QUANTITIES[name].standard_name for name in names}:
+        raise ValueError(
+            f"{array.name or 'the array'} is {known[says]} by its standard_name, where "
+            f"{QUANTITIES[names[0]].long_name} is needed: take the step between, or drop .attrs['standard_name'] "
+            "if it is mistaken"
+        )
+
+
+def check_units(array, *names):
+    """
+    Refuse an array whose units are not those of any of some quantities; missing units are taken as right.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    *names : str
+        Keys of `QUANTITIES`.
+
+    Raises
+    ------
+    ValueError
+        If the units differ.
+    """
+    allowed = list(dict.fromkeys(QUANTITIES[name].units for name in names))
+    units = str(array.attrs.get("units", allowed[0])).strip()
+    if not {units, _SAME_UNITS.get(units)} & set(allowed):
+        wanted = " or ".join(repr(unit) for unit in allowed)
+        raise ValueError(
+            f"{array.name or 'the array'} has units {units!r}, {names[0]} needs {wanted}: "
+            "convert it, then set .attrs['units']"
+        )
+
+
+def with_geometry(array, geometry):
+    """
+    Carry the directions of sun and sensor as coordinates: numbers, or rasters on the same cells.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    geometry : fifesim.base.geometry.Geometry
+
+    Returns
+    -------
+    array : xarray.DataArray
+    """
+    angles = {name: xr.Variable(*_dims_and_data(getattr(geometry, name)), attributes(name)) for name in _GEOMETRY}
+    return array.assign_coords(angles)
+
+
+def _dims_and_data(angle):
+    return (angle.dims, angle.data) if isinstance(angle, xr.DataArray) else ((), angle)
+
+
+def geometry_of(array):
+    """
+    Directions of sun and sensor that an array carries.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+
+    Returns
+    -------
+    geometry : fifesim.base.geometry.Geometry or None
+        None where it carries no solar zenith angle.
+    """
+    if "sza" not in array.coords:
+        return None
+    carried = {name: array.coords[name] for name in _GEOMETRY if name in array.coords}
+    rasters = {name: angle.drop_vars(set(angle.coords) - {"y", "x", "spatial_ref"}) for name, angle in carried.items()}
+    found = {name: angle if angle.ndim else float(angle) for name, angle in rasters.items()}
+    return Geometry(**({"saa": 0.0} | found))
+
+
+def band_coordinates(**values):
+    """
+    Coordinates along the band dimension.
+
+    Parameters
+    ----------
+    **values : sequence, shape (band,)
+        ``band`` for the names, and keys of `QUANTITIES`.
+
+    Returns
+    -------
+    coordinates : dict of str to xarray.DataArray
+    """
+    names = {"band": xr.DataArray(np.asarray(values.pop("band"), dtype=str), dims="band", attrs={"long_name": "band"})}
+    numbers = {
+        name: xr.DataArray(np.asarray(value, float), dims="band", attrs=attributes(name))
+        for name, value in values.items()
+    }
+    return names | numbers

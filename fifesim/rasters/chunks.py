@@ -1,0 +1,355 @@
+"""How a kernel of numpy arrays meets dask: by cell, by place, or from one grid onto another."""
+
+from itertools import combinations
+from typing import NamedTuple
+
+import dask.array as da
+import numpy as np
+import xarray as xr
+from dask.base import tokenize
+
+from fifesim.rasters import grid as grids
+from fifesim.rasters.windows import array_by_place, array_from_windows, gather, slices
+
+
+def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
+    """
+    Apply a kernel cell by cell.
+
+    Parameters
+    ----------
+    kernel : callable
+        Takes numpy arrays that broadcast against each other, and the parameters.
+    *arrays : xarray.DataArray
+        Rasters on one grid, or arrays along ``band``.
+    bands : int, optional
+        The kernel makes a new leading axis of this many bands, and gets inputs along ``band`` with it as last axis.
+    dtype : dtype, optional
+        Of the result.
+    **parameters
+        Passed to the kernel.
+
+    Returns
+    -------
+    array : xarray.DataArray
+        Lazy where an input is.
+
+    Raises
+    ------
+    ValueError
+        If the rasters differ in grid, or in a scalar coordinate such as sza.
+    """
+    arrays = _aligned(arrays)
+    core = {}
+    if bands is not None:
+        core = {
+            "input_core_dims": [["band"] if "band" in array.dims else [] for array in arrays],
+            "output_core_dims": [["band"]],
+            # A file opened lazily has one band a chunk, and the kernel wants all.
+            "dask_gufunc_kwargs": {"output_sizes": {"band": bands}, "allow_rechunk": True},
+        }
+
+    def call(*blocks):
+        out = np.asarray(kernel(*blocks, **parameters), dtype)
+        # apply_ufunc wants new axes last; the transpose below undoes this view.
+        return out if bands is None else np.moveaxis(out, 0, -1)
+
+    out = xr.apply_ufunc(
+        call, *arrays, join="exact", dask="parallelized", output_dtypes=[dtype], keep_attrs=True, **core
+    )
+    dims = [name for name in ("band", "y", "x") if name in out.dims]
+    return out.transpose(*dims, ...)
+
+
+# Edge of an automatic chunk, and tiles along it at most: 8 MB in double precision. [cell]
+_CHUNK = 1008
+_TILES_PER_CHUNK = 2
+
+
+def tiles(kernel, grid, chunks=None, *, tile):
+    """
+    Array of a kernel that makes its cells from their place alone.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(row, column, (rows, columns))`` gives the cells from a row and column of the grid on.
+    grid : odc.geo.geobox.GeoBox
+    chunks : mapping or int or "auto", optional
+        As xarray takes it, over y and x; "auto" ends chunks where tiles end, so that none is made twice. Without it
+        the whole array is made at once.
+    tile : int
+        Size of the fixed tiles that the kernel works by, counted from the origin of the CRS. [cell]
+
+    Returns
+    -------
+    array : xarray.DataArray, dims (y, x)
+    """
+    if chunks is None:
+        return grids.place(xr.DataArray(kernel(0, 0, tuple(grid.shape)), dims=("y", "x")), grid)
+    sizes = _tile_chunks(grid, tile) if chunks == "auto" else _chunk_tuple(chunks)
+    normal = da.core.normalize_chunks(sizes, shape=tuple(grid.shape), dtype=float)
+    lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal)), dims=("y", "x"))
+    # xarray would take over dask's name.
+    return grids.place(lazy.rename(None), grid)
+
+
+def located(kernel, array):
+    """
+    Apply a kernel that must know where its block lies.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(block, starts)`` gives an array like the block, whose first element lies at these indices of the whole.
+    array : xarray.DataArray
+
+    Returns
+    -------
+    array : xarray.DataArray
+        Float, lazy where the input is.
+    """
+
+    def call(block, block_info=None):
+        return kernel(block, tuple(start for start, _ in block_info[0]["array-location"]))
+
+    data = array.data
+    if isinstance(data, da.Array):
+        return array.copy(data=data.map_blocks(call, dtype=float, meta=np.empty((0,) * data.ndim)))
+    return array.copy(data=kernel(data, (0,) * data.ndim))
+
+
+def resample(kernel, rows, columns, array, grid):
+    """
+    Carry a raster onto another grid by one operator for each axis.
+
+    Each output chunk reads the window of the input that it needs.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(block, rows, columns)`` applies the operators to a numpy block, the cells of their windows.
+    rows, columns : fifesim.base.footprints.AxisOperator
+        Cut as ``operator[first:last]``, with the cells they read in ``window``.
+    array : xarray.DataArray, dims (..., y, x)
+    grid : odc.geo.geobox.GeoBox
+        The output's.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims (..., y, x)
+        Float, lazy where the input is.
+    """
+    array = array.transpose(..., "y", "x")
+    data = array.data
+    if isinstance(data, da.Array):
+        out = _resample_lazily(kernel, rows, columns, data)
+    else:
+        these, those = rows[:], columns[:]
+        out = kernel(data[..., these.window, those.window], these, those)
+    result = xr.DataArray(out, dims=array.dims, coords=_other_coordinates(array), name=array.name, attrs=array.attrs)
+    return grids.place(result, grid)
+
+
+class Reads(NamedTuple):
+    """
+    What each cell of a result reads of an array: from its row ``rows[0]`` up to ``rows[1]``, and so its columns.
+
+    Rows and columns that the array does not have are NaN.
+    """
+
+    array: np.ndarray | da.Array  # shape (..., y, x)
+    rows: tuple[np.ndarray, np.ndarray]
+    columns: tuple[np.ndarray, np.ndarray]
+
+    def window(self, rows, columns):
+        """
+        Slices that a block of the result reads.
+
+        Parameters
+        ----------
+        rows, columns : slice
+            Of the result.
+
+        Returns
+        -------
+        rows, columns : slice
+        """
+        return tuple(
+            slice(int(start[block.start]), int(stop[block.stop - 1]))
+            for (start, stop), block in ((self.rows, rows), (self.columns, columns))
+        )
+
+
+def margin_reads(array, rows, columns=None, offset=(0, 0), shape=None):
+    """
+    Reads of cells that need a margin around them; beyond the array it is NaN.
+
+    Parameters
+    ----------
+    array : numpy.ndarray or dask.array.Array, shape (..., y, x)
+    rows : int
+        Margin. [cell]
+    columns : int, optional
+        The same by default. [cell]
+    offset : (int, int), optional
+        Row and column of the array that the first cell of the result lies on.
+    shape : (int, int), optional
+        Of the result; as far as the array goes by default.
+
+    Returns
+    -------
+    reads : Reads
+    """
+    columns = rows if columns is None else columns
+    if (rows or columns) and array.dtype.kind != "f":
+        # Missing is NaN, which integers do not have.
+        array = array.astype(float)
+    if shape is None:
+        shape = array.shape[-2] - offset[0], array.shape[-1] - offset[1]
+    cells = [first + np.arange(size) for first, size in zip(offset, shape, strict=True)]
+    return Reads(array, *((at - depth, at + depth + 1) for at, depth in zip(cells, (rows, columns), strict=True)))
+
+
+def windows(kernel, reads, shape, chunks=None):
+    """
+    Array whose every block is made from windows of others.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(rows, columns, *blocks)`` gives the cells of two slices of the result from the windows that they read.
+    reads : sequence of Reads
+    shape : (..., int, int)
+        Of the result; its last axes are y and x.
+    chunks : (tuple of int, tuple of int), optional
+        Of a lazy result over y and x. Without them all is made at once.
+
+    Returns
+    -------
+    array : numpy.ndarray or dask.array.Array
+    """
+    if chunks is None:
+        whole = [slice(0, size) for size in shape[-2:]]
+        return kernel(*whole, *(gather(each.array, each.window(*whole)) for each in reads))
+
+    def ask(rows, columns):
+        return (rows, columns), [each.window(rows, columns) for each in reads]
+
+    token = tokenize(kernel, reads, shape, chunks)
+    return array_from_windows(kernel, [each.array for each in reads], chunks, ask, token=token, leading=shape[:-2])
+
+
+def neighbourhood(kernel, array, depth, bands=0):
+    """
+    Apply a kernel that needs cells around each.
+
+    Parameters
+    ----------
+    kernel : callable
+        Takes a block with a margin, NaN beyond the raster, and returns it without.
+    array : xarray.DataArray, dims (y, x)
+    depth : int
+        Margin. [cell]
+    bands : int, optional
+        The kernel makes a new leading axis ``band`` of this many.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims ([band], y, x)
+        Lazy, in the same chunks, where the input is; the same bits whatever these are.
+    """
+    array = array.transpose("y", "x")
+    chunks = array.chunks
+    shape = (bands,) * bool(bands) + array.shape
+    data = windows(lambda rows, columns, block: kernel(block), [margin_reads(array.data, depth)], shape, chunks)
+    dims = ("band",) * bool(bands) + ("y", "x")
+    return xr.DataArray(data, dims=dims, coords=_other_coordinates(array))
+
+
+def runs(cells, chunks):
+    """
+    Chunks of a sorted selection of cells, so that each selects from one chunk of all.
+
+    Parameters
+    ----------
+    cells : array of int, shape (n,)
+    chunks : sequence of int
+        Sizes of the chunks of all cells.
+
+    Returns
+    -------
+    sizes : tuple of int
+        Of runs in the selection; they sum to n.
+
+    Examples
+    --------
+    >>> runs(np.array([1, 4, 7, 10]), (5, 3, 4))
+    (2, 1, 1)
+    """
+    chunk = np.minimum(np.searchsorted(np.cumsum(chunks), cells, side="right"), len(chunks) - 1)
+    starts = np.flatnonzero(np.diff(chunk, prepend=-1))
+    return tuple(np.diff([*starts, len(chunk)]).tolist())
+
+
+def _resample_lazily(kernel, rows, columns, data):
+    """One task for each block of pixels, on the merged window of cells."""
+    # What regularize makes of it.
+    dtype = np.dtype(np.float32 if data.dtype == np.float32 else np.float64)
+    # A pixel is made with the chunk of its last cell: what it needs of earlier chunks is cut off when these are made.
+    lasts = [axis.start + np.maximum(axis.count, 1) - 1 for axis in (rows, columns)]
+    chunks = tuple(runs(last, sizes) for last, sizes in zip(lasts, data.chunks[-2:], strict=True))
+    parts = [
+        {part.start: axis[part] for part in slices(sizes)} for axis, sizes in zip((rows, columns), chunks, strict=True)
+    ]
+
+    def ask(row_range, column_range):
+        these, those = parts[0][row_range.start], parts[1][column_range.start]
+        return (these, those), [(these.window, those.window)]
+
+    def block(these, those, window):
+        return kernel(window, these, those)
+
+    token = tokenize(kernel, rows, columns, data.name)
+    return array_from_windows(block, [data], chunks, ask, token=token, leading=data.shape[:-2], dtype=dtype)
+
+
+def _other_coordinates(array):
+    return {name: value for name, value in array.coords.items() if not {"y", "x"} & set(value.dims)}
+
+
+def _tile_chunks(grid, tile):
+    """Chunks of whole tiles, but for the borders of the grid."""
+    step = min(_TILES_PER_CHUNK, max(_CHUNK // tile, 1)) * tile
+    sizes = []
+    for first, size in zip(grids.lattice_position(grid), grid.shape, strict=True):
+        ends = np.arange((first // step + 1) * step, first + size, step) - first
+        sizes.append(tuple(np.diff([0, *ends, size]).tolist()))
+    return tuple(sizes)
+
+
+def _chunk_tuple(chunks):
+    if isinstance(chunks, dict):
+        unknown = set(chunks) - {"y", "x"}
+        if unknown:
+            raise ValueError(f"chunks name the dimensions y and x, got {', '.join(map(str, sorted(unknown)))}")
+        return tuple(-1 if chunks.get(axis) is None else chunks[axis] for axis in ("y", "x"))
+    return (chunks, chunks)
+
+
+def _aligned(arrays):
+    """The same with the coordinates of one raster on all; they must share their cells and their scalar coordinates."""
+    rasters = [array for array in arrays if isinstance(array, xr.DataArray) and {"y", "x"} <= set(array.dims)]
+    for one, other in combinations(rasters, 2):
+        if not grids.same_grid(grids.geobox(one), grids.geobox(other)):
+            raise ValueError(
+                f"{one.name!r} and {other.name!r} lie on different grids, {grids.describe(grids.geobox(one))} and "
+                f"{grids.describe(grids.geobox(other))}: bring one onto the other's first"
+            )
+        for name in set(one.coords) & set(other.coords) - {"spatial_ref"}:
+            a, b = one.coords[name], other.coords[name]
+            if a.ndim == 0 and a.dtype.kind in "fiu" and not np.array_equal(a, b, equal_nan=True):
+                raise ValueError(f"{name} is {float(a):g} in {one.name!r} and {float(b):g} in {other.name!r}")
+    # xarray aligns to the bit, and coordinates from elsewhere differ by rounding.
+    place = {axis: rasters[0].coords[axis].variable for axis in ("y", "x")} if rasters[1:] else {}
+    return [array.assign_coords(place) if any(array is each for each in rasters[1:]) else array for array in arrays]

@@ -1,0 +1,328 @@
+"""GeoTIFF files that a GIS opens in the right place, and that come back as they were."""
+
+import errno
+import json
+import os
+import shutil
+import tempfile
+import warnings
+from contextlib import contextmanager
+from pathlib import Path
+
+import dask.array as da
+import numpy as np
+import rasterio
+import rasterio.errors
+import rasterio.shutil
+import rioxarray
+import xarray as xr
+from dask.utils import SerializableLock
+from distributed import Lock, get_client
+from rasterio._err import CPLE_BaseError
+from rasterio.windows import Window
+
+from fifesim.base.geometry import ANGLES
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
+
+# GDAL's own block size for cloud-optimised files.
+_BLOCK = 512
+
+# The tag that keeps names, types and attributes beyond what GDAL's model of a raster holds.
+_TAG = "FIFESIM"
+
+
+def to_geotiff(raster, path):
+    """
+    Write a raster as a cloud-optimised GeoTIFF.
+
+    The file appears under its name only when it is whole. Lazy data are computed and written chunk by chunk.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray, dims ([band], y, x), or xarray.Dataset of variables over (y, x)
+        The variables of a dataset become bands.
+    path : str or path
+
+    Returns
+    -------
+    path : pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        If the raster has no projected grid or other dimensions.
+    OSError
+        If the file cannot be written.
+
+    Notes
+    -----
+    Bands have names, units, scale and offset, and ``CENTRAL_WAVELENGTH_UM`` in the ``IMAGERY`` domain where there is a
+    wavelength; attributes and the sun are tags. Angles that vary over the cells are not written, which is a warning.
+    """
+    path = Path(path)
+    array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
+    if not set(array.dims) <= {"band", "y", "x"}:
+        raise ValueError(f"a GeoTIFF holds dimensions (band, y, x), got {array.dims}: select or rename")
+    array = array if "band" in array.dims else array.expand_dims("band")
+    array = array.transpose("band", "y", "x")
+    grid = grids.geobox(array)
+    _check_room(array, path)
+    varying = [name for name in ANGLES if name in array.coords and array.coords[name].ndim]
+    if varying:
+        warnings.warn(
+            f"{path.name} leaves out {', '.join(varying)}, which vary over the cells, and another geometry would be "
+            "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()",
+            stacklevel=2,
+        )
+    with _whole(path) as (streamed, finished), _errors_of_gdal(path):
+        _stream(array, grid, streamed, described=raster)
+        rasterio.shutil.copy(
+            streamed,
+            finished,
+            driver="COG",
+            compress="deflate",
+            predictor="yes",
+            blocksize=_BLOCK,
+            overview_resampling="average",
+        )
+        _check_written(streamed, finished, array)
+    return path
+
+
+def open_image(path, chunks=None):
+    """
+    Open a GeoTIFF with its bands, wavelengths, sun and calibration.
+
+    Parameters
+    ----------
+    path : str or path
+        Written by `to_geotiff`; of other files, what GDAL knows of the bands is read.
+    chunks : mapping or int, optional
+        Makes the result lazy.
+
+    Returns
+    -------
+    raster : xarray.DataArray, dims ([band], y, x)
+        As it was written. Digital numbers are not masked: 0 is no data. Of other files, values in their physical unit,
+        NaN where there are no data; digital numbers only where the file says that they scale to radiance.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read as a raster.
+    """
+    try:
+        with rasterio.open(path) as source:
+            kept = json.loads(source.tags().get(_TAG, "null"))
+            fallback = _gdal_description(source)
+        with warnings.catch_warnings():
+            # rioxarray has one scale and offset for all bands; here they are coordinates along band.
+            warnings.filterwarnings("ignore", "(Scales|Offsets) differ across bands")
+            opened = rioxarray.open_rasterio(path, chunks=chunks, mask_and_scale=False)
+            plain = opened.load() if chunks is None else opened
+    except rasterio.errors.RasterioIOError as error:
+        raise ValueError(f"cannot read {path} as a raster: {error}") from None
+    description = kept or fallback["description"]
+    grid = grids.geobox(plain)
+    array = xr.DataArray(plain.data, dims=("band", "y", "x"), name=description["name"])
+    if kept is None:
+        array = _physical(array, **fallback["storage"])
+    coords = {name: _variable(item) for name, item in description["coords"].items()}
+    array = grids.place(array.assign_coords(coords), grid)
+    array.attrs = dict(description["attrs"])
+    if "gain" in array.coords:
+        array.attrs["_FillValue"] = array.dtype.type(0)
+    return array if "band" in description["dims"] else array.isel(band=0, drop=True)
+
+
+def _stacked(dataset):
+    """A dataset's variables as bands."""
+    names = [str(name) for name in dataset.data_vars]
+    array = xr.concat(
+        [dataset[name].drop_vars(["band"], errors="ignore") for name in names],
+        dim=xr.DataArray(names, dims="band", name="band"),
+        combine_attrs="drop",
+        coords="minimal",
+        compat="override",
+    )
+    histories = [dataset[name].attrs.get("history", "") for name in names]
+    array.attrs = {"history": histories[0], "long_name": ", ".join(names)}
+    return array
+
+
+def _streamed_bytes(array):
+    """Size of the cells of a tiled file, whose tiles are all whole."""
+    rows, columns = (-(-size // _BLOCK) * _BLOCK for size in array.shape[-2:])
+    return array.sizes["band"] * rows * columns * array.dtype.itemsize
+
+
+def _check_room(array, path):
+    """Refuse a disk that is full before GDAL, which says so in many lines, comes to it."""
+    if not path.parent.is_dir():
+        return
+    # The stream, and at worst as much again with overviews.
+    needed, free = _streamed_bytes(array) + 1.4 * array.nbytes, shutil.disk_usage(path.parent).free
+    if free < needed:
+        said = f"{os.strerror(errno.ENOSPC)}: {needed / 1e6:.1f} MB are needed, {free / 1e6:.1f} MB are free"
+        raise OSError(errno.ENOSPC, said, str(path))
+
+
+@contextmanager
+def _errors_of_gdal(path):
+    try:
+        yield
+    except (CPLE_BaseError, rasterio.errors.RasterioError) as error:
+        raise OSError(f"cannot write {path}: {error.__cause__ or error}") from error
+
+
+def _check_written(streamed, finished, array):
+    """A full disk may come to light when files are closed, when GDAL tells nobody."""
+    with rasterio.open(streamed) as one, rasterio.open(finished) as other:
+        if os.path.getsize(streamed) < _streamed_bytes(array):
+            raise rasterio.errors.RasterioIOError("the disk did not take all of it")
+        for _, window in other.block_windows(1):
+            if not np.array_equal(
+                one.read(window=window), other.read(window=window), equal_nan=array.dtype.kind == "f"
+            ):
+                raise rasterio.errors.RasterioIOError("what was written is not what is read")
+
+
+@contextmanager
+def _whole(path):
+    """Temporary names beside a file; the second becomes the file when all has gone well."""
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"there is no folder {str(path.parent)!r} to write {path.name} into")
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        streamed, finished = Path(folder) / "streamed.tif", Path(folder) / "finished.tif"
+        yield streamed, finished
+        os.replace(finished, path)
+
+
+def _stream(array, grid, path, described):
+    """A tiled GeoTIFF, block by block, with all metadata."""
+    dtype = array.dtype
+    profile = {
+        "driver": "GTiff",
+        "dtype": dtype.name,
+        "count": array.sizes["band"],
+        "height": grid.shape.y,
+        "width": grid.shape.x,
+        "crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
+        "transform": grid.affine,
+        "nodata": 0 if dtype.kind == "u" else np.nan if dtype.kind == "f" else None,
+        "tiled": True,
+        "blockxsize": _BLOCK,
+        "blockysize": _BLOCK,
+        "bigtiff": "if_safer",
+    }
+    with rasterio.open(path, "w", **profile) as sink:
+        _describe(sink, array, described)
+        if not isinstance(array.data, da.Array):
+            sink.write(array.values)
+    if isinstance(array.data, da.Array):
+        da.store(array.data, _Sink(str(path)), lock=_lock(str(path)), compute=True)
+
+
+class _Sink:
+    """A raster file that takes assignments to slices, as dask stores them, in whichever process that happens."""
+
+    def __init__(self, path):
+        self._path = path
+
+    def __setitem__(self, index, block):
+        bands, rows, columns = index
+        window = Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
+        with rasterio.open(self._path, "r+") as sink:
+            sink.write(block, indexes=list(range(bands.start + 1, bands.stop + 1)), window=window)
+
+
+def _lock(name):
+    """One writer at a time: among the workers of a cluster where there is one, else among threads."""
+    try:
+        get_client()
+    except ValueError:
+        return SerializableLock()
+    return Lock(name)
+
+
+def _describe(sink, array, described):
+    described = described if isinstance(described, xr.DataArray) else array
+    kept = {
+        "name": array.name,
+        "dims": [str(dim) for dim in described.dims],
+        "attrs": {key: _plain(value) for key, value in array.attrs.items() if key != "_FillValue"},
+        "coords": {
+            name: {
+                "dims": list(value.dims),
+                "values": _plain(value.values),
+                "dtype": value.dtype.str,
+                "attrs": dict(value.attrs),
+            }
+            for name, value in array.coords.items()
+            if not {"y", "x"} & set(value.dims) and name != "spatial_ref"
+        },
+    }
+    scalars = {name: item["values"] for name, item in kept["coords"].items() if not item["dims"]}
+    readable = {key: str(value) for key, value in (kept["attrs"] | scalars).items()}
+    sink.update_tags(**readable, **{_TAG: json.dumps(kept)}, AREA_OR_POINT="Area")
+    names = [str(name) for name in array["band"].values] if "band" in array.coords else [str(array.name)]
+    for number, name in enumerate(names, 1):
+        sink.set_band_description(number, name)
+        _describe_band(sink, number, array.isel(band=number - 1))
+    if "gain" in array.coords:
+        sink.scales, sink.offsets = array["gain"].values.tolist(), array["offset"].values.tolist()
+        sink.units = [cf.QUANTITIES["toa_radiance"].units] * len(names)
+    else:
+        sink.units = [
+            cf.QUANTITIES[name].units if name in cf.QUANTITIES else array.attrs.get("units", "") for name in names
+        ]
+
+
+def _describe_band(sink, number, band):
+    per_band = {name: f"{float(band[name]):.9g}" for name in ("wavelength", "solar_irradiance") if name in band.coords}
+    sink.update_tags(number, **per_band)
+    if "wavelength" in per_band:
+        sink.update_tags(number, ns="IMAGERY", CENTRAL_WAVELENGTH_UM=per_band["wavelength"])
+
+
+def _plain(value):
+    """Numbers and text as JSON has them."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.astype(str).tolist() if value.dtype.kind in "mM" else value.tolist()
+    return value
+
+
+def _variable(item):
+    return xr.DataArray(np.array(item["values"], item.get("dtype")), dims=item["dims"], attrs=item["attrs"])
+
+
+def _physical(array, scales, offsets, nodata):
+    """Values of another program's file: masked, scaled, shifted; digital numbers of radiance with 0 for no data."""
+    missing = xr.zeros_like(array, dtype=bool) if nodata is None else array == nodata
+    if scales is None:
+        return array.where(~missing, array.dtype.type(0))
+    if nodata is None and all(scale == 1 for scale in scales) and not any(offsets):
+        return array
+    gain, offset = (xr.DataArray(list(values), dims="band") for values in (scales, offsets))
+    return array.where(~missing) * gain + offset
+
+
+def _gdal_description(source):
+    """Names, calibration and wavelengths of a file that fifesim did not write, and how its values are stored."""
+    names = [name or f"band{number}" for number, name in enumerate(source.descriptions, 1)]
+    coords = {"band": {"dims": ["band"], "values": names, "attrs": {}}}
+    wavelengths = [source.tags(number, ns="IMAGERY").get("CENTRAL_WAVELENGTH_UM") for number in source.indexes]
+    values = {"wavelength": [float(value) for value in wavelengths] if all(wavelengths) else None}
+    counts = np.dtype(source.dtypes[0]).kind == "u" and set(source.units) == {cf.QUANTITIES["toa_radiance"].units}
+    if counts:
+        values |= {"gain": list(source.scales), "offset": list(source.offsets)}
+    coords |= {
+        name: {"dims": ["band"], "values": value, "attrs": cf.attributes(name)}
+        for name, value in values.items()
+        if value
+    }
+    units = {} if counts or not source.units[0] else {"units": source.units[0]}
+    storage = {"scales": None if counts else source.scales, "offsets": source.offsets, "nodata": source.nodata}
+    description = {"name": "image", "dims": ["band", "y", "x"], "attrs": units, "coords": coords}
+    return {"description": description, "storage": storage}

@@ -1,0 +1,146 @@
+"""Scenarios along axes: what a regression becomes as a parameter varies, in one lazy Dataset."""
+
+from itertools import product
+
+import dask
+import dask.array as da
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis.rasters.regression import regress
+from fifesim.scenario.scenario import Scenario
+from fifesim.scenario.simulation import simulate
+from fifesim.scenario.toml import parse_scenario
+
+# What is kept of a regression of the truth on NDVI.
+STATISTICS = ("slope", "intercept", "r2", "residual_deviation", "n")
+VARIABLES = ("lai", "fpar")
+
+
+def sweep(scenario, axes, measures=None, *, pair="coordinates"):
+    """
+    Simulate a scenario along axes of its parameters.
+
+    All points share the scenario's seeds, and so their random numbers.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    axes : mapping
+        By name, the values of a key of the scenario, such as ``{"arp": [0.05, 0.15], "visibility": [10, 45]}``; a key
+        that several sections have is written ``"ground.seed"``. Or by any name a pair of values and a function that
+        takes a Scenario and a value and gives a Scenario. Values that are lists, such as an ``offset``, stand in the
+        coordinate as text: "0.2, 0.0".
+    measures : mapping of str to callable, optional
+        Each takes the run, an `xarray.DataTree` with ``image`` and ``truth`` in memory, and gives a number. By default
+        the regressions of true LAI and FPAR on NDVI.
+    pair : {"coordinates", "index"}, optional
+        As in `regress`, for the default measures.
+
+    Returns
+    -------
+    results : xarray.Dataset
+        Lazy, one task a point. Dimensions are the axes and, for the default measures, ``variable`` (lai, fpar): slope,
+        intercept, r2, residual_deviation and n.
+
+    Raises
+    ------
+    ValueError
+        If an axis has no values or is no key
+
+    Examples
+    --------
+    >>> fit = sweep(Scenario(), {"arp": [0.05, 0.15, 0.24], "visibility": [10.0, 45.0]})
+    >>> dict(fit.r2.sizes)
+    {'arp': 3, 'visibility': 2, 'variable': 2}
+    """
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"sweep takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+    if not axes:
+        raise ValueError("a sweep needs an axis, such as {'arp': [0.05, 0.15, 0.24]}")
+    steps = {name: _axis(name, given) for name, given in axes.items()}
+    names = STATISTICS if measures is None else tuple(measures)
+    shape = (len(names),) + ((len(VARIABLES),) if measures is None else ())
+    points = []
+    for values in product(*(values for values, _ in steps.values())):
+        one = scenario
+        for value, (_, change) in zip(values, steps.values(), strict=True):
+            one = change(one, value)
+        one.complete()
+        points.append(da.from_delayed(dask.delayed(_point)(one, measures, pair), shape=shape, dtype=float))
+    sizes = tuple(len(values) for values, _ in steps.values())
+    # Statistics first, then the axes.
+    found = da.stack(points, axis=1).reshape(shape[0], *sizes, *shape[1:])
+    dims = (*steps, *(("variable",) if measures is None else ()))
+    coordinates = {name: (name, _labels(values), _meaning(name, axes[name])) for name, (values, _) in steps.items()}
+    if measures is None:
+        coordinates["variable"] = list(VARIABLES)
+    return xr.Dataset({name: (dims, found[k]) for k, name in enumerate(names)}, coords=coordinates)
+
+
+def _point(scenario, measures, pair):
+    """Results of one scenario, computed in this thread: the points are what runs in parallel."""
+    run = simulate(scenario)
+    kept = xr.DataTree.from_dict({name: run[name].to_dataset() for name in ("image", "truth")})
+    kept = kept.map_over_datasets(lambda each: each.compute(scheduler="synchronous"))
+    if measures is not None:
+        return np.array([float(measure(kept)) for measure in measures.values()])
+    fits = [regress(kept["truth"][name], kept["image"]["ndvi"], pair=pair) for name in VARIABLES]
+    return np.array([[getattr(fit, name) for fit in fits] for name in STATISTICS], float)
+
+
+def _axis(name, given):
+    """Values of an axis, and the function that puts one into a scenario."""
+    values = given[0] if _has_function(given) else given
+    if isinstance(values, str) or not np.iterable(values) or not len(list(values)):
+        raise ValueError(f"the axis {name!r} needs a list of values, got {values!r}: write [value], even for one")
+    if _has_function(given):
+        return list(values), given[1]
+    section, key = _place(name)
+
+    def change(scenario, value):
+        values = scenario.model_dump(exclude_unset=True)
+        # numpy's numbers are not what a scenario takes.
+        plain = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+        return parse_scenario(values | {section: values.get(section, {}) | {key: plain}})
+
+    return list(given), change
+
+
+def _labels(values):
+    """Values as a coordinate: text where they are lists, which have no place along one dimension."""
+    if all(np.ndim(value) == 0 for value in values):
+        return values
+    return [", ".join(str(part) for part in np.ravel(value).tolist()) or "none" for value in values]
+
+
+def _meaning(name, given):
+    """Attributes of an axis: what plots write beside it."""
+    if _has_function(given):
+        return {}
+    section, key = _place(name)
+    known = Scenario.model_fields[section].annotation.model_fields[key]
+    # The description's first words name the key; ranges and hints follow them.
+    found = {"long_name": known.description.split(";")[0], "units": (known.json_schema_extra or {}).get("unit", "")}
+    return {name: text for name, text in found.items() if text}
+
+
+def _has_function(given):
+    return isinstance(given, tuple) and len(given) == 2 and callable(given[1])
+
+
+def _place(name):
+    """Section and key of an axis."""
+    keys = {section: field.annotation.model_fields for section, field in Scenario.model_fields.items()}
+    section, _, key = name.rpartition(".")
+    found = [each for each in keys if key in keys[each] and section in ("", each)]
+    if len(found) == 1:
+        return found[0], key
+    if found:
+        written = " or ".join(f"{each}.{key!s}" for each in found)
+        raise ValueError(f"the axis {name!r} is a key of several sections: write {written}")
+    known = ", ".join(sorted({key for fields in keys.values() for key in fields}))
+    raise ValueError(
+        f"the axis {name!r} is no key of a scenario: keys are {known}; or give a pair (values, function of a scenario "
+        "and a value)"
+    )

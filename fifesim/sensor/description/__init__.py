@@ -1,0 +1,1 @@
+"""Instruments as files describe them."""

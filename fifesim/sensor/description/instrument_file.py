@@ -1,0 +1,388 @@
+"""Description of an instrument: bands, sampling, spatial response and radiometry, each number with its source."""
+
+from dataclasses import field, replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from fifesim.base.bands import solar_irradiance
+from fifesim.sensor.description.names import lookup
+from fifesim.sensor.description.performance import Gain, Noise, Scan
+from fifesim.sensor.response.spatial_response import (
+    CONFIG,
+    AlongAcross,
+    Angle,
+    Count,
+    Number,
+    Positive,
+    SpatialResponse,
+    View,
+    by_axes,
+)
+from fifesim.sensor.response.spectral_response import Name, SpectralResponse
+
+# Numbers that must be there and those that may; each that is there has a source.
+INSTRUMENT_NUMBERS = ("altitude", "gsd", "interval", "bits", "lsf")
+BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance")
+OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "noise", "gains", "limits")
+
+
+@dataclass(frozen=True, config=CONFIG)
+class InstrumentBand:
+    """
+    One band of an instrument.
+
+    Parameters
+    ----------
+    name : str
+        Name, such as ``"TM3"``.
+    srf : spectral response
+        Where the relative spectral response is found; see `fifesim.sensor.response.spectral_response`.
+    full_scale_radiance, min_radiance : float
+        Radiances of the largest digital number and of digital number 0. [W m-2 sr-1 um-1]
+    solar_irradiance : float
+        Extraterrestrial irradiance that the agency publishes for planetary reflectance. [W m-2 um-1]
+    limits : tuple of float, optional
+        Wavelengths between which the band is nominally. [um]
+    gsd, interval, ifov, lsf, detectors : optional
+        Where they differ from the instrument's.
+    noise : Noise, optional
+    gain : str, optional
+        Name of the gain state that the radiances belong to.
+    gains : dict of Gain, optional
+        Other gain states by name.
+    sources : dict
+        Key of the instrument's references for each number that has another source than the instrument says.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If a value is wrong; `fifesim.sensor.description.instruments.read_instrument` names file and key.
+    """
+
+    name: Name
+    srf: SpectralResponse
+    full_scale_radiance: Number
+    min_radiance: Number
+    solar_irradiance: Positive
+    limits: tuple[Positive, Positive] | None = None
+    gsd: Positive | None = None
+    interval: Angle | None = None
+    ifov: Angle | None = None
+    lsf: SpatialResponse | None = None
+    detectors: Count | None = None
+    noise: Noise | None = None
+    gain: Name = "nominal"
+    gains: dict[str, Gain] = field(default_factory=dict, repr=False, hash=False)
+    sources: dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str] = field(
+        default_factory=dict, repr=False, hash=False
+    )
+
+    def __post_init__(self):
+        Gain(self.full_scale_radiance, self.min_radiance)
+        if self.limits and self.limits[0] >= self.limits[1]:
+            raise ValueError(f"limits: the first must be below the second, got {self.limits} um")
+        if self.gain in self.gains:
+            raise ValueError(f"gains: {self.gain!r} is the band's own gain state, give the others")
+
+    @property
+    def response(self):
+        """Relative spectral response, a `fifesim.base.bands.Band`."""
+        return self.srf.read(self.name)
+
+    @property
+    def wavelength(self):
+        """Response-weighted mean wavelength [um]."""
+        return self.response.center
+
+    @property
+    def spectrum_irradiance(self):
+        """Solar irradiance that ASTM G173 has over the response, beside the agency's [W m-2 um-1]."""
+        return solar_irradiance(self.response)
+
+    def with_gain(self, gain):
+        """
+        The band in another gain state.
+
+        Parameters
+        ----------
+        gain : str
+            Name of a state.
+
+        Returns
+        -------
+        band : InstrumentBand
+
+        Raises
+        ------
+        ValueError
+            If the band has no such state.
+        """
+        if gain == self.gain:
+            return self
+        if gain not in self.gains:
+            raise ValueError(f"{self.name} has no gain state {gain!r}: it has {', '.join([self.gain, *self.gains])}")
+        own = Gain(self.full_scale_radiance, self.min_radiance)
+        others = {name: state for name, state in self.gains.items() if name != gain}
+        new = self.gains[gain]
+        return replace(
+            self,
+            full_scale_radiance=new.full_scale_radiance,
+            min_radiance=new.min_radiance,
+            gain=gain,
+            gains={self.gain: own, **others},
+        )
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Instrument:
+    """
+    Description of an instrument.
+
+    Parameters
+    ----------
+    name, title : str
+        Short name, such as ``"TM"``, and full name.
+    altitude : float
+        Above the ground. [m]
+    gsd : float
+        Pixel of the gridded product. [m]
+    interval : float or Angles
+        Angle between the instrument's own samples. [rad]
+    bits : int
+        Number of radiometric bits.
+    lsf : response of both axes or TwoAxesResponse
+        Spatial response; see `fifesim.sensor.response.spatial_response`.
+    bands : tuple of InstrumentBand
+    sources : dict
+        Key of ``references`` for each number; a band's own sources come first.
+    references : dict
+        Publications by key.
+    ifov : float or Angles, optional
+        Instantaneous field of view. [rad]
+    detectors : int, optional
+        Detectors of a band, which take turns at its lines (whiskbroom) or stand side by side (pushbroom).
+    scan : Scan, optional
+    aliases : tuple of str, optional
+        Other names.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If a value is wrong or has no source; `fifesim.sensor.description.instruments.read_instrument` names file and key.
+    """
+
+    name: Name
+    title: Name
+    altitude: Positive
+    gsd: Positive
+    interval: Angle
+    bits: Annotated[int, Field(strict=True, ge=2, le=16)]
+    lsf: SpatialResponse
+    bands: Annotated[tuple[InstrumentBand, ...], Field(min_length=1)] = field(repr=False)
+    sources: dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str] = field(repr=False, hash=False)
+    references: dict[str, str] = field(repr=False, hash=False)
+    ifov: Angle | None = None
+    detectors: Count | None = None
+    scan: Scan | None = None
+    aliases: tuple[Name, ...] = ()
+
+    def __post_init__(self):
+        names = [band.name for band in self.bands]
+        if len(set(names)) < len(names):
+            raise ValueError(f"bands: each name may occur once, got {', '.join(names)}")
+        for number in (*INSTRUMENT_NUMBERS, *_given(self)):
+            self.source(number)
+        for band in self.bands:
+            for number in (*BAND_NUMBERS, *_given(band)):
+                self.source(number, band)
+
+    @property
+    def line_spread(self):
+        """Line spread function on the ground of the first band, across the track."""
+        return self.line_spreads(self.bands[0]).across
+
+    @property
+    def ground_interval(self):
+        """Distance on the ground between the samples of the first band at nadir, across the track [m]."""
+        return self.ground_intervals(self.bands[0]).across
+
+    def pixel(self, band):
+        """
+        Pixel of a band in the gridded product.
+
+        Parameters
+        ----------
+        band : InstrumentBand
+
+        Returns
+        -------
+        gsd : float
+            [m]
+        """
+        return self.gsd if band.gsd is None else band.gsd
+
+    def ground_intervals(self, band):
+        """
+        Distances on the ground between a band's own samples at nadir.
+
+        Parameters
+        ----------
+        band : InstrumentBand
+
+        Returns
+        -------
+        intervals : AlongAcross
+            [m]
+        """
+        return AlongAcross(*(self.altitude * angle for angle in by_axes(band.interval or self.interval)))
+
+    def ground_fields(self, band):
+        """
+        Instantaneous field of view of a band on the ground at nadir.
+
+        Parameters
+        ----------
+        band : InstrumentBand
+
+        Returns
+        -------
+        widths : AlongAcross
+            None where the instrument's file has none. [m]
+        """
+        return AlongAcross(*(angle and self.altitude * angle for angle in by_axes(band.ifov or self.ifov)))
+
+    def line_spreads(self, band):
+        """
+        Line spread functions of a band on the ground.
+
+        Parameters
+        ----------
+        band : InstrumentBand
+
+        Returns
+        -------
+        lsf : AlongAcross
+            As `fifesim.base.footprints` takes them: along for its rows, across for its columns.
+        """
+        angles = zip(by_axes(band.ifov or self.ifov), by_axes(band.interval or self.interval), strict=True)
+        views = [View(self.altitude, ifov, interval, band) for ifov, interval in angles]
+        responses = by_axes(band.lsf or self.lsf)
+        return AlongAcross(*(response.spread(view) for response, view in zip(responses, views, strict=True)))
+
+    def noise_model(self, band):
+        """
+        Noise of a band at every radiance.
+
+        Parameters
+        ----------
+        band : InstrumentBand
+
+        Returns
+        -------
+        model : fifesim.sensor.response.noise.NoiseModel
+
+        Raises
+        ------
+        ValueError
+            If the instrument's file has no noise for the band.
+        """
+        if band.noise is None:
+            raise ValueError(
+                f"the description of {self.name} has no noise for {band.name}: leave noise out, or give an instrument "
+                "whose file has it"
+            )
+        pushed = self.scan is not None and self.scan.kind == "pushbroom"
+        return band.noise.model(band.detectors or self.detectors or 1, "columns" if pushed else "rows")
+
+    def with_gain(self, gain):
+        """
+        The instrument with those bands that have a gain state in that state.
+
+        Parameters
+        ----------
+        gain : str or dict of str
+            Name of a state for every band that has it, or names by band.
+
+        Returns
+        -------
+        instrument : Instrument
+
+        Raises
+        ------
+        ValueError
+            If a band that is named, or every band, lacks the state.
+        """
+        if isinstance(gain, dict):
+            chosen = {band.name: state for name, state in gain.items() for band in self.select(name)}
+        else:
+            chosen = {band.name: gain for band in self.bands if gain == band.gain or gain in band.gains}
+            if not chosen:
+                raise ValueError(f"no band of {self.name} has a gain state {gain!r}")
+        return replace(self, bands=tuple(band.with_gain(chosen.get(band.name, band.gain)) for band in self.bands))
+
+    def select(self, bands=None):
+        """
+        Bands by name.
+
+        Parameters
+        ----------
+        bands : str or sequence of str, optional
+            Names in any case; all bands by default.
+
+        Returns
+        -------
+        bands : tuple of InstrumentBand
+            In the order asked for.
+
+        Raises
+        ------
+        ValueError
+            If the instrument has no such band.
+
+        Examples
+        --------
+        >>> from fifesim.sensor.description.instruments import instrument
+        >>> [band.name for band in instrument("TM").select(["TM4", "tm3"])]
+        ['TM4', 'TM3']
+        """
+        known = {band.name.lower(): band for band in self.bands}
+        names = known if bands is None else [bands] if isinstance(bands, str) else bands
+        found = tuple(lookup(name, known, f"band of {self.name}") for name in names)
+        if not found or len(set(found)) < len(found):
+            raise ValueError(
+                f"bands of {self.name} must be at least one, each once, got {', '.join(map(str, names)) or 'none'}"
+            )
+        return found
+
+    def source(self, number, band=None):
+        """
+        Publication that a number comes from.
+
+        Parameters
+        ----------
+        number : str
+            Name of a parameter, such as ``"altitude"`` or ``"min_radiance"``.
+        band : InstrumentBand, optional
+            The band whose number it is.
+
+        Returns
+        -------
+        reference : str
+
+        Raises
+        ------
+        ValueError
+            If the number has no source, or its source is not among the references.
+        """
+        key = (band.sources if band else {}).get(number) or self.sources.get(number)
+        if key not in self.references:
+            raise ValueError(f"sources.{number}: must be one of {', '.join(self.references)}, got {key!r}")
+        return self.references[key]
+
+
+def _given(item):
+    """Names of the optional numbers that an instrument or a band has."""
+    names = OPTIONAL_NUMBERS + (INSTRUMENT_NUMBERS if isinstance(item, InstrumentBand) else ())
+    return [name for name in names if getattr(item, name, None)]

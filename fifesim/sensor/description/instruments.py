@@ -1,0 +1,187 @@
+"""
+Instruments by name, and from files of one's own.
+
+The descriptions are the files ``data/instruments/*.toml``; a further instrument is a further file.
+"""
+
+import tomllib
+from functools import lru_cache
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from fifesim.base import datasets
+from fifesim.sensor.description.instrument_file import Instrument, InstrumentBand
+from fifesim.sensor.description.names import lookup
+from fifesim.sensor.description.plausibility import check_units
+
+__all__ = ["Instrument", "InstrumentBand", "instrument", "instrument_names", "read_instrument"]
+
+# Keys whose value has several forms: what follows them in the place of an error is the form's name.
+_FORMS = ("srf", "lsf", "interval", "ifov")
+
+
+def instrument(name):
+    """
+    Description of an instrument by its name, or from a file.
+
+    Parameters
+    ----------
+    name : str, path-like or Instrument
+        Name or alias in any case, such as ``"TM"`` or ``"Landsat-8 OLI"``; or the path of a file, which ends in
+        ``.toml``. An Instrument passes through.
+
+    Returns
+    -------
+    instrument : Instrument
+
+    Raises
+    ------
+    ValueError
+        If no instrument has this name; the message lists those there are. If the file is not right.
+    FileNotFoundError
+        If there is no such file.
+
+    Examples
+    --------
+    >>> tm = instrument("tm")
+    >>> tm.name, round(tm.line_spread.width, 2), round(tm.ground_interval, 3)
+    ('TM', 30.32, 30.315)
+    """
+    if isinstance(name, Instrument):
+        return name
+    if isinstance(name, Path) or (isinstance(name, str) and name.lower().endswith(".toml")):
+        return _read_again(*_state(Path(name)))
+    return lookup(name, _catalogue(), "instrument")
+
+
+def instrument_names():
+    """
+    Names of the instruments.
+
+    Returns
+    -------
+    names : tuple of str
+        In alphabetical order.
+
+    Examples
+    --------
+    >>> "TM" in instrument_names()
+    True
+    """
+    return tuple(sorted({item.name for item in _catalogue().values()}))
+
+
+def read_instrument(path):
+    """
+    Description of an instrument from a file, such as a copy of ``data/instruments/tm.toml``.
+
+    Parameters
+    ----------
+    path : str or path-like
+        TOML file.
+
+    Returns
+    -------
+    instrument : Instrument
+
+    Raises
+    ------
+    ValueError
+        If the file is no valid TOML, a key is missing, unknown or has a wrong value, or a number cannot be in the unit
+        of its key; the message names file, key and remedy.
+    FileNotFoundError
+        If there is no such file.
+    """
+    path = Path(path)
+    found = _parse(path)
+    try:
+        check_units(found)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from None
+    return found
+
+
+def _parse(path):
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise FileNotFoundError(f"there is no instrument file {path}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path.name} is not valid TOML: {error}") from None
+    try:
+        return TypeAdapter(Instrument).validate_python(_with_folder(content, path.parent))
+    except ValidationError as error:
+        reasons = "; ".join(_explain(item) for item in error.errors())
+        raise ValueError(f"{path.name}: {reasons}") from None
+
+
+def _with_folder(content, folder):
+    """The content of a file, whose tables of responses know the folder that they may lie in."""
+    bands = content.get("bands")
+    if not isinstance(bands, list):
+        return content
+    return {**content, "bands": [_placed(band, folder) for band in bands]}
+
+
+def _placed(band, folder):
+    srf = band.get("srf") if isinstance(band, dict) else None
+    if not (isinstance(srf, dict) and "table" in srf):
+        return band
+    return {**band, "srf": {**srf, "folder": str(folder)}}
+
+
+def _explain(error):
+    """One line that names the key, its value and what is allowed; bands count from 1."""
+    key = ".".join(_key_parts(error["loc"]))
+    if error["type"] == "unexpected_keyword_argument":
+        return f"unknown key {key}"
+    if error["type"] == "missing":
+        return f"the key {key} is missing"
+    if error["type"] == "union_tag_invalid":
+        return f"{key}.kind = {error['ctx']['tag']!r}: it must be one of {error['ctx']['expected_tags']}"
+    if error["type"] == "union_tag_not_found":
+        return f"the key {key}.kind is missing"
+    if error["type"] == "value_error":
+        return ": ".join(filter(None, (key, str(error["ctx"]["error"]))))
+    return f"{key} = {error['input']!r}: {error['msg']}"
+
+
+def _key_parts(places):
+    """Keys of a place in the file, without the names of the forms that a value may have."""
+    places = list(places)
+    while places:
+        part = places.pop(0)
+        yield str(part + 1) if isinstance(part, int) else part
+        if part in _FORMS and places:
+            form = places.pop(0)
+            if part == "lsf" and form == "axes" and places:
+                yield places.pop(0)
+            if part == "lsf" and places and places[0] in ("cosine", "boxcar", "gaussian", "table", "system"):
+                places.pop(0)
+
+
+@lru_cache
+def _catalogue():
+    """Instruments by names and aliases in lower case. The tests check the units of these files."""
+    found = {}
+    for item in map(_parse, sorted(datasets.path("instruments").glob("*.toml"))):
+        for name in (item.name, *item.aliases):
+            if name.lower() in found:
+                raise ValueError(f"two instruments are called {name}: {found[name.lower()].name} and {item.name}")
+            found[name.lower()] = item
+    return found
+
+
+def _state(path):
+    """A file and what tells whether it changed."""
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        raise FileNotFoundError(f"there is no instrument file {path}") from None
+    return path, status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=32)
+def _read_again(path, *state):
+    return read_instrument(path)

@@ -1,0 +1,123 @@
+"""Instruments as text, for people to read."""
+
+from fifesim.sensor.response.spatial_response import TwoAxesResponse, by_axes
+from fifesim.sensor.response.spectral_response import half_peak
+
+
+def list_instruments(instruments):
+    """
+    Instruments in a line each.
+
+    Parameters
+    ----------
+    instruments : sequence of fifesim.sensor.description.instruments.Instrument
+
+    Returns
+    -------
+    text : str
+        Name, pixels of the gridded product, bits, number of bands and title.
+
+    Examples
+    --------
+    >>> from fifesim.sensor.description.instruments import instrument
+    >>> list_instruments([instrument("TM")]).splitlines()[1].split()
+    ['TM', '30', '8', '6', 'Landsat-5', 'Thematic', 'Mapper']
+    """
+    lines = [f"{'name':<11}{'pixels, m':>14}{'bits':>6}{'bands':>7}  instrument"]
+    for item in instruments:
+        pixels = ", ".join(f"{size:g}" for size in sorted({item.pixel(band) for band in item.bands}))
+        lines.append(f"{item.name:<11}{pixels:>14}{item.bits:>6}{len(item.bands):>7}  {item.title}")
+    return "\n".join(lines)
+
+
+def describe(instrument):
+    """
+    What an instrument is, in lines of text.
+
+    Parameters
+    ----------
+    instrument : fifesim.sensor.description.instruments.Instrument
+
+    Returns
+    -------
+    text : str
+        Sampling, spatial response, radiometry and noise of its bands, and the sources.
+
+    Examples
+    --------
+    >>> from fifesim.sensor.description.instruments import instrument
+    >>> describe(instrument("TM")).splitlines()[0]
+    'TM  Landsat-5 Thematic Mapper'
+    """
+    lines = [f"{instrument.name}  {instrument.title}"]
+    if instrument.aliases:
+        lines.append(f"  also called {', '.join(instrument.aliases)}")
+    lines += [f"  altitude {instrument.altitude / 1000:g} km, {instrument.bits} bits", *_scan(instrument)]
+    lines += _sampling(instrument)
+    lines += _radiometry(instrument)
+    lines += ["  sources", *(f"    {text}" for text in instrument.references.values())]
+    return "\n".join(lines)
+
+
+def _scan(instrument):
+    scan = instrument.scan
+    if scan is None:
+        return []
+    parts = [f"{scan.kind}, {scan.max_angle:g} degrees to either side"]
+    parts += [f"swath {scan.swath / 1000:g} km"] if scan.swath else []
+    parts += [f"{instrument.detectors} detectors a band"] if instrument.detectors else []
+    return [f"  {', '.join(parts)}"]
+
+
+def _sampling(instrument):
+    """Lines on pixels and line spread, one for each group of bands that share them."""
+    groups = {}
+    for band in instrument.bands:
+        seen = (
+            instrument.pixel(band),
+            instrument.ground_intervals(band),
+            instrument.ground_fields(band),
+            band.lsf or instrument.lsf,
+        )
+        groups.setdefault(seen, []).append(band)
+    lines = []
+    for (pixel, intervals, fields, response), bands in groups.items():
+        spreads = instrument.line_spreads(bands[0])
+        mtf = tuple(float(lsf.mtf(0.5 / step)) for lsf, step in zip(spreads, intervals, strict=True))
+        kinds = by_axes(response) if isinstance(response, TwoAxesResponse) else [response]
+        which = ", ".join(band.name for band in bands) if len(groups) > 1 else "all bands"
+        lines += [
+            f"  {which}: pixels of {pixel:g} m in the gridded product",
+            f"    own interval {_pair(intervals, '.3f')} m at nadir"
+            + (f", instantaneous field of view {_pair(fields, '.2f')} m" if fields.along else ""),
+            f"    line spread {' x '.join(part.kind for part in kinds)}, modulation transfer at the Nyquist frequency "
+            f"of the own interval {_pair(mtf, '.2f')}",
+        ]
+    return lines
+
+
+def _pair(values, form):
+    """Two values, along and across the track, or one where they are equal."""
+    along, across = values
+    return f"{along:{form}}" if along == across else f"{along:{form}} along x {across:{form}} across"
+
+
+def _radiometry(instrument):
+    lines = [
+        "  band      wavelength    at half peak      radiance of DN 0 and full scale      step   solar irradiance"
+        "    SNR at radiance",
+        "                    um              um                     W m-2 sr-1 um-1            W m-2 um-1 (G173)",
+    ]
+    for band in instrument.bands:
+        low, high = half_peak(band.response)
+        step = (band.full_scale_radiance - band.min_radiance) / (2**instrument.bits - 1)
+        noise = ""
+        if band.noise is not None:
+            noise = f"{band.noise.radiance / band.noise.equivalent_radiance:>9.0f} at {band.noise.radiance:g}"
+        gain = f"  {band.gain} gain; also {', '.join(band.gains)}" if band.gains else ""
+        lines.append(
+            f"  {band.name:<8}{band.wavelength:>12.4f}{low:>9.3f} - {high:.3f}{band.min_radiance:>18.2f}"
+            f"{band.full_scale_radiance:>16.2f}{step:>12.4f}{band.solar_irradiance:>11.1f} "
+            f"({band.spectrum_irradiance:.1f}){noise}{gain}"
+        )
+    return lines

@@ -1,0 +1,165 @@
+"""Noise, gain states and scan of an instrument, as its file gives them."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from fifesim.sensor.response.noise import NoiseModel
+from fifesim.sensor.response.spatial_response import CONFIG, Count, Number, Positive
+
+# Mean radius of the earth [m].
+EARTH_RADIUS = 6.371e6
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Noise:
+    r"""
+    Random noise of one band at a stated radiance.
+
+    .. math:: \mathrm{NEdL} = L / \mathrm{SNR}
+
+    Parameters
+    ----------
+    radiance : float
+        Radiance L that the figure holds for. [W m-2 sr-1 um-1]
+    snr : float, optional
+        Ratio of signal to noise there. [1]
+    nedl : float, optional
+        Noise equivalent radiance there, standard deviation; instead of the ratio. [W m-2 sr-1 um-1]
+    shot : float, optional
+        Share of the variance there that grows in proportion to the signal; the rest is constant. Where it is not
+        given it is not known, and all of the noise is taken as constant. [1]
+    gain_spread : float, optional
+        Standard deviation of the detectors' relative gain: fixed pattern, which stripes the image. [1]
+    offset_spread : float, optional
+        Standard deviation of the detectors' offset. [W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    pydantic.ValidationError
+        Unless one of the ratio and the noise is given.
+    """
+
+    radiance: Positive
+    snr: Positive | None = None
+    nedl: Positive | None = None
+    shot: Annotated[float, Field(strict=True, ge=0, le=1)] | None = None
+    gain_spread: Annotated[float, Field(strict=True, ge=0, lt=1)] = 0.0
+    offset_spread: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
+
+    def __post_init__(self):
+        if (self.snr is None) == (self.nedl is None):
+            raise ValueError("give either snr or nedl [W m-2 sr-1 um-1], at the radiance")
+
+    @property
+    def equivalent_radiance(self):
+        """Noise equivalent radiance at `radiance`, standard deviation [W m-2 sr-1 um-1]."""
+        return self.radiance / self.snr if self.nedl is None else self.nedl
+
+    def model(self, detectors, along):
+        """
+        The noise at every radiance.
+
+        Parameters
+        ----------
+        detectors : int
+            Number of detectors of the band.
+        along : "rows" or "columns"
+            Which pixels a detector sees.
+
+        Returns
+        -------
+        model : fifesim.sensor.response.noise.NoiseModel
+        """
+        return NoiseModel.from_snr(
+            self.radiance,
+            self.radiance / self.equivalent_radiance,
+            self.shot or 0.0,
+            detectors=detectors,
+            gain_spread=self.gain_spread,
+            offset_spread=self.offset_spread,
+            along=along,
+        )
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Gain:
+    """
+    Radiances that a gain state spreads over the digital numbers.
+
+    Parameters
+    ----------
+    full_scale_radiance, min_radiance : float
+        Radiances of the largest digital number and of digital number 0. [W m-2 sr-1 um-1]
+    """
+
+    full_scale_radiance: Number
+    min_radiance: Number
+
+    def __post_init__(self):
+        if self.full_scale_radiance <= self.min_radiance:
+            raise ValueError(
+                f"full_scale_radiance must be above min_radiance, got {self.full_scale_radiance:g} "
+                f"and {self.min_radiance:g} W m-2 sr-1 um-1"
+            )
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Scan:
+    """
+    How an instrument covers the width of its swath.
+
+    Parameters
+    ----------
+    kind : "whiskbroom" or "pushbroom"
+        A mirror that sweeps a few detectors across the track, or a row of detectors as long as the line.
+    max_angle : float
+        Largest angle from nadir, at the instrument. [degree]
+    samples : int, optional
+        Samples of a line.
+    lines : int, optional
+        Lines of a sweep, which are seen at once.
+    period : float, optional
+        Time from one sweep, or one line, to the next. [s]
+    swath : float, optional
+        Width on the ground that is published. [m]
+    """
+
+    kind: Literal["whiskbroom", "pushbroom"]
+    max_angle: Annotated[float, Field(strict=True, gt=0, lt=75)]
+    samples: Count | None = None
+    lines: Count | None = None
+    period: Positive | None = None
+    swath: Positive | None = None
+
+
+def swath_width(altitude, max_angle):
+    r"""
+    Width of the ground that a scan covers, along the sphere.
+
+    .. math:: s = 2 R \left[ \arcsin\left(\frac{R + h}{R} \sin \theta\right) - \theta \right]
+
+    Parameters
+    ----------
+    altitude : float
+        Altitude h of the instrument. [m]
+    max_angle : float
+        Largest scan angle :math:`\theta` from nadir. [degree]
+
+    Returns
+    -------
+    width : float
+        Infinite where the line of sight misses the earth. [m]
+
+    Examples
+    --------
+    A narrow swath is that of a plane:
+
+    >>> round(float(swath_width(705e3, 0.1) / (2 * 705e3 * np.tan(np.radians(0.1)))), 5)
+    1.0
+    """
+    angle = np.radians(max_angle)
+    sine = (EARTH_RADIUS + altitude) / EARTH_RADIUS * np.sin(angle)
+    return float(2 * EARTH_RADIUS * (np.arcsin(sine) - angle)) if sine < 1 else float("inf")

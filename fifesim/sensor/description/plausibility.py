@@ -1,0 +1,179 @@
+"""Is a number of an instrument file in the unit that its key has? Kilometres, degrees and nanometres are found out."""
+
+import numpy as np
+
+from fifesim.sensor.description.performance import swath_width
+from fifesim.sensor.response.spatial_response import by_axes
+from fifesim.sensor.response.spectral_response import half_peak
+
+# Angles between samples above this one are degrees, or no imager's [rad].
+_WIDEST = 0.02
+
+# A product's pixel is seldom three times smaller or larger than the interval: a ratio of these, within a factor of
+# three, is a unit that was taken for another.
+_UNITS = {
+    1000.0: ("altitude", "metres", "kilometres, so multiply by 1000"),
+    1e-3: ("interval", "radians", "milliradians, so multiply by 1e-3, unless gsd is in kilometres"),
+    1e-6: ("interval", "radians", "microradians, so multiply by 1e-6"),
+    np.pi / 180: ("interval", "radians", "degrees, so multiply by pi / 180"),
+}
+
+# The agencies' solar spectra differ from ASTM G173 by up to 6 % in a band; units differ by 10 and more.
+_SOLAR = 0.15
+
+# Radiance of the largest digital number, in those of a white surface below an overhead sun. Bands for the ocean
+# saturate early, but not all bands of an instrument do; Landsat's tables of 1986 in mW cm-2 sr-1 um-1 reach 0.06.
+_RADIANCE = (0.02, 5.0)
+_BRIGHTEST = 0.1
+
+# Share of the line spread within one interval of its centre, below which it is too wide, and narrowest support in
+# intervals. Detectors fill a third of their interval and more, and none spreads a sample over ten.
+_SHARE = 0.1
+_NARROWEST = 0.1
+
+# Response at the ends of its table, in its maximum, above which the table was cut inside the band.
+_END = 0.2
+
+# Published swaths are round numbers, and that of a plane is up to 20 % narrower than that of the sphere.
+_SWATH = 0.25
+
+# Samples times interval beside the angle of the scan: bands count their samples each, some overlap.
+_SAMPLED = 6.0
+
+
+def check_units(instrument):
+    """
+    Refuse an instrument with a number that cannot be in its key's unit, or a response that does not cover its band.
+
+    Parameters
+    ----------
+    instrument : fifesim.sensor.description.instrument_file.Instrument
+
+    Raises
+    ------
+    ValueError
+        The message names the key, the number, its unit, and what to type instead.
+    """
+    _check_sampling(instrument, instrument.interval, instrument.gsd, "")
+    for number, band in enumerate(instrument.bands, 1):
+        key = f"bands.{number}."
+        _check_sampling(instrument, band.interval or instrument.interval, instrument.pixel(band), key)
+        try:
+            _check_response(band)
+            _check_radiance(band)
+            _check_spread(instrument, band)
+        except ValueError as error:
+            raise ValueError(f"{key}{error}") from None
+    _check_brightest(instrument)
+    if instrument.scan is not None:
+        _check_scan(instrument)
+
+
+def _check_sampling(instrument, interval, gsd, key):
+    for angle in by_axes(interval):
+        if angle > _WIDEST:
+            raise ValueError(
+                f"{key}interval = {angle:g}: angles are in radians (43 urad is 43e-6); degrees times pi / 180"
+            )
+        ratio = gsd / (angle * instrument.altitude)
+        for factor, (name, unit, remedy) in _UNITS.items():
+            if abs(np.log(ratio / factor)) < np.log(2.5):
+                place = "altitude" if name == "altitude" else f"{key}interval"
+                value = instrument.altitude if name == "altitude" else angle
+                raise ValueError(
+                    f"{place} = {value:g}: it is in {unit}. Samples would lie {angle * instrument.altitude:g} m apart "
+                    f"beside pixels of {gsd:g} m; it looks like {remedy}"
+                )
+
+
+def _check_spread(instrument, band):
+    for field, step in zip(instrument.ground_fields(band), instrument.ground_intervals(band), strict=True):
+        if field is not None and not _NARROWEST < field / step < 1 / _NARROWEST:
+            raise ValueError(
+                f"ifov = {field / instrument.altitude:g}: it is in radians, and {field / step:.3g} times the interval; "
+                "degrees times pi / 180, milliradians times 1e-3, microradians times 1e-6"
+            )
+    for spread, step in zip(instrument.line_spreads(band), instrument.ground_intervals(band), strict=True):
+        within = float(spread.cumulative(step) - spread.cumulative(-step))
+        if within < _SHARE or 2 * spread.half_width < _NARROWEST * step:
+            raise ValueError(
+                f"lsf: its angles are in radians, and it is {2 * spread.half_width:g} m wide beside samples {step:g} m "
+                "apart; degrees times pi / 180, milliradians times 1e-3, microradians times 1e-6"
+            )
+
+
+def _check_response(band):
+    response = np.array(band.response.response) / max(band.response.response)
+    wavelength = band.response.wavelength
+    if max(response[0], response[-1]) > _END:
+        end = 0 if response[0] > response[-1] else -1
+        raise ValueError(
+            f"srf: the response does not cover the band: at {wavelength[end]:g} um, where its table ends, it still is "
+            f"{response[end]:.0%} of its maximum; add the wavelengths where it falls to zero"
+        )
+    if band.limits is None:
+        return
+    low, high = band.limits
+    if low > 100:
+        raise ValueError(f"limits = {list(band.limits)}: wavelengths are in um, these look like nm: divide by 1000")
+    if wavelength[0] > low or wavelength[-1] < high or not low < band.wavelength < high:
+        first, last = half_peak(band.response)
+        raise ValueError(
+            f"srf: the response does not cover the band from {low:g} to {high:g} um: it is tabulated from "
+            f"{wavelength[0]:g} to {wavelength[-1]:g} um and above its half from {first:g} to {last:g} um; name "
+            "another response or correct limits"
+        )
+
+
+def _check_radiance(band):
+    expected = band.spectrum_irradiance
+    if abs(band.solar_irradiance / expected - 1) > _SOLAR:
+        raise ValueError(
+            f"solar_irradiance = {band.solar_irradiance:g}: it is in W m-2 um-1, and the sun has {expected:.1f} over "
+            "this response; mW cm-2 um-1 times 10, W m-2 nm-1 times 1000"
+        )
+    white = expected / np.pi
+    if not _RADIANCE[0] <= band.full_scale_radiance / white <= _RADIANCE[1]:
+        raise ValueError(
+            f"full_scale_radiance = {band.full_scale_radiance:g}: it is in W m-2 sr-1 um-1, and a white surface has "
+            f"{white:.1f} in this band; mW cm-2 sr-1 um-1 times 10"
+        )
+    if band.noise is not None and not band.min_radiance < band.noise.radiance < band.full_scale_radiance:
+        raise ValueError(
+            f"noise.radiance = {band.noise.radiance:g}: it is in W m-2 sr-1 um-1 and must lie between min_radiance and "
+            f"full_scale_radiance, {band.min_radiance:g} and {band.full_scale_radiance:g}"
+        )
+
+
+def _check_brightest(instrument):
+    ratios = [band.full_scale_radiance / band.spectrum_irradiance * np.pi for band in instrument.bands]
+    if max(ratios) < _BRIGHTEST:
+        raise ValueError(
+            f"bands.full_scale_radiance: it is in W m-2 sr-1 um-1, and no band records more than {max(ratios):.0%} of "
+            "a white surface; mW cm-2 sr-1 um-1 times 10"
+        )
+
+
+def _check_scan(instrument):
+    scan = instrument.scan
+    width = swath_width(instrument.altitude, scan.max_angle)
+    if not np.isfinite(width):
+        raise ValueError(
+            f"scan.max_angle = {scan.max_angle:g}: at that angle from nadir, in degrees, the line of sight misses the "
+            f"earth from an altitude of {instrument.altitude:g} m"
+        )
+    if scan.samples is not None:
+        first = instrument.bands[0]
+        half = np.degrees(scan.samples * by_axes(first.interval or instrument.interval).across / 2)
+        if not 1 / _SAMPLED < half / scan.max_angle < _SAMPLED:
+            raise ValueError(
+                f"scan.max_angle = {scan.max_angle:g}: it is in degrees from nadir, and {scan.samples} samples of the "
+                f"first band reach {half:.3g} degrees to either side; radians times 180 / pi"
+            )
+    if scan.swath is None:
+        return
+    if abs(np.log(width / scan.swath)) > np.log(1 + _SWATH):
+        raise ValueError(
+            f"scan: max_angle = {scan.max_angle:g} degrees gives a swath of {width / 1000:.0f} km from this altitude, "
+            f"and swath = {scan.swath:g} m; the angle is from nadir, in degrees, and the swath in metres"
+        )

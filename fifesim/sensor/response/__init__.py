@@ -1,0 +1,1 @@
+"""Point spread, spectral response, noise and calibration."""

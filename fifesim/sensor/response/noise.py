@@ -1,0 +1,329 @@
+"""Noise of a detector: shot, thermal and fixed pattern, drawn by scan line from counters."""
+
+from dataclasses import dataclass
+from numbers import Integral
+
+import numpy as np
+
+# What can be switched on by name.
+KINDS = ("shot", "thermal", "fixed-pattern")
+
+# Pixels of a scan line that are drawn together; a line's place in the counter is (0, 0, tile, line).
+_TILE = 1024
+
+# Keeps the streams apart from those of a landscape with the same seed.
+_SENSOR = 2**40
+
+_MASK = 2**64 - 1
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    r"""
+    Noise of one band.
+
+    .. math:: \sigma^2(L) = \sigma_0^2 + b \, \max(L, 0)
+
+    Thermal (read) noise is the first term, shot noise the second. Fixed pattern is a spread of gain and offset among
+    the detectors, which stays from line to line.
+
+    Parameters
+    ----------
+    thermal : float
+        Standard deviation of the constant part, :math:`\sigma_0`. [W m-2 sr-1 um-1]
+    shot : float
+        Variance of the shot noise at a radiance of 1, b. [W m-2 sr-1 um-1]
+    detectors : int, optional
+        Number of detectors of the band.
+    gain_spread : float, optional
+        Standard deviation of the detectors' relative gain. [1]
+    offset_spread : float, optional
+        Standard deviation of the detectors' offset. [W m-2 sr-1 um-1]
+    along : "columns" or "rows", optional
+        Which pixels a detector sees: those of a row, as in a scanner that sweeps across the track, so that detectors
+        take turns by scan line; or those of a column, as in an array that is pushed along the track.
+
+    Raises
+    ------
+    ValueError
+        If a number is negative or there is no detector.
+    """
+
+    thermal: float
+    shot: float
+    detectors: int = 1
+    gain_spread: float = 0.0
+    offset_spread: float = 0.0
+    along: str = "rows"
+
+    def __post_init__(self):
+        for name in ("thermal", "shot", "gain_spread", "offset_spread"):
+            value = getattr(self, name)
+            if not 0 <= value < np.inf:
+                raise ValueError(f"{name} must not be negative, got {value}")
+        if self.detectors < 1:
+            raise ValueError(f"detectors must be at least 1, got {self.detectors}")
+        if self.along not in ("rows", "columns"):
+            raise ValueError(f"along must be 'rows' (scanner) or 'columns' (pushbroom), got {self.along!r}")
+
+    @classmethod
+    def from_snr(cls, radiance, snr, shot_share=None, **fixed_pattern):
+        r"""
+        The model that has published signal-to-noise ratios.
+
+        Two points decide both terms; one decides only their sum, and ``shot_share`` says how much of its variance is
+        shot noise.
+
+        .. math:: b = s \, \frac{\sigma^2(L_1)}{L_1}, \quad \sigma_0^2 = (1 - s) \, \sigma^2(L_1),
+            \qquad \sigma(L_1) = \frac{L_1}{\mathrm{SNR}_1}
+
+        Parameters
+        ----------
+        radiance, snr : float, or sequence of two
+            [W m-2 sr-1 um-1], [1]
+        shot_share : float, optional
+            In [0, 1]; needed with one point and only there. [1]
+        **fixed_pattern
+            ``detectors``, ``gain_spread``, ``offset_spread`` and ``along`` of the model.
+
+        Returns
+        -------
+        model : NoiseModel
+
+        Raises
+        ------
+        ValueError
+            If the points are not positive, the share is missing, superfluous or out of range, or two points need a
+            negative variance.
+
+        Examples
+        --------
+        >>> model = NoiseModel.from_snr([50.0, 200.0], [100.0, 250.0])
+        >>> round(float(model.snr(50.0)), 9), round(float(model.snr(200.0)), 9)
+        (100.0, 250.0)
+        """
+        radiance, snr = np.atleast_1d(radiance).astype(float), np.atleast_1d(snr).astype(float)
+        if radiance.shape != snr.shape or radiance.size not in (1, 2) or not (min(radiance) > 0 and min(snr) > 0):
+            raise ValueError(
+                f"noise needs one or two points of positive radiance and snr, got {radiance.tolist()} "
+                f"and {snr.tolist()}"
+            )
+        variance = (radiance / snr) ** 2
+        if radiance.size == 1:
+            return cls(*_split(radiance[0], variance[0], shot_share), **fixed_pattern)
+        if shot_share is not None:
+            raise ValueError("shot_share belongs to one published snr; two decide it: leave it out")
+        if radiance[0] == radiance[1]:
+            raise ValueError(f"two points of noise need two radiances, got {radiance[0]:g} twice")
+        shot = np.diff(variance)[0] / np.diff(radiance)[0]
+        thermal = variance[0] - shot * radiance[0]
+        if min(shot, thermal) < 0:
+            raise ValueError(
+                f"snr {snr.tolist()} at {radiance.tolist()} W m-2 sr-1 um-1 need a negative variance of "
+                f"{'shot' if shot < 0 else 'thermal'} noise: give one of them, with a shot_share"
+            )
+        return cls(float(np.sqrt(thermal)), float(shot), **fixed_pattern)
+
+    def noise_equivalent_radiance(self, radiance, kinds=("shot", "thermal")):
+        """
+        Standard deviation of the noise of a detector.
+
+        Parameters
+        ----------
+        radiance : array
+            [W m-2 sr-1 um-1]
+        kinds : sequence of str, optional
+            Among "shot" and "thermal"; others add nothing here.
+
+        Returns
+        -------
+        nedl : array, shape of radiance
+            [W m-2 sr-1 um-1]
+        """
+        radiance = np.asarray(radiance, float)
+        constant = self.thermal**2 if "thermal" in kinds else 0.0
+        return np.sqrt(constant + (self.shot if "shot" in kinds else 0.0) * np.maximum(radiance, 0.0))
+
+    def snr(self, radiance):
+        """
+        Signal-to-noise ratio of a detector.
+
+        Parameters
+        ----------
+        radiance : array
+            [W m-2 sr-1 um-1]
+
+        Returns
+        -------
+        snr : array, shape of radiance
+            Infinite without noise. [1]
+        """
+        with np.errstate(divide="ignore"):
+            return np.asarray(radiance, float) / self.noise_equivalent_radiance(radiance)
+
+
+def _split(radiance, variance, shot_share):
+    """Thermal standard deviation and shot variance at a radiance of 1."""
+    if shot_share is None:
+        raise ValueError(
+            "one published snr does not say how much of the noise is shot noise: give shot_share in [0, 1], 0 for "
+            "noise that is the same at any radiance"
+        )
+    if not 0 <= shot_share <= 1:
+        raise ValueError(f"shot_share must be in [0, 1], got {shot_share}: it is a share of the variance")
+    return float(np.sqrt((1 - shot_share) * variance)), float(shot_share * variance / radiance)
+
+
+def check_kinds(kinds):
+    """
+    Kinds of noise by name.
+
+    Parameters
+    ----------
+    kinds : str or sequence of str
+        Among `KINDS`.
+
+    Returns
+    -------
+    kinds : tuple of str
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown.
+    """
+    kinds = (kinds,) if isinstance(kinds, str) else tuple(kinds)
+    unknown = [str(kind) for kind in kinds if kind not in KINDS]
+    if unknown:
+        raise ValueError(f"unknown noise {', '.join(unknown)}: there are {', '.join(KINDS)}")
+    return kinds
+
+
+def check_seed(seed):
+    """
+    Refuse a seed that is not a whole number from 0 to 2**64 - 1.
+
+    Parameters
+    ----------
+    seed : int
+
+    Raises
+    ------
+    ValueError
+        If it is out of range or not whole.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, Integral) or not 0 <= seed < 2**64:
+        raise ValueError(f"the seed of noise must be a whole number from 0 to 2**64 - 1, got {seed!r}")
+
+
+def fixed_pattern(model, seed, band):
+    """
+    Gain and offset of each detector.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    seed : int
+    band : int
+        Number of the band in its instrument.
+
+    Returns
+    -------
+    gain : array, shape (detectors,)
+        [1]
+    offset : array, shape (detectors,)
+        [W m-2 sr-1 um-1]
+    """
+    # Apart from the lines: there, the second word of the counter is 0.
+    drawn = _normals(seed, band, (0, 1, 0, 0), (2, model.detectors))
+    return 1 + model.gain_spread * drawn[0], model.offset_spread * drawn[1]
+
+
+def line_noise(seed, band, line, column, size):
+    """
+    Standard normal deviates of a piece of a scan line.
+
+    Parameters
+    ----------
+    seed : int
+    band : int
+        Number of the band in its instrument.
+    line, column : int
+        Place of the first pixel, counted as `fifesim.rasters.grid.lattice_position` does; may be negative.
+    size : int
+        Number of pixels.
+
+    Returns
+    -------
+    deviates : array, shape (size,)
+        The same pixels hold the same numbers whatever the piece. [1]
+
+    Examples
+    --------
+    >>> whole = line_noise(7, 2, -5, 1000, 60)
+    >>> bool((line_noise(7, 2, -5, 1030, 20) == whole[30:50]).all())
+    True
+    """
+    first, last = column // _TILE, (column + size - 1) // _TILE
+    tiles = [_normals(seed, band, (0, 0, tile, line), _TILE) for tile in range(first, last + 1)]
+    start = column - first * _TILE
+    return np.concatenate(tiles)[start : start + size]
+
+
+def add_noise(radiance, model, kinds, *, seed, band, row=0, column=0):
+    r"""
+    Radiance as a noisy detector reads it.
+
+    .. math:: L' = g_d \, (L + \sigma(L) \, z) + o_d
+
+    with z a standard normal deviate, and gain g and offset o of the pixel's detector d.
+
+    Parameters
+    ----------
+    radiance : array, shape (y, x)
+        [W m-2 sr-1 um-1]
+    model : NoiseModel
+    kinds : sequence of str
+        Among `KINDS`.
+    seed : int
+    band : int
+        Number of the band in its instrument.
+    row, column : int, optional
+        Place of the first pixel in the lattice of pixels, which decides noise and detectors.
+
+    Returns
+    -------
+    radiance : array, shape (y, x)
+        NaN where it was. [W m-2 sr-1 um-1]
+
+    References
+    ----------
+    [Schowengerdt2007]_, section 3.2
+
+    Examples
+    --------
+    >>> model = NoiseModel(thermal=0.5, shot=0.0)
+    >>> noisy = add_noise(np.full((50, 50), 80.0), model, ["thermal"], seed=1, band=0)
+    >>> bool(abs(noisy.std() - 0.5) < 0.03)
+    True
+    """
+    radiance = np.asarray(radiance, float)
+    out = radiance.copy()
+    rows, columns = radiance.shape
+    if "shot" in kinds or "thermal" in kinds:
+        sigma = model.noise_equivalent_radiance(radiance, kinds)
+        for i in range(rows):
+            out[i] += sigma[i] * line_noise(seed, band, row + i, column, columns)
+    if "fixed-pattern" in kinds:
+        gain, offset = fixed_pattern(model, seed, band)
+        first, size, shape = (row, rows, (-1, 1)) if model.along == "rows" else (column, columns, (1, -1))
+        detector = (first + np.arange(size)) % model.detectors
+        out = gain[detector].reshape(shape) * out + offset[detector].reshape(shape)
+    return out
+
+
+def _normals(seed, band, counter, size):
+    # A list of numbers from 2**63 up would go through floating point, and neighbours be the same.
+    counter = np.array([value & _MASK for value in counter], np.uint64)
+    key = np.array([seed, _SENSOR + band], np.uint64)
+    return np.random.Generator(np.random.Philox(counter=counter, key=key)).standard_normal(size)

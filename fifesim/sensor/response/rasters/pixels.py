@@ -1,0 +1,251 @@
+"""Pixels of an instrument over a labelled scene: which bands, where they lie, and the means over their footprints."""
+
+import dataclasses
+from functools import partial
+
+import numpy as np
+import xarray as xr
+
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.rasters import chunks
+from fifesim.rasters import grid as grids
+
+
+def matching_bands(array, instrument):
+    """
+    Bands of an instrument that those of a raster stand for.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+        With a coordinate ``band`` of the instrument's names, or ``wavelength`` [um].
+    instrument : fifesim.sensor.description.instruments.Instrument
+
+    Returns
+    -------
+    bands : tuple of fifesim.sensor.description.instruments.InstrumentBand
+
+    Raises
+    ------
+    ValueError
+        If a band matches none of the instrument's.
+    """
+    known = {band.name.lower() for band in instrument.bands}
+    names = [str(name) for name in np.atleast_1d(array["band"].values)] if "band" in array.coords else []
+    if names and {name.lower() for name in names} <= known:
+        return instrument.select(names)
+    if "wavelength" in array.coords:
+        wavelengths = np.atleast_1d(array["wavelength"].values).astype(float)
+        return instrument.select([_band_at(value, instrument).name for value in wavelengths])
+    if names:
+        return instrument.select(names)
+    raise ValueError(
+        f"the raster's bands have neither names of {instrument.name} ({', '.join(b.name for b in instrument.bands)}) "
+        "nor a wavelength: assign a coordinate 'band' or 'wavelength' [um] along band"
+    )
+
+
+def _band_at(wavelength, instrument):
+    """The band whose centre is nearest to a wavelength, among those that respond there with half of their peak."""
+    responses = [
+        np.interp(wavelength, band.response.wavelength, band.response.response, left=0.0, right=0.0)
+        / max(band.response.response)
+        for band in instrument.bands
+    ]
+    # A panchromatic band may respond more than the narrow band that is meant.
+    found = [band for band, response in zip(instrument.bands, responses, strict=True) if response >= 0.5]
+    if not found:
+        centres = ", ".join(f"{band.name} at {band.wavelength:.3f}" for band in instrument.bands)
+        raise ValueError(f"no band of {instrument.name} responds at {wavelength:g} um: it has {centres} um")
+    return min(found, key=lambda band: abs(band.wavelength - wavelength))
+
+
+def pixel_grid(scene, instrument, bands, onto=None, interval=None):
+    """
+    Grid of pixels that an image lies on.
+
+    Parameters
+    ----------
+    scene : odc.geo.geobox.GeoBox
+    instrument : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    onto, interval : optional
+        As in `fifesim.sensor.raster.sense`.
+
+    Returns
+    -------
+    pixels : odc.geo.geobox.GeoBox
+
+    Raises
+    ------
+    ValueError
+        If bands lie on different grids, both ``onto`` and ``interval`` are given, or the CRS differs.
+    """
+    if onto is not None:
+        if interval is not None:
+            raise ValueError("onto and interval both say where pixels lie: give one of them")
+        pixels = grids.check_grid(onto)
+        if pixels.crs != scene.crs:
+            raise ValueError(f"onto must be in the CRS of the scene, {scene.crs}, got {pixels.crs}")
+        return pixels
+    if interval is None:
+        return grids.aligned(scene, common_size(instrument, bands, lambda band: (instrument.pixel(band),) * 2))
+    if isinstance(interval, str):
+        if interval != "native":
+            raise ValueError(f"interval must be 'native', or metres between pixels, got {interval!r}")
+        return grids.aligned(scene, common_size(instrument, bands, instrument.ground_intervals))
+    if np.shape(interval) not in ((), (2,)) or not np.all(np.isfinite(interval)) or np.min(interval) <= 0:
+        raise ValueError(
+            f"interval must be 'native', or positive metres between pixels, down and across, got {interval}"
+        )
+    return grids.aligned(scene, interval)
+
+
+def common_size(instrument, bands, size):
+    """
+    Size that bands share, such as that of their pixels.
+
+    Parameters
+    ----------
+    instrument : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    size : callable
+        ``size(band)`` gives metres along and across the track.
+
+    Returns
+    -------
+    along, across : float
+        [m]
+
+    Raises
+    ------
+    ValueError
+        If the bands differ.
+    """
+    names = {}
+    for band in bands:
+        names.setdefault(tuple(size(band)), []).append(band.name)
+    if len(names) > 1:
+        groups = "; ".join(f"{along:g} x {across:g} m: {', '.join(each)}" for (along, across), each in names.items())
+        raise ValueError(
+            f"bands of {instrument.name} lie on different grids ({groups}): sense each group by itself, or bring all "
+            "onto one grid with onto= or interval="
+        )
+    return next(iter(names))
+
+
+def regularized(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_valid):
+    """
+    Means over the footprints of pixels, each band with its own line spread functions.
+
+    Parameters
+    ----------
+    array : xarray.DataArray, dims (band, y, x)
+    instrument : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+        One for each of the array.
+    pixels : odc.geo.geobox.GeoBox
+    offset : (float or array, float or array), optional
+        As in `fifesim.sensor.raster.sense`. [pixel]
+    min_valid : float
+        [1]
+
+    Returns
+    -------
+    means : xarray.DataArray, dims (band, y, x)
+
+    Raises
+    ------
+    ValueError
+        If an offset has another length than its axis, or a line spread is wider than the scene.
+
+    See Also
+    --------
+    fifesim.base.footprints.regularize
+    """
+    scene = grids.geobox(array)
+    if not hasattr(offset, "__len__") or len(offset) != 2:
+        raise ValueError(f"offset must be two, of rows and of columns in pixels, such as (0.5, 0.0), got {offset!r}")
+    axes = zip(offset, pixels.shape, grids.cell_size(pixels), ("rows", "columns"), strict=True)
+    shifts = [_shift(*axis) for axis in axes]
+    groups = {}
+    for number, band in enumerate(bands):
+        groups.setdefault(instrument.line_spreads(band), []).append(number)
+    kernel = partial(regularize, min_valid=min_valid)
+    parts = []
+    for spreads, numbers in groups.items():
+        _check_scene(spreads, scene, min_valid, f"{instrument.name} {', '.join(bands[n].name for n in numbers)}")
+        rows, columns = _operators(spreads, scene, pixels, shifts)
+        part = array if len(groups) == 1 else array.isel(band=numbers)
+        parts.append(chunks.resample(kernel, rows, columns, part, pixels))
+    if len(parts) == 1:
+        return parts[0]
+    order = np.argsort(np.concatenate(list(groups.values())))
+    joined = xr.concat(parts, dim="band", combine_attrs="override", coords="minimal", compat="override", join="exact")
+    return grids.place(joined.isel(band=order), pixels)
+
+
+def directions_on(pixels, geometry):
+    """
+    Directions of sun and sensor at the pixels, where they vary over the cells.
+
+    Parameters
+    ----------
+    pixels : odc.geo.geobox.GeoBox
+    geometry : fifesim.base.geometry.Geometry
+
+    Returns
+    -------
+    geometry : fifesim.base.geometry.Geometry
+        Means of the zenith angles, and the azimuths of mean vectors, over each pixel.
+    """
+
+    def mean(array):
+        scene = grids.geobox(array)
+        rows, columns = _operators([Boxcar(size) for size in grids.cell_size(pixels)], scene, pixels, (0.0, 0.0))
+        return chunks.resample(partial(regularize, min_valid=0.01), rows, columns, array, pixels)
+
+    def azimuth(array):
+        radians = np.radians(array)
+        return np.degrees(np.arctan2(mean(np.sin(radians)), mean(np.cos(radians)))) % 360
+
+    averaged = {"sza": mean, "vza": mean, "saa": azimuth, "vaa": azimuth}
+    return dataclasses.replace(geometry, **{name: averaged[name](getattr(geometry, name)) for name in geometry.rasters})
+
+
+def _operators(spreads, scene, pixels, shifts):
+    axes = (
+        (scene.affine.f, scene.affine.e, scene.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y),
+        (scene.affine.c, scene.affine.a, scene.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x),
+    )
+    names = ("cell_origin", "cell_size", "n_cells", "pixel_origin", "pixel_size", "n_pixels")
+    return [
+        axis_operator(spread, **dict(zip(names, axis, strict=True)), shift=shift)
+        for spread, axis, shift in zip(spreads, axes, shifts, strict=True)
+    ]
+
+
+def _shift(offset, size, pixel, axis):
+    """Metres of an offset in pixels, a number or one for each of an axis."""
+    offset = np.asarray(offset, float)
+    if offset.ndim > 1 or (offset.ndim and offset.size != size) or not np.all(np.isfinite(offset)):
+        raise ValueError(
+            f"the offset of {axis} must be a finite number of pixels, or {size} of them, one for each of the image's "
+            f"{axis}, got shape {offset.shape}"
+        )
+    return offset * pixel
+
+
+def _check_scene(spreads, scene, min_valid, name):
+    """Refuse a point spread of which no pixel can hold enough."""
+    shares, sizes = [], []
+    for spread, cells, cell in zip(spreads, scene.shape, grids.cell_size(scene), strict=True):
+        reach = cells * cell / 2
+        shares.append(float(spread.cumulative(reach) - spread.cumulative(-reach)))
+        sizes.append(f"{2 * spread.half_width:.1f}")
+    if np.prod(shares) < min(min_valid, 1.0) - 1e-9:
+        height, width = (n * cell for n, cell in zip(scene.shape, grids.cell_size(scene), strict=True))
+        raise ValueError(
+            f"the point spread of {name}, {' x '.join(sizes)} m, is wider than the scene of {height:g} x {width:g} m, "
+            f"which holds {np.prod(shares):.0%} of it: simulate a larger scene, or accept it with min_valid="
+        )

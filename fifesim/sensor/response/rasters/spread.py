@@ -1,0 +1,118 @@
+"""Point spread and modulation transfer of an instrument, to plot."""
+
+import numpy as np
+import xarray as xr
+
+from fifesim.sensor.description.instruments import instrument as find_instrument
+
+# Samples of a point spread over the full width of its support, when no spacing is given.
+_SAMPLES = 121
+
+
+def psf(instrument="TM", band=None, *, spacing=None):
+    r"""
+    Point spread function of an instrument on the ground at nadir.
+
+    .. math:: p(x, y) = w_{along}(y) \, w_{across}(x)
+
+    Parameters
+    ----------
+    instrument : str or fifesim.sensor.description.instruments.Instrument, optional
+    band : str, optional
+        Name of a band; the first by default.
+    spacing : float, optional
+        Between samples; by default the response is 121 samples wide. [m]
+
+    Returns
+    -------
+    psf : xarray.DataArray, dims (y, x)
+        Mean of the response over each sample, so that the sum times the squared spacing is 1. ``x`` and ``y`` count
+        from the pixel's centre, across and along the track. [m-2]
+
+    Raises
+    ------
+    ValueError
+        If there is no such instrument or band, or the spacing is not positive.
+
+    See Also
+    --------
+    fifesim.sensor.response.spatial, fifesim.sensor.response.transfer
+    """
+    description, band = _find(instrument, band)
+    spreads = description.line_spreads(band)
+    if spacing is None:
+        spacing = 2 * max(spread.half_width for spread in spreads) / _SAMPLES
+    if not 0 < spacing < np.inf:
+        raise ValueError(f"spacing must be a positive number of metres, got {spacing}")
+    axes = [_line(spread, spacing) for spread in spreads]
+    (along, rows), (across, columns) = axes
+    return xr.DataArray(
+        np.outer(rows, columns),
+        dims=("y", "x"),
+        coords={
+            "y": ("y", along, {"long_name": "distance along the track, from the pixel's centre", "units": "m"}),
+            "x": ("x", across, {"long_name": "distance across the track, from the pixel's centre", "units": "m"}),
+            "band": band.name,
+        },
+        name="psf",
+        attrs={"long_name": "point spread function", "units": "m-2", "instrument": description.name},
+    )
+
+
+def mtf(instrument="TM", band=None, *, frequency=None):
+    """
+    Modulation transfer function of an instrument on the ground at nadir.
+
+    Parameters
+    ----------
+    instrument : str or fifesim.sensor.description.instruments.Instrument, optional
+    band : str, optional
+        Name of a band; the first by default.
+    frequency : array, optional
+        Spatial frequencies; by default from 0 to that of the instrument's samples, twice the Nyquist frequency.
+        [cycles m-1]
+
+    Returns
+    -------
+    mtf : xarray.DataArray, dims (direction, frequency)
+        ``direction`` is "along" or "across" the track. Negative where bright and dark change places. ``nyquist`` is a
+        coordinate along direction. [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no such instrument or band.
+
+    See Also
+    --------
+    fifesim.sensor.response.spatial, fifesim.sensor.response.transfer
+    """
+    description, band = _find(instrument, band)
+    nyquist = np.array([0.5 / interval for interval in description.ground_intervals(band)])
+    frequency = np.linspace(0, 2 * nyquist.max(), 201) if frequency is None else np.atleast_1d(frequency).astype(float)
+    units = {"units": "cycles m-1"}
+    return xr.DataArray(
+        np.stack([spread.mtf(frequency) for spread in description.line_spreads(band)]),
+        dims=("direction", "frequency"),
+        coords={
+            "direction": ["along", "across"],
+            "frequency": ("frequency", frequency, {"long_name": "spatial frequency"} | units),
+            "nyquist": ("direction", nyquist, {"long_name": "Nyquist frequency of the own interval"} | units),
+            "band": band.name,
+        },
+        name="mtf",
+        attrs={"long_name": "modulation transfer function", "units": "1", "instrument": description.name},
+    )
+
+
+def _find(instrument, band):
+    description = find_instrument(instrument)
+    return description, description.bands[0] if band is None else description.select(band)[0]
+
+
+def _line(spread, spacing):
+    """Centres of samples around a line spread's own, and its mean over each [m-1]."""
+    half = int(np.ceil(spread.half_width / spacing - 0.5))
+    centers = np.arange(-half, half + 1) * spacing
+    edges = np.append(centers - spacing / 2, centers[-1] + spacing / 2)
+    return centers, np.diff(spread.cumulative(edges)) / spacing

@@ -1,0 +1,59 @@
+"""How noisy an instrument is at a radiance, by its description."""
+
+from fifesim.sensor.description.instruments import instrument as find_instrument
+
+
+def noise_equivalent_radiance(instrument, band, radiance):
+    """
+    Standard deviation of an instrument's shot and thermal noise at a radiance.
+
+    Parameters
+    ----------
+    instrument : str or fifesim.sensor.description.instruments.Instrument
+    band : str
+        Name of a band.
+    radiance : array
+        [W m-2 sr-1 um-1]
+
+    Returns
+    -------
+    nedl : array, shape of radiance
+        Without fixed pattern and quantisation. [W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    ValueError
+        If there is no such instrument or band, or its description has no noise.
+    """
+    return _noise_of(instrument, band).noise_equivalent_radiance(radiance)
+
+
+def snr(instrument, band, radiance):
+    """
+    Signal-to-noise ratio of an instrument at a radiance, with shot and thermal noise.
+
+    Parameters
+    ----------
+    instrument : str or fifesim.sensor.description.instruments.Instrument
+    band : str
+        Name of a band.
+    radiance : array
+        [W m-2 sr-1 um-1]
+
+    Returns
+    -------
+    snr : array, shape of radiance
+        Without fixed pattern and quantisation. [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no such instrument or band, or its description has no noise.
+    """
+    return _noise_of(instrument, band).snr(radiance)
+
+
+def _noise_of(instrument, band):
+    description = find_instrument(instrument)
+    (found,) = description.select([band])
+    return description.noise_model(found)

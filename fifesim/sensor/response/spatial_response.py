@@ -1,0 +1,368 @@
+"""
+Spatial responses as instrument files give them: angles, which an altitude turns into metres on the ground.
+
+`fifesim.sensor.response.spatial` has their formulas.
+"""
+
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from pydantic import ConfigDict, Discriminator, Field, Tag
+from pydantic.dataclasses import dataclass
+
+from fifesim.base.footprints import Boxcar
+from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread, TableSpread
+from fifesim.sensor.response.transfer import Diffraction, LowPass, SystemSpread
+
+CONFIG = ConfigDict(extra="forbid")
+
+# Strict: TOML has types, and text where a number belongs is a mistake.
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+Count = Annotated[int, Field(strict=True, gt=0)]
+Share = Annotated[float, Field(strict=True, gt=0, lt=1, allow_inf_nan=False)]
+
+
+class AlongAcross(NamedTuple):
+    """
+    Two values in the order of a raster's axes: along the track, by rows, and across it, by columns.
+
+    Parameters
+    ----------
+    along, across : float or line spread function
+    """
+
+    along: object
+    across: object
+
+
+class View(NamedTuple):
+    """
+    How one band sees the ground at nadir, along one axis.
+
+    Parameters
+    ----------
+    altitude : float
+        [m]
+    ifov : float or None
+        Instantaneous field of view. [rad]
+    interval : float
+        Angle between samples. [rad]
+    band : object
+        With the response-weighted mean ``wavelength``, which is only asked for where the response needs it. [um]
+    """
+
+    altitude: float
+    ifov: float | None
+    interval: float
+    band: object
+
+    def width(self, response):
+        """
+        Instantaneous field of view on the ground.
+
+        Parameters
+        ----------
+        response : str
+            Kind of the response that needs it, for the message.
+
+        Returns
+        -------
+        width : float
+            [m]
+
+        Raises
+        ------
+        ValueError
+            If the instrument has none.
+        """
+        if self.ifov is None:
+            raise ValueError(f"lsf: kind {response!r} needs the instantaneous field of view: add ifov, in radians")
+        return self.ifov * self.altitude
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Angles:
+    """
+    An angle that differs between the axes.
+
+    Parameters
+    ----------
+    along, across : float
+        Along and across the track. [rad]
+    """
+
+    along: Positive
+    across: Positive
+
+
+@dataclass(frozen=True, config=CONFIG)
+class CosineResponse:
+    """
+    A cosine truncated at half amplitude, sampled at angles, as tables of sensors give it.
+
+    Parameters
+    ----------
+    kind : "cosine"
+    step : float
+        Angle between samples of the response. [rad]
+    count : int
+        Number of samples.
+    """
+
+    kind: Literal["cosine"]
+    step: Positive
+    count: Count
+
+    def spread(self, view):
+        """
+        Line spread function on the ground.
+
+        Parameters
+        ----------
+        view : View
+
+        Returns
+        -------
+        lsf : fifesim.sensor.response.spatial.CosineSpread
+        """
+        return CosineSpread(self.count * self.step * view.altitude)
+
+
+@dataclass(frozen=True, config=CONFIG)
+class BoxcarResponse:
+    """
+    The detector alone: uniform over an angle.
+
+    Parameters
+    ----------
+    kind : "boxcar"
+    width : float, optional
+        By default the instantaneous field of view. [rad]
+    """
+
+    kind: Literal["boxcar"]
+    width: Positive | None = None
+
+    def spread(self, view):
+        """
+        Line spread function on the ground.
+
+        Parameters
+        ----------
+        view : View
+
+        Returns
+        -------
+        lsf : fifesim.base.footprints.Boxcar
+        """
+        return Boxcar(view.width("boxcar") if self.width is None else self.width * view.altitude)
+
+
+@dataclass(frozen=True, config=CONFIG)
+class GaussianResponse:
+    r"""
+    A Gaussian, by one of three measures.
+
+    .. math:: M\left(\frac{1}{2 E}\right) = \frac{1}{2} \quad\Rightarrow\quad W = \frac{4 \ln 2}{\pi} E
+
+    relates the effective instantaneous field of view E to the full width W at half of the maximum.
+
+    Parameters
+    ----------
+    kind : "gaussian"
+    fwhm : float, optional
+        Full width at half of the maximum. [rad]
+    mtf_at_nyquist : float, optional
+        Modulation transfer at the Nyquist frequency of the sampling interval. [1]
+    eifov : float, optional
+        Effective instantaneous field of view: half of the period that is passed by half. [rad]
+
+    Raises
+    ------
+    pydantic.ValidationError
+        Unless exactly one of the three is given.
+    """
+
+    kind: Literal["gaussian"]
+    fwhm: Positive | None = None
+    mtf_at_nyquist: Share | None = None
+    eifov: Positive | None = None
+
+    def __post_init__(self):
+        given = [name for name in ("fwhm", "mtf_at_nyquist", "eifov") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of fwhm, mtf_at_nyquist and eifov, got {' and '.join(given) or 'none'}")
+
+    def spread(self, view):
+        """
+        Line spread function on the ground.
+
+        Parameters
+        ----------
+        view : View
+
+        Returns
+        -------
+        lsf : fifesim.sensor.response.spatial.GaussianSpread
+        """
+        if self.mtf_at_nyquist is not None:
+            return GaussianSpread.from_mtf(self.mtf_at_nyquist, view.interval * view.altitude)
+        fwhm = self.fwhm if self.eifov is None else 4 * np.log(2) / np.pi * self.eifov
+        return GaussianSpread(float(fwhm * view.altitude))
+
+
+@dataclass(frozen=True, config=CONFIG)
+class TableResponse:
+    """
+    A measured response, linear between angles and zero beyond them.
+
+    Parameters
+    ----------
+    kind : "table"
+    angles : tuple of float
+        From the pixel's nominal centre, increasing. [rad]
+    values : tuple of float
+        Response, in any unit. [1]
+    """
+
+    kind: Literal["table"]
+    angles: Annotated[tuple[Number, ...], Field(min_length=2)]
+    values: Annotated[tuple[Number, ...], Field(min_length=2)]
+
+    def __post_init__(self):
+        # Raises what is wrong with the table before anything is simulated.
+        TableSpread(self.angles, self.values)
+
+    def spread(self, view):
+        """
+        Line spread function on the ground.
+
+        Parameters
+        ----------
+        view : View
+
+        Returns
+        -------
+        lsf : fifesim.sensor.response.spatial.TableSpread
+        """
+        return TableSpread(tuple(angle * view.altitude for angle in self.angles), self.values)
+
+
+@dataclass(frozen=True, config=CONFIG)
+class SystemResponse:
+    """
+    Product of the modulation transfers of an instrument's parts, in units of its own field of view and interval.
+
+    Parameters
+    ----------
+    kind : "system"
+    detector : float, optional
+        Width of the detector, in instantaneous fields of view. [1]
+    smear : float, optional
+        Way of the detector over the ground while it integrates, in sampling intervals. [1]
+    blur : float, optional
+        Full width at half of the maximum of the optics, a Gaussian, in instantaneous fields of view. [1]
+    aperture : float, optional
+        Diameter of optics limited by diffraction. [m]
+    electronics : float, optional
+        Frequency at which the filter of the electronics halves the power. [cycles per sampling interval]
+    poles : int, optional
+        Of that filter.
+    truncation : float, optional
+        Largest share of the response that may be cut off. [1]
+    """
+
+    kind: Literal["system"]
+    detector: Positive = 1.0
+    smear: Positive | None = None
+    blur: Positive | None = None
+    aperture: Positive | None = None
+    electronics: Positive | None = None
+    poles: Count = 1
+    truncation: Share = 1e-3
+
+    def spread(self, view):
+        """
+        Line spread function on the ground.
+
+        Parameters
+        ----------
+        view : View
+
+        Returns
+        -------
+        lsf : fifesim.sensor.response.transfer.SystemSpread
+        """
+        width, interval = view.width("system"), view.interval * view.altitude
+        parts = [Boxcar(self.detector * width)]
+        if self.smear is not None:
+            parts.append(Boxcar(self.smear * interval))
+        if self.blur is not None:
+            parts.append(GaussianSpread(self.blur * width))
+        if self.aperture is not None:
+            parts.append(Diffraction(self.aperture / (1e-6 * view.band.wavelength * view.altitude)))
+        if self.electronics is not None:
+            parts.append(LowPass(self.electronics / interval, self.poles))
+        return SystemSpread(tuple(parts), self.truncation)
+
+
+AxisResponse = Annotated[
+    CosineResponse | BoxcarResponse | GaussianResponse | TableResponse | SystemResponse, Field(discriminator="kind")
+]
+
+
+@dataclass(frozen=True, config=CONFIG)
+class TwoAxesResponse:
+    """
+    Spatial response that differs between the axes.
+
+    Parameters
+    ----------
+    along, across : response of one axis
+        Along and across the track.
+    """
+
+    along: AxisResponse
+    across: AxisResponse
+
+
+def _angle_form(value):
+    return "axes" if isinstance(value, dict | Angles) else "number"
+
+
+def _response_form(value):
+    keys = value if isinstance(value, dict) else vars(value) if hasattr(value, "__dict__") else ()
+    return "axes" if {"along", "across"} & set(keys) else "both"
+
+
+# One value for both axes, or one for each.
+Angle = Annotated[Annotated[Positive, Tag("number")] | Annotated[Angles, Tag("axes")], Discriminator(_angle_form)]
+SpatialResponse = Annotated[
+    Annotated[AxisResponse, Tag("both")] | Annotated[TwoAxesResponse, Tag("axes")], Discriminator(_response_form)
+]
+
+
+def by_axes(value):
+    """
+    A value of both axes, where it may be given for each.
+
+    Parameters
+    ----------
+    value : Angles, TwoAxesResponse or one value
+        None stays None for both.
+
+    Returns
+    -------
+    values : AlongAcross
+
+    Examples
+    --------
+    >>> by_axes(Angles(along=1.3e-3, across=0.95e-3)).across
+    0.00095
+    >>> by_axes(42.5e-6).along
+    4.25e-05
+    """
+    if isinstance(value, Angles | TwoAxesResponse):
+        return AlongAcross(value.along, value.across)
+    return AlongAcross(value, value)

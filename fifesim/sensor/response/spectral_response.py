@@ -1,0 +1,215 @@
+"""Spectral responses as instrument files name them: in pyrsr, in a table beside the file, or written out."""
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+from pydantic import Discriminator, Field, Tag
+from pydantic.dataclasses import dataclass
+from pyrsr.rsr import RSR_reader
+
+from fifesim.base import datasets
+from fifesim.base.bands import Band
+from fifesim.sensor.response.spatial_response import CONFIG, Number
+
+Name = Annotated[str, Field(strict=True, min_length=1)]
+
+# No band of these instruments reaches 100 um, and none begins below 100 nm.
+_LONGEST = 100.0
+
+
+@dataclass(frozen=True, config=CONFIG)
+class PyrsrResponse:
+    """
+    Relative spectral response among those that pyrsr distributes.
+
+    Parameters
+    ----------
+    satellite, sensor, band : str
+        Names in pyrsr, such as ``"Landsat-5"``, ``"TM"``, ``"3"``.
+    """
+
+    satellite: Name
+    sensor: Name
+    band: Name
+
+    def read(self, name):
+        """
+        The response.
+
+        Parameters
+        ----------
+        name : str
+            Of the band that it is made for.
+
+        Returns
+        -------
+        response : fifesim.base.bands.Band
+
+        Raises
+        ------
+        ValueError
+            If pyrsr has no such response.
+        """
+        return _read_pyrsr(name, self)
+
+
+@dataclass(frozen=True, config=CONFIG)
+class ResponseTable:
+    """
+    Relative spectral response in a CSV table with columns satellite, band, wavelength [um] and response.
+
+    Parameters
+    ----------
+    table : str
+        File in the instrument file's folder or in the data folder, such as ``"avhrr_response.csv"``.
+    satellite, band : str
+        Which rows.
+    folder : str, optional
+        Folder of the instrument file; the reader of the file fills it in.
+    """
+
+    table: Name
+    satellite: Name
+    band: Name
+    folder: str = ""
+
+    def read(self, name):
+        """
+        The response.
+
+        Parameters
+        ----------
+        name : str
+            Of the band that it is made for.
+
+        Returns
+        -------
+        response : fifesim.base.bands.Band
+
+        Raises
+        ------
+        ValueError
+            If there is no such table, or it has no such rows.
+        """
+        return _read_table(name, self)
+
+
+@dataclass(frozen=True, config=CONFIG)
+class ResponseList:
+    """
+    Relative spectral response written out in the file.
+
+    Parameters
+    ----------
+    wavelength : tuple of float
+        Increasing. [um]
+    response : tuple of float
+        [1]
+    """
+
+    wavelength: Annotated[tuple[Number, ...], Field(min_length=2)]
+    response: Annotated[tuple[Number, ...], Field(min_length=2)]
+
+    def read(self, name):
+        """
+        The response.
+
+        Parameters
+        ----------
+        name : str
+            Of the band that it is made for.
+
+        Returns
+        -------
+        response : fifesim.base.bands.Band
+
+        Raises
+        ------
+        ValueError
+            If the wavelengths are not in um, do not increase, or a response is negative.
+        """
+        if max(self.wavelength) > _LONGEST:
+            raise ValueError(
+                f"srf.wavelength = {max(self.wavelength):g}: wavelengths are in um, these look like nm: divide by 1000"
+            )
+        return Band(name, self.wavelength, self.response)
+
+
+def _kind(value):
+    keys = set(value) if isinstance(value, dict) else set(vars(value))
+    return "table" if "table" in keys else "listed" if keys & {"wavelength", "response"} else "pyrsr"
+
+
+SpectralResponse = Annotated[
+    Annotated[PyrsrResponse, Tag("pyrsr")]
+    | Annotated[ResponseTable, Tag("table")]
+    | Annotated[ResponseList, Tag("listed")],
+    Discriminator(_kind),
+]
+
+
+def half_peak(response):
+    """
+    Limits of a band: first and last tabulated wavelengths at which the response is at least half of its maximum.
+
+    Parameters
+    ----------
+    response : fifesim.base.bands.Band
+
+    Returns
+    -------
+    low, high : float
+        [um]
+
+    Examples
+    --------
+    >>> half_peak(Band("a", (0.5, 0.6, 0.7, 0.8), (0.0, 0.6, 1.0, 0.2)))
+    (0.6, 0.7)
+    """
+    half = max(response.response) / 2
+    above = [w for w, r in zip(response.wavelength, response.response, strict=True) if r >= half]
+    return above[0], above[-1]
+
+
+@lru_cache(maxsize=512)
+def _read_pyrsr(name, response):
+    try:
+        table = RSR_reader(response.satellite, response.sensor, LayerBandsAssignment=[response.band])[response.band]
+    except (KeyError, FileNotFoundError, ValueError, NotADirectoryError):
+        raise ValueError(
+            f"srf: pyrsr has no response of {response.satellite} {response.sensor} {response.band}: write it out as "
+            "srf = { wavelength = [...], response = [...] } or name a table"
+        ) from None
+    # pyrsr holds some sensors in nanometres and others in micrometres.
+    wavelength = table[:, 0] / 1000 if table[-1, 0] > _LONGEST else table[:, 0]
+    # Measured responses scatter around zero outside of the band.
+    return Band(name, wavelength, np.maximum(table[:, 1], 0))
+
+
+@lru_cache(maxsize=512)
+def _read_table(name, response):
+    beside = Path(response.folder) / response.table
+    path = beside if response.folder and beside.is_file() else _in_data(response.table)
+    table = pd.read_csv(path, comment="#", dtype={"satellite": str, "band": str})
+    missing = {"satellite", "band", "wavelength", "response"} - set(table.columns)
+    if missing:
+        raise ValueError(f"srf.table: {response.table} lacks the columns {', '.join(sorted(missing))}")
+    rows = table[(table["satellite"] == response.satellite) & (table["band"] == response.band)]
+    if rows.empty:
+        known = ", ".join(sorted(set(table["satellite"] + " " + table["band"])))
+        raise ValueError(
+            f"srf.table: {response.table} has no {response.satellite} {response.band}: it has {known or 'no rows'}"
+        )
+    return ResponseList(tuple(rows["wavelength"].astype(float)), tuple(rows["response"].astype(float))).read(name)
+
+
+def _in_data(table):
+    try:
+        return datasets.path(table)
+    except FileNotFoundError:
+        raise ValueError(
+            f"srf.table = {table!r}: no such file beside the instrument file or in the data folder"
+        ) from None

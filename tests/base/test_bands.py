@@ -1,0 +1,65 @@
+import numpy as np
+import pytest
+from pyrsr.rsr import RSR_reader
+
+from fifesim.base.bands import Band, solar_irradiance, solar_irradiance_steps, solar_spectrum
+
+BOX = Band("box", (0.6, 0.6001, 0.6999, 0.7), (0.0, 1.0, 1.0, 0.0))
+
+
+def test_mean_of_a_constant_is_the_constant():
+    assert BOX.mean(np.full(3, 0.25), [0.5, 0.65, 0.8]) == pytest.approx(0.25, rel=1e-14)
+
+
+def test_mean_of_a_line_is_its_value_at_the_center():
+    wavelength = np.array([0.5, 0.8])
+    assert BOX.mean(2 * wavelength, wavelength) == pytest.approx(2 * BOX.center, rel=1e-12)
+    assert BOX.center == pytest.approx(0.65, abs=1e-12)
+
+
+def test_weight_draws_the_mean_toward_it():
+    wavelength = np.linspace(0.5, 0.8, 301)
+    assert BOX.mean(wavelength, wavelength, weight=wavelength**-4) < BOX.center
+
+
+def test_mean_keeps_leading_dimensions():
+    assert BOX.mean(np.ones((2, 3, 4)), [0.5, 0.6, 0.7, 0.8]).shape == (2, 3)
+
+
+def test_spectrum_that_misses_the_band_is_refused():
+    with pytest.raises(ValueError, match=r"band box spans 0.6 to 0.7 um, the spectrum only 0.65 to 0.8 um"):
+        BOX.mean([1.0, 1.0], [0.65, 0.8])
+
+
+@pytest.mark.parametrize("wavelength, response", [((0.5, 0.5), (1, 1)), ((0.5, 0.6), (1, -1)), ((0.5, 0.6), (0, 0))])
+def test_impossible_response_is_refused(wavelength, response):
+    with pytest.raises(ValueError, match="band odd"):
+        Band("odd", wavelength, response)
+
+
+def test_bands_are_hashable_and_equal_by_content():
+    assert hash(Band("a", [0.5, 0.6], [1, 1])) == hash(Band("a", (0.5, 0.6), (1.0, 1.0)))
+
+
+def test_solar_irradiance_over_all_wavelengths_is_the_solar_constant():
+    """1361 W m-2 (Kopp & Lean 2011), of which 1 to 2 % lie outside 0.28 to 4 um."""
+    wavelength, irradiance = solar_spectrum()
+    assert np.trapezoid(irradiance, wavelength) == pytest.approx(0.985 * 1361, rel=0.01)
+
+
+def test_steps_of_the_sun_conserve_its_energy():
+    wavelength = np.linspace(0.4, 2.5, 841)
+    steps = solar_irradiance_steps(wavelength)
+    width = np.gradient(wavelength)
+    width[[0, -1]] /= 2
+    fine, irradiance = solar_spectrum()
+    inside = (fine >= 0.4) & (fine <= 2.5)
+    assert np.sum(steps * width) == pytest.approx(np.trapezoid(irradiance[inside], fine[inside]), rel=1e-9)
+
+
+def test_thematic_mapper_irradiance_agrees_with_landsat_handbook():
+    """Chander, Markham & Helder (2009), Table 4, another solar spectrum (Thuillier 2003): within 4 %."""
+    published = {"1": 1983, "2": 1796, "3": 1536, "4": 1031, "5": 220.0, "7": 83.44}
+    for key, response in RSR_reader("Landsat-5", "TM").items():
+        if key in published:
+            assert solar_irradiance(Band(f"TM{key}", *response.T)) == pytest.approx(published[key], rel=0.04)

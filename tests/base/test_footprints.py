@@ -1,0 +1,298 @@
+"""Footprints of the paper's line spread against quadrature, Fourier transform and symmetry."""
+
+import pickle
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from fifesim.base.footprints import AxisOperator, axis_operator, regularize
+from fifesim.sensor.response.spatial import CosineSpread
+
+CELL = 30 / 9
+TM_WIDTH = 9 * 4.778e-6 * 705e3
+
+# pixel size, pixel origin, width of the line spread [m]
+GRIDS = [
+    pytest.param(30.0, 0.0, 30.0, id="aligned"),
+    pytest.param(30.0, 0.0, TM_WIDTH, id="tm"),
+    pytest.param(30.315, 0.0, TM_WIDTH, id="native-interval"),
+    pytest.param(30.0, 7.123, TM_WIDTH, id="offset"),
+    pytest.param(2.5, -1.7, 4.1, id="smaller-than-cells"),
+    pytest.param(1100.0 / 7, 11.0, 47.0, id="gaps"),
+]
+
+
+def density(x, width):
+    """The paper's line spread function, normalized by quadrature."""
+    area = quad(lambda t: np.cos(2 * np.pi * t / (3 * width)), -width / 2, width / 2, epsabs=0)[0]
+    return np.cos(2 * np.pi * x / (3 * width)) / area
+
+
+def quadrature(low, high, width):
+    """Integral of the line spread function over an interval around the pixel's centre."""
+    low, high = max(low, -width / 2), min(high, width / 2)
+    return quad(density, low, high, args=(width,), epsabs=1e-13)[0] if high > low else 0.0
+
+
+def brute_force_weights(width, pixel, origin, n_pixels, n_cells, cell=CELL):
+    """Dense weights by quadrature of each cell in each pixel."""
+    centers = origin + (np.arange(n_pixels) + 0.5) * pixel
+    return np.array([[quadrature(j * cell - x, (j + 1) * cell - x, width) for j in range(n_cells)] for x in centers])
+
+
+def dense(operator, n_cells):
+    """The operator as a matrix."""
+    matrix = np.zeros((len(operator), n_cells))
+    for i, (start, count) in enumerate(zip(operator.start, operator.count, strict=True)):
+        matrix[i, start : start + count] = operator.weights[i, :count]
+    return matrix
+
+
+def operator(n_cells, n_pixels, pixel=30.0, origin=0.0, width=TM_WIDTH):
+    return axis_operator(
+        CosineSpread(width),
+        cell_origin=0.0,
+        cell_size=CELL,
+        n_cells=n_cells,
+        pixel_origin=origin,
+        pixel_size=pixel,
+        n_pixels=n_pixels,
+    )
+
+
+@pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
+def test_weights_agree_with_quadrature(pixel, origin, width):
+    """Every impulse response at once: column j of the matrix is the image of a single bright cell j."""
+    n_cells, n_pixels = 90, int(300 / pixel) + 2
+    found = dense(operator(n_cells, n_pixels, pixel, origin, width), n_cells)
+    expected = brute_force_weights(width, pixel, origin, n_pixels, n_cells)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
+def test_weights_sum_to_one_inside_the_scene(pixel, origin, width):
+    rows = operator(900, int(2900 / pixel), pixel, origin + 40.0, width)
+    np.testing.assert_allclose(rows.weights.sum(axis=1), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(rows.share, 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
+def test_impulse_gives_the_product_of_both_line_spreads(pixel, origin, width):
+    n_cells, n_pixels = 40, int(120 / pixel) + 1
+    scene = np.zeros((n_cells, n_cells))
+    scene[17, 22] = 1.0
+    axis = operator(n_cells, n_pixels, pixel, origin, width)
+    weights = brute_force_weights(width, pixel, origin, n_pixels, n_cells)
+    share = weights.sum(axis=1)
+    expected = np.outer(weights[:, 17], weights[:, 22])
+    with np.errstate(invalid="ignore"):
+        expected = np.where(np.outer(share, share) > 0.98, expected / np.outer(share, share), np.nan)
+    np.testing.assert_allclose(regularize(scene, axis, axis), expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
+def test_edge_gives_the_integral_over_its_bright_side(pixel, origin, width):
+    n_cells, n_pixels = 120, int(300 / pixel)
+    scene = np.zeros((20, n_cells))
+    scene[:, 43:] = 1.0
+    columns = operator(n_cells, n_pixels, pixel, origin + 40.0, width)
+    rows = operator(20, 1, pixel=20 * CELL, width=TM_WIDTH)
+    centers = origin + 40.0 + (np.arange(n_pixels) + 0.5) * pixel
+    expected = [[quadrature(43 * CELL - x, np.inf, width) for x in centers]]
+    np.testing.assert_allclose(regularize(scene, rows, columns), expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
+def test_sinusoid_on_cells_agrees_with_quadrature(pixel, origin, width):
+    n_cells, n_pixels = 120, int(300 / pixel)
+    wave = np.sin(2 * np.pi * (np.arange(n_cells) + 0.5) * CELL / 71.0)
+    columns = operator(n_cells, n_pixels, pixel, origin + 40.0, width)
+    row = operator(9, 1, width=30.0)
+    expected = brute_force_weights(width, pixel, origin + 40.0, n_pixels, n_cells) @ wave
+    scene = np.broadcast_to(wave, (9, n_cells))
+    np.testing.assert_allclose(regularize(scene, row, columns), [expected], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("wavelength", [400.0, 90.0, 45.4, 21.0])
+@pytest.mark.parametrize("interval", [30.0, 30.315])
+def test_sinusoid_is_reduced_by_the_mtf(wavelength, interval):
+    """
+    The Fourier transform of the line spread by quadrature, a route that knows no cells.
+
+    Cells hold the means of the sinusoid. What is lost lies in the two cells that the ends of the support cut:
+    at most w k cell^2 / 8 each, 4e-10 together for w = 0.02 m-1 and cells of 0.5 mm.
+    """
+    cell, n_cells, n_pixels, k = 5e-4, 200_000, 2, 2 * np.pi / wavelength
+    edges = np.arange(n_cells + 1) * cell
+    scene = np.diff(np.sin(k * edges)) / (k * cell)
+    columns = axis_operator(
+        CosineSpread(TM_WIDTH),
+        cell_origin=0.0,
+        cell_size=cell,
+        n_cells=n_cells,
+        pixel_origin=17.3,
+        pixel_size=interval,
+        n_pixels=n_pixels,
+    )
+    row = axis_operator(
+        CosineSpread(1.0), cell_origin=0, cell_size=1, n_cells=1, pixel_origin=0, pixel_size=1, n_pixels=1
+    )
+    mtf = quad(lambda x: density(x, TM_WIDTH) * np.cos(k * x), -TM_WIDTH / 2, TM_WIDTH / 2, epsabs=1e-13)[0]
+    centers = 17.3 + (np.arange(n_pixels) + 0.5) * interval
+    np.testing.assert_allclose(regularize(scene[None], row, columns), [mtf * np.cos(k * centers)], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(CosineSpread(TM_WIDTH).mtf(1 / wavelength), mtf, rtol=0, atol=1e-12)
+
+
+def test_response_is_half_its_maximum_where_it_ends():
+    """The paper truncates the cosine at half its amplitude."""
+    spread, step = CosineSpread(30.0), 1e-4
+    at_the_end = spread.cumulative(15.0) - spread.cumulative(15.0 - step)
+    in_the_middle = spread.cumulative(step / 2) - spread.cumulative(-step / 2)
+    np.testing.assert_allclose(at_the_end / in_the_middle, 0.5, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
+def test_constant_scene_stays_constant(pixel, origin, width):
+    """Edges of the scene and holes included, wherever a pixel is given at all."""
+    scene = np.full((90, 120), 204.3)
+    rows, columns = (operator(n, int(400 / pixel) + 1, pixel, origin, width) for n in scene.shape)
+    full = regularize(scene, rows, columns, min_valid=0.3)
+    scene[::7, ::5] = np.nan
+    holes = regularize(scene, rows, columns, min_valid=0.3)
+    for image in (full, holes):
+        assert np.isfinite(image).any()
+        np.testing.assert_allclose(image[np.isfinite(image)], 204.3, rtol=1e-14)
+
+
+def test_scene_with_holes_is_the_normalized_sum_over_valid_cells():
+    scene = np.random.default_rng(3).random((2, 70, 80))
+    scene[:, 20:24, 30:37] = np.nan
+    scene[1, 50, 60] = np.nan
+    rows, columns = operator(70, 8, origin=1.1), operator(80, 9, origin=-2.3)
+    y = brute_force_weights(TM_WIDTH, 30.0, 1.1, 8, 70)
+    x = brute_force_weights(TM_WIDTH, 30.0, -2.3, 9, 80)
+    total = np.einsum("ik,jl,bkl->bij", y, x, np.nan_to_num(scene))
+    share = np.einsum("ik,jl,bkl->bij", y, x, np.isfinite(scene).astype(float))
+    with np.errstate(invalid="ignore"):
+        expected = np.where(share >= 0.9, total / share, np.nan)
+    assert 0 < np.isnan(expected).sum() < expected.size
+    np.testing.assert_allclose(regularize(scene, rows, columns, min_valid=0.9), expected, rtol=1e-12)
+
+
+def test_min_valid_decides_at_the_scene_edge():
+    """TM's footprint of 30.32 m overhangs the scene by 0.16 m: it stays; one cell further out it goes."""
+    scene = np.ones((90, 90))
+    rows = operator(90, 10)
+    assert np.isfinite(regularize(scene, rows, rows)).all()
+    assert np.isnan(regularize(scene, rows, rows, min_valid=1.0)[0]).all()
+    assert np.isnan(regularize(scene, operator(90, 10, origin=-CELL), rows)[0]).all()
+    inner = operator(90, 8, origin=30.0)
+    assert np.isfinite(regularize(scene, inner, inner, min_valid=1.0)).all()
+
+
+def test_pixels_outside_the_scene_are_missing():
+    rows = operator(30, 12, origin=-100.0)
+    image = regularize(np.ones((30, 30)), rows, rows, min_valid=0.0)
+    assert np.isnan(image[[0, 1, -1]]).all()
+    assert np.isfinite(image[4, 4])
+
+
+@pytest.mark.parametrize(("pixel", "origin", "width"), GRIDS)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_any_window_gives_the_same_bits(pixel, origin, width, dtype):
+    """Holes stand in some windows only: a pixel must not notice holes outside its own footprint."""
+    rng = np.random.default_rng(11)
+    scene = rng.normal(100.0, 30.0, (2, 151, 173)).astype(dtype)
+    scene[:, 31:33, 100:] = np.nan
+    scene[rng.random(scene.shape) < 0.001] = np.nan
+    n_pixels = int(600 / pixel)
+    rows, columns = (operator(n, n_pixels, pixel, origin, width) for n in scene.shape[1:])
+    whole = regularize(scene, rows, columns)
+    assert whole.dtype == dtype
+    step = max(n_pixels // 5, 1)
+    cuts = [0, *range(1, n_pixels, step), n_pixels]
+    for i0, i1 in pairwise(cuts):
+        for j0, j1 in pairwise(cuts):
+            y, x = rows[i0:i1], columns[j0:j1]
+            part = regularize(scene[:, y.window, x.window], y, x)
+            np.testing.assert_array_equal(part, whole[:, i0:i1, j0:j1])
+
+
+def test_window_holds_only_the_cells_that_are_needed():
+    rows = operator(4500, 500, width=30.0)
+    assert rows.window == slice(0, 4500)
+    assert rows[100:200].window == slice(900, 1800)
+    assert rows[100:200][10:20].window == slice(990, 1080)
+    outside = operator(30, 5, origin=1000.0)
+    assert outside[1:3].window == slice(0, 1)
+    assert np.isnan(regularize(np.ones((1, 1)), outside[1:3], outside[1:3])).all()
+
+
+def test_rows_of_a_north_up_grid_count_from_the_north():
+    """Negative sizes mirror the axis; coordinates of millions of metres keep their digits."""
+    north = axis_operator(
+        CosineSpread(TM_WIDTH),
+        cell_origin=4334211.0,
+        cell_size=-CELL,
+        n_cells=90,
+        pixel_origin=4334211.0 - 7.5,
+        pixel_size=-30.0,
+        n_pixels=9,
+    )
+    plain = operator(90, 9, origin=7.5)
+    np.testing.assert_array_equal(north.start, plain.start)
+    np.testing.assert_allclose(north.weights, plain.weights, rtol=0, atol=1e-12)
+
+
+def test_mean_survives_sampling_at_the_width_of_the_line_spread():
+    """Far from the edges, pixels of any interval average to the mean of a slow gradient."""
+    scene = np.broadcast_to(np.arange(900.0), (30, 900))
+    columns = operator(900, 90, pixel=30.315, origin=100.0)
+    centers = (100.0 + (np.arange(90) + 0.5) * 30.315) / CELL - 0.5
+    image = regularize(scene, operator(30, 1, origin=30.0), columns)
+    inside = np.isfinite(image[0])
+    assert inside.sum() > 80
+    # A symmetric footprint of a gradient is the gradient at its centre, up to the steps of the cells.
+    np.testing.assert_allclose(image[0, inside], centers[inside], rtol=0, atol=0.05)
+
+
+def test_values_are_left_untouched_and_integers_are_accepted():
+    scene = np.random.default_rng(0).integers(0, 255, (30, 30))
+    before = scene.copy()
+    rows = operator(30, 3)
+    image = regularize(scene, rows, rows)
+    np.testing.assert_array_equal(scene, before)
+    np.testing.assert_array_equal(image, regularize(scene.astype(float), rows, rows))
+
+
+def test_operators_survive_pickling():
+    """Workers of dask.distributed receive them so."""
+    rows = pickle.loads(pickle.dumps(operator(90, 9)))
+    assert isinstance(rows, AxisOperator)
+    assert rows.window == slice(0, 90)
+
+
+def test_mistakes_are_named():
+    with pytest.raises(ValueError, match="width"):
+        CosineSpread(-30.0)
+    with pytest.raises(ValueError, match="same sign"):
+        axis_operator(
+            CosineSpread(30.0),
+            cell_origin=0,
+            cell_size=-3,
+            n_cells=9,
+            pixel_origin=0,
+            pixel_size=9,
+            n_pixels=3,
+        )
+    with pytest.raises(ValueError, match="at least 1"):
+        operator(0, 3)
+    rows = operator(90, 9)
+    with pytest.raises(ValueError, match="cut them with"):
+        regularize(np.ones((90, 80)), rows, rows)
+    with pytest.raises(ValueError, match="min_valid"):
+        regularize(np.ones((90, 90)), rows, rows, min_valid=98)
+    with pytest.raises(TypeError, match="step 1"):
+        rows[::2]

@@ -1,0 +1,99 @@
+"""Directions of sun and sensor."""
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import fifesim
+from fifesim.base.geometry import Geometry, relative_azimuth, scattering_angle_cosine, sun_position
+
+
+def almanac_sun(time, latitude, longitude):
+    """Zenith and azimuth of the sun by the Astronomical Almanac's low precision formulas, good to 0.01 degree."""
+    days = (pd.Timestamp(time).tz_convert("UTC") - pd.Timestamp("2000-01-01T12:00Z")) / pd.Timedelta(days=1)
+    anomaly = np.radians(357.528 + 0.9856003 * days)
+    ecliptic = np.radians(280.460 + 0.9856474 * days + 1.915 * np.sin(anomaly) + 0.020 * np.sin(2 * anomaly))
+    obliquity = np.radians(23.439 - 4e-7 * days)
+    right_ascension = np.arctan2(np.cos(obliquity) * np.sin(ecliptic), np.cos(ecliptic))
+    declination = np.arcsin(np.sin(obliquity) * np.sin(ecliptic))
+    sidereal = np.radians(280.46061837 + 360.98564736629 * days + longitude)
+    hour, phi = sidereal - right_ascension, np.radians(latitude)
+    up = np.sin(phi) * np.sin(declination) + np.cos(phi) * np.cos(declination) * np.cos(hour)
+    east = -np.cos(declination) * np.sin(hour)
+    north = np.cos(phi) * np.sin(declination) - np.sin(phi) * np.cos(declination) * np.cos(hour)
+    return np.degrees(np.arccos(up)), np.degrees(np.arctan2(east, north)) % 360
+
+
+@pytest.mark.parametrize(
+    "time, latitude, longitude",
+    [
+        ("1987-06-06T16:35:00Z", 39.06, -96.54),
+        ("1987-06-06T21:00:00Z", 39.06, -96.54),
+        ("1989-12-21T12:00:00Z", -33.0, 18.0),
+    ],
+)
+def test_sun_agrees_with_the_almanac(time, latitude, longitude):
+    sun = sun_position(time, latitude, longitude)
+    zenith, azimuth = almanac_sun(time, latitude, longitude)
+    assert sun.sza == pytest.approx(zenith, abs=0.02)
+    assert sun.saa == pytest.approx(azimuth, abs=0.03)
+
+
+def test_paper_case():
+    """In the morning the sun stands in the southeast; in June the Earth is far from it."""
+    case = fifesim.fife_geometry()
+    assert (round(case.sza, 1), round(case.saa, 1), case.vza, case.vaa) == (28.5, 117.0, 0.0, 0.0)
+    assert case.earth_sun_distance == pytest.approx(1.0148, abs=5e-4)
+
+
+def test_time_without_zone_is_utc_and_others_are_converted():
+    plain = sun_position("1987-06-06T16:35:00", 39.06, -96.54)
+    assert plain == sun_position("1987-06-06T16:35:00Z", 39.06, -96.54)
+    assert plain == sun_position("1987-06-06T11:35:00-05:00", 39.06, -96.54)
+
+
+def test_sun_below_the_horizon_is_refused():
+    with pytest.raises(ValueError, match=r"sza must be in \[0, 90\).*the sun is below the horizon"):
+        sun_position("1987-06-06T06:00:00Z", 39.06, -96.54)
+
+
+@pytest.mark.parametrize("values", [{"sza": -1}, {"vza": 90}, {"sza": np.nan}, {"earth_sun_distance": 149.6e6}])
+def test_impossible_directions_are_refused(values):
+    with pytest.raises(ValueError, match=next(iter(values))):
+        Geometry(**({"sza": 30.0, "saa": 0.0} | values))
+
+
+def test_relative_azimuth_is_symmetric_and_folded():
+    azimuths = np.linspace(-360, 720, 37)
+    raa = relative_azimuth(azimuths[:, None], azimuths)
+    np.testing.assert_allclose(raa, raa.T, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.cos(np.radians(raa)), np.cos(np.radians(azimuths[:, None] - azimuths)), atol=1e-12)
+    assert raa.min() >= 0 and raa.max() <= 180
+
+
+def test_sun_and_sensor_on_one_side_have_no_relative_azimuth():
+    assert Geometry(30, 117, 20, 117).raa == 0
+    assert Geometry(30, 117, 20, 297).raa == 180
+
+
+def unit_vector(zenith, azimuth):
+    zenith, azimuth = np.radians(zenith), np.radians(azimuth)
+    return np.array([np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith)])
+
+
+@pytest.mark.parametrize(
+    "sza, saa, vza, vaa", [(30, 117, 20, 117), (60, 10, 45, 200), (0, 0, 70, 33), (50, 350, 50, 90)]
+)
+def test_scattering_angle_is_that_of_the_vectors(sza, saa, vza, vaa):
+    """Light travels away from the sun, and toward the sensor."""
+    expected = -unit_vector(sza, saa) @ unit_vector(vza, vaa)
+    assert scattering_angle_cosine(sza, vza, relative_azimuth(saa, vaa)) == pytest.approx(expected, abs=1e-12)
+
+
+def test_geometry_is_frozen_and_hashable():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        fifesim.fife_geometry().sza = 10.0
+    assert hash(Geometry(30.0, 0.0)) == hash(Geometry(30.0, 0.0))
+    assert Geometry(60.0, 0.0, 0.0).mu_s == pytest.approx(0.5, abs=1e-15)

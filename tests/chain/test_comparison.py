@@ -1,0 +1,105 @@
+"""One scene through many instruments."""
+
+from dataclasses import replace
+
+import dask
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import in_chunks, no_compute
+
+import fifesim
+from fifesim.rasters import grid as grids
+from fifesim.sensor.response.spectral_response import ResponseList
+
+NAMES = ["TM", "OLI", "MSI"]
+
+
+def test_each_image_is_that_of_the_chain(lai):
+    images = fifesim.compare(lai, ["TM", "OLI"])
+    assert isinstance(images, xr.DataTree) and list(images.children) == ["TM", "OLI"]
+    rho = fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"])
+    xr.testing.assert_identical(images["TM"]["dn"], rho.fifesim.to_toa().fifesim.sense("TM"))
+    oli = images["OLI"]["dn"]
+    names = ["OLI4", "OLI5"]
+    assert oli.dtype == np.uint16 and oli["band"].values.tolist() == names
+    rho = fifesim.surface_reflectance(lai, "OLI", bands=names)
+    xr.testing.assert_identical(oli, rho.fifesim.to_toa().fifesim.sense("OLI"))
+
+
+def test_each_has_its_own_grid_and_red_and_near_infrared(lai):
+    images = fifesim.compare(lai, NAMES)
+    assert {name: grids.cell_size(grids.geobox(images[name]["dn"]))[0] for name in NAMES} == {
+        "TM": 30.0,
+        "OLI": 30.0,
+        "MSI": 10.0,
+    }
+    for name in NAMES:
+        red, nir = images[name]["dn"]["wavelength"].values
+        assert 0.6 < red < 0.7 and 0.75 < nir < 1.0
+        ndvi = fifesim.ndvi(images[name]["dn"])
+        assert 0.2 < float(ndvi.mean()) < 0.7
+
+
+def test_one_pass_makes_them_all(lai):
+    """Lazy until asked, the same bits, and each chunk of the scene is read once."""
+    reads = []
+
+    def read(block):
+        reads.append(block.shape)
+        return block
+
+    with no_compute():
+        scene = in_chunks(lai, {"y": 23, "x": 27})
+        scene = scene.copy(data=scene.data.map_blocks(read, meta=np.empty((0, 0))))
+        images = fifesim.compare(scene, NAMES)
+    arrays = dask.compute(*(images[name]["dn"] for name in NAMES), scheduler="synchronous")
+    assert len(reads) == 4
+    for name, array in zip(NAMES, arrays, strict=True):
+        xr.testing.assert_identical(array, fifesim.compare(lai, [name])[name]["dn"])
+
+
+def test_bands_and_options_reach_the_instruments(lai):
+    images = fifesim.compare(
+        lai, ["TM", "OLI"], bands={"TM": ["TM2", "TM5"]}, interval=(20.0, 25.0), quantise=False, background=0.2,
+        leaf_optics={"TM2": (0.16, 0.12), "TM5": (0.28, 0.31)} | dict.fromkeys(("OLI4", "OLI5"), (0.3, 0.3)),
+    )  # fmt: skip
+    assert images["TM"]["toa_radiance"]["band"].values.tolist() == ["TM2", "TM5"]
+    for name in ("TM", "OLI"):
+        assert grids.cell_size(grids.geobox(images[name]["toa_radiance"])) == (20.0, 25.0)
+
+
+@pytest.mark.parametrize(
+    ("instruments", "options", "message"),
+    [
+        (["TM", "tm"], {}, "each once"),
+        ([], {}, "at least one"),
+        (["TM"], {"bands": {"OLI": ["B4"]}}, "OLI, which is not compared"),
+        (["TM", "MT"], {}, "MT"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(lai, instruments, options, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.compare(lai, instruments, **options)
+
+
+def test_one_leaf_and_one_soil_are_seen_by_all(lai):
+    """A leaf without red absorption on grey ground has no vegetation signal, in whichever bands."""
+    white = fifesim.Leaf(structure=2.0, chlorophyll=0, carotenoids=0, water=0, dry_matter=0)
+    images = fifesim.compare(
+        lai, NAMES, leaf_optics=white, background=0.3, atmosphere=fifesim.Atmosphere(aerosol="none")
+    )
+    green = fifesim.compare(lai, NAMES, leaf_optics=fifesim.Leaf(), background={"soil_wet": 1.0})
+    for name in NAMES:
+        assert (
+            float(fifesim.ndvi(images[name]["dn"]).mean()) < 0.1 < 0.4 < float(fifesim.ndvi(green[name]["dn"]).mean())
+        )
+
+
+def test_a_band_beyond_the_spectra_is_named(lai):
+    tm = fifesim.instrument("TM")
+    far = replace(tm.bands[0], name="far", srf=ResponseList((2.4, 2.5, 2.6), (0.0, 1.0, 0.0)))
+    with pytest.raises(
+        ValueError, match=r"spectrum for band far, 2\.4 to 2\.6 um: .*give leaf_optics= and background="
+    ):
+        fifesim.compare(lai, [replace(tm, bands=(*tm.bands, far))], bands={"TM": ["far"]})

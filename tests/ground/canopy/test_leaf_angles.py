@@ -1,0 +1,121 @@
+"""Leaf angle distributions against their densities, limits and another code."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
+
+DENSITY = {
+    "spherical": np.sin,
+    "planophile": lambda t: 2 / np.pi * (1 + np.cos(2 * t)),
+    "erectophile": lambda t: 2 / np.pi * (1 - np.cos(2 * t)),
+    "plagiophile": lambda t: 2 / np.pi * (1 - np.cos(4 * t)),
+    "extremophile": lambda t: 2 / np.pi * (1 + np.cos(4 * t)),
+    "uniform": lambda t: 2 / np.pi,
+}
+
+
+@pytest.mark.parametrize("name", DENSITY)
+def test_classes_integrate_the_density(name):
+    edges = np.radians(np.arange(0, 91, 10))
+    expected = [quad(DENSITY[name], a, b)[0] for a, b in pairwise(edges)]
+    np.testing.assert_allclose(leaf_angle_classes(name, classes=9).fraction, expected, atol=1e-14)
+
+
+def test_spherical_classes_are_differences_of_cosines():
+    expected = [0.0152, 0.0451, 0.0737, 0.1000, 0.1233, 0.1428, 0.1580, 0.1684, 0.1736]
+    np.testing.assert_allclose(leaf_angle_classes("spherical", classes=9).fraction, expected, atol=5e-5)
+
+
+@pytest.mark.parametrize("a, b", [(-0.35, -0.15), (1, 0), (-1, 0), (0, 1), (0, -1), (0, 0), (0.3, -0.6)])
+def test_verhoef_classes_agree_with_prosail(a, b):
+    """Its iteration stops at 1e-8, which the cube root at a = 1 magnifies."""
+    oracle = pytest.importorskip("prosail.FourSAIL")
+    expected = oracle.verhoef_bimodal(float(a), float(b), 18)
+    np.testing.assert_allclose(leaf_angle_classes(("verhoef", a, b), classes=18).fraction, expected, atol=1e-5)
+
+
+def test_verhoef_without_parameters_is_uniform():
+    expected = leaf_angle_classes("uniform").fraction
+    np.testing.assert_allclose(leaf_angle_classes("verhoef(0, 0)").fraction, expected, atol=1e-12)
+
+
+def test_ellipsoid_with_a_mean_of_one_radian_is_a_sphere():
+    """The mean inclination of spherical leaves is the integral of t sin t, 1."""
+    expected = leaf_angle_classes("spherical").fraction
+    np.testing.assert_allclose(leaf_angle_classes(("campbell", np.degrees(1))).fraction, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("mean", [5, 30, 57, 80, 88])
+def test_ellipsoid_has_the_mean_that_was_asked_for(mean):
+    """Class centres of 0.01 degree leave the mean to 1e-4 degrees."""
+    leaves = leaf_angle_classes(("campbell", mean), classes=9000)
+    assert abs(np.dot(leaves.inclination, leaves.fraction) - mean) < 1e-4
+
+
+@pytest.mark.parametrize("mean", [25, 45, 70])
+def test_ellipsoid_follows_campbell_density(mean):
+    """Campbell (1990): 2 x^3 sin t / (cos^2 t + x^2 sin^2 t)^2, up to a factor; x from the ratio of two classes."""
+    fraction = np.array(leaf_angle_classes(("campbell", mean), classes=900).fraction)
+    t = np.radians((np.arange(900) + 0.5) / 10)
+
+    def density(x):
+        shape = np.sin(t) / (np.cos(t) ** 2 + x**2 * np.sin(t) ** 2) ** 2
+        return shape / shape.sum()
+
+    ratios = np.geomspace(0.05, 20, 4000)
+    nearest = min(ratios, key=lambda x: abs(density(x)[450] / density(x)[300] - fraction[450] / fraction[300]))
+    np.testing.assert_allclose(fraction, density(nearest), atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    "given", ["spherical", "Uniform", "verhoef(-0.35,-0.15)", ("campbell", 57), [0.2, 0.3, 0.5], "30: 0.5, 60: 0.5"]
+)
+def test_text_of_a_distribution_makes_it_again(given):
+    leaves = leaf_angle_classes(given)
+    assert leaf_angle_classes(str(leaves)) == leaves
+    assert leaf_angle_classes(leaves) is leaves
+    assert hash(leaves) == hash(leaf_angle_classes(str(leaves)))
+
+
+def test_text_keeps_another_number_of_classes():
+    leaves = leaf_angle_classes("spherical", classes=18)
+    assert leaf_angle_classes(str(leaves)) == leaves
+
+
+def test_a_sequence_is_equal_classes_from_0_to_90():
+    assert leaf_angle_classes(np.array([0.5, 0.5])).inclination == (22.5, 67.5)
+
+
+def test_rounding_is_normalised_away_and_more_is_refused():
+    assert abs(sum(leaf_angle_classes([0.3333333, 0.3333333, 0.3333334]).fraction) - 1) < 1e-15
+    with pytest.raises(ValueError, match=r"sum to 1, got a sum of 0.9 .* divide them by their sum"):
+        leaf_angle_classes([0.5, 0.4])
+
+
+@pytest.mark.parametrize(
+    "given, message",
+    [
+        ("sperical", "did you mean 'spherical'.* planophile, erectophile"),
+        ("xyz", "Allowed: spherical"),
+        ("verhoef(0.8, 0.5)", r"\|a\| \+ \|b\| <= 1, got a = 0.8, b = 0.5"),
+        ("verhoef(0.8)", "verhoef"),
+        ("verhoef(a, b)", "unknown"),
+        ("campbell(95)", r"\[1, 89\] degrees, got 95"),
+        ([-0.5, 1.5], "not be negative"),
+        ([], "give one fraction for each"),
+        ([np.nan, 1.0], "not be negative"),
+        ("100: 1", r"\[0, 90\]"),
+    ],
+)
+def test_impossible_distributions_are_refused_with_what_is_allowed(given, message):
+    with pytest.raises(ValueError, match=message):
+        leaf_angle_classes(given)
+
+
+def test_leaf_angles_need_one_fraction_for_each_inclination():
+    with pytest.raises(ValueError, match="2 leaf inclinations with 1 fractions"):
+        LeafAngles((10, 20), (1.0,))

@@ -1,0 +1,175 @@
+"""The ground scene on labelled rasters: labels, laziness, and the kernel's numbers."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_compute
+
+import fifesim
+from fifesim.base.geometry import Geometry
+from fifesim.ground.canopy import absorption
+from fifesim.ground.canopy.raster import surface_reflectance
+from fifesim.ground.canopy.reflectance_table import canopy_reflectance
+from fifesim.ground.landscape import field as random_field
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
+
+SUN = Geometry(35.0, 120.0, 10.0, 200.0)
+BANDS = {
+    "bands": ["TM3", "TM4"],
+    "wavelengths": [0.66, 0.84],
+    "leaf_reflectance": [0.08, 0.45],
+    "leaf_transmittance": [0.05, 0.45],
+    "diffuse_fraction": [0.2, 0.1],
+}
+
+
+def reflectance(lai, background=(0.1, 0.2), **options):
+    return surface_reflectance(lai, background=background, geometry=SUN, **BANDS, **options)
+
+
+def test_scene_is_the_field_mapped_to_the_distribution(site):
+    row, column = grids.lattice_position(site)
+    field = random_field.streaming_field(7, 0.15, row, column, tuple(site.shape))
+    lai = fifesim.lai_scene(site, "unburned-ungrazed", arp=0.15, seed=7)
+    table = quantile_table(lai_distribution("unburned-ungrazed"))
+    np.testing.assert_array_equal(lai, quantile_map(field, table))
+
+
+def test_scene_is_labelled_and_placed(site, lai):
+    check_place(lai, site.crs)
+    assert lai.name == "lai" and cf.attributes("lai").items() <= lai.attrs.items()
+    assert lai.attrs["arp"] == 0.15 and lai.attrs["rng_seed"] == "7"
+    assert lai.attrs["lai_distribution"] == "burned-grazed" and lai.attrs["method"] == "streaming"
+    assert grids.same_grid(grids.geobox(lai), site)
+
+
+@pytest.mark.parametrize("chunks", [ODD_CHUNKS, 20, "auto", {"y": -1}])
+def test_scene_has_the_same_bits_in_any_chunks(site, lai, chunks):
+    with no_compute():
+        lazy = fifesim.lai_scene(site, "burned-grazed", arp=0.15, seed=7, chunks=chunks)
+    assert lazy.chunks is not None
+    xr.testing.assert_identical(lazy.compute(), lai)
+
+
+def test_window_of_the_site_is_a_slice_of_it(lai):
+    larger = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((80, 140), (170, 240))), arp=0.15, seed=7)
+    xr.testing.assert_identical(larger[10:55, 10:64].assign_coords(spatial_ref=lai["spatial_ref"]), lai)
+
+
+def test_periodic_scene_is_made_at_once_and_its_chunks_change_nothing(site):
+    whole = fifesim.lai_scene(site, method="periodic", seed=3)
+    xr.testing.assert_identical(fifesim.lai_scene(site, method="periodic", seed=3, chunks=11).compute(), whole)
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"arp": 0.3}, r"arp must be in \[0, 0\.25\), got 0\.3"),
+        ({"seed": -1}, "seed must be"),
+        ({"method": "fft"}, "method must be one of streaming, periodic, got 'fft'"),
+        ({"arp": 0.24999, "chunks": 10}, "at most"),
+        ({"distribution": "grazed"}, "unknown LAI distribution 'grazed'"),
+        ({"chunks": {"band": 1}}, "y and x"),
+    ],
+)
+def test_impossible_scene_is_refused_before_it_computes(site, options, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.lai_scene(site, **options)
+
+
+def test_scene_too_large_for_memory_names_the_streaming_method():
+    grid = fifesim.grid_at("EPSG:26914", 0, 5e6, 4e6, 4e6, 1.0)
+    with pytest.raises(ValueError, match=r"needs .* GB of memory.*method=\"streaming\""):
+        fifesim.lai_scene(grid, method="periodic")
+
+
+def test_reflectance_keeps_its_word_and_equals_the_kernel(lai_with_hole):
+    result = check_raster_function(reflectance, lai_with_hole, quantity="surface_reflectance")
+    kernel = canopy_reflectance(
+        lai_with_hole.values, BANDS["leaf_reflectance"], BANDS["leaf_transmittance"], (0.1, 0.2), sza=SUN.sza,
+        vza=SUN.vza, raa=SUN.raa, diffuse_fraction=BANDS["diffuse_fraction"],
+    )  # fmt: skip
+    np.testing.assert_array_equal(result, kernel)
+    assert result.dims == ("band", "y", "x")
+    assert result["band"].values.tolist() == BANDS["bands"]
+    assert result["wavelength"].values.tolist() == BANDS["wavelengths"]
+    assert cf.geometry_of(result) == SUN
+    assert result.attrs["arp"] == 0.15
+    for band in result:
+        np.testing.assert_array_equal(np.isnan(band), np.isnan(lai_with_hole))
+
+
+def test_background_may_be_a_raster(lai):
+    soil = grids.place(
+        xr.DataArray(np.random.default_rng(0).uniform(0.05, 0.3, lai.shape), dims=("y", "x"), name="soil"),
+        grids.geobox(lai),
+    )
+    one = check_raster_function(
+        lambda lai, soil: reflectance(lai, soil), lai, soil, quantity="surface_reflectance"
+    )  # fmt: skip
+    expected = canopy_reflectance(
+        lai.values, BANDS["leaf_reflectance"], BANDS["leaf_transmittance"], np.stack([soil, soil]), sza=SUN.sza,
+        vza=SUN.vza, raa=SUN.raa, diffuse_fraction=BANDS["diffuse_fraction"],
+    )  # fmt: skip
+    np.testing.assert_array_equal(one, expected)
+    by_band = xr.concat([soil + 0.1, soil], dim="band").assign_coords(band=["TM4", "TM3"])
+    two = check_raster_function(
+        lambda lai, soil: reflectance(lai, soil), lai, by_band, quantity="surface_reflectance"
+    )  # fmt: skip
+    np.testing.assert_array_equal(two.sel(band="TM3"), one.sel(band="TM3"))
+    assert (two.sel(band="TM4") > one.sel(band="TM4")).all()
+    with pytest.raises(ValueError, match="the background lacks band TM4, it has TM3"):
+        reflectance(lai, by_band.sel(band=["TM3"]))
+
+
+def test_background_in_percent_is_refused(lai):
+    with pytest.raises(ValueError, match="units '%', surface_reflectance needs '1'"):
+        reflectance(lai, xr.full_like(lai, 20.0).assign_attrs(units="%"))
+
+
+def test_hole_in_the_background_is_a_hole_in_the_reflectance(lai):
+    soil = xr.full_like(lai, 0.2)
+    soil.attrs = {}
+    soil[3, 4] = np.nan
+    holes = np.isnan(reflectance(lai, soil))
+    assert holes[:, 3, 4].all() and int(holes.sum()) == 2
+
+
+def test_fpar_keeps_its_word_and_equals_the_kernel(lai_with_hole):
+    result = check_raster_function(
+        lambda lai: fifesim.fpar(lai, geometry=SUN, leaf_angles="planophile", fpar_inf=0.9),
+        lai_with_hole,
+        quantity="fpar",
+    )
+    extinction = absorption.extinction_coefficient(SUN.sza, "planophile")
+    np.testing.assert_array_equal(
+        result, absorption.fpar(lai_with_hole.values, extinction=float(extinction), fpar_inf=0.9)
+    )
+    np.testing.assert_array_equal(np.isnan(result), np.isnan(lai_with_hole))
+
+
+def test_fpar_takes_the_sun_that_the_raster_carries(lai):
+    carried = fifesim.fpar(cf.with_geometry(lai, SUN))
+    np.testing.assert_array_equal(carried, fifesim.fpar(lai, geometry=SUN))
+    np.testing.assert_array_equal(fifesim.fpar(lai), fifesim.fpar(lai, geometry=fifesim.fife_geometry()))
+    assert not np.array_equal(carried, fifesim.fpar(lai))
+
+
+@pytest.mark.parametrize("function", [reflectance, fifesim.fpar])
+def test_wrong_units_raise(lai, function):
+    lai.attrs["units"] = "percent"
+    with pytest.raises(ValueError, match="lai has units 'percent', lai needs '1'"):
+        function(lai)
+
+
+@pytest.mark.parametrize("function", [reflectance, fifesim.fpar])
+def test_negative_leaf_area_raises_when_it_computes(lai, function):
+    lai[1, 1] = -0.1
+    with pytest.raises(ValueError, match=r"negative|at least 0"):
+        function(lai)
+    with no_compute():
+        lazy = function(in_chunks(lai, ODD_CHUNKS))
+    with pytest.raises(ValueError, match=r"negative|at least 0"):
+        lazy.compute()

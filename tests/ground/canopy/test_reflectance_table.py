@@ -1,0 +1,115 @@
+"""The table against exact evaluation, wherever it may be used."""
+
+import numpy as np
+import pytest
+
+from fifesim.ground.canopy.lai_table import LIMIT, interpolate, tabulate
+from fifesim.ground.canopy.reflectance_table import canopy_reflectance
+from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
+
+RHO, TAU = np.array([0.07, 0.45, 0.5, 0.0, 0.6, 1.0]), np.array([0.04, 0.42, 0.5, 0.0, 0.4, 0.0])
+SKY, GROUND = np.array([0, 0.1, 0.2, 0.5, 1, 0.3]), np.array([0.15, 0.19, 1, 0, 1, 0.5])
+SCENES = [
+    (28.5, 0, 0, 0, "spherical"),
+    (28.5, 0, 0, 0.05, "planophile"),
+    (28.5, 28.5, 0, 0.05, "erectophile"),
+    (50, 50.1, 0, 0.001, "spherical"),
+    (60, 45, 180, 2, "verhoef(-0.35, -0.15)"),
+    (85, 85, 0, 0.001, "spherical"),
+    (89.9, 89.9, 180, 0, "spherical"),
+    (89.9, 89.9, 0, 0.01, "planophile"),
+    (0, 89.9, 0, 0, "90: 1"),
+    (0, 0, 0, 0, "90: 1"),
+]
+
+
+def cells():
+    rng = np.random.default_rng(8)
+    return np.concatenate([[0, 1e-9, LIMIT], 10 ** rng.uniform(-4, 2, 1500), rng.uniform(0, 8, 1500)])
+
+
+def parameters(scene):
+    return dict(zip(("sza", "vza", "raa", "hotspot", "leaf_angles"), scene, strict=True))
+
+
+def exact(lai, ground, scene):
+    surface = with_background(sail(lai, RHO[:, None], TAU[:, None], **parameters(scene)), ground)
+    return reflectance_factor(surface.rso, surface.rdo, SKY[:, None])
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_table_is_within_the_bound_over_a_uniform_background(scene):
+    lai = cells()
+    table = canopy_reflectance(lai, RHO, TAU, GROUND, diffuse_fraction=SKY, **parameters(scene))
+    np.testing.assert_allclose(table, exact(lai, GROUND[:, None], scene), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_table_is_within_the_bound_over_a_background_raster(scene):
+    lai = cells()
+    ground = np.random.default_rng(9).choice([0, 0.2, 0.99, 1], (RHO.size, lai.size))
+    table = canopy_reflectance(lai, RHO, TAU, ground, diffuse_fraction=SKY, **parameters(scene))
+    np.testing.assert_allclose(table, exact(lai, ground, scene), rtol=0, atol=1e-6)
+
+
+def test_exact_is_the_model_itself():
+    lai, scene = cells(), (28.5, 10, 60, 0.05, "uniform")
+    result = canopy_reflectance(lai, RHO, TAU, GROUND, diffuse_fraction=SKY, exact=True, **parameters(scene))
+    np.testing.assert_array_equal(result, exact(lai, GROUND[:, None], scene))
+
+
+@pytest.mark.parametrize("exactly", [False, True])
+@pytest.mark.parametrize("ground", [0.15, np.full((2, 3, 4), 0.15), np.full((3, 4), 0.15), [0.15, 0.15]])
+def test_bare_ground_is_the_background_and_nan_stays_in_its_cell(ground, exactly):
+    lai = np.zeros((3, 4))
+    lai[1, 2] = np.nan
+    result = canopy_reflectance(lai, [0.07, 0.45], [0.04, 0.42], ground, sza=28.5, hotspot=0.1, exact=exactly)
+    assert result.shape == (2, 3, 4) and result.dtype == np.float64
+    assert np.all(np.isnan(result) == np.isnan(lai))
+    assert np.all(result[:, ~np.isnan(lai)] == 0.15)
+
+
+def test_a_background_without_data_gives_no_reflectance_there():
+    ground = np.array([[0.1, np.nan], [0.1, 0.1]])
+    result = canopy_reflectance(np.ones(2), [0.1, 0.1], [0.1, 0.1], ground, sza=30)
+    np.testing.assert_array_equal(np.isnan(result), np.isnan(ground))
+
+
+def test_any_layout_of_the_cells_gives_the_same_bits():
+    lai = np.random.default_rng(1).gamma(2, 0.5, (30, 40))
+    given = {"leaf_reflectance": [0.07, 0.45], "leaf_transmittance": [0.04, 0.42], "background": 0.2, "sza": 28.5}
+    whole = canopy_reflectance(lai, **given)
+    np.testing.assert_array_equal(canopy_reflectance(lai[3:17:2, ::-1], **given), whole[:, 3:17:2, ::-1])
+    np.testing.assert_array_equal(canopy_reflectance(np.asfortranarray(lai), **given), whole)
+    np.testing.assert_array_equal(canopy_reflectance(lai[4, 5], **given), whole[:, 4, 5])
+
+
+def test_arguments_are_left_as_they_were():
+    lai, ground = np.array([0.0, np.nan, 20.0]), np.full((2, 3), 0.2)
+    given = lai.copy(), ground.copy()
+    canopy_reflectance(lai, [0.1, 0.1], [0.1, 0.1], ground, sza=30)
+    np.testing.assert_array_equal(lai, given[0])
+    np.testing.assert_array_equal(ground, given[1])
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [({"lai": [-1.0]}, "area index"), ({"leaf_reflectance": [0.99]}, "add up"), ({"background": 15}, "background")],
+)
+def test_values_outside_their_range_are_refused(change, message):
+    given = {"lai": [1.0], "leaf_reflectance": [0.1], "leaf_transmittance": [0.1], "background": 0.1} | change
+    with pytest.raises(ValueError, match=message):
+        canopy_reflectance(**given, sza=30)
+
+
+def test_tables_meet_their_tolerance_or_say_so():
+    table = tabulate(lambda lai: np.stack([np.exp(-5 * lai), lai**2 / (1 + lai**2)]), rate=5.0)
+    lai = np.random.default_rng(2).uniform(0, LIMIT, 10_000)
+    np.testing.assert_allclose(interpolate(table, lai), [np.exp(-5 * lai), lai**2 / (1 + lai**2)], atol=2.5e-7)
+    with pytest.raises(ValueError, match="exact=True"):
+        tabulate(lambda lai: np.floor(lai)[None], rate=1.0)
+
+
+def test_outside_a_table_there_is_nothing():
+    table = tabulate(lambda lai: np.exp(-lai)[None], rate=1.0)
+    assert np.all(np.isnan(interpolate(table, [np.nan, -1e-9, LIMIT * 1.001, np.inf])))

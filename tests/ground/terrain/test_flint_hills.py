@@ -1,0 +1,188 @@
+"""The synthetic Flint Hills against the statistics of a real watershed, and as a function of place."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import check_place, no_compute
+from scipy import ndimage
+
+import fifesim
+from fifesim.ground.terrain import flint_hills
+from fifesim.rasters import cf
+
+CELL = 10.0
+SIZE = 522
+SEEDS = range(1, 13)
+
+
+@pytest.fixture(scope="module")
+def landscapes():
+    """Twelve landscapes of 27 km2 at 10 m, one for each seed."""
+    northing, easting = 4.33e6 - CELL * np.arange(SIZE), 7.1e5 + CELL * np.arange(SIZE)
+    return [flint_hills.elevation(seed, northing, easting) for seed in SEEDS]
+
+
+def means_30m(values):
+    return values.reshape(SIZE // 3, 3, SIZE // 3, 3).mean(axis=(1, 3))
+
+
+def semivariance(values, lag):
+    """Of rows and columns, lag in cells."""
+    return 0.25 * sum(np.mean(diff**2) for diff in (values[lag:] - values[:-lag], values[:, lag:] - values[:, :-lag]))
+
+
+def spectrum(values):
+    """Radial periodogram of detrended, tapered squares of 2.61 km, in logarithmic bins."""
+    size = 261
+    rows, columns = np.mgrid[:size, :size]
+    trend = np.stack([rows.ravel(), columns.ravel(), np.ones(size**2)], axis=1)
+    window = np.outer(np.hanning(size), np.hanning(size))
+    frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(size, CELL)] * 2)).ravel()
+    ring = np.digitize(frequency, np.geomspace(1 / 2000, 1 / (2 * CELL), 40))
+    power = []
+    for value in values:
+        for i in (0, 261):
+            for j in (0, 261):
+                square = value[i : i + size, j : j + size].ravel()
+                flat = (square - trend @ np.linalg.lstsq(trend, square)[0]).reshape(size, size)
+                power.append(np.abs(np.fft.fft2(flat * window)).ravel() ** 2 / flat.var())
+    power = np.mean(power, axis=0)
+    rings = [k for k in range(1, 40) if np.any(ring == k)]
+    return [np.array([each[ring == k].mean() for k in rings]) for each in (frequency, power)]
+
+
+# All reference values: USGS 3DEP, Kings Creek watershed of Konza Prairie, 11 km2. It is one watershed: the standard
+# deviation of the median slope among squares of its size is 1.4 degrees here, of the relief over 1 km 11 m.
+def test_slopes_are_those_of_the_watershed(landscapes):
+    """Within 15 % and two standard errors: mean quantiles of 48 squares of 2.61 km, near the watershed's size."""
+    found = []
+    for values in landscapes:
+        down, across = np.gradient(means_30m(values), 30.0)
+        slopes = np.degrees(np.arctan(np.hypot(down, across)))
+        for i in (0, 87):
+            for j in (0, 87):
+                found.append(np.percentile(slopes[i : i + 87, j : j + 87], [5, 25, 50, 75, 95, 99]))
+    watershed, error = np.array([1.8, 4.2, 6.7, 9.4, 12.7, 14.6]), np.std(found, axis=0) / np.sqrt(len(found))
+    assert (np.abs(np.mean(found, axis=0) - watershed) < 0.15 * watershed + 2 * error).all()
+
+
+@pytest.mark.parametrize(("cells", "relief"), [(9, 29), (17, 44), (33, 60)])
+def test_local_relief_is_that_of_the_watershed(landscapes, cells, relief):
+    """Range of elevation in windows of 250, 500 and 1000 m of 30 m means; the median."""
+    inside = slice(cells // 2 + 1, -(cells // 2 + 1))
+    found = [
+        (ndimage.maximum_filter(z, cells) - ndimage.minimum_filter(z, cells))[inside, inside]
+        for z in map(means_30m, landscapes)
+    ]
+    assert np.median(found) == pytest.approx(relief, rel=0.15)
+
+
+def test_semivariogram_is_that_of_the_watershed(landscapes):
+    """The rise beyond 500 m is that of the watershed as a whole, which a wider landscape does not have."""
+    lags = {20: 2.6, 30: 5.5, 50: 13.4, 100: 38.9, 200: 88, 300: 128, 500: 198}
+    found = [np.mean([semivariance(values, int(lag / CELL)) for values in landscapes]) for lag in lags]
+    np.testing.assert_allclose(found, list(lags.values()), rtol=0.15)
+    for lag, value in {800: 299, 1200: 399}.items():
+        found = np.mean([semivariance(values, int(lag / CELL)) for values in landscapes])
+        assert found == pytest.approx(value, rel=0.25)
+
+
+@pytest.mark.parametrize(("shortest", "longest", "exponent"), [(200, 1000, 3.5), (25, 200, 5.1)])
+def test_spectrum_falls_like_that_of_the_watershed(landscapes, shortest, longest, exponent):
+    frequency, power = spectrum(landscapes)
+    band = (frequency >= 1 / longest) & (frequency <= 1 / shortest)
+    found = -np.polyfit(np.log(frequency[band]), np.log(power[band]), 1)[0]
+    assert found == pytest.approx(exponent, rel=0.15)
+
+
+def test_elevations_are_those_of_the_watershed(landscapes):
+    """Within 15 % of its range of 110 m at each quantile, as height above its lowest point."""
+    found = np.quantile(landscapes, [0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1])
+    expected = np.array([334, 341, 352, 379, 400, 412, 434, 440, 443.5])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=0.06 * 110)
+
+
+def test_water_finds_its_way(landscapes):
+    """Cells of 30 m without a lower neighbour are few."""
+    shares = []
+    for values in map(means_30m, landscapes):
+        inner = values[1:-1, 1:-1]
+        lowest = ndimage.minimum_filter(values, footprint=[[1, 1, 1], [1, 0, 1], [1, 1, 1]])[1:-1, 1:-1]
+        shares.append(np.mean(inner <= lowest))
+    assert np.mean(shares) < 0.015
+
+
+def test_surface_is_smooth_at_the_scale_of_fine_cells():
+    """Where cells halve, second differences fall to a quarter."""
+    fine = flint_hills.elevation(3, 4.3e6 - 1.0 * np.arange(400), 7e5 + 1.0 * np.arange(400))
+    coarse, half = (np.abs(np.diff(fine[::step, ::step], 2, axis=0)).mean() for step in (2, 1))
+    assert half == pytest.approx(coarse / 4, rel=0.02)
+
+
+def test_window_is_a_slice_of_the_whole():
+    """Across tiles of the lattice, uplands, and the origin of the reference system."""
+    for north, east in ((4.3e6, 7e5), (200.0, -300.0)):
+        northing, easting = north - 10 / 3 * np.arange(150), east + 10 / 3 * np.arange(170)
+        whole = flint_hills.elevation(7, northing, easting)
+        for rows, columns in (
+            (slice(0, 1), slice(0, 1)),
+            (slice(60, 150), slice(3, 99)),
+            (slice(149, 150), slice(40, 170)),
+        ):
+            np.testing.assert_array_equal(
+                flint_hills.elevation(7, northing[rows], easting[columns]), whole[rows, columns]
+            )
+
+
+def test_tiles_and_uplands_meet_without_a_seam():
+    """A kilometre across the edge of a tile, every metre; and 20 km across many uplands: no step in slope."""
+    seam = flint_hills.TILE * flint_hills.STEP
+    profile = flint_hills.elevation(5, np.array([40.0]), seam - 500 + np.arange(1000.0))[0]
+    curvature = np.abs(np.diff(profile, 2))
+    assert curvature[480:520].max() <= curvature.max()
+    assert curvature.max() < 0.05
+    long = flint_hills.elevation(5, np.array([40.0]), np.arange(0, 20000, 5.0))[0]
+    assert np.abs(np.diff(long)).max() < 5 * np.tan(np.radians(35))
+
+
+def test_seeds_give_unrelated_hills():
+    """A square of 6 km holds few independent elevations; the same hills would correlate by 1."""
+    northing, easting = 4.3e6 - 100.0 * np.arange(60), 7e5 + 100.0 * np.arange(60)
+    fields = [flint_hills.elevation(seed, northing, easting).ravel() for seed in (0, 1, 2**64 - 1)]
+    assert np.abs(np.corrcoef(fields) - np.eye(3)).max() < 0.7
+
+
+def test_hypsometry_rises():
+    eroded = np.linspace(200, 1400, 500)
+    elevation = flint_hills.hypsometry(eroded)
+    assert (np.diff(elevation) > 0).all()
+
+
+def test_raster_has_its_labels_and_place():
+    grid = fifesim.fife_site(30 / 9, window=((90, 190), (180, 334)))
+    dem = fifesim.flint_hills(grid, 7)
+    check_place(dem, "EPSG:26914")
+    assert cf.attributes("dem").items() <= dem.attrs.items()
+    assert dem.attrs["rng_seed"] == "7"
+    np.testing.assert_array_equal(dem, flint_hills.elevation(7, dem["y"].values, dem["x"].values))
+    for chunks in ({"y": 33, "x": 100}, "auto", 7):
+        with no_compute():
+            lazy = fifesim.flint_hills(grid, 7, chunks=chunks)
+        assert lazy.chunks is not None
+        xr.testing.assert_identical(lazy.compute(), dem)
+    xr.testing.assert_equal(fifesim.flint_hills(grid[10:20, 50:99], 7), dem[10:20, 50:99])
+
+
+def test_same_hills_on_other_cells():
+    """Cells of 10 m have their centres on every third cell of 3.33 m."""
+    fine = fifesim.flint_hills(fifesim.grid_at("EPSG:26914", 7.1e5, 4.33e6, 300, 300, 10 / 3), 2)
+    coarse = fifesim.flint_hills(fifesim.grid_at("EPSG:26914", 7.1e5, 4.33e6, 300, 300, 10.0), 2)
+    np.testing.assert_allclose(fine.values[1::3, 1::3], coarse, rtol=0, atol=1e-6)
+
+
+def test_what_cannot_be_made_is_refused():
+    grid = fifesim.fife_site(30, window=((0, 9), (0, 9)))
+    with pytest.raises(ValueError, match="seed must be a whole number"):
+        fifesim.flint_hills(grid, -1)
+    with pytest.raises(ValueError, match="at most 100 m"):
+        fifesim.flint_hills(fifesim.fife_site(500), 1)

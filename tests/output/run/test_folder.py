@@ -1,0 +1,127 @@
+"""The report of a run says what its rasters say."""
+
+import re
+
+import numpy as np
+import pytest
+import rasterio
+import rioxarray  # noqa: F401  registers .rio
+import xarray as xr
+
+import fifesim
+from fifesim.output.run.folder import FILES, simulate_to_folder
+from fifesim.scenario.toml import parse_scenario
+
+FLAT = {"dem": "flat"}
+SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}, "terrain": FLAT}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "small"
+    simulate_to_folder(parse_scenario(SMALL), folder)
+    return folder
+
+
+def test_truth_holds_the_means_of_the_scene(folder):
+    grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
+    lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=3)
+    with rasterio.open(folder / "truth.tif") as truth:
+        assert truth.descriptions == ("lai", "fpar")
+        np.testing.assert_array_equal(truth.read(1), lai.fifesim.aggregate(30).values)
+        np.testing.assert_array_equal(truth.read(2), lai.fifesim.fpar().fifesim.aggregate(30).values)
+
+
+def test_image_is_that_of_the_chain(folder):
+    grid = fifesim.fife_site(30 / 9, window=((0, 180), (0, 270)))
+    lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=3)
+    image = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM")
+    np.testing.assert_array_equal(fifesim.open_image(folder / "image.tif").values, image.values)
+
+
+def test_report_gives_the_regressions_of_its_files(folder):
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    ndvi = fifesim.open_image(folder / "image.tif").fifesim.ndvi()
+    truth = fifesim.open_image(folder / "truth.tif")
+    for name in ("lai", "fpar"):
+        fit = fifesim.regress(truth.sel(band=name, drop=True), ndvi)
+        assert f"{fit.slope:.4f}" in page
+        assert f"{fit.r2:.4f}" in page
+
+
+def test_report_is_self_contained(folder):
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert page.count("data:image/png;base64,") == 4
+
+
+def test_report_names_every_parameter_with_its_unit(folder):
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for key, unit in (("visibility", "km"), ("cell", "m"), ("vza", "degree"), ("arp", "1")):
+        assert re.search(rf"<code>{key}</code>.*?<td>{unit}</td>", page)
+
+
+def test_all_bands_of_an_instrument_make_a_report(tmp_path):
+    bands = ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
+    files = simulate_to_folder(parse_scenario(SMALL | {"sensor": {"bands": bands}}), tmp_path / "all")
+    assert all(path.stat().st_size > 0 for path in files)
+
+
+def test_a_single_band_has_no_ndvi_and_still_a_report(tmp_path):
+    simulate_to_folder(parse_scenario(SMALL | {"sensor": {"bands": ["TM5"]}}), tmp_path / "one")
+    assert "What NDVI tells" not in (tmp_path / "one" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_report_with_terrain_shows_it_and_says_how_far_it_is_known(tmp_path):
+    simulate_to_folder(parse_scenario(SMALL | {"terrain": {"horizon_reach": 900}}), tmp_path / "hills")
+    page = (tmp_path / "hills" / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 5
+    assert "north 0.9 km, east 0.9 km, south 0.9 km, west 0.9 km" in page
+    assert "flint-hills" in (tmp_path / "hills" / "scenario.toml").read_text(encoding="utf-8")
+
+
+HILLS = {
+    "grid": {"width": 4500, "height": 3900},
+    "ground": {"seed": 3},
+    "terrain": {"horizon_reach": 600},
+}
+
+
+@pytest.fixture(scope="module")
+def hills(tmp_path_factory):
+    """A scene of several chunks on terrain, with its cells."""
+    folder = tmp_path_factory.mktemp("hills") / "out"
+    simulate_to_folder(parse_scenario(HILLS), folder, scene=True, threads=2)
+    return folder
+
+
+@pytest.mark.parametrize("chunks", [None, 512, 1500, {"y": 333, "x": 1170}])
+def test_a_run_gives_the_bits_of_the_chain_under_any_chunks(hills, chunks):
+    whole = -1 if chunks is None else chunks
+    tree = fifesim.simulate(parse_scenario(HILLS).complete(), chunks=whole)
+    np.testing.assert_array_equal(fifesim.open_image(hills / "image.tif").values, tree["image"]["dn"].values)
+    truth = fifesim.open_image(hills / "truth.tif")
+    for name in ("lai", "fpar"):
+        np.testing.assert_array_equal(truth.sel(band=name), tree["truth"][name].values)
+
+
+def test_the_scene_holds_the_cells_in_shards(hills):
+    tree = fifesim.simulate(parse_scenario(HILLS).complete())
+    with xr.open_zarr(hills / "scene.zarr", decode_coords="all", consolidated=False) as scene:
+        for name in ("lai", "dem", "surface_reflectance"):
+            np.testing.assert_array_equal(scene[name].values, tree["scene"][name].values)
+            assert scene[name].encoding["shards"][-2:] == (1008, 1008)
+            assert scene[name].attrs["units"] == tree["scene"][name].attrs["units"]
+        assert scene.rio.crs.to_epsg() == 26914
+        np.testing.assert_array_equal(scene["x"], tree["scene"]["x"])
+
+
+def test_nothing_unfinished_stays(hills):
+    assert sorted(path.name for path in hills.iterdir()) == sorted([*FILES, "scene.zarr"])
+
+
+def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_path):
+    """The image lies 30.315 m apart and the truth 30 m, so that no coordinate of one is in the other."""
+    scenario = parse_scenario(SMALL | {"sensor": {"interval": "native"}, "terrain": {"dem": "flat"}})
+    simulate_to_folder(scenario, tmp_path / "own")
+    assert "What NDVI tells" in (tmp_path / "own" / "report.html").read_text(encoding="utf-8")

@@ -1,0 +1,175 @@
+"""How a kernel meets dask: the same bits, nothing early, and only rasters that lie on each other."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import ODD_CHUNKS, in_chunks, no_compute
+from odc.geo.geobox import GeoBox
+
+import fifesim
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.rasters import chunks
+from fifesim.rasters import grid as grids
+
+GRID = fifesim.fife_site(30 / 9, window=((0, 36), (5, 50)))
+BANDS = xr.DataArray([1.0, 2.0, 3.0], dims="band")
+
+
+def raster(grid=GRID, seed=0, bands=None):
+    shape = tuple(grid.shape) if bands is None else (bands, *grid.shape)
+    values = np.random.default_rng(seed).random(shape)
+    return grids.place(xr.DataArray(values, dims=("band", "y", "x")[-len(shape) :], name=f"raster{seed}"), grid)
+
+
+def test_kernel_sees_numbers_and_the_result_keeps_the_grid(array_type):
+    one, two = array_type(raster(seed=1)), array_type(raster(seed=2))
+    with no_compute():
+        out = chunks.pointwise(lambda a, b, power: a + b**power, one, two, power=2)
+    np.testing.assert_array_equal(out, one.values + two.values**2)
+    assert grids.same_grid(grids.geobox(out), GRID)
+
+
+def test_values_along_band_meet_rasters(array_type):
+    cube = array_type(raster(bands=3))
+    with no_compute():
+        out = chunks.pointwise(np.multiply, cube, BANDS)
+    assert out.dims == ("band", "y", "x")
+    np.testing.assert_array_equal(out, cube.values * BANDS.values[:, None, None])
+
+
+def test_kernel_may_make_bands(array_type):
+    plain = array_type(raster())
+    with no_compute():
+        out = chunks.pointwise(lambda a: np.stack([a, 2 * a]), plain, bands=2)
+    assert out.dims == ("band", "y", "x")
+    np.testing.assert_array_equal(out, np.stack([plain.values, 2 * plain.values]))
+
+
+@pytest.mark.parametrize("pieces", [{}, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
+def test_kernel_that_makes_bands_gets_those_of_its_inputs_together(pieces):
+    """A file opened lazily has one band a chunk."""
+    plain, cube = in_chunks(raster(), pieces), in_chunks(raster(seed=1, bands=3), pieces)
+    with no_compute():
+        out = chunks.pointwise(lambda a, b: np.moveaxis(a[..., None] - b, -1, 0), plain, cube, bands=3)
+    np.testing.assert_array_equal(out, plain.values - cube.values)
+
+
+def test_dtype_is_known_before_anything_is_computed():
+    out = chunks.pointwise(lambda a: (a * 9).astype(np.uint8), in_chunks(raster(), ODD_CHUNKS), dtype=np.uint8)
+    assert out.dtype == np.uint8 == out.compute().dtype
+
+
+def test_rasters_on_other_grids_are_refused():
+    other = raster(fifesim.fife_site(30 / 9, window=((0, 36), (6, 51))), seed=1)
+    with pytest.raises(ValueError, match="'raster0' and 'raster1' lie on different grids"):
+        chunks.pointwise(np.add, raster(), other)
+
+
+def test_rasters_whose_coordinates_differ_by_rounding_are_combined():
+    """xarray's own sum of these is empty, and silent."""
+    one, two = raster(), raster(seed=1)
+    shifted = two.assign_coords(x=two["x"].values + 1e-7)
+    np.testing.assert_array_equal(chunks.pointwise(np.add, one, shifted), one.values + two.values)
+
+
+def test_rasters_seen_under_other_suns_are_refused():
+    suns = [raster(seed=seed).assign_coords(sza=float(sza)) for seed, sza in enumerate((20, 20, 30))]
+    chunks.pointwise(np.add, *suns[:2])
+    with pytest.raises(ValueError, match="sza is 20 in 'raster0' and 30 in 'raster2'"):
+        chunks.pointwise(np.add, suns[0], suns[2])
+    with pytest.raises(ValueError, match="sza is 20 in 'raster1' and 30 in 'raster2'"):
+        chunks.pointwise(lambda a, b, c: a, suns[0].drop_vars("sza"), *suns[1:])
+
+
+def places(row, column, shape):
+    """Kernel whose cells tell their place."""
+    return 1000.0 * (row + np.arange(shape[0]))[:, None] + column + np.arange(shape[1])
+
+
+@pytest.mark.parametrize("pieces", [None, "auto", 17, {"y": 5, "x": 8}, {"y": 5}, {"x": -1}, {"y": (30, 6), "x": 45}])
+def test_tiles_are_made_by_their_place(pieces):
+    with no_compute():
+        out = chunks.tiles(places, GRID, pieces, tile=8)
+    assert (out.chunks is None) == (pieces is None)
+    np.testing.assert_array_equal(out, places(0, 0, tuple(GRID.shape)))
+
+
+def test_automatic_chunks_end_where_tiles_end():
+    """Two tiles of 8 cells a chunk; the lattice counts from the origin of the CRS."""
+    out = chunks.tiles(places, GRID, "auto", tile=8)
+    for first, sizes in zip(grids.lattice_position(GRID), out.chunks, strict=True):
+        ends = first + np.cumsum(sizes)[:-1]
+        assert (ends % 16 == 0).all() and len(ends) > 1
+
+
+def test_unknown_dimension_of_chunks_is_named():
+    with pytest.raises(ValueError, match="chunks name the dimensions y and x, got band"):
+        chunks.tiles(places, GRID, {"band": 1}, tile=8)
+
+
+def operators(grid, pixels):
+    return (
+        axis_operator(Boxcar(30.0), cell_origin=origin, cell_size=cell, n_cells=n, pixel_origin=start,
+                      pixel_size=pixel, n_pixels=count)
+        for origin, cell, n, start, pixel, count in (
+            (grid.affine.f, grid.affine.e, grid.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y),
+            (grid.affine.c, grid.affine.a, grid.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x),
+        )
+    )  # fmt: skip
+
+
+PIXELS = [
+    grids.aligned(GRID, 30.0),
+    fifesim.grid_at("EPSG:26914", 704950.0, 4334300.0, 400.0, 400.0, 23.0),
+    fifesim.grid_at("EPSG:26914", 705001.0, 4334200.0, 60.0, 60.0, 1.7),
+]
+
+
+@pytest.mark.parametrize("pixels", PIXELS, ids=["aligned", "beyond-the-scene", "finer-than-cells"])
+@pytest.mark.parametrize("bands", [None, 2])
+def test_resampling_gives_the_same_bits_in_any_chunks(pixels, bands):
+    scene = raster(bands=bands).assign_coords(sza=28.5)
+    scene[..., 10:12, 20:22] = np.nan
+    rows, columns = operators(GRID, pixels)
+    whole = chunks.resample(regularize, rows, columns, scene, pixels)
+    np.testing.assert_array_equal(whole, regularize(scene.values, rows, columns))
+    assert grids.same_grid(grids.geobox(whole), pixels)
+    assert float(whole["sza"]) == 28.5
+    for pieces in (ODD_CHUNKS, ODD_CHUNKS | {"band": 1}, {"y": 1, "x": 45}, {"y": 36, "x": 9}):
+        with no_compute():
+            lazy = chunks.resample(regularize, rows, columns, in_chunks(scene, pieces), pixels)
+        assert lazy.chunks is not None
+        xr.testing.assert_identical(lazy.compute(), whole)
+
+
+def test_output_chunks_read_only_the_cells_that_they_need():
+    """One bad chunk spoils the pixels over it and no others."""
+    scene = in_chunks(raster(), {"y": 9, "x": 9})
+    rows, columns = operators(GRID, PIXELS[0])
+
+    def spoil(block, block_info=None):
+        if block_info[0]["chunk-location"] == (0, 0):
+            raise RuntimeError("read")
+        return block
+
+    scene.data = scene.data.map_blocks(spoil, dtype=float)
+    image = chunks.resample(regularize, rows, columns, scene, PIXELS[0])
+    assert np.isfinite(image[2:, 2:].compute()).all()
+    with pytest.raises(RuntimeError, match="read"):
+        image[0, 0].compute()
+
+
+def test_single_precision_stays_what_is_promised():
+    """Lazy arrays promise a dtype before they are computed."""
+    rows, columns = operators(GRID, PIXELS[0])
+    scene = raster().astype(np.float32)
+    eager = chunks.resample(regularize, rows, columns, scene, PIXELS[0])
+    lazy = chunks.resample(regularize, rows, columns, in_chunks(scene, ODD_CHUNKS), PIXELS[0])
+    assert lazy.dtype == lazy.compute().dtype == eager.dtype
+
+
+def test_grid_without_pixels_in_the_scene_is_all_missing():
+    far = GeoBox((3, 4), GRID.affine * GRID.affine.translation(900, 900), GRID.crs)
+    rows, columns = operators(GRID, far)
+    for scene in (raster(), in_chunks(raster(), ODD_CHUNKS)):
+        assert np.isnan(chunks.resample(regularize, rows, columns, scene, far)).all()

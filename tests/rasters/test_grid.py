@@ -1,0 +1,220 @@
+"""Grids: where the FIFE site lies, what a raster's grid is, and which grids are refused."""
+
+from fractions import Fraction
+
+import numpy as np
+import odc.geo.xr  # noqa: F401  registers .odc
+import pytest
+import xarray as xr
+from affine import Affine
+from lazy import check_place
+from odc.geo.geobox import GeoBox
+
+import fifesim
+from fifesim.rasters import grid as grids
+from fifesim.rasters import sites
+
+CELL = 30 / 9
+
+
+def ramp(grid):
+    """A raster on a grid, no two of whose cells are the same."""
+    values = np.arange(grid.shape.y * grid.shape.x, dtype=float).reshape(tuple(grid.shape))
+    return grids.place(xr.DataArray(values, dims=("y", "x")), grid)
+
+
+def test_site_is_15_km_of_cells_from_its_corner():
+    grid = fifesim.fife_site(CELL)
+    assert tuple(grid.shape) == (4500, 4500)
+    assert grid.crs.epsg == 26914
+    box = grid.boundingbox
+    np.testing.assert_allclose(
+        (box.left, box.top, box.right, box.bottom), (704970, 4334220, 719970, 4319220), rtol=0, atol=1e-6
+    )
+
+
+def test_site_corner_lies_on_the_30_m_lattice():
+    corner = fifesim.fife_site(30).affine
+    assert corner.c % 30 == 0 and corner.f % 30 == 0
+
+
+def test_site_in_its_own_datum():
+    grid = fifesim.fife_site(30, datum="NAD27")
+    assert grid.crs.epsg == 26714
+    assert (grid.affine.c, grid.affine.f) == (705000.0, 4334000.0)
+
+
+def test_only_whole_cells_are_kept():
+    assert tuple(fifesim.fife_site(29).shape) == (517, 517)
+    assert tuple(fifesim.grid_at("EPSG:32614", 0, 1e6, 100, 70, 30).shape) == (2, 3)
+
+
+@pytest.mark.parametrize("cell", [CELL, 30 / 7, 1.1])
+def test_coordinates_of_a_window_are_those_of_the_whole_to_the_bit(cell):
+    """xarray aligns exactly: a difference of 1e-10 m makes the sum of two rasters empty."""
+    whole = grids.coordinates(fifesim.fife_site(cell, window=((0, 900), (0, 900))))
+    part = grids.coordinates(fifesim.fife_site(cell, window=((123, 456), (789, 899))))
+    np.testing.assert_array_equal(part["y"], whole["y"][123:456])
+    np.testing.assert_array_equal(part["x"], whole["x"][789:899])
+
+
+def test_coordinates_are_cell_centres():
+    """Beside exact fractions: doubles of four million metres resolve 1e-9 m."""
+    coordinates = grids.coordinates(fifesim.fife_site(CELL))
+    rows = [float(4334220 - (Fraction(i) + Fraction(1, 2)) * 10 / 3) for i in range(4500)]
+    columns = [float(704970 + (Fraction(i) + Fraction(1, 2)) * 10 / 3) for i in range(4500)]
+    np.testing.assert_allclose(coordinates["y"], rows, rtol=0, atol=2e-9)
+    np.testing.assert_allclose(coordinates["x"], columns, rtol=0, atol=2e-9)
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"cell": 0}, r"cell must be in \(0, 15000\] m, got 0"),
+        ({"cell": 30, "datum": "WGS84"}, "datum must be one of NAD83, NAD27, got 'WGS84'"),
+        ({"cell": 30, "window": ((0, 10), (0, 501))}, "within 500 rows and 500 columns"),
+        ({"cell": 30, "window": ((5, 5), (0, 10))}, "within 500 rows"),
+        ({"cell": 30, "window": 10}, "window must be"),
+    ],
+)
+def test_site_refuses_what_makes_no_grid(options, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.fife_site(**options)
+
+
+CORNER = Affine(30, 0, 705000, 0, -30, 4334000)
+
+
+def box(crs, affine=CORNER):
+    return GeoBox((4, 5), affine, crs)
+
+
+@pytest.mark.parametrize(
+    "grid, message",
+    [
+        (box("EPSG:4326", Affine(0.1, 0, -96, 0, -0.1, 39)), "geographic CRS .EPSG:4326.*reproject"),
+        (box(None), "no CRS.*grid_at"),
+        (box("EPSG:2277"), "must be in metres.*US survey foot"),
+        (box("EPSG:26914", Affine(30, 0, 705000, 0, 30, 4334000)), "north up"),
+        (box("EPSG:26914", Affine(30, 1, 705000, 1, -30, 4334000)), "not rotated"),
+    ],
+)
+def test_grid_whose_distances_are_no_metres_is_refused(grid, message):
+    with pytest.raises(ValueError, match=message):
+        grids.check_grid(grid)
+
+
+def test_something_else_than_a_grid_is_refused():
+    with pytest.raises(TypeError, match=r"got tuple: see fifesim\.fife_site"):
+        grids.check_grid((4, 5))
+    with pytest.raises(ValueError, match="holds no cell of 30 x 30 m"):
+        fifesim.grid_at("EPSG:26914", 0, 0, 20, 100, 30)
+
+
+GRIDS = [
+    fifesim.fife_site(CELL, window=((7, 60), (1, 80))),
+    fifesim.fife_site(30),
+    fifesim.grid_at("EPSG:32614", 704968.3, 4334211.7, 500.0, 700.0, 7.1),
+    GeoBox((4, 5), Affine(20, 0, 705000, 0, -30, 4334000), "EPSG:26914"),
+    fifesim.fife_site(CELL, window=((7, 8), (1, 80))),
+    fifesim.fife_site(CELL, window=((7, 8), (3, 4))),
+    GeoBox((4, 5), Affine(30, 0, -90, 0, -30, 60), "EPSG:26914"),
+]
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=lambda grid: f"{grid.shape.y}x{grid.shape.x}")
+def test_raster_keeps_its_grid(grid):
+    raster = ramp(grid)
+    check_place(raster, grid.crs)
+    found = grids.geobox(raster)
+    assert grids.same_grid(found, grid)
+    np.testing.assert_allclose(found.affine, grid.affine, rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(grids.place(raster, found)["x"], raster["x"])
+    np.testing.assert_array_equal(grids.place(raster, found)["y"], raster["y"])
+
+
+def test_grid_is_right_after_slicing_and_coarsening():
+    """The GeoTransform that xarray carries on is stale then."""
+    grid = fifesim.fife_site(CELL, window=((0, 90), (0, 90)))
+    raster = ramp(grid)
+    assert grids.same_grid(grids.geobox(raster[9:18, 27:]), grid[9:18, 27:90])
+    coarse = raster.coarsen(y=9, x=9).mean()
+    assert grids.same_grid(grids.geobox(coarse), fifesim.fife_site(30, window=((0, 10), (0, 10))))
+
+
+def test_grid_of_a_raster_made_with_rioxarray():
+    x, y = 705000 + 30 * (np.arange(5) + 0.5), 4334000 - 30 * (np.arange(4) + 0.5)
+    raster = xr.DataArray(np.zeros((4, 5)), coords={"y": y, "x": x}, dims=("y", "x")).rio.write_crs("EPSG:26714")
+    assert grids.same_grid(grids.geobox(raster), box("EPSG:26714"))
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (lambda raster: raster.drop_vars("spatial_ref"), "no CRS.*write_crs"),
+        (lambda raster: raster.rename(x="lon"), r"dimensions y and x, got \('y', 'lon'\)"),
+        (lambda raster: raster.isel(x=[0, 1, 3]), "x is not evenly spaced"),
+        (lambda raster: raster[::-1], "north up"),
+    ],
+)
+def test_raster_without_a_usable_grid_is_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        grids.geobox(change(ramp(box("EPSG:26914"))))
+
+
+def test_place_leaves_other_coordinates_and_the_input():
+    grid = fifesim.fife_site(30, window=((0, 4), (0, 5)))
+    raster = ramp(grid).assign_coords(sza=28.5, band_name=("y", list("abcd")))
+    copy = raster.copy(deep=True)
+    moved = grids.place(raster, fifesim.fife_site(30, window=((1, 5), (0, 5))))
+    assert float(moved["sza"]) == 28.5 and "band_name" in moved.coords
+    xr.testing.assert_identical(raster, copy)
+
+
+def test_lattice_counts_from_the_origin_of_the_crs():
+    """Rows count southward: a northing of 4334220 m is 1300266 cells north of it."""
+    assert grids.lattice_position(fifesim.fife_site(CELL)) == (-1300266, 211491)
+    assert grids.lattice_position(fifesim.fife_site(CELL, window=((10, 20), (7, 9)))) == (-1300256, 211498)
+    assert grids.lattice_position(GRIDS[-1]) == (-2, -3)
+
+
+def test_grids_are_compared_with_a_tolerance():
+    grid = box("EPSG:26914")
+    assert grids.same_grid(grid, box("EPSG:26914", Affine(30, 0, 705000.01, 0, -30, 4334000)))
+    assert not grids.same_grid(grid, box("EPSG:26914", Affine(30, 0, 705000.1, 0, -30, 4334000)))
+    assert not grids.same_grid(grid, box("EPSG:32614"))
+    assert not grids.same_grid(grid, grid[:3, :])
+
+
+def test_offset_of_two_grids_is_in_whole_cells():
+    grid = box("EPSG:26914")
+    assert grids.lattice_offset(grid, grid[1:, 2:]) == (1, 2)
+    assert grids.lattice_offset(grid[1:, 2:], grid) == (-1, -2)
+    for other in (box("EPSG:32614"), box("EPSG:26914", Affine(30, 0, 705010, 0, -30, 4334000)), fifesim.fife_site(20)):
+        with pytest.raises(ValueError, match=r"different lattices.*pair=\"index\""):
+            grids.lattice_offset(grid, other)
+
+
+def test_coarser_grid_shares_the_corner():
+    scene = fifesim.fife_site(CELL, window=((1, 100), (1, 60)))
+    coarse = grids.aligned(scene, 30)
+    assert tuple(coarse.shape) == (11, 6)
+    assert (coarse.affine.c, coarse.affine.f) == (scene.affine.c, scene.affine.f)
+    assert grids.cell_size(grids.aligned(scene, (20, 40))) == (20.0, 40.0)
+    with pytest.raises(ValueError, match="no pixel of 500 x 500 m fits"):
+        grids.aligned(scene, 500)
+
+
+@pytest.mark.parametrize("cell", [10.0, 12.0, 20.0, 30 / 9, 60.0])
+def test_position_moves_by_as_many_cells_as_the_window(cell):
+    """At 20 m the site's corner lies half a cell off the lattice, where rounding to even would move by two or none."""
+    whole = sites.fife_site(cell)
+    first = grids.lattice_position(whole)
+    for shift in range(1, 6):
+        moved = grids.lattice_position(whole[shift:, shift:])
+        assert moved == (first[0] + shift, first[1] + shift)
+
+
+def test_convergence_of_a_utm_zone_is_positive_east_of_its_meridian():
+    """Sine of the latitude times the distance from the central meridian."""
+    assert grids.convergence(sites.fife_site(30)) == pytest.approx(np.sin(np.radians(39.06)) * (99 - 96.54), rel=0.01)

@@ -1,0 +1,242 @@
+"""Files onto grids: operations of known accuracy, and the same numbers as an interpolation by another route."""
+
+import numpy as np
+import pyproj
+import pytest
+import rasterio
+import xarray as xr
+from affine import Affine
+from lazy import check_place, no_compute
+from scipy.interpolate import RegularGridInterpolator
+
+import fifesim
+from fifesim.rasters import grid as grids
+from fifesim.rasters import warp
+
+FIFE = (-96.63, 38.98, -96.45, 39.13)
+GRID = fifesim.fife_site(10.0, window=((300, 400), (500, 620)))
+
+
+def write(path, values, affine, crs, nodata=-999.0, dtype="float64"):
+    with rasterio.open(
+        path, "w", driver="GTiff", height=values.shape[0], width=values.shape[1], count=1, dtype=dtype, crs=crs,
+        transform=affine, nodata=nodata,
+    ) as sink:  # fmt: skip
+        sink.write(np.where(np.isnan(values), nodata, values).astype(dtype), 1)
+    return path
+
+
+def hills(rows, columns):
+    """Smooth on the scale of a file's cells, and different everywhere."""
+    i, j = np.arange(rows)[:, None], np.arange(columns)
+    return 2 + np.sin(i / 5) + 0.5 * np.cos(j / 7 + i / 11)
+
+
+def geographic(path, values=None, crs="EPSG:4326", cell=0.0002):
+    """A file in degrees around the grid's place, cells of about 20 m."""
+    west, north = -96.6, 39.12
+    values = hills(500, 500) if values is None else values
+    return write(path, values, Affine(cell, 0, west, 0, -cell, north), crs), values
+
+
+def interpolated(path, values, grid, transform):
+    """Bilinear interpolation between the file's cell centres, at the grid's cell centres. NaN beyond the centres."""
+    with rasterio.open(path) as source:
+        affine = source.transform
+    rows, columns = np.arange(values.shape[0]) + 0.5, np.arange(values.shape[1]) + 0.5
+    place = grids.coordinates(grid)
+    x, y = np.meshgrid(place["x"].values, place["y"].values)
+    x, y = transform(x, y)
+    column, row = ~affine * (x, y)
+    return RegularGridInterpolator((rows, columns), values, bounds_error=False)((row, column))
+
+
+def test_nad27_goes_to_nad83_by_a_route_of_known_accuracy():
+    """
+    FIFE's corner by the NADCON grids is 704968 E 4334211 N.
+
+    Two Helmert operations to WGS 84 (EPSG:1173, of metres) stand in for them and are 2 m off at most there.
+    """
+    pipeline, accuracy = warp.operation("EPSG:26714", "EPSG:26914", FIFE)
+    east, north = pyproj.Transformer.from_pipeline(pipeline).transform(705000.0, 4334000.0)
+    assert np.hypot(east - 704968, north - 4334211) < 2.0
+    assert 0 < accuracy <= 15
+
+
+def test_direct_operation_would_be_a_ballpark_a_pixel_off():
+    """Without grid files PROJ's own choice passes latitude and longitude unchanged, and says so nowhere but here."""
+    direct = pyproj.transformer.TransformerGroup(26714, 26914).transformers[0]
+    if "Ballpark" not in direct.description:
+        pytest.skip("PROJ has its grid files here")
+    east, north = direct.transform(705000.0, 4334000.0)
+    assert 25 < np.hypot(east - 704968, north - 4334211) < 35
+    pipeline, _ = warp.operation("EPSG:26714", "EPSG:26914", FIFE)
+    assert "helmert" in pipeline
+
+
+def test_operation_runs_in_both_directions():
+    forth, _ = warp.operation("EPSG:26714", "EPSG:26914", FIFE)
+    back, _ = warp.operation("EPSG:26914", "EPSG:26714", FIFE)
+    there = pyproj.Transformer.from_pipeline(forth).transform(705000.0, 4334000.0)
+    again = pyproj.Transformer.from_pipeline(back).transform(*there)
+    np.testing.assert_allclose(again, (705000.0, 4334000.0), rtol=0, atol=1e-3)
+
+
+def test_same_crs_needs_no_operation():
+    assert warp.operation("EPSG:26914", pyproj.CRS("EPSG:26914").to_wkt()) == (None, 0.0)
+
+
+UNKNOWN = "+proj=utm +zone=14 +ellps=clrk66 +units=m +no_defs"
+
+
+def test_unknown_datum_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"no operation of known accuracy.*EPSG:26914.*ballpark.*projsync"):
+        warp.operation(UNKNOWN, "EPSG:26914", FIFE)
+    path = write(tmp_path / "lai.tif", hills(400, 400), Affine(10, 0, 709000, 0, -10, 4332000), UNKNOWN)
+    with pytest.raises(ValueError, match="no operation of known accuracy"):
+        fifesim.open_lai(path, GRID)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:4269"])
+def test_degrees_onto_metres_is_bilinear_interpolation(tmp_path, crs):
+    """
+    The warper's rows are straight over 32 cells: 320 m on the ellipsoid sag by 2 mm, 1e-4 of a file's cell.
+
+    The values change by 0.3 a cell at most.
+    """
+    path, values = geographic(tmp_path / "lai.tif", crs=crs)
+    found = warp.file_onto_grid(path, GRID)
+    pipeline, _ = warp.operation("EPSG:26914", crs, FIFE)
+
+    def to_degrees(x, y):
+        latitude, longitude = pyproj.Transformer.from_pipeline(pipeline).transform(x, y)
+        return longitude, latitude
+
+    expected = interpolated(path, values, GRID, to_degrees)
+    assert np.isfinite(expected).all()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=3e-5)
+    check_place(found, GRID.crs)
+
+
+@pytest.mark.parametrize("cell, shift", [(30.0, 0.0), (30.0, 11.3), (10.0, 3.3)])
+def test_metres_onto_metres_is_bilinear_interpolation(tmp_path, cell, shift):
+    affine = Affine(cell, 0, 709000 + shift, 0, -cell, 4332000 - shift)
+    values = hills(*(np.array([4000, 4000]) // cell).astype(int))
+    path = write(tmp_path / "lai.tif", values, affine, "EPSG:26914")
+    expected = interpolated(path, values, GRID, lambda x, y: (x, y))
+    np.testing.assert_allclose(warp.file_onto_grid(path, GRID), expected, rtol=0, atol=1e-6)
+
+
+def test_file_on_the_grid_is_read_as_it_is(tmp_path):
+    values = hills(100, 120)
+    path = write(tmp_path / "lai.tif", values, GRID.affine, "EPSG:26914")
+    np.testing.assert_array_equal(warp.file_onto_grid(path, GRID), values)
+
+
+def test_larger_cells_hold_means(tmp_path):
+    values = np.random.default_rng(0).random((500, 600))
+    path = write(tmp_path / "lai.tif", values, GRID.affine * Affine.scale(0.2), "EPSG:26914")
+    means = values.reshape(100, 5, 120, 5).mean(axis=(1, 3))
+    np.testing.assert_allclose(warp.file_onto_grid(path, GRID), means, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:26914"])
+def test_chunks_and_windows_change_nothing(tmp_path, crs):
+    grid = fifesim.fife_site(5.0, window=((600, 1300), (1000, 1700)))
+    if crs == "EPSG:4326":
+        path, _ = geographic(tmp_path / "lai.tif")
+    else:
+        path = write(tmp_path / "lai.tif", hills(300, 300), Affine(17, 0, 709003, 0, -17, 4332000), crs)
+    whole = warp.file_onto_grid(path, grid)
+    assert np.isfinite(whole).any()
+    for chunks in ("auto", 333, {"y": 101, "x": 700}):
+        with no_compute():
+            lazy = warp.file_onto_grid(path, grid, chunks)
+        assert lazy.chunks is not None
+        xr.testing.assert_identical(lazy.compute(), whole)
+    part = warp.file_onto_grid(path, grid[200:420, 10:600])
+    xr.testing.assert_identical(part, whole[200:420, 10:600].assign_coords(spatial_ref=part["spatial_ref"]))
+
+
+@pytest.mark.parametrize("dtype, nodata", [("float32", -999.0), ("float64", np.nan), ("int16", -1)])
+def test_no_data_stay_no_data(tmp_path, dtype, nodata):
+    """And do not leak into their neighbours as numbers."""
+    values = np.full((400, 400), 3.0)
+    values[150:170, 200:260] = np.nan
+    affine = Affine(10, 0, GRID.affine.c - 1400, 0, -10, GRID.affine.f + 1200)
+    path = write(tmp_path / "lai.tif", values, affine, "EPSG:26914", nodata, dtype)
+    expected = values[120:220, 140:260]
+    np.testing.assert_array_equal(warp.file_onto_grid(path, GRID), expected)
+    finer = warp.file_onto_grid(path, fifesim.fife_site(4.0, window=((750, 1000), (1250, 1550))))
+    np.testing.assert_allclose(finer.values[np.isfinite(finer)], 3.0, rtol=1e-14)
+    assert np.isnan(finer[90, 200]) and np.isfinite(finer[10, 10])
+
+
+def test_cells_beyond_the_file_are_missing(tmp_path):
+    affine = Affine(10, 0, GRID.affine.c + 300, 0, -10, GRID.affine.f - 400)
+    path = write(tmp_path / "lai.tif", hills(400, 400), affine, "EPSG:26914")
+    found = warp.file_onto_grid(path, GRID)
+    assert np.isnan(found[:40]).all() and np.isnan(found[:, :30]).all()
+    assert np.isfinite(found[40:, 30:]).all()
+
+
+def test_nad27_file_lands_where_it_belongs(tmp_path):
+    """A bright square at a known place in NAD27 is found there, not a TM pixel away."""
+    values = np.zeros((400, 400))
+    values[200:210, 200:210] = 1.0
+    path = write(tmp_path / "lai.tif", values, Affine(10, 0, 709000, 0, -10, 4332000), "EPSG:26714")
+    pipeline, _ = warp.operation("EPSG:26714", "EPSG:26914", FIFE)
+    east, north = pyproj.Transformer.from_pipeline(pipeline).transform(711050.0, 4329950.0)
+    grid = fifesim.grid_at("EPSG:26914", 710700.0, 4330600.0, 800.0, 800.0, 2.0)
+    found = warp.file_onto_grid(path, grid)
+    assert float((found * found["x"]).sum() / found.sum()) == pytest.approx(east, abs=0.5)
+    assert float((found * found["y"]).sum() / found.sum()) == pytest.approx(north, abs=0.5)
+
+
+def test_files_that_cannot_be_used_are_named(tmp_path):
+    with pytest.raises(ValueError, match=r"no raster file at '.*missing\.tif'"):
+        fifesim.open_lai(tmp_path / "missing.tif", GRID)
+    text = tmp_path / "text.tif"
+    text.write_text("no raster")
+    with pytest.raises(ValueError, match=r"cannot read .*text\.tif as a raster"):
+        fifesim.open_lai(text, GRID)
+    nowhere = write(tmp_path / "nowhere.tif", hills(40, 40), GRID.affine, None)
+    with pytest.raises(ValueError, match=r"nowhere\.tif has no CRS.*gdal_edit"):
+        fifesim.open_lai(nowhere, GRID)
+    away = write(tmp_path / "away.tif", hills(40, 40), Affine(10, 0, 600000, 0, -10, 4332000), "EPSG:26914")
+    with pytest.raises(ValueError, match=r"away\.tif does not overlap the grid, which spans"):
+        fifesim.open_lai(away, GRID)
+
+
+def test_map_of_leaf_area_is_labelled_and_checked(tmp_path):
+    path = write(tmp_path / "lai.tif", hills(100, 120), GRID.affine, "EPSG:26914")
+    lai = fifesim.open_lai(path, GRID)
+    assert (lai.name, lai.attrs["lai_distribution"]) == ("lai", "lai.tif")
+    negative = write(tmp_path / "negative.tif", hills(100, 120) - 2.5, GRID.affine, "EPSG:26914")
+    with pytest.raises(ValueError, match="negative"):
+        fifesim.open_lai(negative, GRID)
+    with no_compute():
+        lazy = fifesim.open_lai(negative, GRID, chunks=50)
+    with pytest.raises(ValueError, match="negative"):
+        lazy.compute()
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:26914"])
+def test_covering_grid_covers_the_file_in_whole_pixels(tmp_path, crs):
+    if crs == "EPSG:4326":
+        path, values = geographic(tmp_path / "lai.tif")
+    else:
+        values = hills(77, 91)
+        path = write(tmp_path / "lai.tif", values, Affine(10, 0, 709003, 0, -10, 4332001), crs)
+    grid = warp.covering_grid(path, 10 / 3, 30.0)
+    a, box = grid.affine, grid.boundingbox
+    assert grid.crs.epsg == (32614 if crs == "EPSG:4326" else 26914)
+    assert a.c % 30 == 0 and a.f % 30 == 0 and grid.shape.x % 9 == 0 and grid.shape.y % 9 == 0
+    with rasterio.open(path) as source:
+        corners = np.array([source.transform * corner for corner in [(0, 0), (91, 0), (0, 77), (91, 77)]])
+    if crs == "EPSG:4326":
+        corners = np.array(
+            [pyproj.Transformer.from_crs(4326, 32614, always_xy=True).transform(*each) for each in corners]
+        )
+    assert (corners[:, 0] >= box.left).all() and (corners[:, 0] <= box.right).all()
+    assert (corners[:, 1] >= box.bottom).all() and (corners[:, 1] <= box.top).all()

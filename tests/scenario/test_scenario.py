@@ -1,0 +1,200 @@
+"""The scenario: units, ranges, one line a mistake, and a round trip through its own text."""
+
+import re
+import tomllib
+from dataclasses import fields
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+
+import fifesim
+from fifesim.base.geometry import FIFE_TIME, earth_sun_distance
+from fifesim.rasters import grid as grids
+from fifesim.scenario.scenario import Ground, Scenario
+from fifesim.scenario.toml import parse_scenario, write_scenario
+
+SMALL = {"grid": {"width": 300.0, "height": 150.0}}
+
+
+def read_text(tmp_path, text):
+    path = tmp_path / "scenario.toml"
+    path.write_text(text, encoding="utf-8")
+    return fifesim.read_scenario(path)
+
+
+def test_default_is_the_paper_case_on_the_whole_site():
+    default = Scenario()
+    assert grids.same_grid(default.geobox(), fifesim.fife_site(30 / 9))
+    assert default.model_atmosphere() == fifesim.Atmosphere()
+    sun = default.sun_and_view()
+    assert (sun.sza, sun.saa) == pytest.approx((fifesim.fife_geometry().sza, fifesim.fife_geometry().saa), abs=1e-9)
+    assert (default.ground.distribution, default.ground.arp, default.ground.seed) == ("burned-grazed", 0.15, 7)
+    assert (default.sensor.instrument, default.sensor.bands) == ("TM", ["TM3", "TM4"])
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        SMALL,
+        {"geometry": {"sza": 40.0, "saa": 100.0, "vza": 10.0, "vaa": 5.0}},
+        {"ground": {"arp": 0.24, "seed": 2**63 - 1, "method": "periodic", "leaf_angles": "verhoef(-0.35,-0.15)"}},
+        {"ground": {"background": {"TM3": 0.1, "TM4": 0.2}}, "sensor": {"pixel": 15.0, "min_valid": 0.5}},
+        {"grid": {"cell": 1 / 3, "width": 60.0, "height": 60.0}},
+        {"ground": {"leaf": {"chlorophyll": 40.0}, "background_spectra": {"soil_wet": 0.5, "shade": 0.5}}},
+        {"sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}},
+        {"sensor": {"instrument": "L4TM", "interval": "native", "offset": [0.5, -1.0], "noise": ["shot"], "seed": 4}},
+        {"sensor": {"interval": "30.5 m"}},
+    ],
+)
+@pytest.mark.parametrize("complete", [False, True])
+def test_text_of_a_scenario_reads_as_the_same(tmp_path, values, complete):
+    scenario = parse_scenario(values)
+    scenario = scenario.complete() if complete else scenario
+    again = read_text(tmp_path, write_scenario(scenario))
+    assert again == scenario
+    assert write_scenario(again) == write_scenario(scenario)
+
+
+def test_complete_scenario_runs_the_same():
+    scenario = parse_scenario(SMALL | {"geometry": {"vza": 5}})
+    complete = scenario.complete()
+    assert complete.geobox() == scenario.geobox()
+    assert complete.sun_and_view() == scenario.sun_and_view()
+    assert complete.sensor.pixel == 30.0
+    assert set(complete.ground.background) == {"TM3", "TM4"}
+    assert complete.complete() == complete
+
+
+def test_complete_scenario_keeps_what_the_ground_is_made_of():
+    """Chemistry and spectra stay, with their defaults; optics by band would hide them."""
+    values = {"ground": {"leaf": {"brown": 0.1}, "background_spectra": {"soil_dry": 1.0}}}
+    ground = parse_scenario(SMALL | values).complete().ground
+    assert ground.leaf_optics() == fifesim.Leaf(brown=0.1)
+    assert set(ground.leaf) == {field.name for field in fields(fifesim.Leaf)}
+    assert ground.below_canopy() == fifesim.Background({"soil_dry": 1.0})
+    assert (ground.leaf_reflectance, ground.background) == ({}, {})
+
+
+def test_every_key_has_a_meaning_and_every_number_a_unit():
+    """Text beside each key: `key = value  # unit; meaning`."""
+    text = write_scenario(Scenario().complete())
+    tomllib.loads(text)
+    for line in text.splitlines():
+        if "=" in line and not re.match(r"TM\d", line):
+            assert re.search(r"# \S", line), line
+            if re.search(r"= [-\d.]+\s", line):
+                assert re.search(r"# (m|km|degree|1); |seed", line), line
+
+
+@pytest.mark.parametrize(
+    "written, value",
+    [("'23 km'", 23.0), ("'23km'", 23.0), ("'23'", 23.0), ("23", 23.0), ("'2.3e1 km'", 23.0), ("' 23  km '", 23.0)],
+)
+def test_number_may_carry_its_unit(tmp_path, written, value):
+    assert read_text(tmp_path, f"[atmosphere]\nvisibility = {written}").atmosphere.visibility == value
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("[atmosphere]\nvisibilty = 45", "atmosphere.visibilty = 45: did you mean 'visibility'? allowed are profile, "),
+        ("[ground]\nARP = 0.1", "unknown key ground.ARP = 0.1"),
+        ("[atmosfere]\nvisibility = 45", "did you mean 'atmosphere'? allowed are grid, ground"),
+        ("[atmosphere]\nvisibility = '45000 m'", "visibility = '45000 m': visibility is in km; write a number, or a "),
+        ("[grid]\ncell = '3 px'", "cell = '3 px': cell is in m"),
+        ("[atmosphere]\nvisibility = 2", "atmosphere.visibility = 2"),
+        ("[atmosphere]\nvisibility = nan", "atmosphere.visibility = nan"),
+        ("[ground]\narp = 0.25", "ground.arp = 0.25"),
+        ("[ground]\narp = 0.2499", "arp = 0.2499: at most 0.2498 when streaming; or method"),
+        ("[ground]\nseed = -1", "ground.seed = -1"),
+        ("[ground]\nseed = 1.5", "ground.seed = 1.5"),
+        ("[ground]\ndistribution = 'burnt'", "did you mean 'burned-"),
+        (
+            "[ground.leaf]\nchlorofyll = 40",
+            "unknown key 'chlorofyll': did you mean 'chlorophyll'? allowed are structure",
+        ),
+        ("[ground.leaf]\nwater = 12", "water must be in [0, 0.2] cm, got 12"),
+        (
+            "[ground.leaf]\nwater = 0.01\n[ground.leaf_reflectance]\nTM3 = 0.1",
+            "ground.leaf and ground.leaf_reflectance are both given: drop one",
+        ),
+        ("[ground.background_spectra]\nsoil = 1.0", "unknown spectrum 'soil': allowed are soil_dry, "),
+        ("[ground.background_spectra]\nsoil_dry = 0.9", "must add up to 1, got 0.9"),
+        ("[ground]\nleaf_angles = 'sphere'", "ground.leaf_angles = 'sphere'"),
+        ("[geometry]\nsza = 95", "geometry.sza = 95"),
+        ("[atmosphere]\naerosol = 'maritim'", "aerosol = 'maritim': aerosol must be one of"),
+        ("[sensor]\ninstrument = 'TN'", "TM"),
+        ("[sensor]\nbands = ['TM9']", "TM9"),
+        ("[sensor]\nbands = []", "name at least one band"),
+        ("[sensor]\ninterval = 'natve'", "interval = 'natve': must be product or native, or metres above 0"),
+        ("[sensor]\ninterval = '30 km'", "interval is in m"),
+        ("[sensor]\ninterval = -3", "sensor.interval = -3"),
+        ("[sensor]\noffset = [1.0]", "sensor.offset"),
+        ("[sensor]\noffset = [nan, 0.0]", "two finite numbers"),
+        ("[sensor]\nnoise = ['shto']", "sensor.noise"),
+        ("[sensor]\nnoise = ['shot']", "the description of TM has no noise for TM3"),
+        ("atmosphere = 3", "atmosphere"),
+        ("[atmosphere", "scenario.toml is not valid TOML"),
+    ],
+)
+def test_mistake_is_one_line_that_names_it(tmp_path, text, message):
+    with pytest.raises(ValueError) as caught:
+        read_text(tmp_path, text)
+    assert message in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_every_mistake_is_told_at_once(tmp_path):
+    with pytest.raises(ValueError) as caught:
+        read_text(tmp_path, "[atmosphere]\nvisibility = 2\naltitude = -1\n[ground]\narp = 0.3")
+    lines = str(caught.value).splitlines()
+    assert [line.split(" = ")[0] for line in lines] == ["ground.arp", "atmosphere.visibility", "atmosphere.altitude"]
+
+
+def test_missing_scenario_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"cannot read the scenario .*none\.toml: No such file"):
+        fifesim.read_scenario(tmp_path / "none.toml")
+
+
+def test_files_lie_beside_the_scenario(tmp_path):
+    (tmp_path / "samples.csv").write_text("lai\n1\n1.5\n2\n2.5\n3\n")
+    scenario = read_text(tmp_path, "[ground]\ndistribution = 'samples.csv'\nlai_file = 'maps/lai.tif'")
+    assert scenario.ground.distribution == str((tmp_path / "samples.csv").resolve())
+    assert scenario.ground.lai_file == str((tmp_path / "maps" / "lai.tif").resolve())
+
+
+def test_sun_may_be_given_instead_of_time_and_place():
+    sun = parse_scenario({"geometry": {"sza": "40 degree", "saa": 100}}).sun_and_view()
+    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, earth_sun_distance(FIFE_TIME))
+    night = parse_scenario({"geometry": {"time": "1987-06-06T06:00:00Z"}})
+    with pytest.raises(ValueError, match="the sun is below the horizon"):
+        night.sun_and_view()
+
+
+def test_scene_of_a_map_covers_the_map(tmp_path):
+    path = tmp_path / "lai.tif"
+    affine = Affine(10, 0, 709003, 0, -10, 4332001)
+    with rasterio.open(
+        path, "w", driver="GTiff", height=33, width=44, count=1, dtype="float32", crs="EPSG:26914", transform=affine
+    ) as sink:
+        sink.write(np.ones((1, 33, 44), np.float32))
+    covering = parse_scenario({"ground": {"lai_file": str(path)}}).geobox().boundingbox
+    assert covering.left <= 709003 < covering.left + 30 and covering.top - 30 < 4332001 <= covering.top
+    given = parse_scenario(SMALL | {"ground": {"lai_file": str(path)}}).geobox()
+    assert given == parse_scenario(SMALL).geobox()
+
+
+def test_scenario_is_frozen():
+    with pytest.raises(ValueError, match="frozen"):
+        Scenario().atmosphere.visibility = 10.0
+
+
+def test_a_map_of_real_ground_lies_on_no_invented_hills():
+    assert parse_scenario({}).terrain.dem == "flint-hills"
+    assert parse_scenario({"ground": {"lai_file": "lai.tif"}}).terrain.dem == "flat"
+    given = {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "flint-hills"}}
+    assert parse_scenario(given).terrain.dem == "flint-hills"
+    assert Scenario(ground=Ground(lai_file="lai.tif")).terrain.dem == "flat"

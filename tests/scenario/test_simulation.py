@@ -1,0 +1,167 @@
+"""Scenarios with terrain."""
+
+import numpy as np
+import pytest
+import rasterio
+import xarray as xr
+from lazy import no_compute
+
+import fifesim
+from fifesim.rasters import grid as grids
+from fifesim.scenario.simulation import elevation
+from fifesim.scenario.toml import parse_scenario
+
+GRID = {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 600.0, "height": 450.0}
+
+
+def scenario(**terrain):
+    return parse_scenario({"grid": GRID, "ground": {"seed": 7}, "terrain": {"horizon_reach": 900} | terrain})
+
+
+@pytest.fixture
+def hill(tmp_path):
+    """A round hill in a file that reaches 300 m past the grid on every side, in metres or feet."""
+
+    def write(name="hill.tif", unit=None, per_metre=1.0, hole=False):
+        rows, columns = 35, 40
+        y, x = np.mgrid[:rows, :columns]
+        height = 400 + 60 * np.exp(-((x - 20) ** 2 + (y - 17) ** 2) / 72.0)
+        if hole:
+            height[17, 20] = np.nan
+        profile = {
+            "driver": "GTiff",
+            "width": columns,
+            "height": rows,
+            "count": 1,
+            "dtype": "float64",
+            "nodata": np.nan,
+        }
+        place = rasterio.transform.from_origin(GRID["west"] - 300, GRID["north"] + 300, 30, 30)
+        path = tmp_path / name
+        with rasterio.open(path, "w", **profile, crs="EPSG:26914", transform=place) as sink:
+            sink.write(height * per_metre, 1)
+            if unit:
+                sink.units = [unit]
+        return str(path)
+
+    return write
+
+
+def test_hills_are_the_default():
+    assert parse_scenario({}).terrain.dem == "flint-hills"
+
+
+def test_terrain_goes_through_the_chain_written_out(hill):
+    case = scenario(dem=hill())
+    tree = fifesim.simulate(case)
+    grid = case.geobox()
+    dem = fifesim.fine_dem(case.terrain.dem, grid)
+    around, reach = fifesim.source_dem(case.terrain.dem, grid, 900)
+    lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
+    level = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])
+    horizon = fifesim.horizon(around, reach=900)
+    sloped = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], dem=dem, horizon=horizon)
+    np.testing.assert_array_equal(tree["image"]["dn"], fifesim.sense(fifesim.to_toa(sloped)))
+    np.testing.assert_array_equal(tree["level"]["dn"], fifesim.sense(fifesim.to_toa(level)))
+    np.testing.assert_array_equal(tree["terrain"]["dem"], fifesim.aggregate(dem, 30))
+    kt = fifesim.kt(level, dem, horizon=horizon)
+    np.testing.assert_array_equal(tree["terrain"]["kt"], fifesim.aggregate(kt, 30))
+    assert tree["terrain"].attrs == {f"reach_{side}": distance for side, distance in reach.items()}
+    assert reach == dict.fromkeys(("north", "east", "south", "west"), 300.0)
+
+
+def test_the_slope_toward_the_sun_is_brighter_than_the_other(hill):
+    """The sun stands in the south-east: the hill's foot there against that in the north-west, 150 m from the top."""
+    tree = fifesim.simulate(scenario(dem=hill()))
+    kt = tree["terrain"]["kt"].sel(band="TM4").compute()
+    top = {"x": GRID["west"] + 300, "y": GRID["north"] - 225}
+    toward = kt.sel(x=top["x"] + 106, y=top["y"] - 106, method="nearest")
+    away = kt.sel(x=top["x"] - 106, y=top["y"] + 106, method="nearest")
+    assert float(toward) > 1.04
+    assert float(away) < 0.96
+
+
+@pytest.mark.parametrize("change", [{"seed": 8}, {"upwelling": False}, {"dem": "flat"}])
+def test_each_key_of_the_hills_changes_the_light(change):
+    options = {"vza": 8.0, "vaa": 100.0}
+    cases = [
+        parse_scenario({"grid": GRID, "geometry": options, "terrain": {"horizon_reach": 900} | terrain})
+        for terrain in ({}, change)
+    ]
+    one, other = (fifesim.simulate(case)["image"]["dn"] for case in cases)
+    assert (one != other).any()
+
+
+def test_the_reach_of_horizons_is_that_of_the_land_around():
+    near, far = (elevation(scenario(horizon_reach=reach), scenario().geobox()) for reach in (300, 1500))
+    assert far[1].sizes["x"] > near[1].sizes["x"]
+    assert set(far[2].values()) == {1500}
+
+
+def test_feet_are_refused_unless_given(hill):
+    in_feet = hill("feet.tif", unit="ft", per_metre=1 / 0.3048)
+    with pytest.raises(ValueError, match="vertical_units"):
+        fifesim.simulate(scenario(dem=in_feet))
+    metres = fifesim.simulate(scenario(dem=hill()))["terrain"]["dem"]
+    feet = fifesim.simulate(scenario(dem=in_feet, vertical_units="ft"))["terrain"]["dem"]
+    np.testing.assert_allclose(feet, metres, rtol=1e-12)
+
+
+def test_a_hole_is_refused_unless_filled(hill):
+    holed = hill("holed.tif", hole=True)
+    with pytest.raises(ValueError, match="fill"):
+        fifesim.simulate(scenario(dem=holed))
+    filled = fifesim.simulate(scenario(dem=holed, fill=60))["terrain"]["dem"]
+    whole = fifesim.simulate(scenario(dem=hill()))["terrain"]["dem"]
+    # The top of the hill over one cell of 30 m, in a surface of least bending.
+    assert float(np.abs(filled - whole).max()) < 2.0
+
+
+def test_a_sun_that_reaches_no_slope_is_refused(tmp_path):
+    """A plain that falls 30 degrees to the north, and a sun 10 degrees above the southern horizon."""
+    profile = {"driver": "GTiff", "width": 60, "height": 60, "count": 1, "dtype": "float64", "crs": "EPSG:26914"}
+    place = rasterio.transform.from_origin(GRID["west"] - 600, GRID["north"] + 600, 30, 30)
+    rows = np.mgrid[:60, :60][0]
+    with rasterio.open(tmp_path / "ramp.tif", "w", **profile, transform=place) as sink:
+        sink.write(rows * 30 * np.tan(np.radians(30.0)), 1)
+    shaded = {"grid": GRID, "geometry": {"sza": 69.0, "saa": 180.0}, "terrain": {"dem": str(tmp_path / "ramp.tif")}}
+    with pytest.raises(ValueError, match="sun"):
+        fifesim.simulate(parse_scenario(shaded))
+
+
+def test_the_scene_with_terrain_is_lazy_and_on_its_grid(hill):
+    case = scenario(dem=hill())
+    with no_compute():
+        tree = fifesim.simulate(case, chunks={"y": 50, "x": 70})
+    assert tree["scene"]["dem"].chunks is not None
+    assert grids.same_grid(grids.geobox(tree["terrain"]["slope"]), grids.geobox(tree["image"]["dn"]))
+
+
+def test_a_mark_for_no_data_that_is_not_declared_is_no_elevation(hill, tmp_path):
+    with rasterio.open(hill()) as source:
+        values, profile = source.read(1), source.profile | {"nodata": None}
+    values[17, 20] = -9999
+    with rasterio.open(tmp_path / "marked.tif", "w", **profile) as sink:
+        sink.write(values, 1)
+    with pytest.raises(ValueError, match="-a_nodata"):
+        fifesim.simulate(scenario(dem=str(tmp_path / "marked.tif")))["terrain"]["dem"].compute()
+
+
+def test_elevation_of_a_file_goes_to_other_processes(hill):
+    lazy = fifesim.fine_dem(hill(), scenario().geobox(), chunks={"y": 50, "x": 70})
+    np.testing.assert_array_equal(lazy.compute(scheduler="processes", num_workers=2), lazy.compute(scheduler="threads"))
+
+
+@pytest.mark.parametrize("options", [{"fill": 60}, {"vertical_units": "ft"}])
+def test_what_is_for_a_file_is_refused_without_one(options):
+    with pytest.raises(ValueError, match="elevation file"):
+        scenario(**options)
+
+
+def test_keys_of_the_sensor_are_those_of_sense():
+    keys = {"instrument": "L4TM", "interval": 31.0, "offset": [0.25, -0.5], "noise": ["shot", "thermal"], "seed": 3}
+    case = parse_scenario({"grid": GRID, "terrain": {"dem": "flat"}, "sensor": keys})
+    lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
+    toa = fifesim.to_toa(fifesim.surface_reflectance(lai, "L4TM", bands=["TM3", "TM4"]), instrument="L4TM")
+    image = fifesim.sense(toa, "L4TM", interval=31.0, offset=(0.25, -0.5), noise=("shot", "thermal"), seed=3)
+    xr.testing.assert_identical(fifesim.simulate(case)["image"]["dn"].drop_attrs(), image.drop_attrs())

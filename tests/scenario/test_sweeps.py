@@ -1,0 +1,103 @@
+"""Sweeps: lazy, labelled, and the same as each scenario by itself."""
+
+import numpy as np
+import pytest
+from lazy import no_compute
+
+import fifesim
+from fifesim.scenario.toml import parse_scenario
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A flat scene of 20 x 20 pixels."""
+    return parse_scenario({"grid": {"width": 600, "height": 600}, "terrain": {"dem": "flat"}})
+
+
+@pytest.fixture(scope="module")
+def fit(small):
+    with no_compute():
+        lazy = fifesim.sweep(small, {"arp": [0.05, 0.24], "visibility": np.array([10.0, 45.0])})
+    assert lazy.r2.chunks is not None
+    return lazy.compute()
+
+
+def test_points_are_the_scenarios_by_themselves(small, fit):
+    one = parse_scenario(
+        small.model_dump(exclude_unset=True) | {"ground": {"arp": 0.24}, "atmosphere": {"visibility": 10.0}}
+    )
+    run = fifesim.simulate(one)
+    for variable in ("lai", "fpar"):
+        alone = fifesim.regress(run["truth"][variable], run["image"]["ndvi"])
+        point = fit.sel(arp=0.24, visibility=10.0, variable=variable)
+        assert (alone.r2, alone.slope, alone.n) == (float(point.r2), float(point.slope), int(point.n))
+
+
+def test_coordinates_select_and_plot(fit):
+    assert dict(fit.r2.sizes) == {"arp": 2, "visibility": 2, "variable": 2}
+    # Patches larger than a pixel are seen better, whatever the air.
+    assert (fit.r2.sel(arp=0.24) > fit.r2.sel(arp=0.05)).all()
+    (line,) = fit.r2.sel(arp=0.24, variable="lai").plot()
+    assert line.axes.get_xlabel() == "meteorological range [km]"
+
+
+def test_selection_runs_its_own_points_only(small):
+    runs = []
+    measures = {"seen": lambda run: runs.append(run["truth"]["lai"].attrs["arp"]) or runs[-1]}
+    lazy = fifesim.sweep(small, {"arp": [0.05, 0.15, 0.24], "visibility": [10.0, 45.0]}, measures)
+    np.testing.assert_array_equal(lazy.seen.sel(arp=0.15), [0.15, 0.15])
+    assert runs == [0.15, 0.15]
+
+
+def test_axis_may_be_a_function(small):
+    """The correlation length as an axis: 8.3 m is that of arp 0.15."""
+
+    def change(scenario, length):
+        arp = fifesim.arp_for_length(length, scenario.grid.cell)
+        return parse_scenario(scenario.model_dump(exclude_unset=True) | {"ground": {"arp": arp}})
+
+    axis = [8.3, 32.0], change
+    measures = {"deviation": lambda run: run["truth"]["lai"].std(), "arp": lambda run: run["truth"]["lai"].attrs["arp"]}
+    found = fifesim.sweep(small, {"correlation_length": axis, "pixel": [30.0, 60.0]}, measures).compute()
+    assert dict(found.sizes) == {"correlation_length": 2, "pixel": 2}
+    np.testing.assert_allclose(found.arp.sel(pixel=30.0), [0.15, 0.24], atol=0.002)
+    assert (found.deviation.diff("correlation_length") > 0).all() and (found.deviation.diff("pixel") < 0).all()
+
+
+@pytest.mark.parametrize(
+    ("axes", "message"),
+    [
+        ({}, "needs an axis"),
+        ({"seed": [1, 2]}, r"several sections: write ground\.seed or terrain\.seed"),
+        ({"visibilty": [10]}, "'visibilty' is no key of a scenario"),
+        ({"arp": [0.3]}, "less than 0.25"),
+        ({"arp": 0.15}, "needs a list of values, got 0.15"),
+        ({"instrument": "TM"}, "needs a list of values, got 'TM'"),
+        ({"arp": []}, "needs a list of values"),
+        ({"sensor.arp": [0.1]}, "no key of a scenario"),
+    ],
+)
+def test_impossible_axes_are_refused(small, axes, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.sweep(small, axes)
+
+
+def test_sections_are_named_where_a_key_is_in_several(small):
+    found = fifesim.sweep(small, {"ground.seed": [1, 2]})
+    assert found.sizes["ground.seed"] == 2
+
+
+def test_sweep_takes_a_scenario():
+    with pytest.raises(TypeError, match="takes a Scenario, got dict"):
+        fifesim.sweep({}, {"arp": [0.1]})
+
+
+@pytest.mark.parametrize("offsets", [[[0.0, 0.0], [0.3, 0.0]], np.array([[0.0, 0.0], [0.3, 0.0]])])
+def test_values_of_an_axis_may_be_lists(small, offsets):
+    sensor = {"sensor": {"instrument": "L4TM", "bands": ["TM3", "TM4"]}}
+    scenario = parse_scenario(small.model_dump(exclude_unset=True) | sensor)
+    found = fifesim.sweep(scenario, {"offset": offsets, "noise": [[], ["shot", "thermal"]]})
+    assert found["offset"].values.tolist() == ["0.0, 0.0", "0.3, 0.0"]
+    assert found["noise"].values.tolist() == ["none", "shot, thermal"]
+    r2 = found.r2.sel(variable="lai", noise="none")
+    assert float(r2.sel(offset="0.3, 0.0")) < float(r2.sel(offset="0.0, 0.0"))

@@ -1,0 +1,131 @@
+"""Noise of a uniform scene against what its description says, and the independence of its draws."""
+
+import numpy as np
+import pytest
+
+from fifesim.sensor.response.noise import NoiseModel, add_noise, check_kinds, check_seed, fixed_pattern, line_noise
+
+SHAPE = (300, 400)
+MODEL = NoiseModel(0.4, 0.01, detectors=16, gain_spread=0.004, offset_spread=0.2)
+
+
+def residual(radiance, kinds, model=MODEL, seed=5, band=2, **place):
+    return add_noise(np.full(SHAPE, float(radiance)), model, kinds, seed=seed, band=band, **place) - radiance
+
+
+@pytest.mark.parametrize(
+    ("kinds", "variance"),
+    [(["thermal"], lambda L: 0.16), (["shot"], lambda L: 0.01 * L), (["shot", "thermal"], lambda L: 0.16 + 0.01 * L)],
+)
+@pytest.mark.parametrize("radiance", [5.0, 60.0, 180.0])
+def test_uniform_scene_shows_the_noise_that_was_asked_for(kinds, variance, radiance):
+    """Standard deviation and mean within three standard errors of independent normal deviates."""
+    noise = residual(radiance, kinds)
+    sigma = np.sqrt(variance(radiance))
+    assert abs(noise.std() - sigma) < 3 * sigma / np.sqrt(2 * noise.size)
+    assert abs(noise.mean()) < 3 * sigma / np.sqrt(noise.size)
+    for axis in (0, 1):
+        lagged = np.mean(np.diff(noise, axis=axis) ** 2)
+        # Neighbours are independent: the mean square of 119,000 differences, of relative error sqrt(3 / n).
+        assert abs(lagged / (2 * sigma**2) - 1) < 3 * np.sqrt(3 / noise.size)
+
+
+def test_noise_equivalent_radiance_and_snr_are_those_of_the_model():
+    radiance = np.array([0.0, 20.0, 150.0])
+    np.testing.assert_allclose(MODEL.noise_equivalent_radiance(radiance), np.sqrt(0.16 + 0.01 * radiance), rtol=1e-14)
+    np.testing.assert_allclose(MODEL.snr(radiance), radiance / np.sqrt(0.16 + 0.01 * radiance), rtol=1e-14)
+    assert NoiseModel(0.0, 0.0).snr(10.0) == np.inf
+    assert MODEL.noise_equivalent_radiance(-5.0) == 0.4
+
+
+def test_two_published_ratios_are_both_met():
+    model = NoiseModel.from_snr([30.0, 150.0], [120.0, 420.0], detectors=6)
+    np.testing.assert_allclose(model.snr([30.0, 150.0]), [120.0, 420.0], rtol=1e-12)
+    assert model.detectors == 6
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_one_published_ratio_is_met_whatever_the_share_of_shot_noise(share):
+    model = NoiseModel.from_snr(80.0, 200.0, share)
+    assert float(model.snr(80.0)) == pytest.approx(200.0, rel=1e-12)
+    # A fourth of the signal leaves half of the shot noise and all of the other.
+    expected = 0.4**2 * (share / 4 + 1 - share)
+    assert float(model.noise_equivalent_radiance(20.0)) ** 2 == pytest.approx(expected, rel=1e-12)
+
+
+def test_fixed_pattern_repeats_with_the_detectors():
+    """Rows of one detector are the same but for what they see; gains show in bright scenes and offsets in dark."""
+    noise = residual(100.0, ["fixed-pattern"])
+    np.testing.assert_array_equal(noise, noise[:, :1] + np.zeros(SHAPE))
+    np.testing.assert_array_equal(noise[16:], noise[:-16])
+    assert np.unique(noise[:, 0].round(12)).size == 16
+    gain, offset = fixed_pattern(MODEL, 5, 2)
+    np.testing.assert_allclose(noise[:16, 0], 100 * (gain - 1) + offset, rtol=0, atol=1e-12)
+
+
+def test_fixed_pattern_has_its_spread():
+    many = NoiseModel(0.0, 0.0, detectors=20000, gain_spread=0.004, offset_spread=0.2)
+    gain, offset = fixed_pattern(many, 1, 0)
+    assert abs(gain.std() - 0.004) < 3 * 0.004 / np.sqrt(2 * 20000)
+    assert abs(offset.std() - 0.2) < 3 * 0.2 / np.sqrt(2 * 20000)
+    assert abs(np.corrcoef(gain, offset)[0, 1]) < 3 / np.sqrt(20000)
+
+
+def test_pushed_arrays_stripe_along_the_track():
+    model = NoiseModel(0.0, 0.0, detectors=7000, gain_spread=0.004, along="columns")
+    noise = residual(100.0, ["fixed-pattern"], model)
+    np.testing.assert_array_equal(noise, noise[:1] + np.zeros(SHAPE))
+    assert np.unique(noise[0]).size == SHAPE[1]
+
+
+@pytest.mark.parametrize("place", [(0, 0), (-40, -1500), (144_000, 23_566)])
+def test_a_window_has_the_noise_of_the_whole(place):
+    """Also across the tiles of 1024 pixels that a line is drawn by, and on either side of the origin."""
+    row, column = place
+    kinds = ["shot", "thermal", "fixed-pattern"]
+    scene = np.random.default_rng(0).uniform(10, 90, (50, 1200))
+    whole = add_noise(scene, MODEL, kinds, seed=5, band=2, row=row, column=column)
+    for y, x, height, width in ((0, 0, 7, 1200), (13, 1, 20, 40), (49, 990, 1, 210)):
+        part = scene[y : y + height, x : x + width]
+        found = add_noise(part, MODEL, kinds, seed=5, band=2, row=row + y, column=column + x)
+        np.testing.assert_array_equal(found, whole[y : y + height, x : x + width])
+
+
+def test_seeds_bands_and_lines_draw_apart():
+    lines = [line_noise(*key, 0, 4000) for key in ((1, 0, 0), (2, 0, 0), (1, 1, 0), (1, 0, 1), (1, 0, -1))]
+    correlation = np.corrcoef(lines) - np.eye(5)
+    # Ten pairs: four standard errors.
+    assert np.abs(correlation).max() < 4 / np.sqrt(4000)
+
+
+def test_nothing_is_noisy_by_default_and_nan_stays():
+    scene = np.array([[1.0, np.nan], [3.0, 4.0]])
+    np.testing.assert_array_equal(add_noise(scene, MODEL, (), seed=1, band=0), scene)
+    noisy = add_noise(scene, MODEL, ["shot", "thermal", "fixed-pattern"], seed=1, band=0)
+    np.testing.assert_array_equal(np.isnan(noisy), np.isnan(scene))
+    assert scene[0, 0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: NoiseModel(-1.0, 0.0), "thermal must not be negative"),
+        (lambda: NoiseModel(1.0, 0.0, detectors=0), "detectors"),
+        (lambda: NoiseModel(1.0, 0.0, along="lines"), "pushbroom"),
+        (lambda: NoiseModel.from_snr(80.0, 200.0), "give shot_share"),
+        (lambda: NoiseModel.from_snr(80.0, 200.0, 40.0), "share of the variance"),
+        (lambda: NoiseModel.from_snr([80.0, 20.0], [200.0, 300.0]), "negative variance of thermal"),
+        (lambda: NoiseModel.from_snr([20.0, 200.0], [20.0, 300.0]), "negative variance of shot"),
+        (lambda: NoiseModel.from_snr([20.0, 20.0], [20.0, 30.0]), "two radiances"),
+        (lambda: NoiseModel.from_snr([20.0, 40.0], [20.0, 30.0], 0.5), "leave it out"),
+        (lambda: NoiseModel.from_snr([20.0, -40.0], [20.0, 30.0]), "positive radiance"),
+        (lambda: check_kinds(["shot", "speckle"]), "unknown noise speckle: there are shot, thermal, fixed-pattern"),
+        (lambda: check_seed(-1), "seed"),
+        (lambda: check_seed(2**64), "whole number from 0"),
+        (lambda: check_seed(1.5), "whole number from 0 to .*got 1.5"),
+        (lambda: check_seed("7"), "whole number from 0 to .*got '7'"),
+    ],
+)
+def test_noise_that_cannot_be_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

@@ -1,0 +1,126 @@
+"""The image of a scan on labelled rasters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
+
+import fifesim
+from fifesim.base.geometry import Geometry
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.performance import Noise, Scan
+from fifesim.sensor.scan.track import growth
+
+TM = instrument("TM")
+VIEW = {"nadir_offset": -36e3, "heading": 193.6}
+
+
+def scene(shape=(180, 198), plane=None):
+    grid = fifesim.fife_site(30 / 9, window=((90, 90 + shape[0]), (180, 180 + shape[1])))
+    x, y = np.meshgrid(*(grids.coordinates(grid)[axis].values for axis in ("x", "y")))
+    values = np.random.default_rng(2).uniform(10, 90, shape) if plane is None else plane(x, y)
+    array = xr.DataArray(np.stack([values, values + 1]), dims=("band", "y", "x"), coords={"band": ["TM3", "TM4"]})
+    array.attrs["units"] = "W m-2 sr-1 um-1"
+    return cf.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
+
+
+def test_pixels_lie_where_they_say():
+    """A plane is seen at the centre of a symmetric footprint; its steps by cells leave a hundredth of one."""
+    plane = scene(plane=lambda x, y: 0.02 * (x - 705600) - 0.03 * (y - 4333900))
+    image = fifesim.sense_swath(plane, TM, quantise=False, **VIEW)
+    expected = 0.02 * (image["x"] - 705600) - 0.03 * (image["y"] - 4333900)
+    difference = (image.sel(band="TM3") - expected).values
+    x, y = grids.transform_points(~grids.geobox(plane).affine, image["x"], image["y"])
+    inside = (x > 9) & (x < 189) & (y > 9) & (y < 171)
+    assert inside.mean() > 0.5
+    assert np.abs(difference[inside]).max() < np.hypot(0.02, 0.03) * 0.01 * 10 / 3
+
+
+def test_pixels_stand_at_the_instruments_interval_and_turn_with_the_track():
+    image = fifesim.sense_swath(scene(), TM, quantise=False, **VIEW)
+    assert image.dims == ("band", "line", "sample")
+    along = np.hypot(image["x"].diff("line"), image["y"].diff("line"))
+    across = np.hypot(image["x"].diff("sample"), image["y"].diff("sample"))
+    wider = growth(float(image["vza"].mean()) * 0.9, 705e3)
+    # The sphere and the map's scale cost a few thousandths.
+    np.testing.assert_allclose(along, 30.315, rtol=4e-3)
+    np.testing.assert_allclose(across, 30.315 * float(wider[1]), rtol=5e-3)
+    heading = np.degrees(np.arctan2(image["x"].diff("line"), image["y"].diff("line"))) % 360
+    convergence = grids.convergence(grids.geobox(scene()))
+    np.testing.assert_allclose(heading, 193.6 - convergence, rtol=0, atol=0.4)
+    # Flying south, the right is the west.
+    assert (image["x"].diff("sample") < 0).all()
+    assert (abs(image["vaa"] - 283.6) < 0.5).all()
+
+
+def test_constant_scene_stays_constant_and_its_labels_are_whole():
+    image = fifesim.sense_swath(scene(plane=lambda x, y: 0 * x + 40.0), TM, quantise=False, **VIEW)
+    found = image.sel(band="TM3").values
+    np.testing.assert_allclose(found[np.isfinite(found)], 40.0, rtol=1e-14)
+    assert image["latitude"].attrs["units"] == "degrees_north"
+    assert image["vza"].dims == ("line", "sample") and cf.attributes("vza").items() <= image["vza"].attrs.items()
+    assert image.rio.crs == scene().rio.crs
+    assert image.attrs["units"] == "W m-2 sr-1 um-1"
+
+
+@pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
+def test_a_scan_is_the_same_in_any_chunks(chunks, monkeypatch):
+    monkeypatch.setattr("fifesim.sensor.scan.rasters.swath._BLOCK", 7)
+    whole = fifesim.sense_swath(scene(), TM, **VIEW)
+    with no_compute():
+        lazy = fifesim.sense_swath(in_chunks(scene(), chunks), TM, **VIEW)
+    xr.testing.assert_identical(lazy.compute(), whole)
+
+
+def test_digital_numbers_come_back_as_radiance_and_reflectance():
+    image = fifesim.sense_swath(scene(), TM, **VIEW)
+    radiance = fifesim.sense_swath(scene(), TM, quantise=False, **VIEW)
+    assert image.dtype == np.uint8 and image.attrs["_FillValue"] == 0
+    back = fifesim.to_radiance(image)
+    assert float(abs(back - radiance).max()) <= float(image["gain"].max()) / 2 * (1 + 1e-9)
+    reflectance = fifesim.to_reflectance(image)
+    assert reflectance.dims == ("band", "line", "sample") and "latitude" in reflectance.coords
+
+
+def test_noise_goes_by_lines_of_the_scan():
+    noisy = replace(
+        TM,
+        detectors=16,
+        bands=tuple(replace(band, noise=Noise(radiance=50.0, snr=50.0, gain_spread=0.02)) for band in TM.bands),
+        sources=TM.sources | {"noise": "Friedl1995", "detectors": "Friedl1995"},
+    )
+    flat = scene(plane=lambda x, y: 0 * x + 40.0)
+    image = fifesim.sense_swath(flat, noisy, noise="fixed-pattern", seed=1, quantise=False, **VIEW).sel(band="TM3")
+    spread = image.max("sample") - image.min("sample")
+    assert float(spread.max()) < 1e-10
+    assert float(image.mean("sample").std()) > 0.2
+
+
+def test_wide_scans_see_wider():
+    """At 40 degrees a footprint covers 1.37 x 2.0 times as much: the variance of white cells falls in proportion."""
+    wide = replace(
+        TM, altitude=833e3, scan=Scan("whiskbroom", max_angle=55.0), sources=TM.sources | {"scan": "Friedl1995"}
+    )
+    # 705 km and 833 km widen the footprint alike.
+    variance = {}
+    for offset in (0.0, 735e3):
+        image = fifesim.sense_swath(scene((360, 360)), wide, quantise=False, nadir_offset=offset)
+        variance[offset] = float(image.sel(band="TM3").var())
+        angle = float(image["vza"].mean())
+    scan_angle = np.degrees(np.arcsin(np.sin(np.radians(angle)) * 6371 / (6371 + 833)))
+    along, across = growth(scan_angle, 833e3)
+    assert 38 < scan_angle < 42
+    # 300 pixels in the wide image: a standard error of 8 %, and neighbours overlap a little.
+    assert variance[0.0] / variance[735e3] == pytest.approx(float(along * across), rel=0.3)
+
+
+def test_a_scene_that_is_not_scanned_is_named():
+    narrow = replace(TM, scan=Scan("whiskbroom", max_angle=7.7), sources=TM.sources | {"scan": "Friedl1995"})
+    with pytest.raises(ValueError, match="does not see the scene"):
+        fifesim.sense_swath(scene(), narrow, nadir_offset=4e5)
+    with pytest.raises(ValueError, match="simulate a larger one"):
+        fifesim.sense_swath(scene((6, 6)), TM)
