@@ -48,7 +48,7 @@ class DataArrayAccessor:
     compare = _Method("chain.comparison")
     to_radiance = _Method("sensor.raster")
     to_reflectance = _Method("sensor.raster")
-    ndvi = _Method("chain.steps")
+    ndvi = _Method("chain.images")
     aggregate = _Method("analysis.rasters.regression")
     regress = _Method("analysis.rasters.regression")
     relative_equivalent_noise = _Method("analysis.rasters.uncertainty")

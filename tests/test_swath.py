@@ -1,9 +1,8 @@
 """Directions of sun and sensor that vary over the scene, from leaf area to digital numbers."""
 
-import dataclasses
-
 import numpy as np
 import pytest
+import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
@@ -18,9 +17,14 @@ def ramp(lai, low, high):
     return lai.copy(data=values).drop_attrs(deep=False)
 
 
+def by_cell(sza, saa, vza, vaa):
+    """Directions of which some are rasters."""
+    return xr.Dataset({"sza": sza, "saa": saa, "vza": vza, "vaa": vaa})
+
+
 @pytest.fixture
 def swath(lai):
-    return fifesim.Geometry(ramp(lai, 25.0, 31.0), 117.0, ramp(lai, 0.0, 50.0), ramp(lai, 350.0, 370.0))
+    return by_cell(ramp(lai, 25.0, 31.0), 117.0, ramp(lai, 0.0, 50.0), ramp(lai, 350.0, 370.0))
 
 
 def test_each_cell_has_its_own_direction(lai, swath):
@@ -40,7 +44,7 @@ def test_reflectance_keeps_its_word(lai_with_hole, swath):
         lai_with_hole,
         quantity="surface_reflectance",
     )
-    assert cf.geometry_of(result).rasters == ("sza", "vza", "vaa")
+    assert cf.varying(cf.geometry_of(result)) == ("sza", "vza", "vaa")
     np.testing.assert_array_equal(np.isnan(result[0]), np.isnan(lai_with_hole))
 
 
@@ -55,7 +59,7 @@ def test_image_of_a_swath_knows_its_directions(lai, swath):
     toa = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath).fifesim.to_toa()
     image = check_raster_function(lambda array: array.fifesim.sense("TM"), toa, quantity="dn")
     there = cf.geometry_of(image)
-    assert there.rasters == ("sza", "vza", "vaa")
+    assert cf.varying(there) == ("sza", "vza", "vaa")
     middle = toa["sza"].values.reshape(5, 9, 6, 9).mean((1, 3))
     np.testing.assert_allclose(there.sza, middle, rtol=1e-12)
     # North lies between 350 and 10 degrees, and a mean of numbers would be in the south.
@@ -73,8 +77,8 @@ def test_planetary_reflectance_of_a_swath_is_what_it_was(lai, swath):
 
 
 def test_one_direction_as_a_raster_is_that_direction(lai):
-    level = fifesim.Geometry(28.5, 117.0, ramp(lai, 20.0, 20.0), 200.0)
-    one = dataclasses.replace(level, vza=20.0)
+    level = by_cell(28.5, 117.0, ramp(lai, 20.0, 20.0), 200.0)
+    one = fifesim.Geometry(28.5, 117.0, 20.0, 200.0)
     images = [
         lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=g).fifesim.to_toa().fifesim.sense("TM")
         for g in (level, one)
@@ -92,6 +96,6 @@ def test_what_needs_one_sun_says_so(lai, swath, call):
 
 
 def test_a_low_view_is_named(lai):
-    low = fifesim.Geometry(28.5, 117.0, ramp(lai, 20.0, 95.0), 200.0)
+    low = by_cell(28.5, 117.0, ramp(lai, 20.0, 95.0), 200.0)
     with pytest.raises(ValueError, match=r"vza must be in \[0, 90\) degrees in every cell, got"):
         lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=low)

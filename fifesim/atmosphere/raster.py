@@ -23,8 +23,7 @@ def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacenc
     atmosphere : fifesim.atmosphere.air.models.Atmosphere
     bands : sequence of fifesim.base.bands.Band
         One for each band of the raster.
-    geometry : fifesim.base.geometry.Geometry
-        Its angles may be rasters on the cells.
+    geometry : fifesim.base.geometry.Geometry, or xarray.Dataset of angles on the cells
     elevation : xarray.DataArray, dims (y, x), optional
         Of the ground on the cells, 0 to 4000, in the place of the atmosphere's one altitude. [m]
     adjacency : bool, optional
@@ -90,7 +89,7 @@ def diffuse_fraction(atmosphere, bands, geometry):
     ----------
     atmosphere : fifesim.atmosphere.air.models.Atmosphere
     bands : sequence of fifesim.base.bands.Band, length (band,)
-    geometry : fifesim.base.geometry.Geometry
+    geometry : fifesim.base.geometry.Geometry or xarray.Dataset
 
     Returns
     -------
@@ -101,7 +100,7 @@ def diffuse_fraction(atmosphere, bands, geometry):
     --------
     fifesim.atmosphere.schemes.lookup.varying_diffuse_fraction
     """
-    if "sza" not in geometry.rasters:
+    if "sza" not in cf.varying(geometry):
         return engines.band_terms(atmosphere, tuple(bands), geometry.sza, 0.0, 0.0).diffuse_fraction
 
     def kernel(sza):
@@ -121,7 +120,7 @@ def _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency,
     plain = reflectance.drop_vars(["band", *ANGLES], errors="ignore")
     if adjacency:
         out = _with_adjacency(verb, plain, atmosphere, bands, geometry, elevation, surroundings)
-    elif elevation is None and not geometry.rasters:
+    elif elevation is None and not cf.varying(geometry):
         out = _uniform(verb, plain, atmosphere, bands, geometry)
     else:
         out = _varying(verb, plain, atmosphere, bands, geometry, elevation)
@@ -150,21 +149,17 @@ def _varying(verb, reflectance, atmosphere, bands, geometry, elevation):
     else:
         cf.check_quantity(elevation, "dem")
         altitude = elevation / 1000
-    for name in geometry.rasters:
-        cf.check_units(getattr(geometry, name), name)
-    angles = (xr.DataArray(getattr(geometry, name)) for name in ANGLES)
-
     def kernel(rho, *places):
         return lookup.varying_reflectance(
             rho, *places, atmosphere=atmosphere, bands=tuple(bands), to_surface=verb == "to_surface"
         )
 
-    return chunks.pointwise(kernel, reflectance, altitude, *angles, bands=len(bands))
+    return chunks.pointwise(kernel, reflectance, altitude, *cf.angles(geometry), bands=len(bands))
 
 
 def _with_adjacency(verb, reflectance, atmosphere, bands, geometry, elevation, surroundings):
-    if elevation is not None or geometry.rasters:
-        what = "elevation" if elevation is not None else "rasters of " + ", ".join(geometry.rasters)
+    if elevation is not None or cf.varying(geometry):
+        what = "elevation" if elevation is not None else "rasters of " + ", ".join(cf.varying(geometry))
         raise ValueError(f"adjacency takes one geometry and one altitude, got {what}: leave one of the two out")
     terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
     step = adjacency_raster.apparent_reflectance if verb == "to_toa" else adjacency_raster.surface_reflectance

@@ -10,19 +10,19 @@ import pvlib
 ANGLES = ("sza", "saa", "vza", "vaa")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Geometry:
     """
     Directions of sun and sensor seen from the ground.
 
-    Azimuths point toward the sun and toward the sensor, clockwise from north. An angle that varies over a scene is a
-    raster on its cells.
+    Azimuths point toward the sun and toward the sensor, clockwise from north. Where an angle differs from cell to cell, an
+    `xarray.Dataset` of the same names takes the place of this class.
 
     Parameters
     ----------
-    sza, saa : float or xarray.DataArray, dims (y, x)
+    sza, saa : float
         Solar zenith and azimuth angles. [degree]
-    vza, vaa : float or xarray.DataArray, dims (y, x), optional
+    vza, vaa : float, optional
         Sensor zenith and azimuth angles; nadir by default. [degree]
     earth_sun_distance : float, optional
         [astronomical unit]
@@ -30,7 +30,9 @@ class Geometry:
     Raises
     ------
     ValueError
-        If the sun or the sensor is not above the horizon; in a raster, when it is used.
+        If the sun or the sensor is not above the horizon.
+    TypeError
+        If an angle is no number.
     """
 
     sza: float
@@ -40,64 +42,27 @@ class Geometry:
     earth_sun_distance: float = 1.0
 
     def __post_init__(self):
+        for name in ANGLES:
+            if np.ndim(getattr(self, name)):
+                raise TypeError(
+                    f"{name} of a Geometry is one number, got an array: angles by cell are an xarray.Dataset with sza, saa, "
+                    "vza and vaa, such as fifesim.scan_geometry(...).assign(sza=30.0, saa=120.0)"
+                )
         for name in ("saa", "vaa"):
-            angle = getattr(self, name)
-            if np.ndim(angle) == 0 and not np.isfinite(angle):
-                raise ValueError(f"{name} must be finite degrees, got {angle}")
+            if not np.isfinite(getattr(self, name)):
+                raise ValueError(f"{name} must be finite degrees, got {getattr(self, name)}")
         hints = {
             "sza": "the sun is below the horizon; check time, latitude and longitude",
             "vza": "the sensor looks down",
         }
         for name, hint in hints.items():
             angle = getattr(self, name)
-            if np.ndim(angle) == 0 and not 0 <= angle < 90:
+            if not 0 <= angle < 90:
                 raise ValueError(f"{name} must be in [0, 90) degrees, got {angle:g}: {hint}")
         if not 0.9 < self.earth_sun_distance < 1.1:
             raise ValueError(
                 f"earth_sun_distance is in astronomical units, 0.983 to 1.017, got {self.earth_sun_distance:g}"
             )
-
-    def __eq__(self, other):
-        if not isinstance(other, Geometry):
-            return NotImplemented
-        return self is other or (not self.rasters and not other.rasters and self._angles == other._angles)
-
-    def __hash__(self):
-        return id(self) if self.rasters else hash(self._angles)
-
-    @property
-    def _angles(self):
-        return self.sza, self.saa, self.vza, self.vaa, self.earth_sun_distance
-
-    @property
-    def rasters(self):
-        """Names of the angles that vary over the scene."""
-        return tuple(name for name in ANGLES if np.ndim(getattr(self, name)))
-
-    def uniform(self, what):
-        """
-        This geometry, where one direction of sun and sensor is needed.
-
-        Parameters
-        ----------
-        what : str
-            What needs it.
-
-        Returns
-        -------
-        geometry : Geometry
-
-        Raises
-        ------
-        ValueError
-            If an angle varies over the scene.
-        """
-        if self.rasters:
-            raise ValueError(
-                f"{what} needs one direction of sun and sensor, got rasters of {', '.join(self.rasters)}: "
-                "give their means as geometry=fifesim.Geometry(sza, saa, vza, vaa)"
-            )
-        return self
 
     @property
     def raa(self):

@@ -1,9 +1,10 @@
 """One scene through many instruments."""
 
+from dataclasses import replace
+
 import xarray as xr
 
-from fifesim.chain import steps as chain
-from fifesim.sensor import raster as sensor
+from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 # Where the red and the near infrared band of an instrument lie, and the best place. [um]
@@ -11,23 +12,7 @@ _RED = (0.60, 0.70, 0.66)
 _NIR = (0.75, 1.00, 0.84)
 
 
-def compare(
-    lai,
-    instruments,
-    *,
-    bands=None,
-    dem=None,
-    atmosphere=None,
-    geometry=None,
-    leaf_optics=None,
-    background=None,
-    leaf_angles="spherical",
-    hotspot=0.0,
-    interval=None,
-    noise=(),
-    seed=0,
-    quantise=True,
-):
+def compare(lai, instruments, setup=None, *, bands=None):
     """
     Images of one scene by many instruments, each on its own grid.
 
@@ -36,12 +21,11 @@ def compare(
     lai : xarray.DataArray, dims (y, x)
         Leaf area index; in chunks, the images are lazy, and one pass over the scene makes them all. [m2 m-2]
     instruments : sequence of str or Instrument
+    setup : Setup, optional
+        Ground, air and sampling that they share; its instrument and bands do not count. Spectra of leaf and background,
+        as by default, fit every instrument.
     bands : mapping of str to sequence of str, optional
         Bands by the name of an instrument; by default its red and its near infrared band.
-    dem, atmosphere, geometry, leaf_optics, background, leaf_angles, hotspot : optional
-        As in `fifesim.chain.steps.surface_reflectance`; spectra, as by default, fit every instrument.
-    interval, noise, seed, quantise : optional
-        As in `fifesim.sensor.raster.sense`.
 
     Returns
     -------
@@ -56,8 +40,11 @@ def compare(
 
     See Also
     --------
-    fifesim.chain.steps.surface_reflectance, fifesim.chain.steps.to_toa, fifesim.sensor.raster.sense
+    fifesim.chain.setup.reflectance_of, fifesim.chain.setup.image_of
     """
+    setup = Setup() if setup is None else setup
+    if not isinstance(setup, Setup):
+        raise TypeError(f"setup must be a fifesim.Setup, got {setup!r}: see fifesim.Setup")
     descriptions = [find_instrument(each) for each in ([instruments] if isinstance(instruments, str) else instruments)]
     names = [description.name for description in descriptions]
     if not names or len(set(names)) < len(names):
@@ -67,23 +54,10 @@ def compare(
         raise ValueError(f"bands are given for {', '.join(set(bands) - set(names))}, which is not compared")
     nodes = {}
     for description in descriptions:
-        selected = _bands(description, bands.get(description.name))
-        reflectance = chain.surface_reflectance(
-            lai,
-            description,
-            bands=[band.name for band in selected],
-            dem=dem,
-            atmosphere=atmosphere,
-            geometry=geometry,
-            leaf_optics=leaf_optics,
-            background=background,
-            leaf_angles=leaf_angles,
-            hotspot=hotspot,
-        )
-        toa = chain.to_toa(reflectance, instrument=description)
-        image = sensor.sense(toa, description, interval=interval, noise=noise, seed=seed, quantise=quantise)
-        nodes[description.name] = image.to_dataset()
-    return xr.DataTree.from_dict({f"/{name}": dataset for name, dataset in nodes.items()})
+        selected = tuple(band.name for band in _bands(description, bands.get(description.name)))
+        own = replace(setup, instrument=description, bands=selected)
+        nodes[f"/{description.name}"] = image_of(own, reflectance_of(own, lai)).to_dataset()
+    return xr.DataTree.from_dict(nodes)
 
 
 def _bands(description, names):

@@ -1,26 +1,18 @@
 """The steps of Figure 1 that need more than one stage: what a stage needs of another is handed to it here."""
 
-import numpy as np
 import xarray as xr
 
-from fifesim.analysis.rasters import regression as analysis
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import engines
-from fifesim.base.bands import Band
-from fifesim.base.geometry import Geometry, fife_geometry
+from fifesim.chain.carried import air_bands_and_geometry, given_air
+from fifesim.chain.images import planetary_reflectance
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.canopy.spectra import Spectrum
 from fifesim.ground.terrain.rasters import light as terrain
 from fifesim.rasters import cf
-from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.description.instruments import instrument_names
-
-# Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
-# tables. [um]
-_NARROW = 0.0025
 
 
 def surface_reflectance(
@@ -97,9 +89,8 @@ def surface_reflectance(
     """
     if dem is None and horizon is not None:
         raise ValueError("a horizon stands around a dem: give dem= too")
-    _check_kinds(atmosphere, geometry)
-    atmosphere = Atmosphere() if atmosphere is None else atmosphere
-    geometry = geometry or cf.geometry_of(lai) or fife_geometry()
+    atmosphere = given_air(atmosphere) or Atmosphere()
+    geometry = cf.given_geometry(geometry, lai)
     description = find_instrument(instrument)
     selected = description.select(bands)
     names = [band.name for band in selected]
@@ -122,7 +113,7 @@ def surface_reflectance(
     )
     if dem is None:
         return level
-    geometry.uniform("surface_reflectance on slopes")
+    geometry = cf.uniform_geometry(geometry, "surface_reflectance on slopes")
     terms = engines.band_terms(atmosphere, responses, geometry.sza, geometry.vza, geometry.raa)
     light = _sunlight(terms) | {"geometry": geometry, "horizon": horizon}
     return terrain.terrain_reflectance(level, dem, upwelling=upwelling, **light)
@@ -161,8 +152,8 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
     --------
     fifesim.ground.terrain.light.kt
     """
-    atmosphere, bands, geometry = _light(reflectance, atmosphere, geometry, instrument)
-    geometry.uniform("kt")
+    atmosphere, bands, geometry = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)
+    geometry = cf.uniform_geometry(geometry, "kt")
     terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
     return terrain.kt(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
 
@@ -222,7 +213,7 @@ def to_toa(
     --------
     fifesim.atmosphere.schemes.coupling.apparent_reflectance
     """
-    light = _light(reflectance, atmosphere, geometry, instrument)
+    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
     toa = atmosphere_raster.to_toa(reflectance, *light, **scene)
     return toa if instrument is None else toa.assign_attrs(instrument=find_instrument(instrument).name)
@@ -263,58 +254,10 @@ def to_surface(
     fifesim.atmosphere.schemes.coupling.surface_reflectance
     """
     reflectance = planetary_reflectance(reflectance)
-    light = _light(reflectance, atmosphere, geometry, instrument)
+    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
     surface = atmosphere_raster.to_surface(reflectance, *light, **scene)
     return surface if instrument is None else surface.assign_attrs(instrument=find_instrument(instrument).name)
-
-
-def ndvi(image):
-    """
-    Normalized difference vegetation index, from planetary reflectance as in the paper.
-
-    Parameters
-    ----------
-    image : xarray.DataArray, dims (band, y, x)
-        Digital numbers, radiance or reflectance, with a coordinate ``wavelength`` [um] along band.
-
-    Returns
-    -------
-    ndvi : xarray.DataArray, dims (y, x)
-        NaN where there are no data. [1]
-
-    Raises
-    ------
-    ValueError
-        If there is no red or no near infrared band, or no calibration.
-
-    See Also
-    --------
-    fifesim.analysis.rasters.regression.ndvi
-    """
-    return analysis.ndvi(planetary_reflectance(image))
-
-
-def planetary_reflectance(image):
-    """
-    Reflectance of an image, converted where it holds digital numbers or radiance.
-
-    Parameters
-    ----------
-    image : xarray.DataArray, dims (band, y, x)
-
-    Returns
-    -------
-    reflectance : xarray.DataArray, dims (band, y, x)
-        [1]
-
-    Raises
-    ------
-    ValueError
-        If it carries no calibration.
-    """
-    is_radiance = image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
-    return sensor.to_reflectance(image) if "gain" in image.coords or is_radiance else image
 
 
 def _background(responses, given):
@@ -335,54 +278,3 @@ def _sunlight(terms):
         "direct_transmittance": terms.direct_transmittance_down,
         "transmittance_down": terms.transmittance_down,
     }
-
-
-def _light(array, atmosphere, geometry, instrument):
-    """Atmosphere, spectral bands and geometry: as given, else as the array carries them, else the paper's."""
-    _check_kinds(atmosphere, geometry)
-    carried = array.attrs.get("atmosphere")
-    if carried is not None:
-        carried = Atmosphere.parse(carried)
-        if atmosphere is not None and atmosphere != carried:
-            raise ValueError(
-                f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
-                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
-            )
-    return (
-        atmosphere or carried or Atmosphere(),
-        _responses(array, instrument),
-        geometry or cf.geometry_of(array) or fife_geometry(),
-    )
-
-
-def _check_kinds(atmosphere, geometry):
-    for name, value, kind in (("atmosphere", atmosphere, Atmosphere), ("geometry", geometry, Geometry)):
-        if value is not None and not isinstance(value, kind):
-            raise TypeError(f"{name} must be a fifesim.{kind.__name__}, got {value!r}: see fifesim.{kind.__name__}")
-
-
-def _responses(array, instrument):
-    """Spectral responses of an instrument that is given, or carried by name and with the same wavelengths."""
-    carried = array.attrs.get("instrument")
-    if instrument is not None:
-        return tuple(band.response for band in sensor.matching_bands(array, find_instrument(instrument)))
-    if carried is not None:
-        bands = sensor.matching_bands(array, find_instrument(carried)) if carried in instrument_names() else ()
-        centres = [band.wavelength for band in bands]
-        if not bands or ("wavelength" in array.coords and not np.allclose(array["wavelength"], centres, rtol=1e-6)):
-            raise ValueError(
-                f"the raster was made for an instrument {carried!r} of your own, whose response it does not carry: "
-                "give it as instrument="
-            )
-        return tuple(band.response for band in bands)
-    if "wavelength" not in array.coords:
-        raise ValueError(
-            "the raster has neither an instrument nor a wavelength: give instrument=, or assign a coordinate "
-            "'wavelength' [um] along band"
-        )
-    centres = np.atleast_1d(array["wavelength"].values).astype(float)
-    if np.max(centres) > 100:
-        raise ValueError(f"wavelengths are in um, got {np.max(centres):g}: divide nanometres by 1000")
-    return tuple(
-        Band(f"{centre:g} um", (centre - _NARROW, centre, centre + _NARROW), (0.0, 1.0, 0.0)) for centre in centres
-    )

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import ANGLES, fife_geometry
+from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument as find_instrument
@@ -59,7 +59,7 @@ def sense(
         Whether to digitise; radiance otherwise.
     min_valid : float, optional
         Share of its footprint that a pixel needs on valid cells; below it is no data. [1]
-    geometry : fifesim.base.geometry.Geometry, optional
+    geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
         By default that which the array carries, else the paper's.
 
     Returns
@@ -82,7 +82,7 @@ def sense(
     description = find_instrument(instrument)
     toa = toa if "band" in toa.dims else toa.expand_dims("band")
     bands = matching_bands(toa, description)
-    geometry = geometry or cf.geometry_of(toa) or fife_geometry()
+    geometry = cf.given_geometry(geometry, toa)
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
     geometry = directions_on(pixels, geometry)
     scene = toa.drop_vars(ANGLES, errors="ignore")
@@ -225,8 +225,8 @@ def to_reflectance(image):
         calibration.radiance_to_reflectance,
         radiance,
         *_plain(image, "solar_irradiance"),
-        xr.DataArray(geometry.mu_s),
-        earth_sun_distance=geometry.earth_sun_distance,
+        cf.mu_s(geometry),
+        earth_sun_distance=float(geometry.earth_sun_distance),
     )
     out = _placed_as(out, image)
     return cf.label(out, "toa_reflectance", source=radiance, history="to_reflectance")
@@ -247,7 +247,7 @@ def as_radiance(array, bands, geometry):
         Reflectance, or radiance by its units, with a dimension band.
     bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
         One for each of the array.
-    geometry : fifesim.base.geometry.Geometry
+    geometry : fifesim.base.geometry.Geometry or xarray.Dataset
 
     Returns
     -------
@@ -262,8 +262,8 @@ def as_radiance(array, bands, geometry):
         calibration.reflectance_to_radiance,
         plain,
         irradiance,
-        xr.DataArray(geometry.mu_s),
-        earth_sun_distance=geometry.earth_sun_distance,
+        cf.mu_s(geometry),
+        earth_sun_distance=float(geometry.earth_sun_distance),
     )
 
 

@@ -51,7 +51,7 @@ def spectrum(atmosphere=None, geometry=None):
     fifesim.atmosphere.schemes.engines.band_terms
     """
     atmosphere = Atmosphere() if atmosphere is None else atmosphere
-    geometry = (fife_geometry() if geometry is None else geometry).uniform("spectrum")
+    geometry = cf.uniform_geometry(fife_geometry() if geometry is None else geometry, "spectrum")
     for name in ("sza", "vza"):
         engines.check_zenith(name, getattr(geometry, name))
     wavelength = gases.table_wavelengths()

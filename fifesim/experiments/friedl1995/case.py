@@ -10,12 +10,12 @@ from odc.geo.geobox import GeoBox
 from fifesim.analysis.rasters import regression as analysis
 from fifesim.base import datasets
 from fifesim.chain import steps as chain
+from fifesim.chain.images import ndvi
+from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.landscape.distribution import treatments, truncated_normal
 from fifesim.ground.terrain.rasters.hills import flint_hills
 from fifesim.rasters import sites
-from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response.spatial_response import CosineResponse
 
@@ -80,10 +80,11 @@ READINGS = (
 )
 
 
-def _leaf_optics():
-    """Those of the experiment, by band."""
+def _setup():
+    """That of the experiment, with its leaf optics."""
     table = datasets.table("friedl1995_optics.csv").set_index("band")
-    return {band: tuple(row) for band, row in zip(table.index, table.to_numpy(), strict=True)}
+    optics = {band: tuple(row) for band, row in zip(table.index, table.to_numpy(), strict=True)}
+    return Setup(instrument=find_instrument("TM"), bands=BANDS, leaf_optics=optics)
 
 
 def _densities():
@@ -102,21 +103,16 @@ class Case:
     cells : int
         Along the edge of a scene.
     reading : Reading
-    leaf_optics : mapping of str to (float, float)
-        Reflectance and transmittance by band. [1]
-    background : mapping of str to float, optional
-        Its reflectance by band; the table's by default. [1]
     densities : mapping of str to frozen scipy distribution
         Of LAI, by treatment.
-    instrument : fifesim.sensor.description.instruments.Instrument
+    setup : fifesim.chain.setup.Setup
+        On level ground, as Table 1 has it before it is read.
     """
 
     cells: int = CELLS
     reading: Reading = USED
-    leaf_optics: Mapping = field(default_factory=_leaf_optics)
-    background: Mapping | None = None
     densities: Mapping = field(default_factory=_densities)
-    instrument: Instrument = field(default_factory=lambda: find_instrument("TM"))
+    setup: Setup = field(default_factory=_setup)
 
     def __post_init__(self):
         if self.cells < FEWEST_CELLS:
@@ -131,6 +127,21 @@ class Case:
         site = sites.fife_site(CELL)
         first = min(_CORNER, max(site.shape.y - self.cells, 0))
         return GeoBox((self.cells, self.cells), site[first:, first:].affine, site.crs)
+
+    @property
+    def read(self):
+        """The setup as the reading of Table 1 has it, a `fifesim.chain.setup.Setup`."""
+        instrument, reading = self.setup.instrument, self.reading
+        if reading.count is not None:
+            lsf = instrument.lsf
+            instrument = replace(instrument, lsf=CosineResponse(kind=lsf.kind, step=lsf.step, count=reading.count))
+        return replace(
+            self.setup,
+            instrument=instrument,
+            dem=_relief(self.grid) if reading.topography else None,
+            interval="native" if reading.own_interval else None,
+            offset=(reading.offset * CELL / PIXEL,) * 2,
+        )
 
 
 def scenes():
@@ -168,49 +179,6 @@ def landscape(case, treatment, arp, seed):
     """
     lai = ground.lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method="periodic")
     return lai, ground.fpar(lai)
-
-
-def surface_reflectance(case, lai):
-    """
-    Reflectance of the cells in the two bands.
-
-    Parameters
-    ----------
-    case : Case
-    lai : xarray.DataArray, dims (y, x)
-
-    Returns
-    -------
-    reflectance : xarray.DataArray, dims (band, y, x)
-        [1]
-    """
-    dem = _relief(case.grid) if case.reading.topography else None
-    return chain.surface_reflectance(
-        lai, case.instrument, bands=BANDS, dem=dem, leaf_optics=case.leaf_optics, background=case.background
-    )
-
-
-def sense(case, reflectance):
-    """
-    Image of a scene as a reading of Table 1 has it.
-
-    Parameters
-    ----------
-    case : Case
-    reflectance : xarray.DataArray, dims (band, y, x)
-        Of the ground.
-
-    Returns
-    -------
-    image : xarray.DataArray of unsigned integers, dims (band, y, x)
-    """
-    reading = case.reading
-    return sensor.sense(
-        chain.to_toa(reflectance),
-        _instrument(case),
-        interval="native" if reading.own_interval else None,
-        offset=(reading.offset * CELL / PIXEL,) * 2,
-    )
 
 
 def pixel_values(truth, *images):
@@ -251,12 +219,12 @@ def run(case, treatment, arp, seed):
         Least and largest of the same in the cells; NDVI at the top of the atmosphere, too.
     """
     lai, fpar = landscape(case, treatment, arp, seed)
-    reflectance = surface_reflectance(case, lai)
-    image = sense(case, reflectance)
+    reflectance = reflectance_of(case.read, lai)
+    image = image_of(case.read, reflectance)
     truth = [analysis.aggregate(array, PIXEL) for array in (lai, fpar)]
-    of_cells = chain.ndvi(chain.to_toa(reflectance))
+    of_cells = ndvi(chain.to_toa(reflectance))
     limits = [(float(array.min()), float(array.max())) for array in (lai, fpar, of_cells)]
-    return pixel_values(*truth, chain.ndvi(image)), np.array(limits)
+    return pixel_values(*truth, ndvi(image)), np.array(limits)
 
 
 def paper_table():
@@ -287,10 +255,3 @@ def paper_text():
 def _relief(grid):
     """Elevation of the synthetic hills, with a cell more on each side for the slopes at the border."""
     return flint_hills(grid.pad(1), _HILLS_SEED)
-
-
-def _instrument(case):
-    if case.reading.count is None:
-        return case.instrument
-    lsf = case.instrument.lsf
-    return replace(case.instrument, lsf=CosineResponse(kind=lsf.kind, step=lsf.step, count=case.reading.count))

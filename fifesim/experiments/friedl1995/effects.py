@@ -114,7 +114,7 @@ def changes(case):
     -------
     changes : list of Change
     """
-    ground = dict(zip(friedl1995.BANDS, background(list(friedl1995.BANDS), case.background), strict=True))
+    ground = dict(zip(friedl1995.BANDS, background(list(friedl1995.BANDS), case.setup.background), strict=True))
     found = []
     for name, (band, position, step) in {
         "leaf reflectance TM3": ("TM3", 0, -0.005),
@@ -122,14 +122,14 @@ def changes(case):
         "leaf transmittance TM3": ("TM3", 1, 0.01),
         "leaf transmittance TM4": ("TM4", 1, 0.02),
     }.items():
-        pair = list(case.leaf_optics[band])
+        pair = list(case.setup.leaf_optics[band])
         before, pair[position] = pair[position], round(pair[position] + step, 6)
-        optics = {**case.leaf_optics, band: tuple(pair)}
-        found.append(Change(name, f"{before:g}", f"{pair[position]:g}", replace(case, leaf_optics=optics)))
+        optics = {**case.setup.leaf_optics, band: tuple(pair)}
+        found.append(Change(name, f"{before:g}", f"{pair[position]:g}", _but(case, leaf_optics=optics)))
     for band, step in (("TM3", 0.01), ("TM4", 0.01)):
         changed = {**ground, band: round(ground[band] + step, 6)}
         found.append(
-            Change(f"background {band}", f"{ground[band]:g}", f"{changed[band]:g}", replace(case, background=changed))
+            Change(f"background {band}", f"{ground[band]:g}", f"{changed[band]:g}", _but(case, background=changed))
         )
     for name, after, shift, factor, bound in (
         ("mean LAI", "each + 0.1", 0.1, 1.0, 0.0),
@@ -137,9 +137,15 @@ def changes(case):
         ("bounds of LAI", "2.75 standard deviations from the mean", 0.0, 1.0, -0.25),
     ):
         found.append(Change(name, "the table's", after, replace(case, densities=_densities(shift, factor, bound))))
-    finer = replace(case, instrument=replace(case.instrument, bits=16))
-    found.append(Change("radiometric bits", f"{case.instrument.bits}", "16, next to no quantisation", finer))
+    instrument = case.setup.instrument
+    finer = _but(case, instrument=replace(instrument, bits=16))
+    found.append(Change("radiometric bits", f"{instrument.bits}", "16, next to no quantisation", finer))
     return found
+
+
+def _but(case, **changes):
+    """The case with another setup."""
+    return replace(case, setup=replace(case.setup, **changes))
 
 
 def _densities(shift, factor, bound):

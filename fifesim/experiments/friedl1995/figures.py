@@ -7,6 +7,8 @@ from matplotlib.ticker import MaxNLocator
 from fifesim.analysis import density, regression, scaling
 from fifesim.analysis.rasters import regression as analysis
 from fifesim.chain import steps as chain
+from fifesim.chain.images import ndvi, planetary_reflectance
+from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import ARPS, BANDS, PIXEL, VARIABLES
@@ -264,10 +266,10 @@ def figure9(scenes):
 
 def _scene(case, treatment, arp, seed):
     lai, fpar = friedl1995.landscape(case, treatment, arp, seed)
-    ground = friedl1995.surface_reflectance(case, lai)
+    ground = reflectance_of(case.read, lai)
     toa = chain.to_toa(ground)
-    image = friedl1995.sense(case, ground)
-    planetary = chain.planetary_reflectance(image)
+    image = image_of(case.read, ground)
+    planetary = planetary_reflectance(image)
     boa_ndvi = analysis.ndvi(ground)
     means = analysis.aggregate(ground, PIXEL)
     clear = chain.to_toa(means)
@@ -275,7 +277,7 @@ def _scene(case, treatment, arp, seed):
     rasters = {
         "lai": analysis.aggregate(lai, PIXEL),
         "fpar": analysis.aggregate(fpar, PIXEL),
-        "ndvi": chain.ndvi(image),
+        "ndvi": ndvi(image),
         "boa_ndvi": analysis.aggregate(boa_ndvi, PIXEL),
         "ndvi_of_mean": analysis.ndvi(means),
         "boa_red": means[0], "boa_nir": means[1],
@@ -289,7 +291,7 @@ def _scene(case, treatment, arp, seed):
     covariance = np.array([[rr - red**2, rn - red * nir], [rn - red * nir, nn - nir**2]])
     numbers = np.arange(red.size)[None]
     sample = friedl1995_table.draw(numbers, friedl1995_table.SAMPLE, [seed, ARPS.index(arp)], 1)[0, 0]
-    of_cells = {"lai": lai.values.ravel(), "fpar": fpar.values.ravel(), "ndvi": chain.ndvi(toa).values.ravel()}
+    of_cells = {"lai": lai.values.ravel(), "fpar": fpar.values.ravel(), "ndvi": ndvi(toa).values.ravel()}
     moments = {"red": red, "nir": nir, "covariance": covariance}
     return {"cells": lai.values, "of_cells": of_cells, "pixels": values, "sample": sample, "moments": moments}
 

@@ -62,8 +62,8 @@ def page(case, table, text, effects, figures, run, versions):
         arps=ARPS, sample=friedl1995_table.SAMPLE,
         effects={name: each.to_dict("records") for name, each in effects.items()},
         figures=encoded, captions=CAPTIONS, run=run, versions=versions, readings=friedl1995.READINGS,
-        used=friedl1995.USED, interval=case.instrument.ground_interval, cell=friedl1995.CELL, pixel=friedl1995.PIXEL,
-        standard_cells=friedl1995.CELLS, optics=case.leaf_optics, drift=_drift(case),
+        used=friedl1995.USED, interval=case.setup.instrument.ground_interval, cell=friedl1995.CELL, pixel=friedl1995.PIXEL,
+        standard_cells=friedl1995.CELLS, optics=case.setup.leaf_optics, drift=_drift(case),
         relief=_named(effects["readings"], "native interval with relief"),
         aligned_relief=_named(effects["readings"], "aligned with relief"),
     )  # fmt: skip
@@ -116,7 +116,7 @@ def _named(table, name):
 
 def _drift(case):
     """How far the last pixel lies from its block. [m]"""
-    size = case.instrument.ground_interval
+    size = case.setup.instrument.ground_interval
     return int(case.cells * friedl1995.CELL / size - 1) * (size - friedl1995.PIXEL)
 
 

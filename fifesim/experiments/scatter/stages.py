@@ -1,6 +1,6 @@
 """Images of a scene with any of its stages at their ideal."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -11,12 +11,13 @@ from fifesim.analysis import indices
 from fifesim.analysis.rasters import regression as analysis
 from fifesim.base.footprints import Boxcar, axis_operator, regularize
 from fifesim.chain import steps as chain
+from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.ground.canopy import raster as ground
 from fifesim.rasters import grid as grids
+from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
-from fifesim.scenario.simulation import elevation, leaf_area, surface_reflectance
+from fifesim.scenario.simulation import leaf_area, setup_of
 from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters.noise import noisy
@@ -129,12 +130,10 @@ class _Scene:
     """Ground of a scenario, and the instrument over it."""
 
     scenario: Scenario
-    instrument: Instrument
+    setup: Setup
     bands: tuple
     lai: xr.DataArray
     middle: xr.DataArray
-    dem: xr.DataArray | None
-    horizon: xr.DataArray | None
     blocks: GeoBox
     image: GeoBox
 
@@ -145,14 +144,14 @@ class _Scene:
 
 
 def _scene(scenario):
-    instrument, own, grid = find_instrument(scenario.sensor.instrument), scenario.sensor, scenario.geobox()
-    bands = _red_and_nir(instrument.select(own.bands))
-    blocks = grids.aligned(grid, own.pixel or instrument.gsd)
-    image = blocks if own.interval == "product" else pixel_grid(grid, instrument, bands, None, own.interval)
+    setup, grid = setup_of(scenario), scenario.geobox()
+    bands = _red_and_nir(setup.instrument.select(setup.bands))
+    blocks = grids.aligned(grid, scenario.sensor.pixel or setup.instrument.gsd)
+    image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     lai = leaf_area(scenario, grid).compute()
-    middle = _spread_out(analysis.aggregate(lai, grids.cell_size(blocks)[0], min_valid=own.min_valid), lai)
+    middle = _spread_out(analysis.aggregate(lai, grids.cell_size(blocks)[0], min_valid=setup.min_valid), lai)
     dem, horizon, _ = elevation(scenario, grid)
-    return _Scene(scenario, instrument, bands, lai, middle, dem, horizon, blocks, image)
+    return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, lai, middle, blocks, image)
 
 
 def _red_and_nir(bands):
@@ -186,28 +185,28 @@ def _tangent(function, lai, middle):
 
 def _truth(scene, lai, curve):
     """LAI and FPAR by blocks."""
-    land, geometry = scene.scenario.ground, scene.scenario.sun_and_view()
+    land, geometry = scene.scenario.ground, scene.setup.geometry
 
     def fpar(area):
         return ground.fpar(area, geometry=geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
 
     size, (rows, columns) = grids.cell_size(scene.blocks)[0], scene.shape
     return [
-        analysis.aggregate(array, size, min_valid=scene.scenario.sensor.min_valid).values[:rows, :columns]
+        analysis.aggregate(array, size, min_valid=scene.setup.min_valid).values[:rows, :columns]
         for array in (lai, fpar(lai) if curve else _tangent(fpar, lai, scene.middle))
     ]
 
 
 def _cells(scene, lai, curve, relief, air):
     """Red, near infrared and NDVI of the cells, as light leaves the ground or the air, shape (3, y, x)."""
-    terrain = {"dem": scene.dem, "horizon": scene.horizon} if relief else {}
+    setup = scene.setup if relief else replace(scene.setup, dem=None, horizon=None)
 
     def reflectance(area):
-        return surface_reflectance(scene.scenario, area, scene.instrument, **terrain)
+        return reflectance_of(setup, area)
 
     seen = reflectance(lai) if curve else _tangent(reflectance, lai, scene.middle)
     if air:
-        seen = chain.to_toa(seen, adjacency=scene.scenario.atmosphere.adjacency)
+        seen = chain.to_toa(seen, adjacency=setup.adjacency)
     red, nir = (band.values for band in analysis.red_and_nir(seen))
     return np.stack([red, nir, indices.normalized_difference(nir, red)])
 
@@ -231,39 +230,39 @@ def _images(scene, cells, switches):
 def _means(scene, cells, blurred, displaced):
     """Means over footprints, shape (3, y, x)."""
     red, nir = scene.bands
-    own, grid = scene.scenario.sensor, scene.scenario.geobox()
+    setup, grid = scene.setup, scene.scenario.geobox()
     box = scene.image if displaced else scene.blocks
     sizes = grids.cell_size(box)
-    shifts = [offset * size for offset, size in zip(own.offset, sizes, strict=True)] if displaced else (0.0, 0.0)
+    shifts = [offset * size for offset, size in zip(setup.offset, sizes, strict=True)] if displaced else (0.0, 0.0)
     ideal = [Boxcar(size) for size in grids.cell_size(scene.blocks)]
     a, b, (rows, columns) = grid.affine, box.affine, scene.shape
     means = np.empty((len(cells), rows, columns))
     for layer, band in enumerate((red, nir, red)):
-        down, across = scene.instrument.line_spreads(band) if blurred else ideal
+        down, across = setup.instrument.line_spreads(band) if blurred else ideal
         operators = (
             axis_operator(down, cell_origin=a.f, cell_size=a.e, n_cells=grid.shape.y, pixel_origin=b.f, pixel_size=b.e,
                           n_pixels=rows, shift=shifts[0]),
             axis_operator(across, cell_origin=a.c, cell_size=a.a, n_cells=grid.shape.x, pixel_origin=b.c,
                           pixel_size=b.a, n_pixels=columns, shift=shifts[1]),
         )  # fmt: skip
-        means[layer] = regularize(cells[layer], *operators, min_valid=own.min_valid)
+        means[layer] = regularize(cells[layer], *operators, min_valid=setup.min_valid)
     return means
 
 
 def _recorded(scene, means, counts, grains):
     """NDVI of what the detectors record of the mean reflectances."""
-    own, geometry, bands = scene.scenario.sensor, scene.scenario.sun_and_view(), scene.bands
+    setup, geometry, bands = scene.setup, scene.setup.geometry, scene.bands
     radiance = sensor.as_radiance(xr.DataArray(means, dims=("band", "y", "x")), bands, geometry)
     if grains:
         first = grids.lattice_position(scene.image)
-        radiance = noisy(radiance, scene.instrument, bands, own.noise, own.seed, first)
+        radiance = noisy(radiance, setup.instrument, bands, setup.noise, setup.seed, first)
     radiance = radiance.values
     if counts:
         gain, offset = calibration.gain_offset(
             [[[band.full_scale_radiance]] for band in bands], [[[band.min_radiance]] for band in bands],
-            scene.instrument.bits,
+            setup.instrument.bits,
         )  # fmt: skip
-        dn = calibration.radiance_to_dn(radiance, gain, offset, scene.instrument.bits)
+        dn = calibration.radiance_to_dn(radiance, gain, offset, setup.instrument.bits)
         radiance = calibration.dn_to_radiance(dn, gain, offset)
     red, nir = calibration.radiance_to_reflectance(
         radiance, np.array([[[band.solar_irradiance]] for band in bands]), geometry.mu_s, geometry.earth_sun_distance

@@ -6,7 +6,7 @@ import numpy as np
 import psutil
 import xarray as xr
 
-from fifesim.base.geometry import ANGLES, fife_geometry, relative_azimuth
+from fifesim.base.geometry import ANGLES, relative_azimuth
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_lai
@@ -141,7 +141,7 @@ def surface_reflectance(
         Reflectance below the canopy. [1]
     diffuse_fraction : sequence of float, shape (band,), or xarray.DataArray, dims (band, y, x)
         Share of skylight in the irradiance. [1]
-    geometry : fifesim.base.geometry.Geometry
+    geometry : fifesim.base.geometry.Geometry or xarray.Dataset
         Carried on as coordinates. Where an angle is a raster, SAIL is evaluated at every cell.
     leaf_angles : optional
         As `ground.leaf_angles.leaf_angle_classes` takes them.
@@ -183,7 +183,7 @@ def surface_reflectance(
     else:
         background = tuple(map(float, background))
         described = ",".join(f"{value:g}" for value in background)
-    if geometry.rasters:
+    if cf.varying(geometry):
         out = _in_directions(lai, background, diffuse_fraction, geometry, parameters)
     else:
         parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
@@ -239,10 +239,10 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     """
     if not 0 < fpar_inf <= 1:
         raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
-    geometry = geometry or cf.geometry_of(lai) or fife_geometry()
-    if "sza" in geometry.rasters:
-        geometry.uniform("fpar")
-    extinction = float(absorption.extinction_coefficient(geometry.sza, leaf_angles))
+    geometry = cf.given_geometry(geometry, lai)
+    if "sza" in cf.varying(geometry):
+        cf.uniform_geometry(geometry, "fpar")
+    extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))
     _check_scene(lai)
     out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
     out = grids.place(out, grids.geobox(lai))
@@ -305,20 +305,18 @@ def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
         for values in (background, diffuse_fraction)
     ]
     per_band = [values.drop_vars("band", errors="ignore") for values in per_band]
-    angles = [xr.DataArray(getattr(geometry, name)) for name in ANGLES]
-
     def kernel(cells, ground, sky, sza, saa, vza, vaa):
         directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
         return directional_reflectance(cells, background=ground, diffuse_fraction=sky, **directions, **parameters)
 
     plain = lai.drop_vars(ANGLES, errors="ignore")
-    return chunking.pointwise(kernel, plain, *per_band, *angles, bands=len(parameters["leaf_reflectance"]))
+    return chunking.pointwise(kernel, plain, *per_band, *cf.angles(geometry), bands=len(parameters["leaf_reflectance"]))
 
 
 def _directions(geometry):
     """The zenith angles in words."""
     return ", ".join(
-        f"{name} varying" if name in geometry.rasters else f"{name} {getattr(geometry, name):.2f}"
+        f"{name} varying" if name in cf.varying(geometry) else f"{name} {getattr(geometry, name):.2f}"
         for name in ("sza", "vza")
     )
 

@@ -15,7 +15,7 @@ import xarray as xr
 
 from fifesim.analysis.rasters.pairs import matched
 from fifesim.analysis.rasters.regression import regress
-from fifesim.chain.steps import ndvi
+from fifesim.chain.images import ndvi
 from fifesim.output import report
 from fifesim.output.folders import UNFINISHED, check_folder
 from fifesim.output.progress import CellProgress

@@ -6,6 +6,7 @@ import pytest
 from scipy import stats
 from typer.testing import CliRunner
 
+from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.cli import app
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import effects as friedl1995_effects
@@ -23,12 +24,12 @@ def reading(name):
 @pytest.fixture(scope="module")
 def ground():
     case = Case(cells=180)
-    return friedl1995.surface_reflectance(case, friedl1995.landscape(case, "burned-grazed", 0.24, 3)[0])
+    return reflectance_of(case.read, friedl1995.landscape(case, "burned-grazed", 0.24, 3)[0])
 
 
 def test_native_pixels_drift_from_the_truth_by_the_interval(ground):
     """43 microradian x 705 km = 30.315 m (Table 1): 0.315 m a pixel."""
-    native = grids.geobox(friedl1995.sense(Case(cells=180), ground))
+    native = grids.geobox(image_of(Case(cells=180).read, ground))
     assert grids.cell_size(native) == pytest.approx((30.315, 30.315), rel=1e-12)
     blocks = grids.aligned(grids.geobox(ground), 30.0)
     drift = (native.affine * (15.5, 15.5))[0] - (blocks.affine * (15.5, 15.5))[0]
@@ -37,8 +38,8 @@ def test_native_pixels_drift_from_the_truth_by_the_interval(ground):
 
 def test_offset_pixels_see_the_ground_to_the_south_east(ground):
     """Two cells each way: the image of the scene without its first two rows and columns."""
-    moved = friedl1995.sense(Case(cells=180, reading=reading("constant offset")), ground)
-    cut = friedl1995.sense(Case(cells=180, reading=reading("aligned")), ground[:, 2:, 2:])
+    moved = image_of(Case(cells=180, reading=reading("constant offset")).read, ground)
+    cut = image_of(Case(cells=180, reading=reading("aligned")).read, ground[:, 2:, 2:])
     np.testing.assert_array_equal(moved[:, :19, :19], cut[:, :19, :19])
 
 

@@ -157,7 +157,7 @@ def illumination(dem, geometry=None, horizon=None):
     --------
     fifesim.ground.terrain.light.local_cosine, fifesim.ground.terrain.light.horizon_toward
     """
-    geometry = geometry or cf.geometry_of(dem) or fife_geometry()
+    geometry = cf.uniform_geometry(cf.given_geometry(geometry, dem), "illumination")
     return _light(dem, horizon, geometry, "illumination", lambda light: light[2])
 
 
@@ -180,7 +180,7 @@ def shadow(dem, geometry=None, horizon=None):
     ValueError
         As in `illumination`.
     """
-    geometry = geometry or cf.geometry_of(dem) or fife_geometry()
+    geometry = cf.uniform_geometry(cf.given_geometry(geometry, dem), "shadow")
     return _light(dem, horizon, geometry, "shadow", lambda light: np.where(np.isnan(light[2]), np.nan, light[2] == 0))
 
 

@@ -1,13 +1,12 @@
 """Pixels of an instrument over a labelled scene: which bands, where they lie, and the means over their footprints."""
 
-import dataclasses
 from functools import partial
 
 import numpy as np
 import xarray as xr
 
 from fifesim.base.footprints import Boxcar, axis_operator, regularize
-from fifesim.rasters import chunks
+from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
 
 
@@ -192,11 +191,11 @@ def directions_on(pixels, geometry):
     Parameters
     ----------
     pixels : odc.geo.geobox.GeoBox
-    geometry : fifesim.base.geometry.Geometry
+    geometry : fifesim.base.geometry.Geometry or xarray.Dataset
 
     Returns
     -------
-    geometry : fifesim.base.geometry.Geometry
+    geometry : fifesim.base.geometry.Geometry or xarray.Dataset
         Means of the zenith angles, and the azimuths of mean vectors, over each pixel.
     """
 
@@ -210,7 +209,11 @@ def directions_on(pixels, geometry):
         return np.degrees(np.arctan2(mean(np.sin(radians)), mean(np.cos(radians)))) % 360
 
     averaged = {"sza": mean, "vza": mean, "saa": azimuth, "vaa": azimuth}
-    return dataclasses.replace(geometry, **{name: averaged[name](getattr(geometry, name)) for name in geometry.rasters})
+    names = cf.varying(geometry)
+    if not names:
+        return geometry
+    kept = {name: geometry[name].variable for name in geometry.data_vars if name not in names}
+    return xr.Dataset(kept | {name: averaged[name](geometry[name]) for name in names})
 
 
 def _operators(spreads, scene, pixels, shifts):

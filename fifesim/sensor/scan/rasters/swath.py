@@ -7,7 +7,6 @@ import dask.array as da
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import fife_geometry
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument as find_instrument
@@ -80,8 +79,8 @@ def sense_swath(
     description = find_instrument(instrument)
     toa = toa if "band" in toa.dims else toa.expand_dims("band")
     bands = matching_bands(toa, description)
-    geometry = geometry or cf.geometry_of(toa.drop_vars(["vza", "vaa"], errors="ignore")) or fife_geometry()
-    geometry.uniform("sense_swath")
+    geometry = cf.given_geometry(geometry, toa.drop_vars(["vza", "vaa"], errors="ignore"))
+    geometry = cf.uniform_geometry(geometry, "sense_swath")
     scene = grids.geobox(toa)
     track = find_track(scene, track, nadir_offset, heading)
     pixels = _pixels(scene, description, bands, track)

@@ -1,0 +1,53 @@
+"""What an image of any kind tells: it is brought to planetary reflectance first, as in the paper."""
+
+from fifesim.analysis.rasters import regression as analysis
+from fifesim.rasters import cf
+from fifesim.sensor import raster as sensor
+
+
+def ndvi(image):
+    """
+    Normalized difference vegetation index, from planetary reflectance as in the paper.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+        Digital numbers, radiance or reflectance, with a coordinate ``wavelength`` [um] along band.
+
+    Returns
+    -------
+    ndvi : xarray.DataArray, dims (y, x)
+        NaN where there are no data. [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no red or no near infrared band, or no calibration.
+
+    See Also
+    --------
+    fifesim.analysis.rasters.regression.ndvi
+    """
+    return analysis.ndvi(planetary_reflectance(image))
+
+
+def planetary_reflectance(image):
+    """
+    Reflectance of an image, converted where it holds digital numbers or radiance.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If it carries no calibration.
+    """
+    is_radiance = image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
+    return sensor.to_reflectance(image) if "gain" in image.coords or is_radiance else image

@@ -1,0 +1,132 @@
+"""Everything between the leaf area of a scene and its digital numbers, said once."""
+
+from dataclasses import dataclass
+
+import xarray as xr
+from odc.geo.geobox import GeoBox
+
+from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.base.geometry import Geometry
+from fifesim.chain import steps
+from fifesim.sensor import raster as sensor
+from fifesim.sensor.description.instruments import Instrument
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """
+    Ground, air and instrument of a simulation.
+
+    Parameters
+    ----------
+    instrument : str or Instrument, optional
+    bands : sequence of str, optional
+        Names of its bands; all by default.
+    atmosphere : Atmosphere, optional
+        By default midlatitude summer, continental aerosol, 45 km visibility.
+    geometry : Geometry or xarray.Dataset, optional
+        Of sun and sensor; by default that of the leaf area, else the paper's.
+    leaf_optics, background, leaf_angles, hotspot : optional
+        As in `fifesim.surface_reflectance`.
+    dem, horizon, upwelling : optional
+        As in `fifesim.surface_reflectance`; without a dem the ground is level.
+    adjacency, surroundings : optional
+        As in `fifesim.to_toa`.
+    onto, interval, offset, min_valid : optional
+        As in `fifesim.sense`: where pixels lie, and what they need.
+    noise, noise_models, seed, quantise : optional
+        As in `fifesim.sense`.
+    """
+
+    instrument: str | Instrument = "TM"
+    bands: tuple[str, ...] | None = None
+    atmosphere: Atmosphere | None = None
+    geometry: Geometry | xr.Dataset | None = None
+    leaf_optics: object = None
+    background: object = None
+    leaf_angles: object = "spherical"
+    hotspot: float = 0.0
+    dem: xr.DataArray | None = None
+    horizon: xr.DataArray | None = None
+    upwelling: bool = True
+    adjacency: bool = False
+    surroundings: object = None
+    onto: GeoBox | None = None
+    interval: str | float | None = None
+    offset: tuple = (0.0, 0.0)
+    min_valid: float = sensor.MIN_VALID
+    noise: tuple = ()
+    noise_models: object = None
+    seed: int = 0
+    quantise: bool = True
+
+
+def reflectance_of(setup, lai):
+    """
+    Reflectance of a scene of leaf area in the bands of a setup.
+
+    Parameters
+    ----------
+    setup : Setup
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Of the ground; lazy where an input is. [1]
+
+    See Also
+    --------
+    fifesim.chain.steps.surface_reflectance
+    """
+    return steps.surface_reflectance(
+        lai,
+        setup.instrument,
+        bands=setup.bands,
+        dem=setup.dem,
+        horizon=setup.horizon,
+        upwelling=setup.upwelling,
+        atmosphere=setup.atmosphere,
+        geometry=setup.geometry,
+        leaf_optics=setup.leaf_optics,
+        background=setup.background,
+        leaf_angles=setup.leaf_angles,
+        hotspot=setup.hotspot,
+    )
+
+
+def image_of(setup, reflectance):
+    """
+    What the instrument of a setup records of the ground.
+
+    Parameters
+    ----------
+    setup : Setup
+    reflectance : xarray.DataArray, dims (band, y, x)
+        From `reflectance_of`, or of one's own. [1]
+
+    Returns
+    -------
+    image : xarray.DataArray, dims (band, y, x)
+        Digital numbers, or radiance without ``quantise``; lazy where an input is.
+
+    See Also
+    --------
+    fifesim.chain.steps.to_toa, fifesim.sensor.raster.sense
+    """
+    toa = steps.to_toa(
+        reflectance, instrument=setup.instrument, adjacency=setup.adjacency, surroundings=setup.surroundings
+    )
+    return sensor.sense(
+        toa,
+        setup.instrument,
+        onto=setup.onto,
+        interval=setup.interval,
+        offset=setup.offset,
+        noise=setup.noise,
+        seed=setup.seed,
+        noise_models=setup.noise_models,
+        quantise=setup.quantise,
+        min_valid=setup.min_valid,
+    )

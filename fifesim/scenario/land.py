@@ -1,0 +1,88 @@
+"""Elevation of a scenario, and the horizon that the land around makes."""
+
+import numpy as np
+
+from fifesim.ground.terrain.rasters import light as terrain_raster
+from fifesim.ground.terrain.rasters import sky as sky_raster
+from fifesim.ground.terrain.rasters.elevation import fine_dem, source_dem
+from fifesim.ground.terrain.rasters.hills import flint_hills
+from fifesim.rasters import grid as grids
+
+# The synthetic hills around a scene are made at this resolution, as its own horizons are. [m]
+_HILLS_AROUND = 30.0
+
+# A horizon has 32 numbers a cell: 16 MB in chunks of this size. [cell]
+_AROUND_CHUNK = 252
+
+
+def elevation(scenario, grid, chunks=None):
+    """
+    Elevation of a scenario, and the horizon that the land around makes.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells.
+    chunks : mapping or int, optional
+        Makes the elevation lazy.
+
+    Returns
+    -------
+    dem : xarray.DataArray, dims (y, x), or None
+        On the grid or a cell more on each side; None where the ground is flat. [m]
+    horizon : xarray.DataArray, dims (direction, y, x), or None
+        Lazy. [degree]
+    reach : dict of str to float
+        How far the elevation is known beyond each side of the grid, up to the reach of horizons. [m]
+
+    Raises
+    ------
+    ValueError
+        If the elevation cannot be had, or the sun reaches no slope.
+    """
+    terrain = scenario.terrain
+    if terrain.dem == "flat":
+        return None, None, {}
+    if terrain.dem == "flint-hills":
+        # One cell more on each side: slopes at the border are those of the wider land.
+        dem = flint_hills(grid.pad(1), terrain.seed, chunks=chunks)
+        wider = _padded(grid, terrain.horizon_reach)
+        around = flint_hills(wider, terrain.seed, chunks=_AROUND_CHUNK)
+        middle = flint_hills(wider[_middle(wider.shape)], terrain.seed)
+        reach = dict.fromkeys(("north", "east", "south", "west"), terrain.horizon_reach)
+    else:
+        options = {"fill": terrain.fill, "vertical_units": terrain.vertical_units}
+        dem = fine_dem(terrain.dem, grid, chunks=chunks, **options)
+        around, reach = source_dem(terrain.dem, grid, terrain.horizon_reach, **options)
+        middle, around = around[_middle(around.shape)], around.chunk(_AROUND_CHUNK)
+    horizon = sky_raster.horizon(around, reach=terrain.horizon_reach, beside=dem)
+    _check_sun(middle, around, horizon, scenario.sun_and_view())
+    return dem, horizon, reach
+
+
+def _middle(shape):
+    return tuple(slice(max(size // 2 - 8, 0), size // 2 + 8) for size in shape)
+
+
+def _check_sun(middle, around, horizon, geometry):
+    """Somewhere the sun must shine: on lazy elevation no chunk knows whether it reaches another."""
+    # Where no slope is as steep as the sun is high, all face it, and what hides it from them is lit itself.
+    if float(terrain_raster.slope(middle).max()) < 90 - geometry.sza:
+        return
+    light = terrain_raster.illumination(around, geometry, horizon)
+    for block in light.data.blocks.ravel():
+        if np.any(block.compute() > 0):
+            return
+    # Nowhere: the same on elevation in memory says so.
+    terrain_raster.illumination(around.compute(), geometry, horizon.compute())
+
+
+def _padded(grid, margin):
+    """Coarse grid on multiples of its cells from the origin of the CRS that reaches a margin past a fine one."""
+    down, across = (max(round(_HILLS_AROUND / size), 1) * size for size in grids.cell_size(grid))
+    box = grid.boundingbox
+    west, east = (np.floor((box.left - margin) / across), np.ceil((box.right + margin) / across))
+    south, north = (np.floor((box.bottom - margin) / down), np.ceil((box.top + margin) / down))
+    size = (east - west) * across, (north - south) * down
+    return grids.grid_at(grid.crs.to_wkt(), west * across, north * down, *size, (down, across))
