@@ -58,7 +58,7 @@ _PUBLIC = {
     "open_lai": "ground.canopy.raster",
     "psf": "sensor.response.rasters.spread",
     "read_instrument": "sensor.description.instruments",
-    "read_scenario": "scenario.toml",
+    "read_scenario": "scenario.scenario",
     "regress": "analysis.rasters.regression",
     "regularized_variance": "analysis.rasters.lags",
     "relative_equivalent_noise": "analysis.rasters.uncertainty",

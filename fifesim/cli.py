@@ -56,8 +56,7 @@ def simulate(
     from fifesim.output.run.estimates import describe, estimate
     from fifesim.output.run.folder import scenario_to_resume, simulate_to_folder
     from fifesim.output.run.workers import cluster
-    from fifesim.scenario.scenario import Scenario
-    from fifesim.scenario.toml import read_scenario
+    from fifesim.scenario.scenario import Scenario, read_scenario
 
     with _errors_in_one_line(output):
         check_folder(output, overwrite, resume)
@@ -109,7 +108,7 @@ def budget(
 ):
     """Find where the scatter comes from, stage by stage: budget.csv, budget.png, report.html, scenario.toml."""
     from fifesim.experiments.scatter.folder import budget_to_folder
-    from fifesim.scenario.toml import read_scenario
+    from fifesim.scenario.scenario import read_scenario
 
     try:
         found = None if scenario is None else read_scenario(scenario)

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 from fifesim.base import datasets
 from fifesim.cli import app
 from fifesim.output.run.folder import FILES
-from fifesim.scenario.toml import read_scenario, write_scenario
+from fifesim.scenario.scenario import read_scenario
+from fifesim.scenario.toml import write_scenario
 
 SMALL = """
 [grid]

@@ -9,8 +9,8 @@ from distributed import Client, LocalCluster
 
 import fifesim
 from fifesim.output.run.folder import simulate_to_folder
+from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
-from fifesim.scenario.toml import parse_scenario
 
 CHUNKS = {"y": 100, "x": 80}
 

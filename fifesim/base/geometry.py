@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 import pvlib
 
+from fifesim.base import fife
+
 ANGLES = ("sza", "saa", "vza", "vaa")
 
 
@@ -193,13 +195,6 @@ def _utc(time):
     return pd.DatetimeIndex([stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")])
 
 
-# A hypothetical overpass: no Landsat passed the FIFE site on this day (WRS-2 cycle), but the paper simulates it.
-FIFE_TIME = "1987-06-06T16:35:00Z"
-FIFE_LATITUDE = 39.06
-FIFE_LONGITUDE = -96.54
-FIFE_ALTITUDE = 400.0
-
-
 @lru_cache
 def fife_geometry():
     """
@@ -210,4 +205,4 @@ def fife_geometry():
     geometry : Geometry
         sza 28.5, saa 117.0, vza 0, vaa 0. [degree]
     """
-    return sun_position(FIFE_TIME, FIFE_LATITUDE, FIFE_LONGITUDE, FIFE_ALTITUDE)
+    return sun_position(fife.TIME, fife.LATITUDE, fife.LONGITUDE, fife.ALTITUDE)

@@ -8,7 +8,7 @@ import jinja2
 
 from fifesim.output.figures import NAMES, detail_figure, fit_figure, histogram_figure, map_figure, terrain_figure
 from fifesim.rasters import grid as grids
-from fifesim.scenario.scenario import Scenario, names_a_file
+from fifesim.scenario.keys import Keys
 
 _TEMPLATE = "report.html.j2"
 _DPI = 130
@@ -129,11 +129,11 @@ def _ground(terrain):
 def _parameters(scenario):
     """Key, value, unit and meaning of every parameter, by section."""
     sections = []
-    for name in Scenario.model_fields:
+    for name in Keys.model_fields:
         section = getattr(scenario, name)
         rows = []
         for key, known in type(section).model_fields.items():
-            value, unit = getattr(section, key), (known.json_schema_extra or {}).get("unit", "")
+            value, unit = getattr(section, key), section.unit(key)
             if isinstance(value, dict):
                 value = ", ".join(f"{band} {number:g}" for band, number in value.items())
             elif isinstance(value, list):
@@ -142,7 +142,7 @@ def _parameters(scenario):
                 value = f"{value:.10g}"
             elif isinstance(value, bool):
                 value = "yes" if value else "no"
-            elif isinstance(value, str) and names_a_file(key, value):
+            elif section.names_a_file(key, value):
                 value = Path(value).name
             rows.append((key, "not given" if value is None else value, unit, known.description))
         sections.append((name, rows))

@@ -3,11 +3,7 @@
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
-FIFE_SIZE = 15000.0
-
-# FIFE's own corner in NAD27, and the nearest point of the 30 m lattice of today's NAD83 elevation models to the place
-# that a Helmert transformation (EPSG:1173, good to 7 m) gives it: 704968 E 4334211 N.
-_FIFE_CORNERS = {"NAD83": ("EPSG:26914", 704970.0, 4334220.0), "NAD27": ("EPSG:26714", 705000.0, 4334000.0)}
+from fifesim.base import fife
 
 
 def fife_site(cell, window=None, datum="NAD83"):
@@ -39,12 +35,12 @@ def fife_site(cell, window=None, datum="NAD83"):
     >>> fife_site(30).shape
     Shape2d(x=500, y=500)
     """
-    if datum not in _FIFE_CORNERS:
-        raise ValueError(f"datum must be one of {', '.join(_FIFE_CORNERS)}, got {datum!r}")
-    if not 0 < cell <= FIFE_SIZE:
-        raise ValueError(f"cell must be in (0, {FIFE_SIZE:g}] m, got {cell:g}")
-    crs, west, north = _FIFE_CORNERS[datum]
-    size = int(FIFE_SIZE / cell + 1e-6)
+    if datum not in fife.CORNERS:
+        raise ValueError(f"datum must be one of {', '.join(fife.CORNERS)}, got {datum!r}")
+    if not 0 < cell <= fife.SIZE:
+        raise ValueError(f"cell must be in (0, {fife.SIZE:g}] m, got {cell:g}")
+    crs, west, north = fife.CORNERS[datum]
+    size = int(fife.SIZE / cell + 1e-6)
     site = GeoBox((size, size), Affine(cell, 0.0, west, 0.0, -cell, north), crs)
     return site if window is None else _window(site, window)
 

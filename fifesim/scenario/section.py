@@ -1,6 +1,8 @@
-"""Sections of a scenario: tables whose numbers know their units."""
+"""Sections of a scenario: tables whose keys know their units, and which of them name files."""
 
 import re
+from difflib import get_close_matches
+from pathlib import Path
 from typing import get_args
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -40,7 +42,44 @@ def text(default, description):
     -------
     field : pydantic.fields.FieldInfo
     """
-    return Field(default, description=description, json_schema_extra={"unit": ""})
+    return Field(default, description=description)
+
+
+def seed(default, description):
+    """
+    A key whose value is a seed.
+
+    Parameters
+    ----------
+    default : int
+    description : str
+        Of what.
+
+    Returns
+    -------
+    field : pydantic.fields.FieldInfo
+    """
+    return Field(default, description=description, ge=0, lt=2**63, strict=True)
+
+
+def file(default, description, *, names=(), suffix=None):
+    """
+    A key whose value is the path of a file, or one of some names.
+
+    Parameters
+    ----------
+    default : str or None
+    description : str
+    names : sequence of str, optional
+        What stands for no file.
+    suffix : str, optional
+        Tells a file from a name where not all names are known; ``"*"`` is any suffix. Without it all else is a file.
+
+    Returns
+    -------
+    field : pydantic.fields.FieldInfo
+    """
+    return Field(default, description=description, json_schema_extra={"file": {"names": names, "suffix": suffix}})
 
 
 class Section(BaseModel):
@@ -57,14 +96,77 @@ class Section(BaseModel):
 
     @classmethod
     def _in_unit(cls, key, value):
-        known = cls.model_fields.get(key)
-        unit = (known.json_schema_extra or {}).get("unit") if known else None
+        unit = cls.unit(key) if key in cls.model_fields else ""
         if not unit or not isinstance(value, str):
             return value
         match = _QUANTITY.fullmatch(value)
-        if match is None and str in get_args(known.annotation):
+        if match is None and str in get_args(cls.model_fields[key].annotation):
             # A key that takes words beside numbers.
             return value
         if match is None or match[2] not in ("", unit):
             raise ValueError(f"{key} = {value!r}: {key} is in {unit}; write a number, or a number and {unit!r}")
         return float(match[1])
+
+    @classmethod
+    def unit(cls, key):
+        """
+        Unit of a key.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        unit : str
+            Empty where it has none.
+        """
+        return (cls.model_fields[key].json_schema_extra or {}).get("unit", "")
+
+    @classmethod
+    def names_a_file(cls, key, value):
+        """
+        Whether the value of a key is the path of a file.
+
+        Parameters
+        ----------
+        key : str
+        value : object
+
+        Returns
+        -------
+        answer : bool
+        """
+        kind = (cls.model_fields[key].json_schema_extra or {}).get("file") if key in cls.model_fields else None
+        if kind is None or not isinstance(value, str) or value in kind["names"]:
+            return False
+        found = Path(value).suffix.lower()
+        return kind["suffix"] is None or (bool(found) if kind["suffix"] == "*" else found == kind["suffix"])
+
+    @property
+    def files(self):
+        """Files that the section names, a dict of their paths by key."""
+        values = {key: getattr(self, key) for key in type(self).model_fields}
+        return {key: value for key, value in values.items() if self.names_a_file(key, value)}
+
+    def with_whole_paths(self):
+        """The same with the full paths of its files, so that it can be run from elsewhere."""
+        return self.model_copy(update={key: str(Path(value).resolve()) for key, value in self.files.items()})
+
+
+def nearest(value, allowed):
+    """
+    The beginning of a message that names the nearest of what is allowed.
+
+    Parameters
+    ----------
+    value : str
+    allowed : sequence of str
+
+    Returns
+    -------
+    hint : str
+        Empty where none is near.
+    """
+    near = get_close_matches(value, allowed, n=1)
+    return f"did you mean {near[0]!r}? " if near else ""

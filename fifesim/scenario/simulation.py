@@ -14,7 +14,6 @@ from fifesim.ground.terrain.rasters import light as terrain_raster
 from fifesim.rasters import grid as grids
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
-from fifesim.sensor.description.instruments import instrument as find_instrument
 
 
 def simulate(scenario, chunks="auto"):
@@ -44,10 +43,9 @@ def simulate(scenario, chunks="auto"):
     if not isinstance(scenario, Scenario):
         raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, land, setup = scenario.geobox(), scenario.ground, setup_of(scenario)
-    pixel = scenario.sensor.pixel or setup.instrument.gsd
 
     def means(array):
-        return analysis.aggregate(array, pixel, min_valid=setup.min_valid)
+        return analysis.aggregate(array, scenario.sensor.size, min_valid=setup.min_valid)
 
     lai = leaf_area(scenario, grid, chunks)
     fpar = ground.fpar(lai, geometry=setup.geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
@@ -114,10 +112,9 @@ def setup_of(scenario):
         If the instrument or its bands are unknown.
     """
     land, own = scenario.ground, scenario.sensor
-    instrument = find_instrument(own.instrument)
     aligned = own.interval == "product"
     return Setup(
-        instrument=instrument,
+        instrument=own.description,
         bands=tuple(own.bands),
         atmosphere=scenario.model_atmosphere(),
         geometry=scenario.sun_and_view(),
@@ -127,7 +124,7 @@ def setup_of(scenario):
         hotspot=land.hotspot,
         upwelling=scenario.terrain.upwelling,
         adjacency=scenario.atmosphere.adjacency,
-        onto=grids.aligned(scenario.geobox(), own.pixel or instrument.gsd) if aligned else None,
+        onto=grids.aligned(scenario.geobox(), own.size) if aligned else None,
         interval=None if aligned else own.interval,
         offset=tuple(own.offset),
         min_valid=own.min_valid,

@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
-from fifesim.scenario.scenario import Scenario
+from fifesim.scenario.keys import Keys
+from fifesim.scenario.scenario import Scenario, parse_scenario
 from fifesim.scenario.simulation import simulate
-from fifesim.scenario.toml import parse_scenario
 
 # What is kept of a regression of the truth on NDVI.
 STATISTICS = ("slope", "intercept", "r2", "residual_deviation", "n")
@@ -119,9 +119,9 @@ def _meaning(name, given):
     if _has_function(given):
         return {}
     section, key = _place(name)
-    known = Scenario.model_fields[section].annotation.model_fields[key]
+    keys = Keys.model_fields[section].annotation
     # The description's first words name the key; ranges and hints follow them.
-    found = {"long_name": known.description.split(";")[0], "units": (known.json_schema_extra or {}).get("unit", "")}
+    found = {"long_name": keys.model_fields[key].description.split(";")[0], "units": keys.unit(key)}
     return {name: text for name, text in found.items() if text}
 
 
@@ -131,7 +131,7 @@ def _has_function(given):
 
 def _place(name):
     """Section and key of an axis."""
-    keys = {section: field.annotation.model_fields for section, field in Scenario.model_fields.items()}
+    keys = {section: field.annotation.model_fields for section, field in Keys.model_fields.items()}
     section, _, key = name.rpartition(".")
     found = [each for each in keys if key in keys[each] and section in ("", each)]
     if len(found) == 1:

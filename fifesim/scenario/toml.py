@@ -1,32 +1,32 @@
-"""Scenarios as TOML files: read with one line a mistake, written with every unit."""
+"""Scenarios as TOML text: spelled as keys may be, with one line a mistake, and written with every unit."""
 
+import inspect
 import tomllib
-from difflib import get_close_matches
 from pathlib import Path
 
 from pydantic import ValidationError
 
-from fifesim.scenario.scenario import Scenario, names_a_file
+from fifesim.scenario.keys import Keys
+from fifesim.scenario.section import nearest
 
 
-def read_scenario(path):
+def load_values(path):
     """
-    Scenario of a TOML file.
+    Values of a TOML file.
 
     Parameters
     ----------
     path : str or path
-        Files that it names lie relative to it.
 
     Returns
     -------
-    scenario : Scenario
+    values : dict
+        Files that it names lie relative to it, and have their full paths here.
 
     Raises
     ------
     ValueError
-        If it is missing or not TOML, or a key or value is wrong: one line a mistake, with the key, the value and what
-        is allowed.
+        If it is missing or not TOML.
     """
     path = Path(path)
     try:
@@ -35,41 +35,55 @@ def read_scenario(path):
         raise ValueError(f"cannot read the scenario {path}: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path.name} is not valid TOML: {error}") from None
-    for section, key in (("ground", "lai_file"), ("ground", "distribution"), ("terrain", "dem")):
-        table = values.get(section)
-        name = table.get(key) if isinstance(table, dict) else None
-        if isinstance(name, str) and names_a_file(key, name):
-            table[key] = str((path.parent / name).resolve())
-    return parse_scenario(values)
+    for name, field in Keys.model_fields.items():
+        table = values.get(name)
+        for key, value in table.items() if isinstance(table, dict) else ():
+            if field.annotation.names_a_file(key, value):
+                table[key] = str((path.parent / value).resolve())
+    return values
 
 
-def parse_scenario(values):
+def validated(model, values):
     """
-    Scenario of nested mappings.
+    A model of nested mappings, whose mistakes are one line each.
 
     Parameters
     ----------
+    model : type
+        `Keys`, which knows spelling, types and ranges, or a Scenario, which knows what values mean.
     values : mapping
         As TOML gives it.
 
     Returns
     -------
-    scenario : Scenario
+    found : model
 
     Raises
     ------
     ValueError
-        One line a mistake.
-
-    Examples
-    --------
-    >>> parse_scenario({"atmosphere": {"visibility": "23 km"}}).atmosphere.visibility
-    23.0
+        One line a mistake, with the key, the value and what is allowed.
     """
     try:
-        return Scenario.model_validate(values)
+        return model.model_validate(values)
     except ValidationError as error:
         raise ValueError("\n".join(_explain(item) for item in error.errors())) from None
+
+
+def check_spelling(path):
+    """
+    Refuse a scenario whose keys, types or ranges are wrong; this asks no physics, and is quick.
+
+    Parameters
+    ----------
+    path : str or path
+        TOML file.
+
+    Raises
+    ------
+    ValueError
+        As in `load_values` and `validated`.
+    """
+    validated(Keys, load_values(path))
 
 
 def write_scenario(scenario):
@@ -78,7 +92,7 @@ def write_scenario(scenario):
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : fifesim.scenario.scenario.Scenario
 
     Returns
     -------
@@ -86,12 +100,12 @@ def write_scenario(scenario):
         Reading it gives the same scenario.
     """
     lines = ["# Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
-    for name in Scenario.model_fields:
+    for name in Keys.model_fields:
         section = getattr(scenario, name)
-        lines += ["", f"[{name}]  # {type(section).__doc__.splitlines()[0]}"]
+        lines += ["", f"[{name}]  # {inspect.getdoc(type(section)).splitlines()[0]}"]
         tables = []
         for key, known in type(section).model_fields.items():
-            value, unit = getattr(section, key), (known.json_schema_extra or {}).get("unit", "")
+            value, unit = getattr(section, key), section.unit(key)
             meaning = f"{unit}; {known.description}" if unit else known.description
             if isinstance(value, dict):
                 tables += [
@@ -121,11 +135,10 @@ def _explain(error):
     """One line that names the key, the value and what is allowed."""
     key = ".".join(str(part) for part in error["loc"])
     if error["type"] == "extra_forbidden":
-        known = list(Scenario.model_fields)
-        if len(error["loc"]) > 1 and error["loc"][0] in Scenario.model_fields:
-            known = list(Scenario.model_fields[error["loc"][0]].annotation.model_fields)
-        near = get_close_matches(str(error["loc"][-1]), known, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
+        known = list(Keys.model_fields)
+        if len(error["loc"]) > 1 and error["loc"][0] in Keys.model_fields:
+            known = list(Keys.model_fields[error["loc"][0]].annotation.model_fields)
+        hint = nearest(str(error["loc"][-1]), known)
         return f"unknown key {key} = {error['input']!r}: {hint}allowed are {', '.join(known)}"
     message = str(error["ctx"]["error"]) if error["type"] == "value_error" else error["msg"]
     if isinstance(error["input"], dict):

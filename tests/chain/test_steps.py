@@ -9,7 +9,8 @@ from lazy import ODD_CHUNKS, check_raster_function, in_chunks, no_compute
 
 import fifesim
 from fifesim.atmosphere.schemes import coupling, engines
-from fifesim.base.geometry import FIFE_TIME, Geometry, earth_sun_distance
+from fifesim.base import fife
+from fifesim.base.geometry import Geometry, earth_sun_distance
 from fifesim.chain import steps as chain
 from fifesim.ground.canopy import optics
 from fifesim.rasters import cf
@@ -276,7 +277,7 @@ def test_scenario_options_reach_their_stages():
     assert "ndvi" not in tree["image"]
     assert image["band"].values.tolist() == ["TM5"]
     assert grids.cell_size(grids.geobox(image)) == (50.0, 50.0)
-    assert cf.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(FIFE_TIME))
+    assert cf.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
     assert fifesim.Atmosphere.parse(image.attrs["atmosphere"]).visibility == 23
 
 
@@ -322,7 +323,7 @@ def test_every_key_of_a_scenario_reaches_its_stage():
         "sensor": {"bands": bands, "pixel": 50.0, "min_valid": 1.0},
     }
     tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
-    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(FIFE_TIME))
+    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
     grid = grids.grid_at("EPSG:26914", *SMALL["grid"].values(), 30 / 9)
     lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
     rho = fifesim.surface_reflectance(

@@ -10,10 +10,12 @@ import rasterio
 from affine import Affine
 
 import fifesim
-from fifesim.base.geometry import FIFE_TIME, earth_sun_distance
+from fifesim.base import fife
+from fifesim.base.geometry import earth_sun_distance
 from fifesim.rasters import grid as grids
-from fifesim.scenario.scenario import Ground, Scenario
-from fifesim.scenario.toml import parse_scenario, write_scenario
+from fifesim.scenario.scenario import Scenario, parse_scenario
+from fifesim.scenario.sections import Ground
+from fifesim.scenario.toml import write_scenario
 
 SMALL = {"grid": {"width": 300.0, "height": 150.0}}
 
@@ -168,7 +170,7 @@ def test_files_lie_beside_the_scenario(tmp_path):
 
 def test_sun_may_be_given_instead_of_time_and_place():
     sun = parse_scenario({"geometry": {"sza": "40 degree", "saa": 100}}).sun_and_view()
-    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, earth_sun_distance(FIFE_TIME))
+    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, earth_sun_distance(fife.TIME))
     night = parse_scenario({"geometry": {"time": "1987-06-06T06:00:00Z"}})
     with pytest.raises(ValueError, match="the sun is below the horizon"):
         night.sun_and_view()

@@ -8,8 +8,8 @@ from lazy import no_compute
 
 import fifesim
 from fifesim.rasters import grid as grids
+from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import elevation
-from fifesim.scenario.toml import parse_scenario
 
 GRID = {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 600.0, "height": 450.0}
 

@@ -5,7 +5,7 @@ import pytest
 from lazy import no_compute
 
 import fifesim
-from fifesim.scenario.toml import parse_scenario
+from fifesim.scenario.scenario import parse_scenario
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,8 @@ from fifesim.analysis.attribution import by_itself, shapley, taken_away
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
 from fifesim.ground.landscape.field import check_seed
 from fifesim.rasters import grid as grids
-from fifesim.scenario.scenario import Grid, Scenario
+from fifesim.scenario.scenario import Scenario, grid_keys
 from fifesim.scenario.simulation import leaf_area
-from fifesim.sensor.description.instruments import instrument
 
 # Rows of the table beside the stages: what is left when all of them are ideal, and all together.
 CURVATURE, TOTAL = "curvature", "total"
@@ -127,7 +126,7 @@ def realise(scenario, *, realisations, cells, seed=None):
     for number in range(realisations):
         ground = land.model_copy(update={"seed": first + number})
         sensor = own.model_copy(update={"seed": own.seed + number})
-        window = _as_section(windows[places[number % len(places)]])
+        window = grid_keys(windows[places[number % len(places)]])
         found.append(scenario.model_copy(update={"grid": window, "ground": ground, "sensor": sensor}))
     return found
 
@@ -245,7 +244,7 @@ def _windows(scenario, cells):
     """Windows of a scenario's grid side by side, whole ones only."""
     box = scenario.geobox()
     size = tuple(min(cells, count) for count in box.shape)
-    pixel = scenario.sensor.pixel or instrument(scenario.sensor.instrument).gsd
+    pixel = scenario.sensor.size
     held = tuple(int(count * cell / pixel + 1e-6) for count, cell in zip(size, grids.cell_size(box), strict=True))
     if min(held) < _FEWEST:
         raise ValueError(
@@ -263,10 +262,3 @@ def _windows(scenario, cells):
     if not filled:
         raise ValueError(f"no scene of {size[0]} x {size[1]} cells of the LAI map holds enough data: take fewer cells")
     return filled
-
-
-def _as_section(box):
-    """A grid as the scenario's section has it."""
-    a = box.affine
-    crs = f"EPSG:{box.crs.epsg}" if box.crs.epsg else box.crs.to_wkt()
-    return Grid(crs=crs, west=a.c, north=a.f, width=a.a * box.shape.x, height=-a.e * box.shape.y, cell=a.a)

@@ -18,7 +18,6 @@ from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import leaf_area, setup_of
 from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import pixel_grid
@@ -78,9 +77,9 @@ def working_stages(scenario):
     stages : tuple of str
         In the order of `STAGES`.
     """
-    own, instrument = scenario.sensor, find_instrument(scenario.sensor.instrument)
-    size = own.pixel or instrument.gsd
-    spreads = [spread for name in own.bands for spread in instrument.line_spreads(instrument.select([name])[0])]
+    own, size = scenario.sensor, scenario.sensor.size
+    bands = own.description.select(own.bands)
+    spreads = [spread for band in bands for spread in own.description.line_spreads(band)]
     ideal = {
         "point spread": all(isinstance(spread, Boxcar) and spread.width == size for spread in spreads),
         "registration": own.interval in ("product", size) and not any(own.offset),
@@ -146,7 +145,7 @@ class _Scene:
 def _scene(scenario):
     setup, grid = setup_of(scenario), scenario.geobox()
     bands = _red_and_nir(setup.instrument.select(setup.bands))
-    blocks = grids.aligned(grid, scenario.sensor.pixel or setup.instrument.gsd)
+    blocks = grids.aligned(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     lai = leaf_area(scenario, grid).compute()
     middle = _spread_out(analysis.aggregate(lai, grids.cell_size(blocks)[0], min_valid=setup.min_valid), lai)

@@ -25,8 +25,9 @@ from fifesim.output.run.schedule import ordered_blocks, run_on_client, run_on_th
 from fifesim.output.run.workers import found_client, usable_cores
 from fifesim.rasters import grid as grids
 from fifesim.rasters.files import to_geotiff
+from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
-from fifesim.scenario.toml import read_scenario, write_scenario
+from fifesim.scenario.toml import write_scenario
 
 FILES = ("image.tif", "truth.tif", "quicklook.png", "report.html", "scenario.toml")
 SCENE = "scene.zarr"
@@ -145,10 +146,9 @@ def _unfinished(folder, scenario, scene, resume):
 
 def _state(scenario, scene):
     """What must be the same for blocks of two runs to fit together, besides the scenario."""
-    named = (scenario.ground.lai_file, scenario.ground.distribution, scenario.terrain.dem)
     inputs = {}
-    for name in named:
-        if name and Path(name).is_file():
+    for name in scenario.files.values():
+        if Path(name).is_file():
             status = os.stat(name)
             inputs[name] = [status.st_size, status.st_mtime_ns]
     return {"versions": _versions(), "inputs": inputs, "scene": bool(scene)}

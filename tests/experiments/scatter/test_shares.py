@@ -11,7 +11,7 @@ from fifesim.cli import app
 from fifesim.experiments.scatter import folder as scatter_run
 from fifesim.experiments.scatter import shares as scatter
 from fifesim.experiments.scatter.stages import STAGES, pixels, working_stages
-from fifesim.scenario.toml import parse_scenario
+from fifesim.scenario.scenario import parse_scenario
 
 # 12 x 14 pixels of 30 m.
 GRID = {"west": 707970.0, "north": 4331220.0, "width": 420.0, "height": 360.0}

@@ -10,7 +10,7 @@ import xarray as xr
 
 import fifesim
 from fifesim.output.run.folder import FILES, simulate_to_folder
-from fifesim.scenario.toml import parse_scenario
+from fifesim.scenario.scenario import parse_scenario
 
 FLAT = {"dem": "flat"}
 SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}, "terrain": FLAT}

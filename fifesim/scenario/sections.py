@@ -1,52 +1,32 @@
-"""The section of a scenario on leaf area, leaves and what lies below them."""
+"""What the values of a scenario mean, section by section, and what physics refuses of them."""
 
 from dataclasses import asdict, fields
-from difflib import get_close_matches
-from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
+from fifesim.atmosphere.air import aerosols, models
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, spectrum_names
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.field import LARGEST_STREAMING_ARP
-from fifesim.scenario.section import Section, number, text
+from fifesim.ground.terrain.spline import metres_per_unit
+from fifesim.scenario.keys import AirKeys, GroundKeys, SensorKeys, TerrainKeys
+from fifesim.scenario.section import nearest
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.response.noise import check_kinds
 
 _BY_BAND = ("leaf_reflectance", "leaf_transmittance")
 
 
-class Ground(Section):
+class Ground(GroundKeys):
     """Leaf area, leaves and what lies below them."""
-
-    distribution: str = text("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples")
-    arp: float = number(0.15, "1", "autoregressive parameter; larger is smoother", ge=0, lt=0.25)
-    seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = Field(
-        7, description="of the random field, a whole number"
-    )
-    method: Literal["streaming", "periodic"] = text("streaming", "streaming, or the paper's periodic (in memory)")
-    lai_file: str | None = text(None, "a LAI map to use instead of a random field")
-    leaf_angles: str = text("spherical", "leaf angle distribution")
-    hotspot: float = number(0.0, "1", "leaf size over canopy height", ge=0)
-    fpar_inf: float = number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
-    leaf_reflectance: dict[str, float] = Field({}, description="by band [1]; all bands or none")
-    leaf_transmittance: dict[str, float] = Field({}, description="by band [1]; all bands or none")
-    background: dict[str, float] = Field({}, description="reflectance below the canopy by band [1]; all bands or none")
-    leaf: dict[str, float] = Field(
-        {},
-        description="instead of leaf optics by band: structure [1], chlorophyll, carotenoids, anthocyanins [ug cm-2], "
-        "brown [1], water [cm], dry_matter [g cm-2]",
-    )
-    background_spectra: dict[str, float] = Field(
-        {},
-        description="instead of background by band: shares of soil_dry, soil_wet, dead_grass, golden_grass, shade",
-    )
 
     @field_validator("distribution")
     @classmethod
     def _known_distribution(cls, value):
-        if not value.lower().endswith(".csv"):
+        if not cls.names_a_file("distribution", value):
             lai_distribution(value)
         return value
 
@@ -62,9 +42,7 @@ class Ground(Section):
         known = [each.name for each in fields(Leaf)]
         for name in value:
             if name not in known:
-                near = get_close_matches(name, known, n=1)
-                hint = f"did you mean {near[0]!r}? " if near else ""
-                raise ValueError(f"unknown key {name!r}: {hint}allowed are {', '.join(known)}")
+                raise ValueError(f"unknown key {name!r}: {nearest(name, known)}allowed are {', '.join(known)}")
         Leaf(**value)
         return value
 
@@ -75,13 +53,6 @@ class Ground(Section):
             if name not in spectrum_names():
                 raise ValueError(f"unknown spectrum {name!r}: allowed are {', '.join(spectrum_names())}")
         return Background(value).fractions if value else value
-
-    @model_validator(mode="after")
-    def _one_description(self):
-        for spectra, by_band in (("leaf", "leaf_reflectance"), ("background_spectra", "background")):
-            if getattr(self, spectra) and getattr(self, by_band):
-                raise ValueError(f"ground.{spectra} and ground.{by_band} are both given: drop one of them")
-        return self
 
     @model_validator(mode="after")
     def _streaming_limit(self):
@@ -143,3 +114,66 @@ class Ground(Section):
 
 def _by_band(names, values):
     return {name: float(value) for name, value in zip(names, values, strict=True)}
+
+
+class Terrain(TerrainKeys):
+    """Elevation, and the light on slopes."""
+
+    @field_validator("vertical_units")
+    @classmethod
+    def _known_unit(cls, value):
+        if value is not None:
+            metres_per_unit(value)
+        return value
+
+
+class Air(AirKeys):
+    """The atmosphere."""
+
+    @field_validator("profile", "engine")
+    @classmethod
+    def _known_name(cls, value, info):
+        allowed = {"profile": models.PROFILES, "engine": models.ENGINES}[info.field_name]
+        if value not in allowed:
+            raise ValueError(f"must be one of {', '.join(allowed)}, got {value!r}")
+        return value
+
+    @field_validator("aerosol")
+    @classmethod
+    def _known_aerosol(cls, value):
+        return value if value == "none" else aerosols.canonical(value)
+
+    @model_validator(mode="after")
+    def _possible(self):
+        self.model()
+        return self
+
+    def model(self):
+        """The atmosphere that these keys describe, a `fifesim.atmosphere.air.models.Atmosphere`."""
+        return models.Atmosphere(**self.model_dump(exclude={"adjacency"}))
+
+
+class Sensor(SensorKeys):
+    """The instrument."""
+
+    @field_validator("noise")
+    @classmethod
+    def _known_noise(cls, value):
+        return list(check_kinds(value))
+
+    @model_validator(mode="after")
+    def _known_bands(self):
+        for band in self.description.select(self.bands):
+            if self.noise:
+                self.description.noise_model(band)
+        return self
+
+    @property
+    def description(self):
+        """The instrument, a `fifesim.sensor.description.instruments.Instrument`."""
+        return instrument(self.instrument)
+
+    @property
+    def size(self):
+        """Size of a pixel: as given, else that of the instrument's gridded product. [m]"""
+        return self.pixel or self.description.gsd

@@ -1,0 +1,198 @@
+"""Every key of a scenario: its default, unit, range and meaning. What physics says of a value is beside its meaning."""
+
+import math
+from typing import Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from fifesim.base import fife
+from fifesim.scenario.section import Section, file, nearest, number, seed, text
+
+LAND_FORMS = ("flint-hills", "flat")
+INTERVALS = ("product", "native")
+ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
+
+
+class GridKeys(Section):
+    """Ground cells. Without any key but cell, a scene that reads a LAI file covers that file."""
+
+    crs: str = text(fife.CORNERS["NAD83"][0], "projected coordinate reference system in metres")
+    west: float = number(fife.CORNERS["NAD83"][1], "m", "easting of the upper left corner")
+    north: float = number(fife.CORNERS["NAD83"][2], "m", "northing of the upper left corner")
+    width: float = number(fife.SIZE, "m", "west to east", gt=0)
+    height: float = number(fife.SIZE, "m", "north to south", gt=0)
+    cell: float = number(30 / 9, "m", "size of a cell", gt=0)
+
+
+class GroundKeys(Section):
+    """Leaf area, leaves and what lies below them."""
+
+    distribution: str = file("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples", suffix=".csv")
+    arp: float = number(0.15, "1", "autoregressive parameter; larger is smoother", ge=0, lt=0.25)
+    seed: int = seed(7, "of the random field, a whole number")
+    method: Literal["streaming", "periodic"] = text("streaming", "streaming, or the paper's periodic (in memory)")
+    lai_file: str | None = file(None, "a LAI map to use instead of a random field")
+    leaf_angles: str = text("spherical", "leaf angle distribution")
+    hotspot: float = number(0.0, "1", "leaf size over canopy height", ge=0)
+    fpar_inf: float = number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
+    leaf_reflectance: dict[str, float] = text({}, "by band [1]; all bands or none")
+    leaf_transmittance: dict[str, float] = text({}, "by band [1]; all bands or none")
+    background: dict[str, float] = text({}, "reflectance below the canopy by band [1]; all bands or none")
+    leaf: dict[str, float] = text(
+        {},
+        "instead of leaf optics by band: structure [1], chlorophyll, carotenoids, anthocyanins [ug cm-2], "
+        "brown [1], water [cm], dry_matter [g cm-2]",
+    )
+    background_spectra: dict[str, float] = text(
+        {}, "instead of background by band: shares of soil_dry, soil_wet, dead_grass, golden_grass, shade"
+    )
+
+    @model_validator(mode="after")
+    def _one_description(self):
+        for spectra, by_band in (("leaf", "leaf_reflectance"), ("background_spectra", "background")):
+            if getattr(self, spectra) and getattr(self, by_band):
+                raise ValueError(f"ground.{spectra} and ground.{by_band} are both given: drop one of them")
+        return self
+
+
+class TerrainKeys(Section):
+    """Elevation, and the light on slopes."""
+
+    dem: str = file(
+        "flint-hills",
+        "flint-hills (synthetic), flat, or a raster file of elevation; flat below a lai_file by default",
+        names=LAND_FORMS,
+        suffix="*",
+    )
+    seed: int = seed(7, "of the synthetic hills")
+    fill: float | None = number(None, "m", "holes of the file are interpolated up to this distance", gt=0)
+    vertical_units: str | None = text(None, "of the file's elevation where they are not metres, such as ft")
+    horizon_reach: float = number(5000.0, "m", "greatest distance of terrain that hides the sky", ge=30, le=100_000)
+    upwelling: bool = text(True, "with the view's cosine on slopes (Eq. 5)")
+
+    @model_validator(mode="after")
+    def _options_of_a_file(self):
+        for key in ("fill", "vertical_units"):
+            if getattr(self, key) is not None and self.dem in LAND_FORMS:
+                raise ValueError(f"{key} is for an elevation file, dem is {self.dem!r}: name a file or drop {key}")
+        return self
+
+    @field_validator("dem")
+    @classmethod
+    def _known_land(cls, value):
+        if value not in LAND_FORMS and not cls.names_a_file("dem", value):
+            allowed = f"allowed are {', '.join(LAND_FORMS)}, or a raster file such as dem.tif"
+            raise ValueError(nearest(value, LAND_FORMS) + allowed)
+        return value
+
+
+class SunAndViewKeys(Section):
+    """Directions; the sun's from time and place, or given by sza and saa."""
+
+    time: str = text(fife.TIME, "UTC; a hypothetical overpass by default")
+    latitude: float = number(fife.LATITUDE, "degree", "north", ge=-90, le=90)
+    longitude: float = number(fife.LONGITUDE, "degree", "east", ge=-180, le=360)
+    sza: float | None = number(None, "degree", "solar zenith, instead of that of time and place", ge=0, lt=90)
+    saa: float | None = number(None, "degree", "solar azimuth, clockwise from north")
+    vza: float = number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=75)
+    vaa: float = number(0.0, "degree", "azimuth toward the sensor, clockwise from north")
+
+    @model_validator(mode="after")
+    def _whole_sun(self):
+        if (self.sza is None) != (self.saa is None):
+            raise ValueError("sza and saa go together: give both, or neither to have the sun of time and place")
+        return self
+
+
+class AirKeys(Section):
+    """The atmosphere."""
+
+    profile: str = text("midlatitude-summer", "of pressure, temperature, water vapour and ozone")
+    aerosol: str = text("continental", 'aerosol model, "none", or a mixture such as "dust:0.5+soot:0.5" by volume')
+    visibility: float | None = number(45.0, "km", "meteorological range; give it or aot", ge=5, le=100)
+    aot: float | None = number(None, "1", "aerosol optical thickness at 0.55 um, instead of visibility", ge=0, le=2)
+    altitude: float = number(0.4, "km", "of the ground above the sea", ge=0, le=4)
+    h2o: float | None = number(None, "g cm-2", "water vapour, instead of the profile's", ge=0, le=10)
+    o3: float | None = number(None, "cm-atm", "ozone, instead of the profile's", ge=0, le=1)
+    engine: str = text("5S", f"one of {', '.join(ENGINES)}")
+    adjacency: bool = text(False, "whether light of the surroundings is scattered into a cell's view")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_amount(cls, values):
+        by_aot = isinstance(values, dict) and values.get("aot") is not None
+        return values | {"visibility": values.get("visibility")} if by_aot else values
+
+
+class SensorKeys(Section):
+    """The instrument."""
+
+    instrument: str = file("TM", "see: fifesim sensors", suffix=".toml")
+    bands: list[str] = text(["TM3", "TM4"], "names of bands")
+    pixel: float | None = number(
+        None,
+        "m",
+        "size of a pixel; by default the instrument's gridded product; the footprint stays the instrument's",
+        gt=0,
+    )
+    interval: str | float = Field(
+        "product",
+        description="between pixels: product, that of their size; native, the instrument's own; or metres",
+        json_schema_extra={"unit": "m"},
+    )
+    offset: list[float] = Field(
+        [0.0, 0.0],
+        description="registration error southward and eastward: pixels see the ground beside them",
+        json_schema_extra={"unit": "pixel"},
+        min_length=2,
+        max_length=2,
+    )
+    noise: list[str] = text([], "of the detectors: shot, thermal, fixed-pattern")
+    seed: int = seed(0, "of the noise")
+    min_valid: float = number(0.98, "1", "share of its footprint that a pixel needs on valid cells", ge=0, le=1)
+
+    @field_validator("bands")
+    @classmethod
+    def _some_bands(cls, value):
+        if not value:
+            raise ValueError("name at least one band")
+        return value
+
+    @field_validator("interval")
+    @classmethod
+    def _known_interval(cls, value):
+        if value in INTERVALS or (not isinstance(value, str) and 0 < value < math.inf):
+            return value
+        raise ValueError(f"must be {' or '.join(INTERVALS)}, or metres above 0 between pixels")
+
+    @field_validator("offset")
+    @classmethod
+    def _finite_offset(cls, value):
+        if not all(map(math.isfinite, value)):
+            raise ValueError("must be two finite numbers of pixels")
+        return value
+
+
+class Keys(Section):
+    """The sections of a scenario, spelled as they may be."""
+
+    grid: GridKeys = GridKeys()
+    ground: GroundKeys = GroundKeys()
+    terrain: TerrainKeys = TerrainKeys()
+    geometry: SunAndViewKeys = SunAndViewKeys()
+    atmosphere: AirKeys = AirKeys()
+    sensor: SensorKeys = SensorKeys()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_invented_hills(cls, values):
+        """A map of real ground without an elevation is flat: synthetic hills are for synthetic landscapes."""
+        if not isinstance(values, dict):
+            return values
+        ground, terrain = values.get("ground", {}), values.get("terrain", {})
+        lai_file = (
+            ground.lai_file if isinstance(ground, GroundKeys) else isinstance(ground, dict) and ground.get("lai_file")
+        )
+        if lai_file and isinstance(terrain, dict) and "dem" not in terrain:
+            return values | {"terrain": {"dem": "flat"} | terrain}
+        return values
