@@ -103,11 +103,8 @@ def carry(pipeline, source, target, x, y):
     """
     if pipeline is None:
         return x, y
-    swap_in, swap_out = (
-        pyproj.CRS.from_user_input(each).axis_info[0].direction == "north" for each in (source, target)
-    )
-    first, second = pyproj.Transformer.from_pipeline(pipeline).transform(*((y, x) if swap_in else (x, y)))
-    return (second, first) if swap_out else (first, second)
+    first, second = pyproj.Transformer.from_pipeline(pipeline).transform(*((y, x) if _north_first(source) else (x, y)))
+    return (second, first) if _north_first(target) else (first, second)
 
 
 def file_onto_grid(path, grid, chunks=None):
@@ -182,11 +179,10 @@ def covering_grid(path, cell, pixel):
     if crs.is_geographic:
         target = _utm(crs, x, y)
         pipeline, _ = operation(crs, target, (x.min(), y.min(), x.max(), y.max()))
-        north_first = crs.axis_info[0].direction == "north"
-        x, y = pyproj.Transformer.from_pipeline(pipeline).transform(*((y, x) if north_first else (x, y)))
+        x, y = carry(pipeline, crs, target, x, y)
         crs = target
     west, north = np.floor(np.min(x) / pixel) * pixel, np.ceil(np.max(y) / pixel) * pixel
-    width, height = (np.ceil(size / pixel) * pixel for size in (np.max(x) - west, north - np.min(y)))
+    width, height = np.ceil((np.max(x) - west) / pixel) * pixel, np.ceil((north - np.min(y)) / pixel) * pixel
     name = f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else crs.to_wkt()
     return grids.grid_at(name, float(west), float(north), float(width), float(height), cell)
 
@@ -229,6 +225,11 @@ def _pipeline(*steps):
         words = step.definition.split()
         parts += words[1:] if words[0] == "proj=pipeline" else ["step", *words]
     return " ".join("+" + word for word in ["proj=pipeline", *parts])
+
+
+def _north_first(crs):
+    """Whether a CRS gives northing or latitude before easting or longitude."""
+    return pyproj.CRS.from_user_input(crs).axis_info[0].direction == "north"
 
 
 def _name(crs):

@@ -80,9 +80,16 @@ def _check_sun(middle, around, horizon, geometry):
 
 def _padded(grid, margin):
     """Coarse grid on multiples of its cells from the origin of the CRS that reaches a margin past a fine one."""
-    down, across = (max(round(_HILLS_AROUND / size), 1) * size for size in grids.cell_size(grid))
+    height, width = grids.cell_size(grid)
+    down, across = max(round(_HILLS_AROUND / height), 1) * height, max(round(_HILLS_AROUND / width), 1) * width
     box = grid.boundingbox
-    west, east = (np.floor((box.left - margin) / across), np.ceil((box.right + margin) / across))
-    south, north = (np.floor((box.bottom - margin) / down), np.ceil((box.top + margin) / down))
-    size = (east - west) * across, (north - south) * down
-    return grids.grid_at(grid.crs.to_wkt(), west * across, north * down, *size, (down, across))
+    west, east = np.floor((box.left - margin) / across), np.ceil((box.right + margin) / across)
+    south, north = np.floor((box.bottom - margin) / down), np.ceil((box.top + margin) / down)
+    return grids.grid_at(
+        grid.crs.to_wkt(),
+        west * across,
+        north * down,
+        width=(east - west) * across,
+        height=(north - south) * down,
+        cell=(down, across),
+    )

@@ -194,7 +194,7 @@ def pixel_values(truth, *images):
     values : array, shape (rasters, pixels)
     """
     rasters = (truth, *images)
-    rows, columns = (min(raster.sizes[axis] for raster in rasters) for axis in ("y", "x"))
+    rows, columns = min(raster.sizes["y"] for raster in rasters), min(raster.sizes["x"] for raster in rasters)
     values = np.stack([raster.values[:rows, :columns].ravel() for raster in rasters])
     return values[:, np.isfinite(values).all(axis=0)]
 

@@ -89,7 +89,7 @@ def sensitivity(case, seeds, each=iter):
         other = friedl1995_table.realise(change.case, seeds)
         row = {"name": change.name, "before": change.before, "after": change.after}
         for k, variable in enumerate(VARIABLES):
-            was, now = (outcome.fits.mean(axis=0)[:, k] for outcome in (base, other))
+            was, now = base.fits.mean(axis=0)[:, k], other.fits.mean(axis=0)[:, k]
             row |= {
                 f"{variable}_r2": np.mean(now[:, 2] - was[:, 2]),
                 f"{variable}_slope": np.mean(now[:, 1] / was[:, 1] - 1),

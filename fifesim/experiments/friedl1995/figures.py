@@ -121,7 +121,7 @@ def figure5(scenes):
     for row, scene, arp in zip(axes, scenes, ARPS, strict=True):
         values, sample = scene["pixels"], scene["sample"]
         for axis, variable in zip(row, VARIABLES, strict=True):
-            truth, toa, boa = (values[name][sample] for name in (variable, "ndvi", "boa_ndvi"))
+            truth, toa, boa = values[variable][sample], values["ndvi"][sample], values["boa_ndvi"][sample]
             axis.scatter(boa, truth, color=_COLORS[0], marker="^", label="ground (BOA)", **_DOT)
             axis.scatter(toa, truth, color=_COLORS[1], marker="o", label="sensor (TOA)", **_DOT)
             fit = regression.fit(regression.row_sums(truth[None], toa[None], truth.mean(), toa.mean()), truth.mean(),
@@ -248,7 +248,8 @@ def figure9(scenes):
     figure = Figure(figsize=(_FIGURE_WIDTH, 5.0), layout="constrained")
     for row, band, name in zip(figure.subplots(len(BANDS), len(ARPS)), BANDS, ("red", "nir"), strict=True):
         for axis, scene, arp in zip(row, scenes, ARPS, strict=True):
-            boa, toa = (scene["pixels"][f"{place}_{name}"][scene["sample"]] for place in ("boa", "toa"))
+            values, sample = scene["pixels"], scene["sample"]
+            boa, toa = values[f"boa_{name}"][sample], values[f"toa_{name}"][sample]
             axis.scatter(boa, toa, color=_COLORS[1], label="simulated image", **_DOT)
             at = np.array([boa.min(), boa.max()])
             # What the atmosphere alone makes of the mean reflectance of the ground.
@@ -273,7 +274,7 @@ def _scene(case, treatment, arp, seed):
     boa_ndvi = analysis.ndvi(ground)
     means = analysis.aggregate(ground, PIXEL)
     clear = chain.to_toa(means)
-    squares = [ground[0] ** 2, ground[0] * ground[1], ground[1] ** 2]
+    products = {"red_red": ground[0] ** 2, "red_nir": ground[0] * ground[1], "nir_nir": ground[1] ** 2}
     rasters = {
         "lai": analysis.aggregate(lai, PIXEL),
         "fpar": analysis.aggregate(fpar, PIXEL),
@@ -283,12 +284,12 @@ def _scene(case, treatment, arp, seed):
         "boa_red": means[0], "boa_nir": means[1],
         "toa_red": planetary[0], "toa_nir": planetary[1],
         "clear_red": clear[0], "clear_nir": clear[1],
-    } | {f"square_{k}": analysis.aggregate(square.drop_vars("band", errors="ignore"), PIXEL)
-         for k, square in enumerate(squares)}  # fmt: skip
+    } | {name: analysis.aggregate(product.drop_vars("band", errors="ignore"), PIXEL)
+         for name, product in products.items()}  # fmt: skip
     values = dict(zip(rasters, friedl1995.pixel_values(*rasters.values()), strict=True))
     red, nir = values["boa_red"], values["boa_nir"]
-    rr, rn, nn = (values[f"square_{k}"] for k in range(3))
-    covariance = np.array([[rr - red**2, rn - red * nir], [rn - red * nir, nn - nir**2]])
+    mixed = values["red_nir"] - red * nir
+    covariance = np.array([[values["red_red"] - red**2, mixed], [mixed, values["nir_nir"] - nir**2]])
     numbers = np.arange(red.size)[None]
     sample = friedl1995_table.draw(numbers, friedl1995_table.SAMPLE, [seed, ARPS.index(arp)], 1)[0, 0]
     of_cells = {"lai": lai.values.ravel(), "fpar": fpar.values.ravel(), "ndvi": ndvi(toa).values.ravel()}

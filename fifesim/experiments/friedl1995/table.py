@@ -176,7 +176,7 @@ def line(x, y):
     """
     x_mean, y_mean = x.mean(axis=-1), y.mean(axis=-1)
     x_about, y_about = x - x_mean[..., None], y - y_mean[..., None]
-    xx, xy, yy = ((a * b).sum(axis=-1) for a, b in ((x_about, x_about), (x_about, y_about), (y_about, y_about)))
+    xx, xy, yy = (x_about * x_about).sum(axis=-1), (x_about * y_about).sum(axis=-1), (y_about * y_about).sum(axis=-1)
     slope = xy / xx
     return np.stack([y_mean - slope * x_mean, slope, slope * xy / yy], axis=-1)
 
@@ -196,7 +196,7 @@ def mean_noise(variable, ndvi, increment):
     values, noise : array, shape (increments,)
         Mean of the variable and its relative equivalent noise in increments of at least three pixels. [1]
     """
-    first, last = (int(np.floor(limit / increment)) for limit in (variable.min(), variable.max()))
+    first, last = int(np.floor(variable.min() / increment)), int(np.floor(variable.max() / increment))
     sums = uncertainty.increment_sums(
         variable[None], ndvi[None], first, increment, last - first + 1, float(ndvi.mean())
     )

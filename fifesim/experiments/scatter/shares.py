@@ -205,7 +205,8 @@ def unexplained(truth, ndvi):
     >>> float(unexplained(np.array([0.0, 1.0, 2.0]), np.array([0.2, 0.4, 0.6])).round(12))
     0.0
     """
-    truth, ndvi = (values - values.mean(axis=-1, keepdims=True) for values in (truth, ndvi))
+    truth = truth - truth.mean(axis=-1, keepdims=True)
+    ndvi = ndvi - ndvi.mean(axis=-1, keepdims=True)
     squares = (truth**2).sum(axis=-1) * (ndvi**2).sum(axis=-1)
     if not np.all(squares > 0):
         raise ValueError("LAI, FPAR or NDVI does not vary over the pixels: there is no scatter to share")
@@ -251,9 +252,11 @@ def _windows(scenario, cells):
             f"a scene of {size[0]} x {size[1]} cells holds {held[0]} x {held[1]} pixels of {pixel:g} m, and a budget "
             f"needs {_FEWEST} x {_FEWEST}: take more cells, a larger grid, or a larger grid.cell"
         )
-    rows, columns = (range(count // edge) for count, edge in zip(box.shape, size, strict=True))
+    height, width = size
     found = [
-        GeoBox(size, box[row * size[0] :, column * size[1] :].affine, box.crs) for row in rows for column in columns
+        GeoBox(size, box[row * height :, column * width :].affine, box.crs)
+        for row in range(box.shape.y // height)
+        for column in range(box.shape.x // width)
     ]
     if not scenario.ground.lai_file:
         return found

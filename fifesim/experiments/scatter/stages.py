@@ -164,12 +164,10 @@ def _red_and_nir(bands):
 
 def _spread_out(means, cells):
     """Means of blocks over their cells; a cell of no block keeps its own, and one without data has none."""
-    rows, columns = (
-        np.floor((np.arange(cells.sizes[axis]) + 0.5) * cell / block + 1e-9).astype(int)
-        for axis, cell, block in zip(
-            ("y", "x"), grids.cell_size(grids.geobox(cells)), grids.cell_size(grids.geobox(means)), strict=True
-        )
-    )
+    down, across = grids.cell_size(grids.geobox(cells))
+    tall, wide = grids.cell_size(grids.geobox(means))
+    rows = np.floor((np.arange(cells.sizes["y"]) + 0.5) * down / tall + 1e-9).astype(int)
+    columns = np.floor((np.arange(cells.sizes["x"]) + 0.5) * across / wide + 1e-9).astype(int)
     inside = (rows < means.sizes["y"])[:, None] & (columns < means.sizes["x"])
     spread = means.values[np.minimum(rows, means.sizes["y"] - 1)][:, np.minimum(columns, means.sizes["x"] - 1)]
     return cells.copy(data=np.where(inside & np.isfinite(spread) & np.isfinite(cells.values), spread, cells.values))
@@ -206,8 +204,8 @@ def _cells(scene, lai, curve, relief, air):
     seen = reflectance(lai) if curve else _tangent(reflectance, lai, scene.middle)
     if air:
         seen = chain.to_toa(seen, adjacency=setup.adjacency)
-    red, nir = (band.values for band in analysis.red_and_nir(seen))
-    return np.stack([red, nir, indices.normalized_difference(nir, red)])
+    red, nir = analysis.red_and_nir(seen)
+    return np.stack([red.values, nir.values, indices.normalized_difference(nir.values, red.values)])
 
 
 def _images(scene, cells, switches):
