@@ -1,10 +1,18 @@
 """Sphinx configuration. Build with: sphinx-build -W -b html docs docs/_build/html"""
 
+import sys
+from pathlib import Path
+
 from docutils import nodes
 from sphinx.addnodes import pending_xref
 from sphinx.ext import autosummary
 
 import fifesim
+
+sys.path.insert(0, str(Path(__file__).parent))
+import make_api
+
+make_api.write()
 
 project = "fifesim"
 author = "the fifesim developers"

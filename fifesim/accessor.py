@@ -1,9 +1,54 @@
-"""The ``.fifesim`` accessor: every method is the function of the same name with the raster as its first argument."""
+"""Public names, found when they are first used, and the ``.fifesim`` accessor: its methods are functions of a raster."""
 
+import re
 from importlib import import_module
+from pathlib import Path
 from types import MethodType
+from typing import NamedTuple
 
 import xarray as xr
+
+# One line of the table: where a name lives, and of what it is a method.
+_LINE = re.compile(r"from \.([\w.]+) import (\w+) as \2(?:  # method of a (DataArray|Dataset)( and of a Dataset)?)?")
+
+
+class Public(NamedTuple):
+    """A public name: the module it lives in, the kinds of raster it is a method of, and its group in the API page."""
+
+    module: str
+    methods_of: tuple[str, ...]
+    group: str
+
+
+def _table():
+    """What ``__init__.pyi`` says, by name."""
+    found, group = {}, ""
+    for line in Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8").splitlines():
+        if line.startswith("# "):
+            group = line[2:]
+        elif match := _LINE.fullmatch(line):
+            module, name, kind, both = match.groups()
+            found[name] = Public(f"fifesim.{module}", tuple(filter(None, (kind, "Dataset" if both else None))), group)
+    return found
+
+
+PUBLIC = _table()
+
+
+def find(name):
+    """
+    A public name.
+
+    Parameters
+    ----------
+    name : str
+        A key of `PUBLIC`.
+
+    Returns
+    -------
+    found : object
+    """
+    return getattr(import_module(PUBLIC[name].module), name)
 
 
 class _Method:
@@ -13,64 +58,24 @@ class _Method:
     A bound method keeps the function's name, signature and documentation.
     """
 
-    def __init__(self, module):
-        self._module = f"fifesim.{module}"
-
-    def __set_name__(self, owner, name):
+    def __init__(self, name):
         self._name = name
 
     def __get__(self, accessor, owner=None):
-        function = getattr(import_module(self._module), self._name)
-        return function if accessor is None else MethodType(function, accessor._raster)
+        return find(self._name) if accessor is None else MethodType(find(self._name), accessor._raster)
 
 
-@xr.register_dataarray_accessor("fifesim")
-class DataArrayAccessor:
-    """fifesim on a DataArray."""
-
+class _Accessor:
     def __init__(self, raster):
         self._raster = raster
 
-    surface_reflectance = _Method("chain.steps")
-    fpar = _Method("ground.canopy.raster")
-    slope = _Method("ground.terrain.rasters.light")
-    aspect = _Method("ground.terrain.rasters.light")
-    horizon = _Method("ground.terrain.rasters.sky")
-    sky_view = _Method("ground.terrain.rasters.light")
-    terrain_view = _Method("ground.terrain.rasters.light")
-    illumination = _Method("ground.terrain.rasters.light")
-    shadow = _Method("ground.terrain.rasters.light")
-    kt = _Method("chain.steps")
-    to_toa = _Method("chain.steps")
-    to_surface = _Method("chain.steps")
-    sense = _Method("sensor.raster")
-    sense_swath = _Method("sensor.scan.rasters.swath")
-    compare = _Method("chain.comparison")
-    to_radiance = _Method("sensor.raster")
-    to_reflectance = _Method("sensor.raster")
-    ndvi = _Method("chain.images")
-    aggregate = _Method("analysis.rasters.regression")
-    regress = _Method("analysis.rasters.regression")
-    relative_equivalent_noise = _Method("analysis.rasters.uncertainty")
-    invert = _Method("analysis.rasters.inversion")
-    inversion_error = _Method("analysis.rasters.inversion")
-    ndvi_bias = _Method("analysis.rasters.scaling")
-    ndvi_linearity = _Method("analysis.rasters.scaling")
-    fpar_bias = _Method("analysis.rasters.scaling")
-    share_kept = _Method("analysis.rasters.scaling")
-    density = _Method("analysis.rasters.scaling")
-    autocovariance = _Method("analysis.rasters.lags")
-    variogram = _Method("analysis.rasters.lags")
-    regularized_variance = _Method("analysis.rasters.lags")
-    to_geotiff = _Method("rasters.files")
+
+def _methods(kind):
+    return {name: _Method(name) for name, public in PUBLIC.items() if kind in public.methods_of}
 
 
-@xr.register_dataset_accessor("fifesim")
-class DatasetAccessor:
-    """fifesim on a Dataset."""
+DataArrayAccessor = type("DataArrayAccessor", (_Accessor,), {"__doc__": "fifesim on a DataArray."} | _methods("DataArray"))
+DatasetAccessor = type("DatasetAccessor", (_Accessor,), {"__doc__": "fifesim on a Dataset."} | _methods("Dataset"))
 
-    def __init__(self, raster):
-        self._raster = raster
-
-    inversion_error = _Method("analysis.rasters.inversion")
-    to_geotiff = _Method("rasters.files")
+xr.register_dataarray_accessor("fifesim")(DataArrayAccessor)
+xr.register_dataset_accessor("fifesim")(DatasetAccessor)

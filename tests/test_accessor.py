@@ -2,6 +2,8 @@
 
 import inspect
 import pickle
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,41 +11,9 @@ import xarray as xr
 
 import fifesim
 from fifesim import accessor
+from fifesim.accessor import PUBLIC
 
-METHODS = {
-    "aggregate": fifesim.aggregate,
-    "aspect": fifesim.aspect,
-    "autocovariance": fifesim.autocovariance,
-    "density": fifesim.density,
-    "compare": fifesim.compare,
-    "fpar": fifesim.fpar,
-    "fpar_bias": fifesim.fpar_bias,
-    "horizon": fifesim.horizon,
-    "illumination": fifesim.illumination,
-    "inversion_error": fifesim.inversion_error,
-    "invert": fifesim.invert,
-    "kt": fifesim.kt,
-    "ndvi": fifesim.ndvi,
-    "ndvi_bias": fifesim.ndvi_bias,
-    "ndvi_linearity": fifesim.ndvi_linearity,
-    "regress": fifesim.regress,
-    "regularized_variance": fifesim.regularized_variance,
-    "relative_equivalent_noise": fifesim.relative_equivalent_noise,
-    "sense": fifesim.sense,
-    "sense_swath": fifesim.sense_swath,
-    "shadow": fifesim.shadow,
-    "share_kept": fifesim.share_kept,
-    "sky_view": fifesim.sky_view,
-    "slope": fifesim.slope,
-    "surface_reflectance": fifesim.surface_reflectance,
-    "terrain_view": fifesim.terrain_view,
-    "to_geotiff": fifesim.to_geotiff,
-    "to_radiance": fifesim.to_radiance,
-    "to_reflectance": fifesim.to_reflectance,
-    "to_surface": fifesim.to_surface,
-    "to_toa": fifesim.to_toa,
-    "variogram": fifesim.variogram,
-}
+METHODS = {name: getattr(fifesim, name) for name, found in PUBLIC.items() if "DataArray" in found.methods_of}
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -53,8 +23,29 @@ def test_method_is_the_function(lai, name):
     assert method.__self__ is lai
 
 
-def test_every_method_is_listed_here():
-    assert {name for name in vars(accessor.DataArrayAccessor) if not name.startswith("_")} == set(METHODS)
+def test_every_line_of_the_table_is_read():
+    """A line of another form would be a name that editors know and the package does not."""
+    table = Path(fifesim.__file__).with_name("__init__.pyi").read_text(encoding="utf-8")
+    assert table.count("\nfrom ") == len(PUBLIC) == len(fifesim.__all__) - 1
+
+
+def test_functions_of_a_raster_are_methods_and_no_others():
+    """Whatever takes a raster first is a method: its first parameter is documented as one."""
+    for name, found in PUBLIC.items():
+        function = getattr(fifesim, name)
+        if not inspect.isfunction(function):
+            assert not found.methods_of
+            continue
+        first = re.search(r"Parameters\n-+\n\w+(?:, \w+)* : (.*)", inspect.cleandoc(function.__doc__))
+        takes_one = first is not None and first[1].startswith("xarray.")
+        assert takes_one == ("DataArray" in found.methods_of), name
+
+
+def test_editors_find_every_name():
+    """What the table says is where the name is defined, or where it is meant to be imported from."""
+    for name, found in PUBLIC.items():
+        defined = getattr(getattr(fifesim, name), "__module__", found.module)
+        assert defined == found.module or not defined.startswith("fifesim"), name
 
 
 def test_method_keeps_documentation_and_signature(lai):

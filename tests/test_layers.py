@@ -108,6 +108,18 @@ def test_a_folder_is_read_at_a_glance():
     shown = [path for path in PACKAGE.iterdir() if not path.name.startswith(("__pycache__", "."))]
     assert len([path for path in shown if path.name != "data"]) <= 14
     assert {path.name for path in shown if path.is_dir()} - {"data"} == {*ORDER, *STAGES} - {"stages", "cli"}
+def code_lines(tree):
+    """Statements that are no docstring, import or constant."""
+    return [node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+
+
+@pytest.mark.parametrize("name", [name for name in ORDINARY if code_lines(TREES[name])])
+def test_every_module_has_tests_of_its_name(name):
+    """Tests mirror the tree, so that a maintainer finds them."""
+    *folders, last = name.split(".")
+    assert Path(__file__).parent.joinpath(*folders, f"test_{last}.py").exists()
+
+
 def test_only_the_package_imports_the_accessor():
     assert [name for name in FILES if "accessor" in own_imports(name)] == ["__init__"]
 
@@ -122,7 +134,7 @@ def test_imports_stand_at_the_top(name):
 def test_only_the_front_doors_import_by_name():
     """`import_module` would pass by the other tests."""
     by_name = {name for name in FILES if "importlib.import_module" in imported(TREES[name])}
-    assert by_name <= {"__init__", "accessor", "atmosphere.__init__", "cli"}
+    assert by_name <= {"__init__", "accessor", "atmosphere.__init__"}
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -132,8 +144,8 @@ def test_no_file_shares_a_name_with_a_public_function_in_it(name):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_files_are_shorter_than_400_lines(name):
-    assert len(FILES[name].read_text(encoding="utf-8").splitlines()) < 400
+def test_no_file_is_longer_than_350_lines(name):
+    assert len(FILES[name].read_text(encoding="utf-8").splitlines()) <= 350
 
 
 def public_functions():

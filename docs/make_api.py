@@ -1,0 +1,83 @@
+"""The API pages: public names by group, from the table of the package, and every module of physics."""
+
+from itertools import groupby
+from pathlib import Path
+
+import fifesim
+from fifesim.accessor import PUBLIC
+
+PAGES = Path(__file__).parent / "api"
+PACKAGE = Path(fifesim.__file__).parent
+PHYSICS = ("base", "ground", "atmosphere", "sensor", "analysis")
+
+# Functions of a module of the API that is public as a whole.
+_BESIDE = {"Atmosphere": ["atmosphere.spectrum"]}
+
+_TITLE = "{title}\n{line}\n\n{text}\n\n.. currentmodule:: fifesim\n"
+_SUMMARY = "\n.. autosummary::\n   :toctree: names\n{options}   :nosignatures:\n\n{names}\n"
+
+
+def functions():
+    """
+    Page of the public names.
+
+    Returns
+    -------
+    page : str
+    """
+    text = (
+        "Functions of a raster are methods of the ``.fifesim`` accessor too: ``fifesim.ndvi(image)`` is "
+        "``image.fifesim.ndvi()``. ``fifesim.__version__`` is the version."
+    )
+    parts = [_heading("Functions and classes", text)]
+    for group, members in groupby(PUBLIC.items(), key=lambda item: item[1].group):
+        names = [name for name, _ in members]
+        methods = [name for name in names if PUBLIC[name].methods_of]
+        parts.append(f"\n.. rubric:: {group}\n" + _summary(names + _BESIDE.get(group, [])))
+        if methods:
+            parts.append(f"\nMethods of a raster: {', '.join(f'``{name}``' for name in methods)}.\n")
+    return "".join(parts)
+
+
+def modules():
+    """
+    Names of the modules of physics.
+
+    Returns
+    -------
+    names : list of str
+    """
+    paths = (path for folder in PHYSICS for path in sorted((PACKAGE / folder).rglob("[a-z]*.py")))
+    dotted = [".".join(path.relative_to(PACKAGE).with_suffix("").parts) for path in paths]
+    return [name for name in dotted if not name.endswith(".raster") and ".rasters." not in name]
+
+
+def physics():
+    """
+    Page of the modules of physics.
+
+    Returns
+    -------
+    page : str
+    """
+    text = "Functions of numpy arrays, for those who need a single equation. They may change between versions."
+    options = "   :template: module.rst\n"
+    parts = [_heading("Physics", text)]
+    for folder, names in groupby(modules(), key=lambda name: name.rpartition(".")[0]):
+        parts.append(f"\n.. rubric:: {folder.replace('.', ', ')}\n" + _summary(list(names), options))
+    return "".join(parts)
+
+
+def write():
+    """Write the pages."""
+    PAGES.mkdir(exist_ok=True)
+    (PAGES / "functions.rst").write_text(functions(), encoding="utf-8")
+    (PAGES / "physics.rst").write_text(physics(), encoding="utf-8")
+
+
+def _heading(title, text):
+    return _TITLE.format(title=title, line="=" * len(title), text=text)
+
+
+def _summary(names, options=""):
+    return _SUMMARY.format(options=options, names="\n".join(f"   {name}" for name in names))

@@ -1,0 +1,91 @@
+"""
+Every public name and where it lives, one line each.
+
+The package finds them here when they are first used, the API page lists them, and editors follow them. A name marked as a
+method is a method of the ``.fifesim`` accessor too, which hands it the raster as first argument.
+"""
+
+# Grids and geometry
+from .rasters.sites import fife_site as fife_site
+from .rasters.grid import grid_at as grid_at
+from .base.geometry import Geometry as Geometry
+from .base.geometry import fife_geometry as fife_geometry
+from .base.geometry import sun_position as sun_position
+
+# Ground
+from .ground.canopy.raster import lai_scene as lai_scene
+from .ground.canopy.raster import open_lai as open_lai
+from .ground.landscape.distribution import lai_distribution as lai_distribution
+from .ground.landscape.distribution import treatments as treatments
+from .ground.landscape.field import correlation_length as correlation_length
+from .ground.landscape.field import arp_for_length as arp_for_length
+from .ground.canopy.prospect import Leaf as Leaf
+from .ground.canopy.spectra import Background as Background
+from .chain.steps import surface_reflectance as surface_reflectance  # method of a DataArray
+from .ground.canopy.raster import fpar as fpar  # method of a DataArray
+
+# Terrain
+from .ground.terrain.rasters.elevation import fine_dem as fine_dem
+from .ground.terrain.rasters.elevation import source_dem as source_dem
+from .ground.terrain.rasters.hills import flint_hills as flint_hills
+from .ground.terrain.rasters.light import slope as slope  # method of a DataArray
+from .ground.terrain.rasters.light import aspect as aspect  # method of a DataArray
+from .ground.terrain.rasters.sky import horizon as horizon  # method of a DataArray
+from .ground.terrain.rasters.light import sky_view as sky_view  # method of a DataArray
+from .ground.terrain.rasters.light import terrain_view as terrain_view  # method of a DataArray
+from .ground.terrain.rasters.light import illumination as illumination  # method of a DataArray
+from .ground.terrain.rasters.light import shadow as shadow  # method of a DataArray
+from .chain.steps import kt as kt  # method of a DataArray
+
+# Atmosphere
+from .atmosphere.air.models import Atmosphere as Atmosphere
+from .chain.steps import to_toa as to_toa  # method of a DataArray
+from .chain.steps import to_surface as to_surface  # method of a DataArray
+
+# Sensor
+from .sensor.raster import sense as sense  # method of a DataArray
+from .sensor.scan.rasters.view import scan_geometry as scan_geometry
+from .sensor.scan.track import Track as Track
+from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method of a DataArray
+from .chain.comparison import compare as compare  # method of a DataArray
+from .sensor.response.rasters.spread import psf as psf
+from .sensor.response.rasters.spread import mtf as mtf
+from .sensor.response.noise import NoiseModel as NoiseModel
+from .sensor.response.signal_to_noise import noise_equivalent_radiance as noise_equivalent_radiance
+from .sensor.response.signal_to_noise import snr as snr
+from .sensor.raster import to_radiance as to_radiance  # method of a DataArray
+from .sensor.raster import to_reflectance as to_reflectance  # method of a DataArray
+from .sensor.description.instruments import instrument as instrument
+from .sensor.description.instruments import instrument_names as instrument_names
+from .sensor.description.instruments import read_instrument as read_instrument
+from .sensor.description.instruments import Instrument as Instrument
+from .base.bands import Band as Band
+
+# Analysis
+from .analysis.rasters.regression import aggregate as aggregate  # method of a DataArray
+from .chain.images import ndvi as ndvi  # method of a DataArray
+from .analysis.rasters.regression import regress as regress  # method of a DataArray
+from .analysis.regression import Regression as Regression
+from .analysis.rasters.uncertainty import relative_equivalent_noise as relative_equivalent_noise  # method of a DataArray
+from .analysis.rasters.inversion import invert as invert  # method of a DataArray
+from .analysis.rasters.inversion import inversion_error as inversion_error  # method of a DataArray and of a Dataset
+from .analysis.rasters.scaling import share_kept as share_kept  # method of a DataArray
+from .analysis.rasters.scaling import density as density  # method of a DataArray
+from .analysis.rasters.scaling import scale_bias as scale_bias
+from .analysis.rasters.scaling import ndvi_linearity as ndvi_linearity  # method of a DataArray
+from .analysis.rasters.scaling import ndvi_bias as ndvi_bias  # method of a DataArray
+from .analysis.rasters.scaling import fpar_bias as fpar_bias  # method of a DataArray
+from .analysis.rasters.lags import autocovariance as autocovariance  # method of a DataArray
+from .analysis.rasters.lags import variogram as variogram  # method of a DataArray
+from .analysis.rasters.lags import regularized_variance as regularized_variance  # method of a DataArray
+
+# Files and runs
+from .rasters.files import to_geotiff as to_geotiff  # method of a DataArray and of a Dataset
+from .rasters.files import open_image as open_image
+from .scenario.simulation import simulate as simulate
+from .scenario.sweeps import sweep as sweep
+from .experiments.scatter.shares import budget as budget
+from .scenario.scenario import Scenario as Scenario
+from .scenario.scenario import read_scenario as read_scenario
+from .experiments.verification.areas import verify as verify
+from .chain.setup import Setup as Setup
