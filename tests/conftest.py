@@ -34,3 +34,25 @@ def lai(lai_values):
 def lai_with_hole(lai):
     lai[20:24, 30:33] = np.nan
     return lai
+
+
+def contract_of(site, **chunks):
+    lai = fifesim.lai_scene(site, "burned-grazed", arp=0.15, seed=7, **chunks)
+    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], dem=None)
+    toa = rho.fifesim.to_toa()
+    image = toa.fifesim.sense("TM")
+    ndvi = image.fifesim.ndvi()
+    truth = lai.fifesim.aggregate(30)
+    return {"lai": lai, "rho": rho, "toa": toa, "image": image, "ndvi": ndvi, "truth": truth}
+
+
+@pytest.fixture(scope="session")
+def contract():
+    """A function that runs the lines that users write, in order."""
+    return contract_of
+
+
+@pytest.fixture(scope="session")
+def whole(site):
+    """What they give in memory."""
+    return contract_of(site)

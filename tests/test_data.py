@@ -49,13 +49,3 @@ def test_header_says_the_units_and_the_table_is_whole(path):
 def test_everything_in_the_folder_is_a_table_or_makes_one():
     extra = {path.name for path in DATA.rglob("*") if path.is_file() and path not in TABLES}
     assert all(name == "README.md" or re.fullmatch(r"make_\w+\.py", name) for name in extra), extra
-
-
-def test_tables_are_copies_that_may_be_changed():
-    datasets.table("lai_distributions.csv").loc[:, "mean"] = -1.0
-    assert (datasets.table("lai_distributions.csv")["mean"] > 0).all()
-
-
-def test_missing_table_is_named():
-    with pytest.raises(FileNotFoundError, match=r"'no_such\.csv'"):
-        datasets.path("no_such.csv")

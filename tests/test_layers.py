@@ -108,6 +108,8 @@ def test_a_folder_is_read_at_a_glance():
     shown = [path for path in PACKAGE.iterdir() if not path.name.startswith(("__pycache__", "."))]
     assert len([path for path in shown if path.name != "data"]) <= 14
     assert {path.name for path in shown if path.is_dir()} - {"data"} == {*ORDER, *STAGES} - {"stages", "cli"}
+
+
 def code_lines(tree):
     """Statements that are no docstring, import or constant."""
     return [node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]

@@ -1,16 +1,13 @@
 """Figure 1 end to end: what its users write, eagerly and lazily, and what one stage hands to another."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import xarray as xr
-from lazy import ODD_CHUNKS, check_raster_function, in_chunks, no_compute
+from lazy import ODD_CHUNKS, in_chunks, no_compute
 
 import fifesim
-from fifesim.atmosphere.schemes import coupling, engines
-from fifesim.base import fife
-from fifesim.base.geometry import Geometry, earth_sun_distance
+from fifesim.atmosphere.schemes import engines
+from fifesim.base.geometry import Geometry
 from fifesim.chain import steps as chain
 from fifesim.ground.canopy import optics
 from fifesim.rasters import cf
@@ -20,24 +17,8 @@ from fifesim.sensor.description.instruments import instrument
 TM34 = ["TM3", "TM4"]
 
 
-def contract(site, **chunks):
-    """The lines that users write, in order."""
-    lai = fifesim.lai_scene(site, "burned-grazed", arp=0.15, seed=7, **chunks)
-    rho = lai.fifesim.surface_reflectance("TM", bands=TM34, dem=None)
-    toa = rho.fifesim.to_toa()
-    image = toa.fifesim.sense("TM")
-    ndvi = image.fifesim.ndvi()
-    truth = lai.fifesim.aggregate(30)
-    return {"lai": lai, "rho": rho, "toa": toa, "image": image, "ndvi": ndvi, "truth": truth}
-
-
-@pytest.fixture(scope="module")
-def whole(site):
-    return contract(site)
-
-
 @pytest.mark.parametrize("chunks", [{"y": 27, "x": 36}, {"y": 23, "x": 31}, "auto"], ids=str)
-def test_chain_has_the_same_bits_lazily_and_computes_nothing_early(site, whole, chunks):
+def test_chain_has_the_same_bits_lazily_and_computes_nothing_early(site, contract, whole, chunks):
     with no_compute():
         lazy = contract(site, chunks=chunks)
     for name, array in lazy.items():
@@ -104,15 +85,6 @@ def test_skylight_of_the_atmosphere_reaches_the_ground(lai):
     assert rho.fifesim.to_toa().attrs["atmosphere"] == haze.text
 
 
-def test_different_atmosphere_raises(whole):
-    for function in (fifesim.to_toa, fifesim.to_surface):
-        array = whole["rho"] if function is fifesim.to_toa else whole["toa"]
-        with pytest.raises(ValueError, match=r"made for another atmosphere.*surface_reflectance\(atmosphere=\.\.\.\)"):
-            function(array, fifesim.Atmosphere(visibility=23.0))
-        same = function(array, fifesim.Atmosphere())
-        xr.testing.assert_identical(same, function(array))
-
-
 def test_bare_ground_is_the_background(lai):
     bare = xr.zeros_like(lai)
     expected = np.array(optics.background(TM34))[:, None, None]
@@ -161,62 +133,6 @@ def test_image_goes_back_to_the_surface_within_its_counts(whole):
     np.testing.assert_allclose(back.mean(("y", "x")), truth.mean(("y", "x")), rtol=0, atol=0.004)
 
 
-def user_raster(site, wavelengths):
-    values = np.random.default_rng(1).uniform(0.05, 0.4, (len(wavelengths), *site.shape))
-    array = xr.DataArray(values, dims=("band", "y", "x"), coords={"wavelength": ("band", wavelengths)}, name="mine")
-    return grids.place(array, site)
-
-
-def test_user_raster_with_only_wavelengths_goes_through(site):
-    """No band names, no instrument, no sun: the paper's sun, narrow bands, and the instrument's nearest ones."""
-    mine = user_raster(site, [0.665, 0.842])
-    toa = check_raster_function(fifesim.to_toa, mine, quantity="toa_reflectance")
-    responses = tuple(
-        fifesim.Band("narrow", (centre - 0.0025, centre, centre + 0.0025), (0.0, 1.0, 0.0)) for centre in (0.665, 0.842)
-    )
-    sun = fifesim.fife_geometry()
-    terms = engines.band_terms(fifesim.Atmosphere(), responses, sun.sza, sun.vza, sun.raa)
-    factors = [
-        getattr(terms, name)[:, None, None]
-        for name in (
-            "path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance"
-        )
-    ]  # fmt: skip
-    np.testing.assert_array_equal(toa, coupling.apparent_reflectance(mine.values, *factors))
-    image = fifesim.sense(toa, "TM")
-    assert image["band"].values.tolist() == TM34
-    assert np.isfinite(image.fifesim.ndvi()).all()
-    np.testing.assert_allclose(toa.fifesim.to_surface(), mine, rtol=0, atol=1e-12)
-
-
-def test_user_raster_may_name_the_instrument(site):
-    mine = user_raster(site, [0.66, 0.83])
-    as_tm = fifesim.to_toa(mine, instrument="TM")
-    named = fifesim.to_toa(mine.assign_coords(band=TM34), instrument="TM")
-    np.testing.assert_array_equal(as_tm, named)
-    assert not np.array_equal(as_tm, fifesim.to_toa(mine))
-
-
-def test_raster_without_bands_is_refused(site):
-    with pytest.raises(ValueError, match=r"neither an instrument nor a wavelength: give instrument="):
-        fifesim.to_toa(user_raster(site, [0.66, 0.83]).drop_vars("wavelength"))
-
-
-def test_geometry_travels_with_the_raster(lai):
-    sun = Geometry(50.0, 140.0, 8.0, 20.0, 1.01)
-    image = lai.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun).fifesim.to_toa().fifesim.sense("TM")
-    assert cf.geometry_of(image) == sun
-    assert cf.geometry_of(image.fifesim.ndvi()) == sun
-
-
-def test_ndvi_is_from_planetary_reflectance(whole):
-    rho = whole["image"].fifesim.to_reflectance()
-    red, nir = rho.sel(band="TM3").values, rho.sel(band="TM4").values
-    np.testing.assert_array_equal(whole["image"].fifesim.ndvi(), (nir - red) / (nir + red))
-    np.testing.assert_array_equal(whole["image"].fifesim.to_radiance().fifesim.ndvi(), whole["ndvi"])
-    np.testing.assert_array_equal(rho.fifesim.ndvi(), whole["ndvi"])
-
-
 def test_hole_in_the_ground_is_no_data_in_the_image(lai):
     lai[18:27, 27:36] = np.nan
     image = lai.fifesim.surface_reflectance("TM", bands=TM34).fifesim.to_toa().fifesim.sense("TM")
@@ -247,131 +163,8 @@ def test_low_sun_is_refused_by_the_atmosphere(lai):
         fifesim.surface_reflectance(lai, geometry=Geometry(89.0, 100.0))
 
 
-SMALL = {
-    "grid": {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 180.0, "height": 150.0},
-    "ground": {"seed": 7},
-    "terrain": {"dem": "flat"},
-}
-
-
-def test_scenario_runs_the_chain(whole, site):
-    scenario = fifesim.Scenario.model_validate(SMALL)
-    with no_compute():
-        tree = fifesim.simulate(scenario)
-    assert grids.same_grid(grids.geobox(tree["scene"]["lai"]), site)
-    np.testing.assert_array_equal(tree["scene"]["lai"], whole["lai"])
-    np.testing.assert_array_equal(tree["image"]["dn"], whole["image"])
-    np.testing.assert_array_equal(tree["image"]["ndvi"], whole["ndvi"])
-    np.testing.assert_array_equal(tree["truth"]["lai"], whole["truth"])
-    np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fifesim.fpar(whole["lai"]), 30.0))
-
-
-def test_scenario_options_reach_their_stages():
-    options = SMALL | {
-        "atmosphere": {"visibility": 23},
-        "geometry": {"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
-        "sensor": {"bands": ["TM5"], "pixel": 50.0},
-    }
-    tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
-    image = tree["image"]["dn"]
-    assert "ndvi" not in tree["image"]
-    assert image["band"].values.tolist() == ["TM5"]
-    assert grids.cell_size(grids.geobox(image)) == (50.0, 50.0)
-    assert cf.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
-    assert fifesim.Atmosphere.parse(image.attrs["atmosphere"]).visibility == 23
-
-
-def test_leaf_and_spectra_of_a_scenario_reach_the_canopy():
-    options = SMALL | {
-        "ground": {"leaf": {"chlorophyll": 55.0}, "background_spectra": {"soil_wet": 0.5, "golden_grass": 0.5}},
-        "sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]},
-    }
-    scenario = fifesim.Scenario.model_validate(options)
-    tree = fifesim.simulate(scenario)
-    rho = fifesim.surface_reflectance(
-        tree["scene"]["lai"],
-        "OLI",
-        bands=["OLI4", "OLI5"],
-        geometry=scenario.sun_and_view(),
-        leaf_optics=fifesim.Leaf(chlorophyll=55.0),
-        background={"soil_wet": 0.5, "golden_grass": 0.5},
-    )
-    np.testing.assert_array_equal(tree["image"]["dn"], fifesim.to_toa(rho).fifesim.sense("OLI"))
-
-
-def test_every_key_of_a_scenario_reaches_its_stage():
-    """Each key differs from its default, so that one that is left out changes the bits."""
-    bands = ["TM3", "TM4"]
-    leaf, back = {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)}, {"TM3": 0.1, "TM4": 0.2}
-    options = {
-        "grid": SMALL["grid"],
-        "terrain": SMALL["terrain"],
-        "ground": {
-            "distribution": "burned-ungrazed",
-            "arp": 0.2,
-            "seed": 11,
-            "method": "periodic",
-            "leaf_angles": "planophile",
-            "hotspot": 0.2,
-            "fpar_inf": 0.9,
-            "leaf_reflectance": {band: optics[0] for band, optics in leaf.items()},
-            "leaf_transmittance": {band: optics[1] for band, optics in leaf.items()},
-            "background": back,
-        },
-        "geometry": {"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
-        "atmosphere": {"visibility": 23, "altitude": 1.0},
-        "sensor": {"bands": bands, "pixel": 50.0, "min_valid": 1.0},
-    }
-    tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
-    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
-    grid = grids.grid_at("EPSG:26914", *SMALL["grid"].values(), 30 / 9)
-    lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
-    rho = fifesim.surface_reflectance(
-        lai,
-        bands=bands,
-        atmosphere=fifesim.Atmosphere(visibility=23, altitude=1.0),
-        geometry=sun,
-        leaf_optics=leaf,
-        background=back,
-        leaf_angles="planophile",
-        hotspot=0.2,
-    )
-    image = fifesim.sense(fifesim.to_toa(rho), onto=grids.aligned(grid, 50.0), min_valid=1.0)
-    fpar = fifesim.fpar(lai, geometry=sun, leaf_angles="planophile", fpar_inf=0.9)
-    np.testing.assert_array_equal(tree["image"]["dn"], image)
-    np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))
-    np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fpar, 50.0, min_valid=1.0))
-
-
-def own_instrument(name, tm3):
-    """The Thematic Mapper with another name, or the response of another band in TM3."""
-    tm = instrument("TM")
-    bands = tuple(
-        dataclasses.replace(band, srf=tm.select(tm3)[0].srf) if band.name == "TM3" else band for band in tm.bands
-    )
-    return dataclasses.replace(tm, name=name, bands=bands)
-
-
-@pytest.mark.parametrize("mine", [own_instrument("MINE", "TM3"), own_instrument("TM", "TM1")])
-def test_the_response_of_ones_own_instrument_is_never_guessed(lai, mine):
-    rho = fifesim.surface_reflectance(lai, mine, bands=["TM3", "TM4"])
-    with pytest.raises(ValueError, match="give it as instrument="):
-        fifesim.to_toa(rho)
-    fifesim.to_toa(rho, instrument=mine)
-
-
 def test_one_band_goes_through_the_chain(lai):
     rho = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])
     both = fifesim.sense(fifesim.to_toa(rho))
     one = fifesim.sense(fifesim.to_toa(rho.sel(band="TM4")))
     np.testing.assert_array_equal(one.squeeze("band"), both.sel(band="TM4"))
-
-
-@pytest.mark.parametrize(
-    "step", [lambda image: image.fifesim.aggregate(60), lambda image: image[0].fifesim.regress(image[1])]
-)
-def test_digital_numbers_are_no_values_to_average(lai, step):
-    """Their 0 is no data and would be taken for dark ground."""
-    image = fifesim.sense(fifesim.to_toa(fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])))
-    with pytest.raises(ValueError, match="digital numbers"):
-        step(image)

@@ -23,32 +23,6 @@ def ramp(grid):
     return grids.place(xr.DataArray(values, dims=("y", "x")), grid)
 
 
-def test_site_is_15_km_of_cells_from_its_corner():
-    grid = fifesim.fife_site(CELL)
-    assert tuple(grid.shape) == (4500, 4500)
-    assert grid.crs.epsg == 26914
-    box = grid.boundingbox
-    np.testing.assert_allclose(
-        (box.left, box.top, box.right, box.bottom), (704970, 4334220, 719970, 4319220), rtol=0, atol=1e-6
-    )
-
-
-def test_site_corner_lies_on_the_30_m_lattice():
-    corner = fifesim.fife_site(30).affine
-    assert corner.c % 30 == 0 and corner.f % 30 == 0
-
-
-def test_site_in_its_own_datum():
-    grid = fifesim.fife_site(30, datum="NAD27")
-    assert grid.crs.epsg == 26714
-    assert (grid.affine.c, grid.affine.f) == (705000.0, 4334000.0)
-
-
-def test_only_whole_cells_are_kept():
-    assert tuple(fifesim.fife_site(29).shape) == (517, 517)
-    assert tuple(fifesim.grid_at("EPSG:32614", 0, 1e6, 100, 70, 30).shape) == (2, 3)
-
-
 @pytest.mark.parametrize("cell", [CELL, 30 / 7, 1.1])
 def test_coordinates_of_a_window_are_those_of_the_whole_to_the_bit(cell):
     """xarray aligns exactly: a difference of 1e-10 m makes the sum of two rasters empty."""
@@ -65,21 +39,6 @@ def test_coordinates_are_cell_centres():
     columns = [float(704970 + (Fraction(i) + Fraction(1, 2)) * 10 / 3) for i in range(4500)]
     np.testing.assert_allclose(coordinates["y"], rows, rtol=0, atol=2e-9)
     np.testing.assert_allclose(coordinates["x"], columns, rtol=0, atol=2e-9)
-
-
-@pytest.mark.parametrize(
-    "options, message",
-    [
-        ({"cell": 0}, r"cell must be in \(0, 15000\] m, got 0"),
-        ({"cell": 30, "datum": "WGS84"}, "datum must be one of NAD83, NAD27, got 'WGS84'"),
-        ({"cell": 30, "window": ((0, 10), (0, 501))}, "within 500 rows and 500 columns"),
-        ({"cell": 30, "window": ((5, 5), (0, 10))}, "within 500 rows"),
-        ({"cell": 30, "window": 10}, "window must be"),
-    ],
-)
-def test_site_refuses_what_makes_no_grid(options, message):
-    with pytest.raises(ValueError, match=message):
-        fifesim.fife_site(**options)
 
 
 CORNER = Affine(30, 0, 705000, 0, -30, 4334000)

@@ -7,6 +7,9 @@ import xarray as xr
 from lazy import no_compute
 
 import fifesim
+from fifesim.base import fife
+from fifesim.base.geometry import Geometry, earth_sun_distance
+from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import elevation
@@ -165,3 +168,100 @@ def test_keys_of_the_sensor_are_those_of_sense():
     toa = fifesim.to_toa(fifesim.surface_reflectance(lai, "L4TM", bands=["TM3", "TM4"]), instrument="L4TM")
     image = fifesim.sense(toa, "L4TM", interval=31.0, offset=(0.25, -0.5), noise=("shot", "thermal"), seed=3)
     xr.testing.assert_identical(fifesim.simulate(case)["image"]["dn"].drop_attrs(), image.drop_attrs())
+
+
+# The cells of the fixture "site", on level ground.
+LEVEL = {
+    "grid": {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 180.0, "height": 150.0},
+    "ground": {"seed": 7},
+    "terrain": {"dem": "flat"},
+}
+
+
+def test_scenario_runs_the_chain(whole, site):
+    scenario = fifesim.Scenario.model_validate(LEVEL)
+    with no_compute():
+        tree = fifesim.simulate(scenario)
+    assert grids.same_grid(grids.geobox(tree["scene"]["lai"]), site)
+    np.testing.assert_array_equal(tree["scene"]["lai"], whole["lai"])
+    np.testing.assert_array_equal(tree["image"]["dn"], whole["image"])
+    np.testing.assert_array_equal(tree["image"]["ndvi"], whole["ndvi"])
+    np.testing.assert_array_equal(tree["truth"]["lai"], whole["truth"])
+    np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fifesim.fpar(whole["lai"]), 30.0))
+
+
+def test_scenario_options_reach_their_stages():
+    options = LEVEL | {
+        "atmosphere": {"visibility": 23},
+        "geometry": {"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
+        "sensor": {"bands": ["TM5"], "pixel": 50.0},
+    }
+    tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
+    image = tree["image"]["dn"]
+    assert "ndvi" not in tree["image"]
+    assert image["band"].values.tolist() == ["TM5"]
+    assert grids.cell_size(grids.geobox(image)) == (50.0, 50.0)
+    assert cf.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
+    assert fifesim.Atmosphere.parse(image.attrs["atmosphere"]).visibility == 23
+
+
+def test_leaf_and_spectra_of_a_scenario_reach_the_canopy():
+    options = LEVEL | {
+        "ground": {"leaf": {"chlorophyll": 55.0}, "background_spectra": {"soil_wet": 0.5, "golden_grass": 0.5}},
+        "sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]},
+    }
+    scenario = fifesim.Scenario.model_validate(options)
+    tree = fifesim.simulate(scenario)
+    rho = fifesim.surface_reflectance(
+        tree["scene"]["lai"],
+        "OLI",
+        bands=["OLI4", "OLI5"],
+        geometry=scenario.sun_and_view(),
+        leaf_optics=fifesim.Leaf(chlorophyll=55.0),
+        background={"soil_wet": 0.5, "golden_grass": 0.5},
+    )
+    np.testing.assert_array_equal(tree["image"]["dn"], fifesim.to_toa(rho).fifesim.sense("OLI"))
+
+
+def test_every_key_of_a_scenario_reaches_its_stage():
+    """Each key differs from its default, so that one that is left out changes the bits."""
+    bands = ["TM3", "TM4"]
+    leaf, back = {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)}, {"TM3": 0.1, "TM4": 0.2}
+    options = {
+        "grid": LEVEL["grid"],
+        "terrain": LEVEL["terrain"],
+        "ground": {
+            "distribution": "burned-ungrazed",
+            "arp": 0.2,
+            "seed": 11,
+            "method": "periodic",
+            "leaf_angles": "planophile",
+            "hotspot": 0.2,
+            "fpar_inf": 0.9,
+            "leaf_reflectance": {band: optics[0] for band, optics in leaf.items()},
+            "leaf_transmittance": {band: optics[1] for band, optics in leaf.items()},
+            "background": back,
+        },
+        "geometry": {"sza": 40.0, "saa": 100.0, "vza": 5.0, "vaa": 10.0},
+        "atmosphere": {"visibility": 23, "altitude": 1.0},
+        "sensor": {"bands": bands, "pixel": 50.0, "min_valid": 1.0},
+    }
+    tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
+    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
+    grid = grids.grid_at("EPSG:26914", *LEVEL["grid"].values(), 30 / 9)
+    lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
+    rho = fifesim.surface_reflectance(
+        lai,
+        bands=bands,
+        atmosphere=fifesim.Atmosphere(visibility=23, altitude=1.0),
+        geometry=sun,
+        leaf_optics=leaf,
+        background=back,
+        leaf_angles="planophile",
+        hotspot=0.2,
+    )
+    image = fifesim.sense(fifesim.to_toa(rho), onto=grids.aligned(grid, 50.0), min_valid=1.0)
+    fpar = fifesim.fpar(lai, geometry=sun, leaf_angles="planophile", fpar_inf=0.9)
+    np.testing.assert_array_equal(tree["image"]["dn"], image)
+    np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))
+    np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fpar, 50.0, min_valid=1.0))

@@ -1,0 +1,92 @@
+"""What a raster carries of air, bands and directions, or is asked for."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import check_raster_function
+
+import fifesim
+from fifesim.atmosphere.schemes import coupling, engines
+from fifesim.base.geometry import Geometry
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
+from fifesim.sensor.description.instruments import instrument
+
+
+def test_different_atmosphere_raises(whole):
+    for function in (fifesim.to_toa, fifesim.to_surface):
+        array = whole["rho"] if function is fifesim.to_toa else whole["toa"]
+        with pytest.raises(ValueError, match=r"made for another atmosphere.*surface_reflectance\(atmosphere=\.\.\.\)"):
+            function(array, fifesim.Atmosphere(visibility=23.0))
+        same = function(array, fifesim.Atmosphere())
+        xr.testing.assert_identical(same, function(array))
+
+
+TM34 = ["TM3", "TM4"]
+
+
+def user_raster(site, wavelengths):
+    values = np.random.default_rng(1).uniform(0.05, 0.4, (len(wavelengths), *site.shape))
+    array = xr.DataArray(values, dims=("band", "y", "x"), coords={"wavelength": ("band", wavelengths)}, name="mine")
+    return grids.place(array, site)
+
+
+def test_user_raster_with_only_wavelengths_goes_through(site):
+    """No band names, no instrument, no sun: the paper's sun, narrow bands, and the instrument's nearest ones."""
+    mine = user_raster(site, [0.665, 0.842])
+    toa = check_raster_function(fifesim.to_toa, mine, quantity="toa_reflectance")
+    responses = tuple(
+        fifesim.Band("narrow", (centre - 0.0025, centre, centre + 0.0025), (0.0, 1.0, 0.0)) for centre in (0.665, 0.842)
+    )
+    sun = fifesim.fife_geometry()
+    terms = engines.band_terms(fifesim.Atmosphere(), responses, sun.sza, sun.vza, sun.raa)
+    factors = [
+        getattr(terms, name)[:, None, None]
+        for name in (
+            "path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance"
+        )
+    ]  # fmt: skip
+    np.testing.assert_array_equal(toa, coupling.apparent_reflectance(mine.values, *factors))
+    image = fifesim.sense(toa, "TM")
+    assert image["band"].values.tolist() == TM34
+    assert np.isfinite(image.fifesim.ndvi()).all()
+    np.testing.assert_allclose(toa.fifesim.to_surface(), mine, rtol=0, atol=1e-12)
+
+
+def test_user_raster_may_name_the_instrument(site):
+    mine = user_raster(site, [0.66, 0.83])
+    as_tm = fifesim.to_toa(mine, instrument="TM")
+    named = fifesim.to_toa(mine.assign_coords(band=TM34), instrument="TM")
+    np.testing.assert_array_equal(as_tm, named)
+    assert not np.array_equal(as_tm, fifesim.to_toa(mine))
+
+
+def test_raster_without_bands_is_refused(site):
+    with pytest.raises(ValueError, match=r"neither an instrument nor a wavelength: give instrument="):
+        fifesim.to_toa(user_raster(site, [0.66, 0.83]).drop_vars("wavelength"))
+
+
+def test_geometry_travels_with_the_raster(lai):
+    sun = Geometry(50.0, 140.0, 8.0, 20.0, 1.01)
+    image = lai.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun).fifesim.to_toa().fifesim.sense("TM")
+    assert cf.geometry_of(image) == sun
+    assert cf.geometry_of(image.fifesim.ndvi()) == sun
+
+
+def own_instrument(name, tm3):
+    """The Thematic Mapper with another name, or the response of another band in TM3."""
+    tm = instrument("TM")
+    bands = tuple(
+        dataclasses.replace(band, srf=tm.select(tm3)[0].srf) if band.name == "TM3" else band for band in tm.bands
+    )
+    return dataclasses.replace(tm, name=name, bands=bands)
+
+
+@pytest.mark.parametrize("mine", [own_instrument("MINE", "TM3"), own_instrument("TM", "TM1")])
+def test_the_response_of_ones_own_instrument_is_never_guessed(lai, mine):
+    rho = fifesim.surface_reflectance(lai, mine, bands=["TM3", "TM4"])
+    with pytest.raises(ValueError, match="give it as instrument="):
+        fifesim.to_toa(rho)
+    fifesim.to_toa(rho, instrument=mine)

@@ -1,0 +1,24 @@
+"""What an image of any kind tells."""
+
+import numpy as np
+import pytest
+
+import fifesim
+
+
+def test_ndvi_is_from_planetary_reflectance(whole):
+    rho = whole["image"].fifesim.to_reflectance()
+    red, nir = rho.sel(band="TM3").values, rho.sel(band="TM4").values
+    np.testing.assert_array_equal(whole["image"].fifesim.ndvi(), (nir - red) / (nir + red))
+    np.testing.assert_array_equal(whole["image"].fifesim.to_radiance().fifesim.ndvi(), whole["ndvi"])
+    np.testing.assert_array_equal(rho.fifesim.ndvi(), whole["ndvi"])
+
+
+@pytest.mark.parametrize(
+    "step", [lambda image: image.fifesim.aggregate(60), lambda image: image[0].fifesim.regress(image[1])]
+)
+def test_digital_numbers_are_no_values_to_average(lai, step):
+    """Their 0 is no data and would be taken for dark ground."""
+    image = fifesim.sense(fifesim.to_toa(fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])))
+    with pytest.raises(ValueError, match="digital numbers"):
+        step(image)

@@ -1,0 +1,59 @@
+"""A setup says once what the steps of the chain take one by one."""
+
+from dataclasses import FrozenInstanceError, fields, replace
+
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.chain.setup import Setup, image_of, reflectance_of
+
+# Every field of the ground, the air and the sampling away from its default, as the public functions take them.
+GROUND = {
+    "bands": ("TM3", "TM4"),
+    "atmosphere": fifesim.Atmosphere(visibility=23),
+    "geometry": fifesim.Geometry(40.0, 100.0, 5.0, 10.0),
+    "leaf_optics": {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)},
+    "background": {"TM3": 0.1, "TM4": 0.2},
+    "leaf_angles": "planophile",
+    "hotspot": 0.2,
+    "upwelling": False,
+}
+SENSOR = {
+    "interval": (20.0, 25.0),
+    "offset": (0.2, -0.1),
+    "min_valid": 0.9,
+    "noise": ("thermal",),
+    "noise_models": fifesim.NoiseModel(thermal=2.0, shot=0.0),
+    "seed": 5,
+    "quantise": False,
+}
+
+
+def test_every_field_reaches_its_step(lai, site):
+    dem = fifesim.flint_hills(site.pad(1), seed=7)
+    horizon = fifesim.horizon(fifesim.flint_hills(site.pad(40), seed=7))
+    air = {"adjacency": True, "surroundings": 0.3}
+    setup = Setup(instrument="TM", dem=dem, horizon=horizon, **GROUND, **air, **SENSOR)
+    rho = fifesim.surface_reflectance(lai, "TM", dem=dem, horizon=horizon, **GROUND)
+    xr.testing.assert_identical(reflectance_of(setup, lai), rho)
+    image = fifesim.sense(fifesim.to_toa(rho, **air), "TM", **SENSOR)
+    xr.testing.assert_identical(image_of(setup, rho), image)
+    told = {"instrument", "dem", "horizon", *GROUND, *air, *SENSOR}
+    assert {field.name for field in fields(Setup)} - told == {"onto"}
+
+
+def test_pixels_may_lie_on_a_grid_of_ones_own(lai, site, whole):
+    pixels = fifesim.grid_at(site.crs, site.affine.c + 7.0, site.affine.f - 11.0, 90, 60, 30)
+    setup = replace(Setup(bands=("TM3", "TM4")), onto=pixels)
+    xr.testing.assert_identical(image_of(setup, whole["rho"]), whole["toa"].fifesim.sense("TM", onto=pixels))
+
+
+def test_defaults_are_those_of_the_functions(lai, whole):
+    setup = Setup(bands=("TM3", "TM4"))
+    xr.testing.assert_identical(image_of(setup, reflectance_of(setup, lai)), whole["image"])
+
+
+def test_setup_is_frozen():
+    with pytest.raises(FrozenInstanceError):
+        Setup().instrument = "OLI"

@@ -1,0 +1,60 @@
+"""Images with stages at their ideal."""
+
+import numpy as np
+import pytest
+
+import fifesim
+from fifesim.experiments.scatter import shares as scatter
+from fifesim.experiments.scatter.stages import STAGES, pixels
+
+
+def of(seen, **at_work):
+    """NDVI with the stages named at work, and those without a word ideal."""
+    return seen.ndvi[tuple(int(at_work.get(stage.replace(" ", "_"), 0)) for stage in seen.stages)]
+
+
+def test_all_stages_at_work_are_the_simulation(rough):
+    seen = pixels(rough)
+    run = fifesim.simulate(rough)
+    assert seen.stages == tuple(STAGES)
+    rows, columns = (min(run[name].sizes[axis] for name in ("truth", "image")) for axis in ("y", "x"))
+    ndvi = run["image"]["ndvi"].values[:rows, :columns]
+    found = np.isfinite(ndvi)
+    # The ideal images have data where the displaced one has.
+    np.testing.assert_array_equal(seen.ndvi[(1,) * 8], ndvi[found])
+    for name in ("lai", "fpar"):
+        np.testing.assert_array_equal(seen.truth[name][1].ravel(), run["truth"][name].values[:rows, :columns][found])
+        line = fifesim.regress(run["truth"][name], run["image"]["ndvi"], pair="index")
+        assert scatter.unexplained(seen.truth[name][1].ravel(), seen.ndvi[(1,) * 8]) == pytest.approx(
+            1 - line.r2, abs=1e-12
+        )
+
+
+def test_ideal_of_ndvi_scaling_is_the_mean_over_the_cells(scenario):
+    case = scenario()
+    lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
+    of_cells = fifesim.ndvi(fifesim.surface_reflectance(lai, bands=["TM3", "TM4"]))
+    found = of(pixels(case), **{"non-linearity": 1})
+    np.testing.assert_allclose(found, fifesim.aggregate(of_cells, 30).values.ravel(), rtol=1e-12)
+
+
+def test_ideal_of_non_linearity_is_the_reflectance_and_fpar_of_the_mean(scenario):
+    """Tangents average to the curve's value at the mean; its table is within 1e-6 of SAIL."""
+    seen = pixels(scenario())
+    lai = fifesim.lai_scene(scenario().geobox(), "burned-grazed", arp=0.15, seed=7).fifesim.aggregate(30)
+    of_mean = fifesim.ndvi(fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], exact=True))
+    np.testing.assert_allclose(of(seen, NDVI_scaling=1), of_mean.values.ravel(), atol=2e-5)
+    np.testing.assert_allclose(seen.truth["fpar"][0].ravel(), fifesim.fpar(lai).values.ravel(), rtol=1e-12)
+    np.testing.assert_allclose(seen.truth["lai"][0].ravel(), lai.values.ravel(), rtol=1e-12)
+
+
+def test_over_uniform_pixels_the_cells_are_the_mean(scenario):
+    """
+    Aligned, the cosine of 30.3 m takes in 0.16 m of each neighbour alone.
+
+    Half a count of TM3 is .001 of reflectance, and that .005 of NDVI.
+    """
+    seen = pixels(scenario())
+    lai = fifesim.lai_scene(scenario().geobox(), "burned-grazed", arp=0.15, seed=7).fifesim.aggregate(30)
+    of_mean = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"]).fifesim.to_toa()
+    np.testing.assert_allclose(seen.homogeneous_ndvi, fifesim.ndvi(of_mean).values.ravel(), atol=0.01)

@@ -1,0 +1,49 @@
+"""What the values of a section mean."""
+
+import numpy as np
+import pytest
+
+import fifesim
+from fifesim.scenario.sections import Air, Ground, Sensor, Terrain
+from fifesim.sensor.description.instruments import instrument
+
+
+def test_optics_by_band_need_both_of_a_leaf():
+    assert Ground().leaf_optics() is None and Ground().below_canopy() is None
+    both = Ground(leaf_reflectance={"TM3": 0.1}, leaf_transmittance={"TM3": 0.05})
+    assert both.leaf_optics() == {"TM3": (0.1, 0.05)}
+    with pytest.raises(ValueError, match="must name the same bands"):
+        Ground(leaf_reflectance={"TM3": 0.1}).leaf_optics()
+
+
+def test_complete_optics_are_those_that_the_chain_takes():
+    bands = [band.response for band in instrument("TM").select(["TM3", "TM4"])]
+    keys = Ground().complete_optics(bands)
+    rho = fifesim.ground.canopy.optics.leaf_optics(bands)[0]
+    np.testing.assert_array_equal(list(keys["leaf_reflectance"].values()), rho)
+    assert Ground(**keys).complete_optics(bands) == keys
+
+
+def test_air_is_an_atmosphere():
+    assert Air().model() == fifesim.Atmosphere()
+    assert Air(aot=0.2, h2o=1.0).model() == fifesim.Atmosphere(aot=0.2, h2o=1.0)
+
+
+def test_size_of_a_pixel_is_the_products_unless_given():
+    assert Sensor().size == 30.0 and Sensor(pixel=50.0).size == 50.0
+    assert Sensor(instrument="MSI", bands=["MSI4"]).size == instrument("MSI").gsd
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "said"),
+    [
+        (Ground, {"arp": 0.2499}, "at most 0.2498 when streaming"),
+        (Ground, {"distribution": "burnt"}, "unknown LAI distribution"),
+        (Terrain, {"dem": "a.tif", "vertical_units": "furlong"}, "vertical units must be one of"),
+        (Air, {"engine": "7S"}, "must be one of 5S"),
+        (Sensor, {"noise": ["shot"]}, "no noise for TM3"),
+    ],
+)
+def test_what_physics_refuses(section, values, said):
+    with pytest.raises(ValueError, match=said):
+        section(**values)
