@@ -2,13 +2,10 @@
 
 import xarray as xr
 
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.chain import steps as chain
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import instrument as find_instrument
-
-# Where the red and the near infrared band of an instrument lie, and the best place. [um]
-_RED = (0.60, 0.70, 0.66)
-_NIR = (0.75, 1.00, 0.84)
 
 
 def compare(
@@ -91,12 +88,12 @@ def _bands(description, names):
     if names is not None:
         return description.select(names)
     found = []
-    for what, (low, high, best) in (("red", _RED), ("near infrared", _NIR)):
-        inside = [band for band in description.bands if low <= band.wavelength <= high]
-        if not inside:
+    for window in (RED, NEAR_INFRARED):
+        number = nearest([band.wavelength for band in description.bands], window)
+        if number is None:
             raise ValueError(
-                f"{description.name} has no {what} band, {low:g} to {high:g} um: give "
+                f"{description.name} has no {window.name} band, {window.low:g} to {window.high:g} um: give "
                 f"bands={{{description.name!r}: ...}}"
             )
-        found.append(min(inside, key=lambda band: abs(band.wavelength - best)))
+        found.append(description.bands[number])
     return tuple(found)

@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters import regression as analysis
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.chain import steps as chain
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.terrain.rasters import light as terrain_raster
@@ -224,7 +225,4 @@ def _padded(grid, margin):
 
 
 def _has_ndvi(image):
-    wavelength = image["wavelength"].values
-    return bool(
-        np.any((wavelength >= 0.6) & (wavelength <= 0.7)) and np.any((wavelength >= 0.75) & (wavelength <= 1.0))
-    )
+    return all(nearest(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))

@@ -6,13 +6,10 @@ import numpy as np
 
 from fifesim.analysis import indices, regression
 from fifesim.analysis.rasters.pairs import check_no_counts, matched, origins, sums_by_row
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.base.footprints import Boxcar, axis_operator, regularize
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
-
-# The red chlorophyll absorption and the near infrared plateau: where a band must lie, and the best place. [um]
-_RED = (0.60, 0.70, 0.66)
-_NIR = (0.75, 1.00, 0.84)
 
 
 def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
@@ -146,19 +143,21 @@ def red_and_nir(reflectance):
         As in `ndvi`.
     """
     cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
-    numbers = (_nearest_band(reflectance, "red", *_RED), _nearest_band(reflectance, "near infrared", *_NIR))
+    numbers = [_nearest_band(reflectance, window) for window in (RED, NEAR_INFRARED)]
     per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
     return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
 
 
-def _nearest_band(reflectance, what, low, high, best):
+def _nearest_band(reflectance, window):
     if "band" not in reflectance.dims:
         raise ValueError("ndvi needs a red and a near infrared band along band, got a raster of one band")
     if "wavelength" not in reflectance.coords:
         raise ValueError("the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords")
-    wavelength = np.atleast_1d(reflectance["wavelength"].values)
-    inside = np.flatnonzero((wavelength >= low) & (wavelength <= high))
-    if not inside.size:
-        found = ", ".join(f"{value:.3f}" for value in wavelength)
-        raise ValueError(f"no {what} band between {low:g} and {high:g} um: the raster has {found} um")
-    return int(inside[np.argmin(np.abs(wavelength[inside] - best))])
+    wavelengths = np.atleast_1d(reflectance["wavelength"].values)
+    number = nearest(wavelengths, window)
+    if number is None:
+        found = ", ".join(f"{value:.3f}" for value in wavelengths)
+        raise ValueError(
+            f"no {window.name} band between {window.low:g} and {window.high:g} um: the raster has {found} um"
+        )
+    return number
