@@ -110,7 +110,7 @@ def recorded(radiance, description, bands, quantise):
     radiance : xarray.DataArray
         With a dimension band. [W m-2 sr-1 um-1]
     description : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
         One for each of the array.
     quantise : bool
         Whether as digital numbers.
@@ -245,7 +245,7 @@ def as_radiance(array, bands, geometry):
     ----------
     array : xarray.DataArray
         Reflectance, or radiance by its units, with a dimension band.
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
         One for each of the array.
     geometry : fifesim.base.geometry.Geometry
 

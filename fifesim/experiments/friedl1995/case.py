@@ -17,7 +17,7 @@ from fifesim.rasters import sites
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.response.spatial_response import CosineResponse
+from fifesim.sensor.description.spatial_response import CosineResponse
 
 ARPS = (0.05, 0.15, 0.24)
 VARIABLES = ("lai", "fpar")

@@ -23,7 +23,7 @@ def matching_bands(array, instrument):
 
     Returns
     -------
-    bands : tuple of fifesim.sensor.description.instruments.InstrumentBand
+    bands : tuple of fifesim.sensor.description.band.InstrumentBand
 
     Raises
     ------
@@ -68,7 +68,7 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
     ----------
     scene : odc.geo.geobox.GeoBox
     instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
     onto, interval : optional
         As in `fifesim.sensor.raster.sense`.
 
@@ -108,7 +108,7 @@ def common_size(instrument, bands, size):
     Parameters
     ----------
     instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
     size : callable
         ``size(band)`` gives metres along and across the track.
 
@@ -142,7 +142,7 @@ def regularized(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_vali
     ----------
     array : xarray.DataArray, dims (band, y, x)
     instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
         One for each of the array.
     pixels : odc.geo.geobox.GeoBox
     offset : (float or array, float or array), optional
