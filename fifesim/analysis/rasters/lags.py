@@ -8,8 +8,9 @@ import xarray as xr
 from fifesim.analysis import variogram as kernels
 from fifesim.analysis.rasters.pairs import check_no_counts, origins
 from fifesim.analysis.rasters.regression import aggregate
-from fifesim.base.footprints import Boxcar, axis_operator
+from fifesim.base.footprints import Boxcar
 from fifesim.rasters import grid as grids
+from fifesim.rasters.regularization import operators
 
 # Blocks of cells that are transformed together, counted from the first cell of the raster: fixed, so that the chunks
 # change no rounding.
@@ -126,7 +127,8 @@ def regularized_variance(array, pixel=30.0, lsf=None):
     pixel : float, optional
         Size of the pixels. [m]
     lsf : line spread function, optional
-        As `fifesim.base.footprints` has it, such as ``instrument("TM").line_spread``; the mean over the pixel by default.
+        As `fifesim.base.footprints` has it, such as ``instrument("TM").line_spread``; the mean over the pixel by
+        default.
 
     Returns
     -------
@@ -148,18 +150,11 @@ def regularized_variance(array, pixel=30.0, lsf=None):
     fifesim.analysis.variogram.footprint_variance
     """
     scene = grids.geobox(array)
-    pixels = grids.aligned(scene, pixel)
     lsf = Boxcar(pixel) if lsf is None else lsf
-    rows, columns = (
-        axis_operator(lsf, cell_origin=a, cell_size=b, n_cells=n, pixel_origin=c, pixel_size=d, n_pixels=m)
-        for a, b, n, c, d, m in (
-            (scene.affine.f, scene.affine.e, scene.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y),
-            (scene.affine.c, scene.affine.a, scene.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x),
-        )
-    )
     lags = autocovariance(array, 2 * lsf.half_width + max(grids.cell_size(scene)))
-    reach = lags.sizes["lag_y"] - 1, lags.sizes["lag_x"] // 2
-    down, across = (kernels.weight_correlation(each, step) for each, step in zip((rows, columns), reach, strict=True))
+    rows, columns = operators((lsf, lsf), scene, grids.aligned(scene, pixel))
+    down = kernels.weight_correlation(rows, lags.sizes["lag_y"] - 1)
+    across = kernels.weight_correlation(columns, lags.sizes["lag_x"] // 2)
     predicted = kernels.footprint_variance(lags["covariance"].values, down, across)
     # In memory, so that the chunks change no rounding.
     simulated = float(aggregate(array, pixel, lsf=lsf).compute().var())

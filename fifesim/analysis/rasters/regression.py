@@ -1,15 +1,13 @@
 """Analysis on labelled rasters: true means, vegetation indices and their regression."""
 
-from functools import partial
-
 import numpy as np
 
 from fifesim.analysis import indices, regression
 from fifesim.analysis.rasters.pairs import check_no_counts, matched, origins, sums_by_row
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
+from fifesim.rasters.regularization import areas, regularized
 
 
 def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
@@ -24,8 +22,8 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     min_valid : float, optional
         Share of its area that a block needs on valid cells; below it is NaN. [1]
     lsf : line spread function, optional
-        As `fifesim.base.footprints` has it, to weight the cells about each block's middle; all within the block count the
-        same by default.
+        As `fifesim.base.footprints` has it, to weight the cells about each block's middle; all within the block count
+        the same by default.
 
     Returns
     -------
@@ -42,18 +40,9 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     fifesim.base.footprints.regularize
     """
     check_no_counts(array)
-    scene = grids.geobox(array)
-    blocks = grids.aligned(scene, pixel)
-    (down, across), a, b = grids.cell_size(blocks), scene.affine, blocks.affine
-    rows = axis_operator(
-        lsf or Boxcar(down), cell_origin=a.f, cell_size=a.e, n_cells=scene.shape.y, pixel_origin=b.f, pixel_size=b.e,
-        n_pixels=blocks.shape.y,
-    )  # fmt: skip
-    columns = axis_operator(
-        lsf or Boxcar(across), cell_origin=a.c, cell_size=a.a, n_cells=scene.shape.x, pixel_origin=b.c, pixel_size=b.a,
-        n_pixels=blocks.shape.x,
-    )  # fmt: skip
-    means = chunks.resample(partial(regularize, min_valid=min_valid), rows, columns, array, blocks)
+    blocks = grids.aligned(grids.geobox(array), pixel)
+    spreads = areas(blocks) if lsf is None else (lsf, lsf)
+    means = regularized(array, spreads, blocks, min_valid=min_valid)
     means.attrs = dict(array.attrs) | {
         "history": "\n".join(filter(None, [array.attrs.get("history", ""), f"aggregate: means over {pixel:g} m"]))
     }
