@@ -76,7 +76,8 @@ def sense(
 
     See Also
     --------
-    fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise, fifesim.sensor.response.calibration.radiance_to_dn
+    fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise,
+    fifesim.sensor.response.calibration.radiance_to_dn
     """
     cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
     description = find_instrument(instrument)

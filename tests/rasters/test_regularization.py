@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from lazy import ODD_CHUNKS, in_chunks, no_compute
+from odc.geo.geobox import GeoBox
 
 import fifesim
-from fifesim.base.footprints import Boxcar
+from fifesim.base.footprints import Boxcar, regularize
 from fifesim.rasters import grid as grids
-from fifesim.rasters.regularization import areas, operators, regularized
+from fifesim.rasters.regularization import areas, operators, regularized, resample
 
 CELLS = fifesim.grid_at("EPSG:26914", 705600.0, 4334000.0, 120.0, 90.0, 3.0)
 # Off the lattice of the cells, and higher than wide.
@@ -59,3 +60,72 @@ def test_chunks_change_no_bit(cells):
     with no_compute():
         lazy = regularized(in_chunks(cells, ODD_CHUNKS), areas(PIXELS), PIXELS, min_valid=0.5)
     xr.testing.assert_identical(lazy.compute(), regularized(cells, areas(PIXELS), PIXELS, min_valid=0.5))
+
+
+def raster(seed=0, bands=None):
+    shape = tuple(SITE.shape) if bands is None else (bands, *SITE.shape)
+    values = np.random.default_rng(seed).random(shape)
+    return grids.place(xr.DataArray(values, dims=("band", "y", "x")[-len(shape) :], name=f"raster{seed}"), SITE)
+
+
+SITE = fifesim.fife_site(30 / 9, window=((0, 36), (5, 50)))
+ANYWHERE = [
+    grids.aligned(SITE, 30.0),
+    fifesim.grid_at("EPSG:26914", 704950.0, 4334300.0, 400.0, 400.0, 23.0),
+    fifesim.grid_at("EPSG:26914", 705001.0, 4334200.0, 60.0, 60.0, 1.7),
+]
+
+
+@pytest.mark.parametrize("pixels", ANYWHERE, ids=["aligned", "beyond-the-scene", "finer-than-cells"])
+@pytest.mark.parametrize("bands", [None, 2])
+def test_resampling_gives_the_same_bits_in_any_chunks(pixels, bands):
+    scene = raster(bands=bands).assign_coords(sza=28.5)
+    scene[..., 10:12, 20:22] = np.nan
+    rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, pixels)
+    whole = resample(rows, columns, scene, pixels)
+    np.testing.assert_array_equal(whole, regularize(scene.values, rows, columns))
+    assert grids.same_grid(grids.geobox(whole), pixels)
+    assert float(whole["sza"]) == 28.5
+    for pieces in (ODD_CHUNKS, ODD_CHUNKS | {"band": 1}, {"y": 1, "x": 45}, {"y": 36, "x": 9}):
+        with no_compute():
+            lazy = resample(rows, columns, in_chunks(scene, pieces), pixels)
+        assert lazy.chunks is not None
+        xr.testing.assert_identical(lazy.compute(), whole)
+
+
+def test_output_chunks_read_only_the_cells_that_they_need():
+    """One bad chunk spoils the pixels over it and no others."""
+    scene = in_chunks(raster(), {"y": 9, "x": 9})
+    rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, ANYWHERE[0])
+
+    def spoil(block, block_info=None):
+        if block_info[0]["chunk-location"] == (0, 0):
+            raise RuntimeError("read")
+        return block
+
+    scene.data = scene.data.map_blocks(spoil, dtype=float)
+    image = resample(rows, columns, scene, ANYWHERE[0])
+    assert np.isfinite(image[2:, 2:].compute()).all()
+    with pytest.raises(RuntimeError, match="read"):
+        image[0, 0].compute()
+
+
+def test_single_precision_stays_what_is_promised():
+    """Lazy arrays promise a dtype before they are computed."""
+    rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, ANYWHERE[0])
+    scene = raster().astype(np.float32)
+    eager = resample(rows, columns, scene, ANYWHERE[0])
+    lazy = resample(rows, columns, in_chunks(scene, ODD_CHUNKS), ANYWHERE[0])
+    assert lazy.dtype == lazy.compute().dtype == eager.dtype
+
+
+def test_grid_without_pixels_in_the_scene_is_all_missing():
+    far = GeoBox((3, 4), SITE.affine * SITE.affine.translation(900, 900), SITE.crs)
+    rows, columns = operators((Boxcar(30.0), Boxcar(30.0)), SITE, far)
+    for scene in (raster(), in_chunks(raster(), ODD_CHUNKS)):
+        assert np.isnan(resample(rows, columns, scene, far)).all()
+
+
+def test_raster_without_a_name_gets_none_of_dasks():
+    lazy = regularized(in_chunks(raster().rename(None), ODD_CHUNKS), areas(ANYWHERE[0]), ANYWHERE[0], min_valid=0.5)
+    assert lazy.name is None

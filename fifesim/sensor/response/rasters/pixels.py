@@ -250,9 +250,9 @@ def _check_scene(spreads, scene, min_valid, name):
     share = _within(along, height) * _within(across, width)
     if share < min(min_valid, 1.0) - 1e-9:
         raise ValueError(
-            f"the point spread of {name}, {2 * along.half_width:.1f} x {2 * across.half_width:.1f} m, is wider than the "
-            f"scene of {height:g} x {width:g} m, which holds {share:.0%} of it: simulate a larger scene, or accept it "
-            "with min_valid="
+            f"the point spread of {name}, {2 * along.half_width:.1f} x {2 * across.half_width:.1f} m, is wider than "
+            f"the scene of {height:g} x {width:g} m, which holds {share:.0%} of it: simulate a larger scene, or accept "
+            "it with min_valid="
         )
 
 
