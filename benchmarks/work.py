@@ -14,8 +14,8 @@ from chain import BANDS, floor
 
 import fifesim
 from fifesim.output.run.folder import simulate_to_folder
-from fifesim.scenario.simulation import simulate
 from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.simulation import simulate
 
 CELL = 30 / 9
 WEST, NORTH = 704970.0, 4334220.0

@@ -2,8 +2,8 @@
 Simulate what a satellite would have seen.
 
 Ground scene, canopy reflectance, atmosphere and sensor on georeferenced rasters, after Friedl, Davis, Michaelsen and
-Moritz (1995). Importing this package registers the ``.fifesim`` accessor of xarray. The public names and where they live
-are the lines of ``__init__.pyi``.
+Moritz (1995). Importing this package registers the ``.fifesim`` accessor of xarray. The public names, and where they
+live, are the lines of ``__init__.pyi``.
 """
 
 from importlib import import_module

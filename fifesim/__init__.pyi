@@ -1,8 +1,8 @@
 """
 Every public name and where it lives, one line each.
 
-The package finds them here when they are first used, the API page lists them, and editors follow them. A name marked as a
-method is a method of the ``.fifesim`` accessor too, which hands it the raster as first argument.
+The package finds them here when they are first used, the API page lists them, and editors follow them. A name marked as
+a method is one of the ``.fifesim`` accessor of a DataArray too, which hands it the raster as first argument.
 """
 
 # Grids and geometry
@@ -21,40 +21,40 @@ from .ground.landscape.field import correlation_length as correlation_length
 from .ground.landscape.field import arp_for_length as arp_for_length
 from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
-from .chain.steps import surface_reflectance as surface_reflectance  # method of a DataArray
-from .ground.canopy.raster import fpar as fpar  # method of a DataArray
+from .chain.steps import surface_reflectance as surface_reflectance  # method
+from .ground.canopy.raster import fpar as fpar  # method
 
 # Terrain
 from .ground.terrain.rasters.elevation import fine_dem as fine_dem
 from .ground.terrain.rasters.elevation import source_dem as source_dem
 from .ground.terrain.rasters.hills import flint_hills as flint_hills
-from .ground.terrain.rasters.light import slope as slope  # method of a DataArray
-from .ground.terrain.rasters.light import aspect as aspect  # method of a DataArray
-from .ground.terrain.rasters.sky import horizon as horizon  # method of a DataArray
-from .ground.terrain.rasters.light import sky_view as sky_view  # method of a DataArray
-from .ground.terrain.rasters.light import terrain_view as terrain_view  # method of a DataArray
-from .ground.terrain.rasters.light import illumination as illumination  # method of a DataArray
-from .ground.terrain.rasters.light import shadow as shadow  # method of a DataArray
-from .chain.steps import kt as kt  # method of a DataArray
+from .ground.terrain.rasters.light import slope as slope  # method
+from .ground.terrain.rasters.light import aspect as aspect  # method
+from .ground.terrain.rasters.sky import horizon as horizon  # method
+from .ground.terrain.rasters.light import sky_view as sky_view  # method
+from .ground.terrain.rasters.light import terrain_view as terrain_view  # method
+from .ground.terrain.rasters.light import illumination as illumination  # method
+from .ground.terrain.rasters.light import shadow as shadow  # method
+from .chain.steps import kt as kt  # method
 
 # Atmosphere
 from .atmosphere.air.models import Atmosphere as Atmosphere
-from .chain.steps import to_toa as to_toa  # method of a DataArray
-from .chain.steps import to_surface as to_surface  # method of a DataArray
+from .chain.steps import to_toa as to_toa  # method
+from .chain.steps import to_surface as to_surface  # method
 
 # Sensor
-from .sensor.raster import sense as sense  # method of a DataArray
+from .sensor.raster import sense as sense  # method
 from .sensor.scan.rasters.view import scan_geometry as scan_geometry
 from .sensor.scan.track import Track as Track
-from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method of a DataArray
-from .chain.comparison import compare as compare  # method of a DataArray
+from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method
+from .chain.comparison import compare as compare  # method
 from .sensor.response.rasters.spread import psf as psf
 from .sensor.response.rasters.spread import mtf as mtf
 from .sensor.response.noise import NoiseModel as NoiseModel
 from .sensor.response.signal_to_noise import noise_equivalent_radiance as noise_equivalent_radiance
 from .sensor.response.signal_to_noise import snr as snr
-from .sensor.raster import to_radiance as to_radiance  # method of a DataArray
-from .sensor.raster import to_reflectance as to_reflectance  # method of a DataArray
+from .sensor.raster import to_radiance as to_radiance  # method
+from .sensor.raster import to_reflectance as to_reflectance  # method
 from .sensor.description.instruments import instrument as instrument
 from .sensor.description.instruments import instrument_names as instrument_names
 from .sensor.description.instruments import read_instrument as read_instrument
@@ -62,25 +62,25 @@ from .sensor.description.instruments import Instrument as Instrument
 from .base.bands import Band as Band
 
 # Analysis
-from .analysis.rasters.regression import aggregate as aggregate  # method of a DataArray
-from .chain.images import ndvi as ndvi  # method of a DataArray
-from .analysis.rasters.regression import regress as regress  # method of a DataArray
+from .analysis.rasters.regression import aggregate as aggregate  # method
+from .chain.images import ndvi as ndvi  # method
+from .analysis.rasters.regression import regress as regress  # method
 from .analysis.regression import Regression as Regression
-from .analysis.rasters.uncertainty import relative_equivalent_noise as relative_equivalent_noise  # method of a DataArray
-from .analysis.rasters.inversion import invert as invert  # method of a DataArray
-from .analysis.rasters.inversion import inversion_error as inversion_error  # method of a DataArray and of a Dataset
-from .analysis.rasters.scaling import share_kept as share_kept  # method of a DataArray
-from .analysis.rasters.scaling import density as density  # method of a DataArray
+from .analysis.rasters.uncertainty import relative_equivalent_noise as relative_equivalent_noise  # method
+from .analysis.rasters.inversion import invert as invert  # method
+from .analysis.rasters.inversion import inversion_error as inversion_error  # method, of a Dataset too
+from .analysis.rasters.scaling import share_kept as share_kept  # method
+from .analysis.rasters.scaling import density as density  # method
 from .analysis.rasters.scaling import scale_bias as scale_bias
-from .analysis.rasters.scaling import ndvi_linearity as ndvi_linearity  # method of a DataArray
-from .analysis.rasters.scaling import ndvi_bias as ndvi_bias  # method of a DataArray
-from .analysis.rasters.scaling import fpar_bias as fpar_bias  # method of a DataArray
-from .analysis.rasters.lags import autocovariance as autocovariance  # method of a DataArray
-from .analysis.rasters.lags import variogram as variogram  # method of a DataArray
-from .analysis.rasters.lags import regularized_variance as regularized_variance  # method of a DataArray
+from .analysis.rasters.scaling import ndvi_linearity as ndvi_linearity  # method
+from .analysis.rasters.scaling import ndvi_bias as ndvi_bias  # method
+from .analysis.rasters.scaling import fpar_bias as fpar_bias  # method
+from .analysis.rasters.lags import autocovariance as autocovariance  # method
+from .analysis.rasters.lags import variogram as variogram  # method
+from .analysis.rasters.lags import regularized_variance as regularized_variance  # method
 
 # Files and runs
-from .rasters.files import to_geotiff as to_geotiff  # method of a DataArray and of a Dataset
+from .rasters.files import to_geotiff as to_geotiff  # method, of a Dataset too
 from .rasters.files import open_image as open_image
 from .scenario.simulation import simulate as simulate
 from .scenario.sweeps import sweep as sweep

@@ -1,4 +1,4 @@
-"""Public names, found when they are first used, and the ``.fifesim`` accessor: its methods are functions of a raster."""
+"""Public names, found when they are first used, and the ``.fifesim`` accessor, whose methods are some of them."""
 
 import re
 from importlib import import_module
@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import xarray as xr
 
-# One line of the table: where a name lives, and of what it is a method.
-_LINE = re.compile(r"from \.([\w.]+) import (\w+) as \2(?:  # method of a (DataArray|Dataset)( and of a Dataset)?)?")
+# One line of the table: where a name lives, and whether it is a method of a DataArray, or of a Dataset too.
+_LINE = re.compile(r"from \.([\w.]+) import (\w+) as \2(  # method(, of a Dataset too)?)?")
 
 
 class Public(NamedTuple):
@@ -27,8 +27,9 @@ def _table():
         if line.startswith("# "):
             group = line[2:]
         elif match := _LINE.fullmatch(line):
-            module, name, kind, both = match.groups()
-            found[name] = Public(f"fifesim.{module}", tuple(filter(None, (kind, "Dataset" if both else None))), group)
+            module, name, of_array, of_dataset = match.groups()
+            methods_of = ("DataArray",) * bool(of_array) + ("Dataset",) * bool(of_dataset)
+            found[name] = Public(f"fifesim.{module}", methods_of, group)
     return found
 
 
@@ -74,7 +75,9 @@ def _methods(kind):
     return {name: _Method(name) for name, public in PUBLIC.items() if kind in public.methods_of}
 
 
-DataArrayAccessor = type("DataArrayAccessor", (_Accessor,), {"__doc__": "fifesim on a DataArray."} | _methods("DataArray"))
+DataArrayAccessor = type(
+    "DataArrayAccessor", (_Accessor,), {"__doc__": "fifesim on a DataArray."} | _methods("DataArray")
+)
 DatasetAccessor = type("DatasetAccessor", (_Accessor,), {"__doc__": "fifesim on a Dataset."} | _methods("Dataset"))
 
 xr.register_dataarray_accessor("fifesim")(DataArrayAccessor)

@@ -138,14 +138,14 @@ def sensors(
 ):
     """List the instruments, or one in detail: bands, sampling, point spread, radiometry, noise, sources."""
     from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
-    from fifesim.sensor.description.listing import describe, list_instruments
+    from fifesim.sensor.description.listing import instrument_in_words, list_instruments
 
     try:
         if check is not None:
-            found = describe(read_instrument(check))
+            found = instrument_in_words(read_instrument(check))
             text = f"{found}\n{check} is right: every number has a source, and none looks like another unit."
         elif name is not None:
-            text = describe(instrument(name))
+            text = instrument_in_words(instrument(name))
         else:
             text = list_instruments([instrument(each) for each in instrument_names()])
     except (ValueError, OSError) as error:

@@ -3,8 +3,9 @@
 import numpy as np
 from scipy import fft
 
-# Rows of the sums over pairs.
-_COUNT, _FIRST, _SECOND, _PRODUCT, _FIRST_SQUARE, _SECOND_SQUARE = range(6)
+# Sums over pairs, and their places.
+SUMS = 6
+_COUNT, _FIRST, _SECOND, _PRODUCT, _FIRST_SQUARE, _SECOND_SQUARE = range(SUMS)
 
 
 def lag_sums(cells, margin, reach, origin=0.0):

@@ -149,6 +149,7 @@ def _varying(verb, reflectance, atmosphere, bands, geometry, elevation):
     else:
         cf.check_quantity(elevation, "dem")
         altitude = elevation / 1000
+
     def kernel(rho, *places):
         return lookup.varying_reflectance(
             rho, *places, atmosphere=atmosphere, bands=tuple(bands), to_surface=verb == "to_surface"

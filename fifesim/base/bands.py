@@ -1,10 +1,61 @@
-"""Spectral bands: response-weighted means and solar irradiance."""
+"""Spectral bands: response-weighted means, solar irradiance, and which of them shows what."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import pvlib
+
+
+class Window(NamedTuple):
+    """
+    Where a band must lie to show something of the ground.
+
+    Parameters
+    ----------
+    name : str
+    low, high : float
+        Wavelengths between which it lies. [um]
+    best : float
+        The best place. [um]
+    """
+
+    name: str
+    low: float
+    high: float
+    best: float
+
+
+# The green peak and the red absorption of chlorophyll, and the plateau of leaves in the near infrared.
+GREEN = Window("green", 0.50, 0.60, 0.56)
+RED = Window("red", 0.60, 0.70, 0.66)
+NEAR_INFRARED = Window("near infrared", 0.75, 1.00, 0.84)
+
+
+def nearest(wavelengths, window):
+    """
+    Which of some bands shows best what a window is for.
+
+    Parameters
+    ----------
+    wavelengths : array, shape (n,)
+        Of the bands. [um]
+    window : Window
+
+    Returns
+    -------
+    number : int or None
+        Of the band in the window that is nearest to its best place; None where there is none.
+
+    Examples
+    --------
+    >>> nearest([0.56, 0.61, 0.67, 0.83], RED), nearest([0.56, 0.61], NEAR_INFRARED)
+    (2, None)
+    """
+    wavelengths = np.asarray(wavelengths, float)
+    inside = np.flatnonzero((wavelengths >= window.low) & (wavelengths <= window.high))
+    return int(inside[np.argmin(np.abs(wavelengths[inside] - window.best))]) if inside.size else None
 
 
 @dataclass(frozen=True)
@@ -32,7 +83,8 @@ class Band:
     response: tuple = field(repr=False)
 
     def __post_init__(self):
-        wavelength, response = (tuple(float(v) for v in values) for values in (self.wavelength, self.response))
+        wavelength = tuple(float(each) for each in self.wavelength)
+        response = tuple(float(each) for each in self.response)
         if len(wavelength) < 2 or len(wavelength) != len(response) or np.any(np.diff(wavelength) <= 0):
             raise ValueError(f"band {self.name}: wavelengths must increase, one for each response")
         if min(response) < 0 or max(response) == 0:

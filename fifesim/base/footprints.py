@@ -2,8 +2,8 @@
 Means of ground cells over the footprints of pixels, for any ratio of sizes and any offset.
 
 A line spread function (lsf) is any object with ``half_width`` [m], outside of which it is zero, and
-``cumulative(x)``, its integral from there up to the distance x [m] from the pixel centre, 0 to 1. The weight
-of a cell from a to b is then exactly ``cumulative(b) - cumulative(a)``, whatever the shape. The footprint is
+``cumulative(x)``, its integral from there up to the distance x [m] from the pixel centre, 0 to 1, as `LineSpread` says.
+The weight of a cell from a to b is then exactly ``cumulative(b) - cumulative(a)``, whatever the shape. The footprint is
 the product of one lsf per axis.
 """
 
@@ -17,36 +17,37 @@ from numba import njit
 _DUST = 1e-12
 
 
-@dataclass(frozen=True)
-class Boxcar:
+class Transfer:
     """
-    Uniform line spread function: with it a footprint is an area and its mean the true one.
+    What a part of an instrument leaves of waves on the ground.
 
-    Parameters
-    ----------
-    width : float
-        Width of the support. [m]
-
-    Raises
-    ------
-    ValueError
-        If the width is not positive.
-
-    Examples
-    --------
-    >>> float(Boxcar(30.0).cumulative(-7.5))
-    0.25
+    Each kind of part gives the formula, ``_mtf(frequency)``.
     """
 
-    width: float
+    def mtf(self, frequency):
+        """
+        Modulation transfer function, the Fourier transform of the line spread function.
 
-    def __post_init__(self):
-        check_width(self.width)
+        Parameters
+        ----------
+        frequency : array
+            Spatial frequency. [cycles m-1]
 
-    @property
-    def half_width(self):
-        """Distance from the pixel centre beyond which the response is zero [m]."""
-        return self.width / 2
+        Returns
+        -------
+        mtf : array, shape of frequency
+            Factor by which a sinusoid's amplitude is reduced, negative where bright and dark change places. [1]
+        """
+        return self._mtf(np.asarray(frequency, float))
+
+
+class LineSpread(Transfer):
+    """
+    Response of a sensor to a line, by the line's distance from the pixel centre.
+
+    Each shape gives ``half_width``, the distance from the pixel centre beyond which it is zero [m], and two formulas:
+    ``_cumulative(x)``, and its transform ``_mtf(frequency)``.
+    """
 
     def cumulative(self, x):
         """
@@ -60,27 +61,67 @@ class Boxcar:
         Returns
         -------
         share : array, shape of x
-            [1]
+            0 before the support, 1 behind it. [1]
         """
-        return np.clip(0.5 + np.asarray(x, float) / self.width, 0.0, 1.0)
+        return self._cumulative(np.asarray(x, float))
 
-    def mtf(self, frequency):
-        r"""
-        Modulation transfer function, the Fourier transform of the line spread function.
 
-        .. math:: M(f) = \mathrm{sinc}(f W), \qquad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
+@dataclass(frozen=True)
+class FiniteSpread(LineSpread):
+    """
+    Line spread function that ends at half of its width to either side.
 
-        Parameters
-        ----------
-        frequency : array
-            Spatial frequency. [cycles m-1]
+    Parameters
+    ----------
+    width : float
+        Width W of the support. [m]
 
-        Returns
-        -------
-        mtf : array, shape of frequency
-            Factor by which a sinusoid's amplitude is reduced, negative where bright and dark change places. [1]
-        """
-        return np.sinc(np.asarray(frequency, float) * self.width)
+    Raises
+    ------
+    ValueError
+        If the width is not positive.
+    """
+
+    width: float
+
+    def __post_init__(self):
+        check_width(self.width)
+
+    @property
+    def half_width(self):
+        """Half of the width [m]."""
+        return self.width / 2
+
+
+@dataclass(frozen=True)
+class Boxcar(FiniteSpread):
+    r"""
+    Uniform line spread function: with it a footprint is an area and its mean the true one.
+
+    .. math:: C(x) = \frac{1}{2} + \frac{x}{W}, \quad |x| \le \frac{W}{2}; \qquad
+        M(f) = \mathrm{sinc}(f W), \quad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
+
+    Parameters
+    ----------
+    width : float
+        Width W of the support. [m]
+
+    Raises
+    ------
+    ValueError
+        If the width is not positive.
+
+    Examples
+    --------
+    >>> float(Boxcar(30.0).cumulative(-7.5))
+    0.25
+    """
+
+    def _cumulative(self, x):
+        return np.clip(0.5 + x / self.width, 0.0, 1.0)
+
+    def _mtf(self, frequency):
+        return np.sinc(frequency * self.width)
 
 
 def check_width(width):

@@ -17,8 +17,8 @@ class Geometry:
     """
     Directions of sun and sensor seen from the ground.
 
-    Azimuths point toward the sun and toward the sensor, clockwise from north. Where an angle differs from cell to cell, an
-    `xarray.Dataset` of the same names takes the place of this class.
+    Azimuths point toward the sun and toward the sensor, clockwise from north. Where an angle differs from cell to cell,
+    an `xarray.Dataset` of the same names takes the place of this class.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ class Geometry:
         for name in ANGLES:
             if np.ndim(getattr(self, name)):
                 raise TypeError(
-                    f"{name} of a Geometry is one number, got an array: angles by cell are an xarray.Dataset with sza, saa, "
-                    "vza and vaa, such as fifesim.scan_geometry(...).assign(sza=30.0, saa=120.0)"
+                    f"{name} of a Geometry is one number, got an array: angles by cell are an xarray.Dataset with sza, "
+                    "saa, vza and vaa, such as fifesim.scan_geometry(...).assign(sza=30.0, saa=120.0)"
                 )
         for name in ("saa", "vaa"):
             if not np.isfinite(getattr(self, name)):

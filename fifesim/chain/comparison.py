@@ -4,12 +4,9 @@ from dataclasses import replace
 
 import xarray as xr
 
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.sensor.description.instruments import instrument as find_instrument
-
-# Where the red and the near infrared band of an instrument lie, and the best place. [um]
-_RED = (0.60, 0.70, 0.66)
-_NIR = (0.75, 1.00, 0.84)
 
 
 def compare(lai, instruments, setup=None, *, bands=None):
@@ -65,12 +62,12 @@ def _bands(description, names):
     if names is not None:
         return description.select(names)
     found = []
-    for what, (low, high, best) in (("red", _RED), ("near infrared", _NIR)):
-        inside = [band for band in description.bands if low <= band.wavelength <= high]
-        if not inside:
+    for window in (RED, NEAR_INFRARED):
+        number = nearest([band.wavelength for band in description.bands], window)
+        if number is None:
             raise ValueError(
-                f"{description.name} has no {what} band, {low:g} to {high:g} um: give "
+                f"{description.name} has no {window.name} band, {window.low:g} to {window.high:g} um: give "
                 f"bands={{{description.name!r}: ...}}"
             )
-        found.append(min(inside, key=lambda band: abs(band.wavelength - best)))
+        found.append(description.bands[number])
     return tuple(found)

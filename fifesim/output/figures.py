@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fifesim.analysis.rasters.pairs import matched
+from fifesim.base.bands import GREEN, NEAR_INFRARED, RED, nearest
 from fifesim.rasters import grid as grids
 from fifesim.sensor.raster import to_reflectance
 
@@ -15,9 +16,6 @@ _NO_DATA = (0.85, 0.85, 0.85)
 # Without the blue of the map's seas.
 _LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)))
 _LINE, _BAND = "#b2182b", "#f4a582"
-
-# Where the colours of a composite lie, and the wavelength that serves each best. [um]
-_COMPOSITE = {"near infrared": (0.75, 1.0, 0.84), "red": (0.6, 0.7, 0.66), "green": (0.5, 0.6, 0.56)}
 
 NAMES = {"lai": "leaf area index", "fpar": "FPAR", "ndvi": "NDVI"}
 """Quantities in words."""
@@ -285,12 +283,9 @@ def _stretch(dn):
 
 def _composite_bands(dn):
     """Names of the bands of a colour infrared composite, as far as there are any; else the first band."""
-    found = {}
-    for color, (low, high, best) in _COMPOSITE.items():
-        inside = [band for band in dn["band"].values if low <= float(dn["wavelength"].sel(band=band)) <= high]
-        if inside:
-            found[color] = min(inside, key=lambda band: abs(float(dn["wavelength"].sel(band=band)) - best))
-    return found or {"grey": dn["band"].values[0]}
+    numbers = {window.name: nearest(dn["wavelength"].values, window) for window in (NEAR_INFRARED, RED, GREEN)}
+    names = dn["band"].values
+    return {color: names[number] for color, number in numbers.items() if number is not None} or {"grey": names[0]}
 
 
 def _composite_name(dn):

@@ -243,7 +243,9 @@ def geometry_of(array):
     """
     if "sza" not in array.coords:
         return None
-    carried = {name: array.coords[name].variable for name in (*_GEOMETRY, "y", "x", "spatial_ref") if name in array.coords}
+    carried = {
+        name: array.coords[name].variable for name in (*_GEOMETRY, "y", "x", "spatial_ref") if name in array.coords
+    }
     return checked_geometry(xr.Dataset(carried).set_coords(["spatial_ref"] if "spatial_ref" in carried else []))
 
 

@@ -1,6 +1,6 @@
-"""How a kernel of numpy arrays meets dask: by cell, by place, or from one grid onto another."""
+"""How a kernel of numpy arrays meets dask: by cell, by place, or from windows of others."""
 
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import dask.array as da
@@ -119,38 +119,6 @@ def located(kernel, array):
     return array.copy(data=kernel(data, (0,) * data.ndim))
 
 
-def resample(kernel, rows, columns, array, grid):
-    """
-    Carry a raster onto another grid by one operator for each axis.
-
-    Each output chunk reads the window of the input that it needs.
-
-    Parameters
-    ----------
-    kernel : callable
-        ``kernel(block, rows, columns)`` applies the operators to a numpy block, the cells of their windows.
-    rows, columns : fifesim.base.footprints.AxisOperator
-        Cut as ``operator[first:last]``, with the cells they read in ``window``.
-    array : xarray.DataArray, dims (..., y, x)
-    grid : odc.geo.geobox.GeoBox
-        The output's.
-
-    Returns
-    -------
-    array : xarray.DataArray, dims (..., y, x)
-        Float, lazy where the input is.
-    """
-    array = array.transpose(..., "y", "x")
-    data = array.data
-    if isinstance(data, da.Array):
-        out = _resample_lazily(kernel, rows, columns, data)
-    else:
-        these, those = rows[:], columns[:]
-        out = kernel(data[..., these.window, those.window], these, those)
-    result = xr.DataArray(out, dims=array.dims, coords=_other_coordinates(array), name=array.name, attrs=array.attrs)
-    return grids.place(result, grid)
-
-
 class Reads(NamedTuple):
     """
     What each cell of a result reads of an array: from its row ``rows[0]`` up to ``rows[1]``, and so its columns.
@@ -220,6 +188,7 @@ def windows(kernel, reads, shape, chunks=None):
     kernel : callable
         ``kernel(rows, columns, *blocks)`` gives the cells of two slices of the result from the windows that they read.
     reads : sequence of Reads
+        Or of others with an ``array`` and its ``window(rows, columns)``.
     shape : (..., int, int)
         Of the result; its last axes are y and x.
     chunks : (tuple of int, tuple of int), optional
@@ -238,6 +207,31 @@ def windows(kernel, reads, shape, chunks=None):
 
     token = tokenize(kernel, reads, shape, chunks)
     return array_from_windows(kernel, [each.array for each in reads], chunks, ask, token=token, leading=shape[:-2])
+
+
+def in_blocks(kernel, reads, shape, size):
+    """
+    Array that is made by fixed blocks, however it is read.
+
+    Parameters
+    ----------
+    kernel, reads, shape
+        As in `windows`.
+    size : int
+        Rows and columns of a block, counted from the first cell.
+
+    Returns
+    -------
+    array : numpy.ndarray or dask.array.Array
+        Lazy where one of the arrays is; else its blocks are made one after the other, which bounds the memory.
+    """
+    sizes = tuple(tuple(np.diff([*range(0, length, size), length]).tolist()) for length in shape[-2:])
+    if any(isinstance(each.array, da.Array) for each in reads):
+        return windows(kernel, reads, shape, sizes)
+    out = np.empty(shape)
+    for block in product(*map(slices, sizes)):
+        out[(..., *block)] = kernel(*block, *(gather(each.array, each.window(*block)) for each in reads))
+    return out
 
 
 def neighbourhood(kernel, array, depth, bands=0):
@@ -264,7 +258,22 @@ def neighbourhood(kernel, array, depth, bands=0):
     shape = (bands,) * bool(bands) + array.shape
     data = windows(lambda rows, columns, block: kernel(block), [margin_reads(array.data, depth)], shape, chunks)
     dims = ("band",) * bool(bands) + ("y", "x")
-    return xr.DataArray(data, dims=dims, coords=_other_coordinates(array))
+    return xr.DataArray(data, dims=dims, coords=other_coordinates(array))
+
+
+def other_coordinates(array):
+    """
+    Coordinates of a raster that are not by cells.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+
+    Returns
+    -------
+    coordinates : dict of str to xarray.DataArray
+    """
+    return {name: value for name, value in array.coords.items() if not {"y", "x"} & set(value.dims)}
 
 
 def runs(cells, chunks):
@@ -290,32 +299,6 @@ def runs(cells, chunks):
     chunk = np.minimum(np.searchsorted(np.cumsum(chunks), cells, side="right"), len(chunks) - 1)
     starts = np.flatnonzero(np.diff(chunk, prepend=-1))
     return tuple(np.diff([*starts, len(chunk)]).tolist())
-
-
-def _resample_lazily(kernel, rows, columns, data):
-    """One task for each block of pixels, on the merged window of cells."""
-    # What regularize makes of it.
-    dtype = np.dtype(np.float32 if data.dtype == np.float32 else np.float64)
-    # A pixel is made with the chunk of its last cell: what it needs of earlier chunks is cut off when these are made.
-    lasts = [axis.start + np.maximum(axis.count, 1) - 1 for axis in (rows, columns)]
-    chunks = tuple(runs(last, sizes) for last, sizes in zip(lasts, data.chunks[-2:], strict=True))
-    parts = [
-        {part.start: axis[part] for part in slices(sizes)} for axis, sizes in zip((rows, columns), chunks, strict=True)
-    ]
-
-    def ask(row_range, column_range):
-        these, those = parts[0][row_range.start], parts[1][column_range.start]
-        return (these, those), [(these.window, those.window)]
-
-    def block(these, those, window):
-        return kernel(window, these, those)
-
-    token = tokenize(kernel, rows, columns, data.name)
-    return array_from_windows(block, [data], chunks, ask, token=token, leading=data.shape[:-2], dtype=dtype)
-
-
-def _other_coordinates(array):
-    return {name: value for name, value in array.coords.items() if not {"y", "x"} & set(value.dims)}
 
 
 def _tile_chunks(grid, tile):

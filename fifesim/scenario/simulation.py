@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters import regression as analysis
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
@@ -140,7 +140,4 @@ def _cut(raster, grid):
 
 
 def _has_ndvi(image):
-    wavelength = image["wavelength"].values
-    return bool(
-        np.any((wavelength >= 0.6) & (wavelength <= 0.7)) and np.any((wavelength >= 0.75) & (wavelength <= 1.0))
-    )
+    return all(nearest(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))

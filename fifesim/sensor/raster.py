@@ -10,7 +10,7 @@ from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import check_kinds
 from fifesim.sensor.response.rasters.noise import noisy
-from fifesim.sensor.response.rasters.pixels import directions_on, matching_bands, pixel_grid, regularized
+from fifesim.sensor.response.rasters.pixels import directions_on, matching_bands, means_by_band, pixel_grid
 
 # Share of its footprint's weight that a pixel needs on valid cells. The paper's footprint of 30.32 m leaves a
 # scene of whole 30 m pixels by 0.16 m.
@@ -76,7 +76,8 @@ def sense(
 
     See Also
     --------
-    fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise, fifesim.sensor.response.calibration.radiance_to_dn
+    fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise,
+    fifesim.sensor.response.calibration.radiance_to_dn
     """
     cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
     description = find_instrument(instrument)
@@ -86,7 +87,7 @@ def sense(
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
     geometry = directions_on(pixels, geometry)
     scene = toa.drop_vars(ANGLES, errors="ignore")
-    means = regularized(scene, description, bands, pixels, offset=offset, min_valid=min_valid)
+    means = means_by_band(scene, description, bands, pixels, offset=offset, min_valid=min_valid)
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
@@ -110,7 +111,7 @@ def recorded(radiance, description, bands, quantise):
     radiance : xarray.DataArray
         With a dimension band. [W m-2 sr-1 um-1]
     description : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
         One for each of the array.
     quantise : bool
         Whether as digital numbers.
@@ -245,7 +246,7 @@ def as_radiance(array, bands, geometry):
     ----------
     array : xarray.DataArray
         Reflectance, or radiance by its units, with a dimension band.
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
         One for each of the array.
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset
 

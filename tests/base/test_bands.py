@@ -2,7 +2,16 @@ import numpy as np
 import pytest
 from pyrsr.rsr import RSR_reader
 
-from fifesim.base.bands import Band, solar_irradiance, solar_irradiance_steps, solar_spectrum
+from fifesim.base.bands import (
+    GREEN,
+    NEAR_INFRARED,
+    RED,
+    Band,
+    nearest,
+    solar_irradiance,
+    solar_irradiance_steps,
+    solar_spectrum,
+)
 
 BOX = Band("box", (0.6, 0.6001, 0.6999, 0.7), (0.0, 1.0, 1.0, 0.0))
 
@@ -63,3 +72,25 @@ def test_thematic_mapper_irradiance_agrees_with_landsat_handbook():
     for key, response in RSR_reader("Landsat-5", "TM").items():
         if key in published:
             assert solar_irradiance(Band(f"TM{key}", *response.T)) == pytest.approx(published[key], rel=0.04)
+
+
+@pytest.mark.parametrize(
+    ("window", "wavelengths", "number"),
+    [
+        (RED, (0.61, 0.64, 0.69, 0.76), 1),
+        (RED, (0.64, 0.66, 0.67), 1),
+        (NEAR_INFRARED, (0.705, 0.75, 1.0, 1.24), 1),
+        (NEAR_INFRARED, (0.95, 0.86), 1),
+        (GREEN, (0.49, 0.60), 1),
+        (RED, (0.599, 0.701, np.nan), None),
+        (RED, (), None),
+    ],
+)
+def test_the_band_nearest_to_the_best_place_of_a_window_is_taken(window, wavelengths, number):
+    """Limits belong to a window; what lies outside is not taken, however near to the best place."""
+    assert nearest(wavelengths, window) == number
+
+
+def test_thematic_mapper_shows_red_in_its_third_and_near_infrared_in_its_fourth_band():
+    centers = [Band(f"TM{key}", *response.T).center for key, response in RSR_reader("Landsat-5", "TM").items()]
+    assert [nearest(centers, window) for window in (GREEN, RED, NEAR_INFRARED)] == [1, 2, 3]

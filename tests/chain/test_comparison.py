@@ -10,7 +10,7 @@ from lazy import in_chunks, no_compute
 
 import fifesim
 from fifesim.rasters import grid as grids
-from fifesim.sensor.response.spectral_response import ResponseList
+from fifesim.sensor.description.spectral_response import ResponseList
 
 NAMES = ["TM", "OLI", "MSI"]
 

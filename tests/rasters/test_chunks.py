@@ -1,13 +1,13 @@
 """How a kernel meets dask: the same bits, nothing early, and only rasters that lie on each other."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 import xarray as xr
 from lazy import ODD_CHUNKS, in_chunks, no_compute
-from odc.geo.geobox import GeoBox
 
 import fifesim
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
 from fifesim.rasters import chunks
 from fifesim.rasters import grid as grids
 
@@ -107,69 +107,27 @@ def test_unknown_dimension_of_chunks_is_named():
         chunks.tiles(places, GRID, {"band": 1}, tile=8)
 
 
-def operators(grid, pixels):
-    return (
-        axis_operator(Boxcar(30.0), cell_origin=origin, cell_size=cell, n_cells=n, pixel_origin=start,
-                      pixel_size=pixel, n_pixels=count)
-        for origin, cell, n, start, pixel, count in (
-            (grid.affine.f, grid.affine.e, grid.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y),
-            (grid.affine.c, grid.affine.a, grid.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x),
-        )
-    )  # fmt: skip
+class Seen(NamedTuple):
+    """Cells that lie one further down the diagonal for each row of the result."""
+
+    array: object
+
+    def window(self, rows, columns):
+        return slice(rows.start, rows.stop), slice(columns.start + rows.start, columns.stop + rows.stop - 1)
 
 
-PIXELS = [
-    grids.aligned(GRID, 30.0),
-    fifesim.grid_at("EPSG:26914", 704950.0, 4334300.0, 400.0, 400.0, 23.0),
-    fifesim.grid_at("EPSG:26914", 705001.0, 4334200.0, 60.0, 60.0, 1.7),
-]
+def diagonals(rows, columns, cells):
+    width = columns.stop - columns.start
+    return np.stack([line[k : k + width] for k, line in enumerate(cells)])
 
 
-@pytest.mark.parametrize("pixels", PIXELS, ids=["aligned", "beyond-the-scene", "finer-than-cells"])
-@pytest.mark.parametrize("bands", [None, 2])
-def test_resampling_gives_the_same_bits_in_any_chunks(pixels, bands):
-    scene = raster(bands=bands).assign_coords(sza=28.5)
-    scene[..., 10:12, 20:22] = np.nan
-    rows, columns = operators(GRID, pixels)
-    whole = chunks.resample(regularize, rows, columns, scene, pixels)
-    np.testing.assert_array_equal(whole, regularize(scene.values, rows, columns))
-    assert grids.same_grid(grids.geobox(whole), pixels)
-    assert float(whole["sza"]) == 28.5
-    for pieces in (ODD_CHUNKS, ODD_CHUNKS | {"band": 1}, {"y": 1, "x": 45}, {"y": 36, "x": 9}):
-        with no_compute():
-            lazy = chunks.resample(regularize, rows, columns, in_chunks(scene, pieces), pixels)
-        assert lazy.chunks is not None
-        xr.testing.assert_identical(lazy.compute(), whole)
-
-
-def test_output_chunks_read_only_the_cells_that_they_need():
-    """One bad chunk spoils the pixels over it and no others."""
-    scene = in_chunks(raster(), {"y": 9, "x": 9})
-    rows, columns = operators(GRID, PIXELS[0])
-
-    def spoil(block, block_info=None):
-        if block_info[0]["chunk-location"] == (0, 0):
-            raise RuntimeError("read")
-        return block
-
-    scene.data = scene.data.map_blocks(spoil, dtype=float)
-    image = chunks.resample(regularize, rows, columns, scene, PIXELS[0])
-    assert np.isfinite(image[2:, 2:].compute()).all()
-    with pytest.raises(RuntimeError, match="read"):
-        image[0, 0].compute()
-
-
-def test_single_precision_stays_what_is_promised():
-    """Lazy arrays promise a dtype before they are computed."""
-    rows, columns = operators(GRID, PIXELS[0])
-    scene = raster().astype(np.float32)
-    eager = chunks.resample(regularize, rows, columns, scene, PIXELS[0])
-    lazy = chunks.resample(regularize, rows, columns, in_chunks(scene, ODD_CHUNKS), PIXELS[0])
-    assert lazy.dtype == lazy.compute().dtype == eager.dtype
-
-
-def test_grid_without_pixels_in_the_scene_is_all_missing():
-    far = GeoBox((3, 4), GRID.affine * GRID.affine.translation(900, 900), GRID.crs)
-    rows, columns = operators(GRID, far)
-    for scene in (raster(), in_chunks(raster(), ODD_CHUNKS)):
-        assert np.isnan(chunks.resample(regularize, rows, columns, scene, far)).all()
+@pytest.mark.parametrize("size", [1, 4, 99])
+def test_blocks_read_windows_of_any_shape(array_type, size):
+    """Lazy where an array is, in the fixed blocks; what a block reads need not go by rows and columns."""
+    cells = array_type(raster())
+    with no_compute():
+        found = chunks.in_blocks(diagonals, [Seen(cells.data)], (30, 12), size)
+    if cells.chunks is not None:
+        assert found.chunks[1] == tuple([size] * (12 // size) + [12 % size] * bool(12 % size))
+    expected = [cells.values[k, k : k + 12] for k in range(30)]
+    np.testing.assert_array_equal(found, expected)

@@ -9,7 +9,7 @@ import pytest
 
 from fifesim.base import datasets
 from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
-from fifesim.sensor.description.listing import describe
+from fifesim.sensor.description.listing import instrument_in_words
 from fifesim.sensor.description.performance import swath_width
 from fifesim.sensor.description.plausibility import check_units
 from fifesim.sensor.response.calibration import gain_offset, radiance_to_reflectance, reflectance_to_radiance
@@ -87,7 +87,7 @@ def test_instrument_travels_to_workers_and_is_a_key(name):
 @pytest.mark.parametrize("name", instrument_names())
 def test_description_has_a_line_for_every_band_and_every_source(name):
     item = instrument(name)
-    text = describe(item)
+    text = instrument_in_words(item)
     assert all(any(line.split()[:1] == [each.name] for line in text.splitlines()) for each in item.bands)
     assert all(reference in text for reference in item.references.values())
 

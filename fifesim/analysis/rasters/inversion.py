@@ -5,9 +5,10 @@ import math
 import xarray as xr
 
 from fifesim.analysis import uncertainty
-from fifesim.analysis.rasters.pairs import matched, sums_by_row
+from fifesim.analysis.rasters.pairs import matched
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
+from fifesim.rasters.reductions import row_sums
 
 _LIMITS = ("low", "high")
 
@@ -95,9 +96,8 @@ def inversion_error(estimate, truth, *, pair="coordinates"):
         maps = [estimate[name] for name in (*variables, *_LIMITS)]
     matched_maps = [matched(each, truth, pair) for each in maps]
     arrays = [matched_maps[0][1], *(each for each, _ in matched_maps)]
-    n, total, squares, inside = (
-        math.fsum(column) for column in sums_by_row(uncertainty.error_sums, *arrays, count=4).T
-    )
+    sums = row_sums(uncertainty.error_sums, *arrays, count=4)
+    n, total, squares, inside = map(math.fsum, sums.T)
     if n == 0:
         raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
     found = {"bias": total / n, "rmse": math.sqrt(squares / n), "n": int(n)}

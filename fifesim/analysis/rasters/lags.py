@@ -1,15 +1,17 @@
 """Variograms of labelled rasters, and the variance that regularization leaves."""
 
-import dask
-import dask.array as da
+from functools import partial
+
 import numpy as np
 import xarray as xr
 
 from fifesim.analysis import variogram as kernels
 from fifesim.analysis.rasters.pairs import check_no_counts, origins
 from fifesim.analysis.rasters.regression import aggregate
-from fifesim.base.footprints import Boxcar, axis_operator
+from fifesim.base.footprints import Boxcar
 from fifesim.rasters import grid as grids
+from fifesim.rasters.reductions import block_sums, limits
+from fifesim.rasters.regularization import operators
 
 # Blocks of cells that are transformed together, counted from the first cell of the raster: fixed, so that the chunks
 # change no rounding.
@@ -55,7 +57,9 @@ def autocovariance(array, reach):
             f"({min(count * size / 2 for count, size in zip(array.shape, sizes, strict=True)):g} m), got {reach:g} m"
         )
     (origin,) = origins(array)
-    sums = np.sum(_block_sums(array.data, steps, origin), axis=0)
+    shape = (kernels.SUMS, steps[0] + 1, 2 * steps[1] + 1)
+    kernel = partial(kernels.lag_sums, reach=steps, origin=origin)
+    sums = block_sums(kernel, array.data, shape, _BLOCK, steps)
     if not sums[0].any():
         raise ValueError("the raster has no valid cells")
     found = {
@@ -95,7 +99,7 @@ def variogram(array, reach):
     if abs(down - across) > 1e-6 * across:
         raise ValueError(f"a variogram by distance needs square cells, got {down:g} x {across:g} m: use autocovariance")
     lags = autocovariance(array, reach)
-    low, high = (float(limit) for limit in dask.compute(array.min(), array.max()))
+    low, high = limits(array)
     if not high > low:
         raise ValueError(f"a correlation needs values that vary, got {low:g} to {high:g}: use autocovariance")
     along = xr.concat(
@@ -126,7 +130,8 @@ def regularized_variance(array, pixel=30.0, lsf=None):
     pixel : float, optional
         Size of the pixels. [m]
     lsf : line spread function, optional
-        As `fifesim.base.footprints` has it, such as ``instrument("TM").line_spread``; the mean over the pixel by default.
+        As `fifesim.base.footprints` has it, such as ``instrument("TM").line_spread``; the mean over the pixel by
+        default.
 
     Returns
     -------
@@ -148,42 +153,13 @@ def regularized_variance(array, pixel=30.0, lsf=None):
     fifesim.analysis.variogram.footprint_variance
     """
     scene = grids.geobox(array)
-    pixels = grids.aligned(scene, pixel)
     lsf = Boxcar(pixel) if lsf is None else lsf
-    rows, columns = (
-        axis_operator(lsf, cell_origin=a, cell_size=b, n_cells=n, pixel_origin=c, pixel_size=d, n_pixels=m)
-        for a, b, n, c, d, m in (
-            (scene.affine.f, scene.affine.e, scene.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y),
-            (scene.affine.c, scene.affine.a, scene.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x),
-        )
-    )
     lags = autocovariance(array, 2 * lsf.half_width + max(grids.cell_size(scene)))
-    reach = lags.sizes["lag_y"] - 1, lags.sizes["lag_x"] // 2
-    down, across = (kernels.weight_correlation(each, step) for each, step in zip((rows, columns), reach, strict=True))
+    rows, columns = operators((lsf, lsf), scene, grids.aligned(scene, pixel))
+    down = kernels.weight_correlation(rows, lags.sizes["lag_y"] - 1)
+    across = kernels.weight_correlation(columns, lags.sizes["lag_x"] // 2)
     predicted = kernels.footprint_variance(lags["covariance"].values, down, across)
     # In memory, so that the chunks change no rounding.
     simulated = float(aggregate(array, pixel, lsf=lsf).compute().var())
     cells = float(lags["covariance"].sel(lag_y=0.0, lag_x=0.0))
     return xr.Dataset({"cells": cells, "predicted": predicted, "simulated": simulated}, attrs={"pixel": float(pixel)})
-
-
-def _block_sums(data, reach, origin):
-    """Sums of the blocks of a raster."""
-    parts = []
-    for top in range(0, data.shape[0], _BLOCK):
-        for left in range(0, data.shape[1], _BLOCK):
-            window, margin = zip(
-                *(_reach(first, size, each) for first, size, each in zip((top, left), data.shape, reach, strict=True)),
-                strict=True,
-            )
-            part = data[window]
-            lazy = dask.delayed(kernels.lag_sums) if isinstance(data, da.Array) else kernels.lag_sums
-            parts.append(lazy(part, margin, reach, origin))
-    return dask.compute(*parts)
-
-
-def _reach(first, size, margin):
-    """Slice of a block with what there is of its margin, and how much that is before and after it."""
-    last = min(first + _BLOCK, size)
-    start, stop = max(first - margin, 0), min(last + margin, size)
-    return slice(start, stop), (first - start, stop - last)

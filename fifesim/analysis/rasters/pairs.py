@@ -1,10 +1,9 @@
-"""Pairs of pixels of two rasters, and sums over them by rows, the same to the bit under any chunking."""
+"""Pairs of pixels of two rasters."""
 
-import dask
-import dask.array as da
 import numpy as np
 
 from fifesim.rasters import grid as grids
+from fifesim.rasters.reductions import computed
 
 PAIRINGS = ("coordinates", "index")
 
@@ -70,33 +69,8 @@ def origins(*arrays):
     -------
     origins : tuple of float
     """
-    first = dask.compute(*(array.isel(y=slice(1)).data for array in arrays))
-    return tuple(float(np.nan_to_num(row[np.isfinite(row)].mean())) if np.isfinite(row).any() else 0.0 for row in first)
-
-
-def sums_by_row(kernel, *arrays, count, **parameters):
-    """
-    Sums of whole rows, so that the chunks do not change their rounding; computes.
-
-    Parameters
-    ----------
-    kernel : callable
-        ``kernel(*blocks, **parameters)`` gives ``count`` sums of each row of float arrays of shape (rows, columns).
-    *arrays : xarray.DataArray, dims (y, x)
-        Of one shape.
-    count : int
-    **parameters
-        Passed to the kernel.
-
-    Returns
-    -------
-    sums : array, shape (rows, count)
-    """
-    if not any(isinstance(array.data, da.Array) for array in arrays):
-        return kernel(*(np.ascontiguousarray(array.values, float) for array in arrays), **parameters)
-    rows = da.core.normalize_chunks("auto", shape=arrays[0].shape, dtype=float, previous_chunks=None)[0]
-    blocks = (da.asarray(array.data).astype(float).rechunk((rows, -1)) for array in arrays)
-    return da.map_blocks(kernel, *blocks, dtype=float, chunks=(rows, (count,)), **parameters).compute()
+    rows = computed(*(array.isel(y=slice(1)).data for array in arrays))
+    return tuple(float(np.nan_to_num(row[np.isfinite(row)].mean())) if np.isfinite(row).any() else 0.0 for row in rows)
 
 
 def _common_index(y, x):

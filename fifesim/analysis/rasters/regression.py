@@ -1,18 +1,14 @@
 """Analysis on labelled rasters: true means, vegetation indices and their regression."""
 
-from functools import partial
-
 import numpy as np
 
 from fifesim.analysis import indices, regression
-from fifesim.analysis.rasters.pairs import check_no_counts, matched, origins, sums_by_row
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.analysis.rasters.pairs import check_no_counts, matched, origins
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
-
-# The red chlorophyll absorption and the near infrared plateau: where a band must lie, and the best place. [um]
-_RED = (0.60, 0.70, 0.66)
-_NIR = (0.75, 1.00, 0.84)
+from fifesim.rasters.reductions import row_sums
+from fifesim.rasters.regularization import areas, regularized
 
 
 def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
@@ -27,8 +23,8 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     min_valid : float, optional
         Share of its area that a block needs on valid cells; below it is NaN. [1]
     lsf : line spread function, optional
-        As `fifesim.base.footprints` has it, to weight the cells about each block's middle; all within the block count the
-        same by default.
+        As `fifesim.base.footprints` has it, to weight the cells about each block's middle; all within the block count
+        the same by default.
 
     Returns
     -------
@@ -45,18 +41,9 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     fifesim.base.footprints.regularize
     """
     check_no_counts(array)
-    scene = grids.geobox(array)
-    blocks = grids.aligned(scene, pixel)
-    (down, across), a, b = grids.cell_size(blocks), scene.affine, blocks.affine
-    rows = axis_operator(
-        lsf or Boxcar(down), cell_origin=a.f, cell_size=a.e, n_cells=scene.shape.y, pixel_origin=b.f, pixel_size=b.e,
-        n_pixels=blocks.shape.y,
-    )  # fmt: skip
-    columns = axis_operator(
-        lsf or Boxcar(across), cell_origin=a.c, cell_size=a.a, n_cells=scene.shape.x, pixel_origin=b.c, pixel_size=b.a,
-        n_pixels=blocks.shape.x,
-    )  # fmt: skip
-    means = chunks.resample(partial(regularize, min_valid=min_valid), rows, columns, array, blocks)
+    blocks = grids.aligned(grids.geobox(array), pixel)
+    spreads = areas(blocks) if lsf is None else (lsf, lsf)
+    means = regularized(array, spreads, blocks, min_valid=min_valid)
     means.attrs = dict(array.attrs) | {
         "history": "\n".join(filter(None, [array.attrs.get("history", ""), f"aggregate: means over {pixel:g} m"]))
     }
@@ -122,7 +109,7 @@ def regress(y, x, *, pair="coordinates"):
     """
     y, x = matched(y, x, pair)
     y_origin, x_origin = origins(y, x)
-    sums = sums_by_row(regression.row_sums, y, x, count=6, y_origin=y_origin, x_origin=x_origin)
+    sums = row_sums(regression.row_sums, y, x, count=6, y_origin=y_origin, x_origin=x_origin)
     return regression.fit(sums, y_origin, x_origin)
 
 
@@ -146,19 +133,21 @@ def red_and_nir(reflectance):
         As in `ndvi`.
     """
     cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
-    numbers = (_nearest_band(reflectance, "red", *_RED), _nearest_band(reflectance, "near infrared", *_NIR))
+    numbers = [_nearest_band(reflectance, window) for window in (RED, NEAR_INFRARED)]
     per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
     return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
 
 
-def _nearest_band(reflectance, what, low, high, best):
+def _nearest_band(reflectance, window):
     if "band" not in reflectance.dims:
         raise ValueError("ndvi needs a red and a near infrared band along band, got a raster of one band")
     if "wavelength" not in reflectance.coords:
         raise ValueError("the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords")
-    wavelength = np.atleast_1d(reflectance["wavelength"].values)
-    inside = np.flatnonzero((wavelength >= low) & (wavelength <= high))
-    if not inside.size:
-        found = ", ".join(f"{value:.3f}" for value in wavelength)
-        raise ValueError(f"no {what} band between {low:g} and {high:g} um: the raster has {found} um")
-    return int(inside[np.argmin(np.abs(wavelength[inside] - best))])
+    wavelengths = np.atleast_1d(reflectance["wavelength"].values)
+    number = nearest(wavelengths, window)
+    if number is None:
+        found = ", ".join(f"{value:.3f}" for value in wavelengths)
+        raise ValueError(
+            f"no {window.name} band between {window.low:g} and {window.high:g} um: the raster has {found} um"
+        )
+    return number

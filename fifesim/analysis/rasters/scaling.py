@@ -1,9 +1,8 @@
 """Scale invariance of labelled rasters."""
 
 import math
+from functools import partial
 
-import dask
-import dask.array as da
 import numpy as np
 import xarray as xr
 
@@ -13,9 +12,13 @@ from fifesim.analysis.rasters.pairs import check_no_counts
 from fifesim.analysis.rasters.regression import aggregate, red_and_nir, regress
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
+from fifesim.rasters.reductions import block_sums, limits
 
 # Bins of the histogram that stands for the values of a raster: 1/2000 of their range is far less than a bandwidth.
 _BINS = 2000
+
+# Blocks of values that are counted together. [cell]
+_BLOCK = 1024
 
 
 def scale_bias(algorithm, array, pixel=30.0):
@@ -225,11 +228,11 @@ def density(array, points=256, bandwidth=None):
     fifesim.analysis.density.gaussian_density
     """
     check_no_counts(array)
-    low, high = (float(limit) for limit in (array.min(), array.max()))
+    low, high = limits(array)
     if not high > low:
         raise ValueError(f"a density needs values that vary, got {low:g} to {high:g}")
     edges = np.linspace(low, high, _BINS + 1)
-    counts = _counts(array.data, edges)
+    counts = block_sums(partial(_counts, edges=edges), np.atleast_2d(array.data), (_BINS,), _BLOCK)
     middles = (edges[1:] + edges[:-1]) / 2
     if bandwidth is None:
         bandwidth = _rule_of_thumb(middles, counts)
@@ -250,12 +253,9 @@ def _fpar_bias(mean, square, **parameters):
     return scaling.beer_bias(mean, np.maximum(square - mean**2, 0.0), **parameters)
 
 
-def _counts(data, edges):
-    """Histogram over all blocks; counts are whole, so that their order does not matter."""
-    if not isinstance(data, da.Array):
-        return np.histogram(data[np.isfinite(data)], edges)[0].astype(float)
-    blocks = [dask.delayed(_counts)(block, edges) for block in data.to_delayed().ravel()]
-    return np.sum(dask.compute(*blocks), axis=0)
+def _counts(cells, margin, edges):
+    """Histogram of a block; counts are whole, so that their order does not matter."""
+    return np.histogram(cells[np.isfinite(cells)], edges)[0].astype(float)
 
 
 def _rule_of_thumb(middles, counts):

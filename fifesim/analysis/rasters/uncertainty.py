@@ -1,13 +1,13 @@
 """Relative equivalent noise of labelled rasters."""
 
-import dask
 import numpy as np
 import xarray as xr
 
 from fifesim.analysis import uncertainty
-from fifesim.analysis.rasters.pairs import matched, origins, sums_by_row
+from fifesim.analysis.rasters.pairs import matched, origins
 from fifesim.analysis.rasters.regression import regress
 from fifesim.rasters import cf
+from fifesim.rasters.reductions import limits, row_sums
 
 # More increments than this are a width in other units than the variable.
 _MOST_INCREMENTS = 10_000
@@ -57,10 +57,10 @@ def relative_equivalent_noise(variable, ndvi, increment=0.1, *, slope=None, min_
     variable, ndvi = matched(variable, ndvi, pair)
     if slope is None:
         slope = regress(ndvi, variable, pair="index").slope
-    low, high = (float(limit) for limit in dask.compute(variable.min(), variable.max()))
+    low, high = limits(variable)
     if not (np.isfinite(low) and np.isfinite(high)):
         raise ValueError(f"the variable goes from {low:g} to {high:g}: relative noise needs finite values")
-    first, last = (int(np.floor(limit / increment)) for limit in (low, high))
+    first, last = int(np.floor(low / increment)), int(np.floor(high / increment))
     if last - first >= _MOST_INCREMENTS:
         raise ValueError(
             f"increment {increment:g} cuts {low:g} to {high:g} into {last - first + 1} parts: "
@@ -68,7 +68,7 @@ def relative_equivalent_noise(variable, ndvi, increment=0.1, *, slope=None, min_
         )
     increments = last - first + 1
     (origin,) = origins(ndvi)
-    sums = sums_by_row(
+    sums = row_sums(
         uncertainty.increment_sums, variable, ndvi, count=uncertainty.SUMS * increments, first=first, width=increment,
         increments=increments, ndvi_origin=origin,
     )  # fmt: skip

@@ -11,9 +11,9 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.adjacency import blocks, environment_grid
 from fifesim.atmosphere.adjacency import environment as adjacency
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
 from fifesim.rasters import chunks
 from fifesim.rasters import grid as grids
+from fifesim.rasters.regularization import areas, regularized
 
 # How far from the scene a raster of its surroundings counts at its place. Beyond it lies 3e-4 of what molecules scatter
 # into the view, and nothing of what aerosol does. [m]
@@ -283,15 +283,15 @@ def _outer(surroundings, array, along):
             f"the surroundings must lie within {REACH / 1000:g} km of the scene, {grids.extent(here)}, "
             f"got {grids.extent(there)}"
         )
-    north, down, above, rows = rows
-    west, across, left, columns = columns
-    grid = GeoBox((len(rows), len(columns)), Affine(across, 0.0, west, 0.0, down, north), here.crs)
-    wanted = _same_bands(surroundings, array)
-    return (above, left), chunks.resample(partial(regularize, min_valid=0.0), rows, columns, wanted, grid)
+    north, down, above = rows
+    west, across, left = columns
+    shape = along[0].count + 2 * above, along[1].count + 2 * left
+    grid = GeoBox(shape, Affine(across, 0.0, west, 0.0, down, north), here.crs)
+    return (above, left), regularized(_same_bands(surroundings, array), areas(grid), grid, min_valid=0.0)
 
 
 def _outer_axis(along, origin, cell, outer_origin, outer_cell, outer_cells):
-    """First edge, signed size and margin of the blocks that a raster is brought onto, and the operator; or None."""
+    """First edge, signed size and margin of the blocks that a raster is brought onto; or None."""
     direction, size = np.sign(cell), along.cells * abs(cell)
     before = direction * (origin - outer_origin)
     behind = abs(outer_cells * outer_cell) - before - abs(along.n_cells * cell)
@@ -299,16 +299,7 @@ def _outer_axis(along, origin, cell, outer_origin, outer_cell, outer_cells):
         return None
     margin = max(1, int(np.ceil(min(max(before, behind), REACH) / size)))
     first = origin - direction * (along.offset * abs(cell) + margin * size)
-    operator = axis_operator(
-        Boxcar(size),
-        cell_origin=outer_origin,
-        cell_size=outer_cell,
-        n_cells=outer_cells,
-        pixel_origin=first,
-        pixel_size=direction * size,
-        n_pixels=along.count + 2 * margin,
-    )
-    return first, direction * size, margin, operator
+    return first, direction * size, margin
 
 
 def _same_bands(surroundings, array):

@@ -17,7 +17,7 @@ from fifesim.ground.landscape.distribution import treatments, truncated_normal
 from fifesim.ground.terrain.rasters.hills import flint_hills
 from fifesim.rasters import sites
 from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.response.spatial_response import CosineResponse
+from fifesim.sensor.description.spatial_response import CosineResponse
 
 ARPS = (0.05, 0.15, 0.24)
 VARIABLES = ("lai", "fpar")

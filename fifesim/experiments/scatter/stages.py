@@ -9,11 +9,12 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.analysis import indices
 from fifesim.analysis.rasters import regression as analysis
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.base.footprints import Boxcar, regularize
 from fifesim.chain import steps as chain
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.ground.canopy import raster as ground
 from fifesim.rasters import grid as grids
+from fifesim.rasters.regularization import areas, operators
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import leaf_area, setup_of
@@ -231,18 +232,12 @@ def _means(scene, cells, blurred, displaced):
     box = scene.image if displaced else scene.blocks
     sizes = grids.cell_size(box)
     shifts = [offset * size for offset, size in zip(setup.offset, sizes, strict=True)] if displaced else (0.0, 0.0)
-    ideal = [Boxcar(size) for size in grids.cell_size(scene.blocks)]
-    a, b, (rows, columns) = grid.affine, box.affine, scene.shape
+    rows, columns = scene.shape
     means = np.empty((len(cells), rows, columns))
     for layer, band in enumerate((red, nir, red)):
-        down, across = setup.instrument.line_spreads(band) if blurred else ideal
-        operators = (
-            axis_operator(down, cell_origin=a.f, cell_size=a.e, n_cells=grid.shape.y, pixel_origin=b.f, pixel_size=b.e,
-                          n_pixels=rows, shift=shifts[0]),
-            axis_operator(across, cell_origin=a.c, cell_size=a.a, n_cells=grid.shape.x, pixel_origin=b.c,
-                          pixel_size=b.a, n_pixels=columns, shift=shifts[1]),
-        )  # fmt: skip
-        means[layer] = regularize(cells[layer], *operators, min_valid=setup.min_valid)
+        spreads = setup.instrument.line_spreads(band) if blurred else areas(scene.blocks)
+        along = operators(spreads, grid, box[:rows, :columns], shifts)
+        means[layer] = regularize(cells[layer], *along, min_valid=setup.min_valid)
     return means
 
 

@@ -305,6 +305,7 @@ def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
         for values in (background, diffuse_fraction)
     ]
     per_band = [values.drop_vars("band", errors="ignore") for values in per_band]
+
     def kernel(cells, ground, sky, sza, saa, vza, vaa):
         directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
         return directional_reflectance(cells, background=ground, diffuse_fraction=sky, **directions, **parameters)

@@ -1,138 +1,23 @@
 """Description of an instrument: bands, sampling, spatial response and radiometry, each number with its source."""
 
 from dataclasses import field, replace
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from fifesim.base.bands import solar_irradiance
-from fifesim.sensor.description.names import lookup
-from fifesim.sensor.description.performance import Gain, Noise, Scan
-from fifesim.sensor.response.spatial_response import (
-    CONFIG,
-    AlongAcross,
-    Angle,
-    Count,
-    Number,
-    Positive,
-    SpatialResponse,
-    View,
-    by_axes,
+from fifesim.sensor.description.axes import AlongAcross, Angle, by_axes
+from fifesim.sensor.description.band import (
+    BAND_NUMBERS,
+    INSTRUMENT_NUMBERS,
+    OPTIONAL_NUMBERS,
+    InstrumentBand,
+    Sources,
 )
-from fifesim.sensor.response.spectral_response import Name, SpectralResponse
-
-# Numbers that must be there and those that may; each that is there has a source.
-INSTRUMENT_NUMBERS = ("altitude", "gsd", "interval", "bits", "lsf")
-BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance")
-OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "noise", "gains", "limits")
-
-
-@dataclass(frozen=True, config=CONFIG)
-class InstrumentBand:
-    """
-    One band of an instrument.
-
-    Parameters
-    ----------
-    name : str
-        Name, such as ``"TM3"``.
-    srf : spectral response
-        Where the relative spectral response is found; see `fifesim.sensor.response.spectral_response`.
-    full_scale_radiance, min_radiance : float
-        Radiances of the largest digital number and of digital number 0. [W m-2 sr-1 um-1]
-    solar_irradiance : float
-        Extraterrestrial irradiance that the agency publishes for planetary reflectance. [W m-2 um-1]
-    limits : tuple of float, optional
-        Wavelengths between which the band is nominally. [um]
-    gsd, interval, ifov, lsf, detectors : optional
-        Where they differ from the instrument's.
-    noise : Noise, optional
-    gain : str, optional
-        Name of the gain state that the radiances belong to.
-    gains : dict of Gain, optional
-        Other gain states by name.
-    sources : dict
-        Key of the instrument's references for each number that has another source than the instrument says.
-
-    Raises
-    ------
-    pydantic.ValidationError
-        If a value is wrong; `fifesim.sensor.description.instruments.read_instrument` names file and key.
-    """
-
-    name: Name
-    srf: SpectralResponse
-    full_scale_radiance: Number
-    min_radiance: Number
-    solar_irradiance: Positive
-    limits: tuple[Positive, Positive] | None = None
-    gsd: Positive | None = None
-    interval: Angle | None = None
-    ifov: Angle | None = None
-    lsf: SpatialResponse | None = None
-    detectors: Count | None = None
-    noise: Noise | None = None
-    gain: Name = "nominal"
-    gains: dict[str, Gain] = field(default_factory=dict, repr=False, hash=False)
-    sources: dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str] = field(
-        default_factory=dict, repr=False, hash=False
-    )
-
-    def __post_init__(self):
-        Gain(self.full_scale_radiance, self.min_radiance)
-        if self.limits and self.limits[0] >= self.limits[1]:
-            raise ValueError(f"limits: the first must be below the second, got {self.limits} um")
-        if self.gain in self.gains:
-            raise ValueError(f"gains: {self.gain!r} is the band's own gain state, give the others")
-
-    @property
-    def response(self):
-        """Relative spectral response, a `fifesim.base.bands.Band`."""
-        return self.srf.read(self.name)
-
-    @property
-    def wavelength(self):
-        """Response-weighted mean wavelength [um]."""
-        return self.response.center
-
-    @property
-    def spectrum_irradiance(self):
-        """Solar irradiance that ASTM G173 has over the response, beside the agency's [W m-2 um-1]."""
-        return solar_irradiance(self.response)
-
-    def with_gain(self, gain):
-        """
-        The band in another gain state.
-
-        Parameters
-        ----------
-        gain : str
-            Name of a state.
-
-        Returns
-        -------
-        band : InstrumentBand
-
-        Raises
-        ------
-        ValueError
-            If the band has no such state.
-        """
-        if gain == self.gain:
-            return self
-        if gain not in self.gains:
-            raise ValueError(f"{self.name} has no gain state {gain!r}: it has {', '.join([self.gain, *self.gains])}")
-        own = Gain(self.full_scale_radiance, self.min_radiance)
-        others = {name: state for name, state in self.gains.items() if name != gain}
-        new = self.gains[gain]
-        return replace(
-            self,
-            full_scale_radiance=new.full_scale_radiance,
-            min_radiance=new.min_radiance,
-            gain=gain,
-            gains={self.gain: own, **others},
-        )
+from fifesim.sensor.description.fields import CONFIG, Count, Name, Positive
+from fifesim.sensor.description.names import lookup
+from fifesim.sensor.description.performance import Scan
+from fifesim.sensor.description.spatial_response import SpatialResponse, View
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -153,7 +38,7 @@ class Instrument:
     bits : int
         Number of radiometric bits.
     lsf : response of both axes or TwoAxesResponse
-        Spatial response; see `fifesim.sensor.response.spatial_response`.
+        Spatial response; see `fifesim.sensor.description.spatial_response`.
     bands : tuple of InstrumentBand
     sources : dict
         Key of ``references`` for each number; a band's own sources come first.
@@ -170,7 +55,8 @@ class Instrument:
     Raises
     ------
     pydantic.ValidationError
-        If a value is wrong or has no source; `fifesim.sensor.description.instruments.read_instrument` names file and key.
+        If a value is wrong or has no source; `fifesim.sensor.description.instruments.read_instrument` names file and
+        key.
     """
 
     name: Name
@@ -181,7 +67,7 @@ class Instrument:
     bits: Annotated[int, Field(strict=True, ge=2, le=16)]
     lsf: SpatialResponse
     bands: Annotated[tuple[InstrumentBand, ...], Field(min_length=1)] = field(repr=False)
-    sources: dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str] = field(repr=False, hash=False)
+    sources: Sources = field(repr=False, hash=False)
     references: dict[str, str] = field(repr=False, hash=False)
     ifov: Angle | None = None
     detectors: Count | None = None

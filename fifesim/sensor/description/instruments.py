@@ -11,11 +11,9 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from fifesim.base import datasets
-from fifesim.sensor.description.instrument_file import Instrument, InstrumentBand
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import lookup
 from fifesim.sensor.description.plausibility import check_units
-
-__all__ = ["Instrument", "InstrumentBand", "instrument", "instrument_names", "read_instrument"]
 
 # Keys whose value has several forms: what follows them in the place of an error is the form's name.
 _FORMS = ("srf", "lsf", "interval", "ifov")

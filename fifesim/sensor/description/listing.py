@@ -1,7 +1,7 @@
 """Instruments as text, for people to read."""
 
-from fifesim.sensor.response.spatial_response import TwoAxesResponse, by_axes
-from fifesim.sensor.response.spectral_response import half_peak
+from fifesim.sensor.description.axes import TwoAxes, by_axes
+from fifesim.sensor.description.spectral_response import half_peak
 
 
 def list_instruments(instruments):
@@ -30,7 +30,7 @@ def list_instruments(instruments):
     return "\n".join(lines)
 
 
-def describe(instrument):
+def instrument_in_words(instrument):
     """
     What an instrument is, in lines of text.
 
@@ -46,7 +46,7 @@ def describe(instrument):
     Examples
     --------
     >>> from fifesim.sensor.description.instruments import instrument
-    >>> describe(instrument("TM")).splitlines()[0]
+    >>> instrument_in_words(instrument("TM")).splitlines()[0]
     'TM  Landsat-5 Thematic Mapper'
     """
     lines = [f"{instrument.name}  {instrument.title}"]
@@ -84,7 +84,7 @@ def _sampling(instrument):
     for (pixel, intervals, fields, response), bands in groups.items():
         spreads = instrument.line_spreads(bands[0])
         mtf = tuple(float(lsf.mtf(0.5 / step)) for lsf, step in zip(spreads, intervals, strict=True))
-        kinds = by_axes(response) if isinstance(response, TwoAxesResponse) else [response]
+        kinds = by_axes(response) if isinstance(response, TwoAxes) else [response]
         which = ", ".join(band.name for band in bands) if len(groups) > 1 else "all bands"
         lines += [
             f"  {which}: pixels of {pixel:g} m in the gridded product",

@@ -6,8 +6,8 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from fifesim.sensor.description.fields import CONFIG, Count, Number, Positive
 from fifesim.sensor.response.noise import NoiseModel
-from fifesim.sensor.response.spatial_response import CONFIG, Count, Number, Positive
 
 # Mean radius of the earth [m].
 EARTH_RADIUS = 6.371e6

@@ -2,8 +2,9 @@
 Line spread functions of sensors (Eq. 3), as `fifesim.base.footprints` takes them.
 
 Here stand the cosine of the paper, the Gaussian and a measured table; `fifesim.base.footprints.Boxcar` is another, and
-`fifesim.sensor.response.transfer` makes one of the parts of an instrument. A footprint takes one for its rows, along the track,
-and one for its columns, across the track.
+`fifesim.sensor.response.transfer` makes one of the parts of an instrument. A footprint takes one for its rows, along
+the track, and one for its columns, across the track. Each shape holds its integral C and the transform M of its
+density w.
 """
 
 from dataclasses import dataclass, field
@@ -11,18 +12,24 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import ndtr, spherical_jn
 
-from fifesim.base.footprints import check_width
+from fifesim.base.footprints import FiniteSpread, LineSpread, check_width
 
 # Standard deviations at which a Gaussian is cut: 2e-9 of it lie beyond.
 _GAUSSIAN_REACH = 6.0
 
 
 @dataclass(frozen=True)
-class CosineSpread:
+class CosineSpread(FiniteSpread):
     r"""
     Cosine line spread function truncated at half its amplitude.
 
-    .. math:: w(x) = \cos\frac{2 \pi x}{3 W}, \qquad |x| \le W / 2
+    .. math::
+
+        w(x) &= \cos\frac{2 \pi x}{3 W}, \qquad |x| \le W / 2 \\
+        C(x) &= \frac{1}{2} + \frac{1}{\sqrt{3}} \sin\frac{2 \pi x}{3 W} \\
+        M(f) &= \frac{\pi}{3 \sqrt{3}} \left[ \mathrm{sinc}\left(\frac{1}{3} - f W\right)
+            + \mathrm{sinc}\left(\frac{1}{3} + f W\right) \right],
+        \qquad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
 
     Parameters
     ----------
@@ -46,67 +53,24 @@ class CosineSpread:
     0.5
     """
 
-    width: float
-
-    def __post_init__(self):
-        check_width(self.width)
-
-    @property
-    def half_width(self):
-        """Distance from the pixel centre beyond which the response is zero [m]."""
-        return self.width / 2
-
-    def cumulative(self, x):
-        r"""
-        Share of the response that lies before a distance from the pixel centre.
-
-        .. math:: C(x) = \frac{1}{2} + \frac{1}{\sqrt{3}} \sin\frac{2 \pi x}{3 W}
-
-        Parameters
-        ----------
-        x : array
-            Distance from the pixel centre. [m]
-
-        Returns
-        -------
-        share : array, shape of x
-            0 before the support, 1 behind it. [1]
-        """
+    def _cumulative(self, x):
         x = np.clip(x, -self.half_width, self.half_width)
         return 0.5 + np.sin(2 * np.pi * x / (3 * self.width)) / np.sqrt(3)
 
-    def mtf(self, frequency):
-        r"""
-        Modulation transfer function, the Fourier transform of the line spread function.
-
-        .. math::
-
-            M(f) = \frac{\pi}{3 \sqrt{3}} \left[ \mathrm{sinc}\left(\frac{1}{3} - f W\right)
-                + \mathrm{sinc}\left(\frac{1}{3} + f W\right) \right],
-            \qquad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
-
-        Parameters
-        ----------
-        frequency : array
-            Spatial frequency. [cycles m-1]
-
-        Returns
-        -------
-        mtf : array, shape of frequency
-            Factor by which a sinusoid's amplitude is reduced. [1]
-        """
-        phase = np.asarray(frequency, float) * self.width
+    def _mtf(self, frequency):
+        phase = frequency * self.width
         return np.pi / (3 * np.sqrt(3)) * (np.sinc(1 / 3 - phase) + np.sinc(1 / 3 + phase))
 
 
 @dataclass(frozen=True)
-class GaussianSpread:
+class GaussianSpread(LineSpread):
     r"""
     Gaussian line spread function.
 
-    .. math:: w(x) = \exp\left(-\frac{x^2}{2 \sigma^2}\right), \qquad \sigma = \frac{W}{2 \sqrt{2 \ln 2}}
+    .. math:: w(x) = \exp\left(-\frac{x^2}{2 \sigma^2}\right), \qquad \sigma = \frac{W}{2 \sqrt{2 \ln 2}}, \qquad
+        M(f) = \exp(-2 \pi^2 \sigma^2 f^2)
 
-    It is cut at :math:`6 \sigma`, where 2e-9 of it is lost.
+    It is cut at :math:`6 \sigma`, where 2e-9 of it is lost, and scaled; M is the transform of the whole.
 
     Parameters
     ----------
@@ -178,46 +142,24 @@ class GaussianSpread:
         """Share of the Gaussian that lies beyond the half width, for which the rest is scaled [1]."""
         return float(2 * ndtr(-_GAUSSIAN_REACH))
 
-    def cumulative(self, x):
-        """
-        Share of the response that lies before a distance from the pixel centre.
+    def _cumulative(self, x):
+        z = np.clip(x / self.sigma, -_GAUSSIAN_REACH, _GAUSSIAN_REACH)
+        return (ndtr(z) - ndtr(-_GAUSSIAN_REACH)) / (1 - self.truncated_share)
 
-        Parameters
-        ----------
-        x : array
-            Distance from the pixel centre. [m]
-
-        Returns
-        -------
-        share : array, shape of x
-            0 before the support, 1 behind it. [1]
-        """
-        x = np.clip(np.asarray(x, float) / self.sigma, -_GAUSSIAN_REACH, _GAUSSIAN_REACH)
-        return (ndtr(x) - ndtr(-_GAUSSIAN_REACH)) / (1 - self.truncated_share)
-
-    def mtf(self, frequency):
-        r"""
-        Modulation transfer function, to 2e-9.
-
-        .. math:: M(f) = \exp(-2 \pi^2 \sigma^2 f^2)
-
-        Parameters
-        ----------
-        frequency : array
-            Spatial frequency. [cycles m-1]
-
-        Returns
-        -------
-        mtf : array, shape of frequency
-            Factor by which a sinusoid's amplitude is reduced. [1]
-        """
-        return np.exp(-2 * (np.pi * self.sigma * np.asarray(frequency, float)) ** 2)
+    def _mtf(self, frequency):
+        return np.exp(-2 * (np.pi * self.sigma * frequency) ** 2)
 
 
 @dataclass(frozen=True)
-class TableSpread:
-    """
+class TableSpread(LineSpread):
+    r"""
     Measured line spread function, linear between its positions and zero beyond them.
+
+    With :math:`z = 2 \pi f h` on a segment of half length h around c, with mean value v and slope m,
+
+    .. math:: M(f) = \sum e^{-2 \pi i f c} \left[ 2 h v \, j_0(z) - 2 i m h^2 j_1(z) \right]
+
+    or its modulus where the table is not symmetric.
 
     Parameters
     ----------
@@ -243,7 +185,8 @@ class TableSpread:
     values: tuple = field(repr=False)
 
     def __post_init__(self):
-        positions, values = (tuple(float(v) for v in each) for each in (self.positions, self.values))
+        positions = tuple(float(each) for each in self.positions)
+        values = tuple(float(each) for each in self.values)
         if len(positions) < 2 or len(positions) != len(values):
             raise ValueError(
                 f"a line spread table needs two positions or more and a value for each, got {len(positions)} positions "
@@ -262,50 +205,20 @@ class TableSpread:
         """Distance from the pixel centre beyond which the response is zero [m]."""
         return max(abs(self.positions[0]), abs(self.positions[-1]))
 
-    def cumulative(self, x):
-        """
-        Share of the response that lies before a distance from the pixel centre.
-
-        Parameters
-        ----------
-        x : array
-            Distance from the pixel centre. [m]
-
-        Returns
-        -------
-        share : array, shape of x
-            0 before the support, 1 behind it. [1]
-        """
+    def _cumulative(self, x):
         nodes, density = np.array(self.positions), np.array(self.values)
         area = np.concatenate([[0.0], np.cumsum(np.diff(nodes) * (density[1:] + density[:-1]) / 2)])
-        x = np.clip(np.asarray(x, float), nodes[0], nodes[-1])
+        x = np.clip(x, nodes[0], nodes[-1])
         index = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2)
         into = x - nodes[index]
         slope = (density[index + 1] - density[index]) / (nodes[index + 1] - nodes[index])
         return (area[index] + into * (density[index] + slope * into / 2)) / area[-1]
 
-    def mtf(self, frequency):
-        r"""
-        Modulation transfer function: the Fourier transform of the broken line, or its modulus if that is not symmetric.
-
-        With :math:`z = 2 \pi f h` on a segment of half length h around c, with mean value v and slope m,
-
-        .. math:: M(f) = \sum e^{-2 \pi i f c} \left[ 2 h v \, j_0(z) - 2 i m h^2 j_1(z) \right]
-
-        Parameters
-        ----------
-        frequency : array
-            Spatial frequency. [cycles m-1]
-
-        Returns
-        -------
-        mtf : array, shape of frequency
-            Factor by which a sinusoid's amplitude is reduced. [1]
-        """
+    def _mtf(self, frequency):
         nodes, density = np.array(self.positions), np.array(self.values)
         half = np.diff(nodes) / 2
         mean, rise = (density[1:] + density[:-1]) / 2, np.diff(density) / 2
-        omega = 2 * np.pi * np.asarray(frequency, float)[..., None]
+        omega = 2 * np.pi * frequency[..., None]
         z = omega * half
         even, odd = 2 * mean * half * spherical_jn(0, z), 2 * rise * half * spherical_jn(1, z)
         transform = (np.exp(-1j * omega * (nodes[:-1] + half)) * (even - 1j * odd)).sum(axis=-1)

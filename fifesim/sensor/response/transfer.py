@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import irfft
 
+from fifesim.base.footprints import LineSpread, Transfer
 from fifesim.sensor.response.spatial import TableSpread
 
 # Samples of the tabulated response over its equivalent width, and the periods of the transform that are tried, in the
@@ -20,9 +21,34 @@ _JUMP = 1e-3
 
 
 @dataclass(frozen=True)
-class Diffraction:
+class CutoffTransfer(Transfer):
     """
+    Transfer function that a frequency describes.
+
+    Parameters
+    ----------
+    cutoff : float
+        [cycles m-1]
+
+    Raises
+    ------
+    ValueError
+        If the frequency is not positive.
+    """
+
+    cutoff: float
+
+    def __post_init__(self):
+        if not 0 < self.cutoff < np.inf:
+            raise ValueError(f"cutoff must be a positive number of cycles per metre, got {self.cutoff}")
+
+
+@dataclass(frozen=True)
+class Diffraction(CutoffTransfer):
+    r"""
     Transfer function of a circular aperture without aberrations, to be a part of `SystemSpread`.
+
+    .. math:: M(f) = \frac{2}{\pi} \left( \arccos \nu - \nu \sqrt{1 - \nu^2} \right), \qquad \nu = |f| / f_c \le 1
 
     Parameters
     ----------
@@ -39,35 +65,17 @@ class Diffraction:
     [Goodman2005]_, section 6.3
     """
 
-    cutoff: float
-
-    def __post_init__(self):
-        _check_frequency(self.cutoff)
-
-    def mtf(self, frequency):
-        r"""
-        Modulation transfer function.
-
-        .. math:: M(f) = \frac{2}{\pi} \left( \arccos \nu - \nu \sqrt{1 - \nu^2} \right), \qquad \nu = |f| / f_c \le 1
-
-        Parameters
-        ----------
-        frequency : array
-            Spatial frequency. [cycles m-1]
-
-        Returns
-        -------
-        mtf : array, shape of frequency
-            [1]
-        """
-        nu = np.minimum(np.abs(np.asarray(frequency, float)) / self.cutoff, 1.0)
+    def _mtf(self, frequency):
+        nu = np.minimum(np.abs(frequency) / self.cutoff, 1.0)
         return 2 / np.pi * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
 
 
 @dataclass(frozen=True)
-class LowPass:
-    """
+class LowPass(CutoffTransfer):
+    r"""
     Transfer function of electronics, a Butterworth filter whose delay is corrected; a part of `SystemSpread`.
+
+    .. math:: M(f) = \left[ 1 + (f / f_c)^{2 n} \right]^{-1/2}
 
     Parameters
     ----------
@@ -82,35 +90,19 @@ class LowPass:
         If the frequency or the order is not positive.
     """
 
-    cutoff: float
     order: int = 1
 
     def __post_init__(self):
-        _check_frequency(self.cutoff)
+        super().__post_init__()
         if self.order < 1:
             raise ValueError(f"order must be at least 1, got {self.order}: it is the number of poles")
 
-    def mtf(self, frequency):
-        r"""
-        Modulation transfer function.
-
-        .. math:: M(f) = \left[ 1 + (f / f_c)^{2 n} \right]^{-1/2}
-
-        Parameters
-        ----------
-        frequency : array
-            Spatial frequency. [cycles m-1]
-
-        Returns
-        -------
-        mtf : array, shape of frequency
-            [1]
-        """
-        return (1 + (np.asarray(frequency, float) / self.cutoff) ** (2 * self.order)) ** -0.5
+    def _mtf(self, frequency):
+        return (1 + (frequency / self.cutoff) ** (2 * self.order)) ** -0.5
 
 
 @dataclass(frozen=True)
-class SystemSpread:
+class SystemSpread(LineSpread):
     r"""
     Line spread function of a chain of parts, whose transfer functions are multiplied.
 
@@ -118,14 +110,15 @@ class SystemSpread:
 
         w(x) = \int \prod_k M_k(f) \, e^{2 \pi i f x} \, df
 
-    It is tabulated, linear between 128 samples over its equivalent width, and cut where little is left. The diffraction
-    of an aperture decays as :math:`x^{-2}` alone, so that some always is.
+    It is tabulated, linear between 128 samples over its equivalent width, and cut where little is left; its own
+    transfer function is that of the table. The diffraction of an aperture decays as :math:`x^{-2}` alone, so that some
+    always is left.
 
     Parameters
     ----------
     parts : sequence
-        Objects with ``mtf(frequency)``: `Diffraction` or `GaussianSpread` for the optics,
-        `fifesim.base.footprints.Boxcar` for the detector and for the smear of its motion, `LowPass` for the electronics.
+        Objects with ``mtf(frequency)``: `Diffraction` or `GaussianSpread` for the optics, `LowPass` for the
+        electronics, `fifesim.base.footprints.Boxcar` for the detector and for the smear of its motion.
     truncation : float, optional
         Largest share of the response that may be cut off. [1]
 
@@ -173,36 +166,10 @@ class SystemSpread:
         """Distance from the pixel centre beyond which the response is taken as zero [m]."""
         return self.table.half_width
 
-    def cumulative(self, x):
-        """
-        Share of the response that lies before a distance from the pixel centre.
-
-        Parameters
-        ----------
-        x : array
-            Distance from the pixel centre. [m]
-
-        Returns
-        -------
-        share : array, shape of x
-            0 before the support, 1 behind it. [1]
-        """
+    def _cumulative(self, x):
         return self.table.cumulative(x)
 
-    def mtf(self, frequency):
-        """
-        Modulation transfer function of the response as it is tabulated and cut.
-
-        Parameters
-        ----------
-        frequency : array
-            Spatial frequency. [cycles m-1]
-
-        Returns
-        -------
-        mtf : array, shape of frequency
-            Factor by which a sinusoid's amplitude is reduced. [1]
-        """
+    def _mtf(self, frequency):
         return self.table.mtf(frequency)
 
     def product(self, frequency):
@@ -272,8 +239,3 @@ def _density(parts, step, samples):
     # Lines between the samples multiply the transform by sinc squared.
     density = irfft(product / np.sinc(frequency * step) ** 2, samples) / step
     return density[: samples // 2]
-
-
-def _check_frequency(cutoff):
-    if not 0 < cutoff < np.inf:
-        raise ValueError(f"cutoff must be a positive number of cycles per metre, got {cutoff}")

@@ -20,9 +20,9 @@ class Footprints:
 
     Parameters
     ----------
-    row, column : array, shape (n_pixels,)
+    row, column : array, shape (..., n_pixels)
         Centre, counted from the upper left corner of the grid. [cell]
-    frame : array, shape (n_pixels, 2, 2)
+    frame : array, shape (..., n_pixels, 2, 2)
         A step of a row and of a column (last axis) along and across the track, as it would be at nadir: divided by the
         growth of the footprint. [m]
     along, across : line spread function
@@ -63,8 +63,9 @@ class Footprints:
         return tuple(out)
 
     def __getitem__(self, pixels):
-        """The footprints of some of the pixels."""
-        return Footprints(self.row[pixels], self.column[pixels], self.frame[pixels], self.along, self.across)
+        """Footprints of some of the pixels, one after the other."""
+        frame = self.frame[pixels].reshape(-1, 2, 2)
+        return Footprints(self.row[pixels].ravel(), self.column[pixels].ravel(), frame, self.along, self.across)
 
 
 def footprint_operator(footprints, rows, columns):
@@ -82,6 +83,7 @@ def footprint_operator(footprints, rows, columns):
     Parameters
     ----------
     footprints : Footprints
+        On one axis.
     rows, columns : slice
         Window of the grid; what lies outside of it is lost.
 

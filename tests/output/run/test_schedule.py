@@ -7,10 +7,11 @@ import xarray as xr
 from dask.core import get_dependencies
 
 from fifesim import fife_site
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.base.footprints import Boxcar, axis_operator
 from fifesim.output.run.schedule import ordered_blocks, run_on_threads
 from fifesim.rasters import grid as grids
-from fifesim.rasters.chunks import neighbourhood, resample, tiles
+from fifesim.rasters.chunks import neighbourhood, tiles
+from fifesim.rasters.regularization import resample
 
 
 def places(row, column, shape):
@@ -27,7 +28,7 @@ def means(side, chunk):
         Boxcar(3.3 * cell), cell_origin=0, cell_size=cell, n_cells=side, pixel_origin=0, pixel_size=3.1 * cell,
         n_pixels=side // 4,
     )  # fmt: skip
-    return resample(regularize, axis, axis, array, grids.aligned(grid, 4 * cell)).data
+    return resample(axis, axis, array, grids.aligned(grid, 4 * cell)).data
 
 
 def wanted(array, name="means"):
@@ -67,7 +68,7 @@ def test_what_waits_does_not_grow_with_the_rows():
             )
             for size in raster.shape
         ]
-        array = resample(regularize, *axes, raster, grids.aligned(grid, 10.0)).data
+        array = resample(*axes, raster, grids.aligned(grid, 10.0)).data
         graph, _, order = ordered_blocks({"a": array}, wanted(array, "a"))
         last = {}
         for key in graph:

@@ -15,7 +15,7 @@ def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
     radiance : xarray.DataArray, dims (band, y, x)
         By pixels. [W m-2 sr-1 um-1]
     instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
         One for each of the array.
     kinds : str or sequence of str
         Among "shot", "thermal" and "fixed-pattern".

@@ -1,13 +1,11 @@
 """Pixels of an instrument over a labelled scene: which bands, where they lie, and the means over their footprints."""
 
-from functools import partial
-
 import numpy as np
 import xarray as xr
 
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
-from fifesim.rasters import cf, chunks
+from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
+from fifesim.rasters.regularization import areas, regularized
 
 
 def matching_bands(array, instrument):
@@ -22,7 +20,7 @@ def matching_bands(array, instrument):
 
     Returns
     -------
-    bands : tuple of fifesim.sensor.description.instruments.InstrumentBand
+    bands : tuple of fifesim.sensor.description.band.InstrumentBand
 
     Raises
     ------
@@ -67,7 +65,7 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
     ----------
     scene : odc.geo.geobox.GeoBox
     instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
     onto, interval : optional
         As in `fifesim.sensor.raster.sense`.
 
@@ -107,7 +105,7 @@ def common_size(instrument, bands, size):
     Parameters
     ----------
     instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
     size : callable
         ``size(band)`` gives metres along and across the track.
 
@@ -133,7 +131,7 @@ def common_size(instrument, bands, size):
     return next(iter(names))
 
 
-def regularized(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_valid):
+def means_by_band(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_valid):
     """
     Means over the footprints of pixels, each band with its own line spread functions.
 
@@ -141,7 +139,7 @@ def regularized(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_vali
     ----------
     array : xarray.DataArray, dims (band, y, x)
     instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.instruments.InstrumentBand
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
         One for each of the array.
     pixels : odc.geo.geobox.GeoBox
     offset : (float or array, float or array), optional
@@ -162,26 +160,49 @@ def regularized(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_vali
     --------
     fifesim.base.footprints.regularize
     """
-    scene = grids.geobox(array)
     if not hasattr(offset, "__len__") or len(offset) != 2:
         raise ValueError(f"offset must be two, of rows and of columns in pixels, such as (0.5, 0.0), got {offset!r}")
-    axes = zip(offset, pixels.shape, grids.cell_size(pixels), ("rows", "columns"), strict=True)
-    shifts = [_shift(*axis) for axis in axes]
+    down, across = grids.cell_size(pixels)
+    shifts = _shift(offset[0], pixels.shape.y, down, "rows"), _shift(offset[1], pixels.shape.x, across, "columns")
+
+    def means(part, spreads, names):
+        _check_scene(spreads, grids.geobox(array), min_valid, f"{instrument.name} {names}")
+        return regularized(part, spreads, pixels, shifts=shifts, min_valid=min_valid)
+
+    return grids.place(by_line_spread(means, array, instrument, bands), pixels)
+
+
+def by_line_spread(means, array, instrument, bands):
+    """
+    Raster made of bands that share their line spread functions at a time.
+
+    Parameters
+    ----------
+    means : callable
+        ``means(part, spreads, names)`` makes it of the bands that have these line spread functions.
+    array : xarray.DataArray, dims (band, y, x)
+    instrument : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
+        One for each of the array.
+
+    Returns
+    -------
+    raster : xarray.DataArray, dims (band, ...)
+        Bands in the order of the array.
+    """
     groups = {}
     for number, band in enumerate(bands):
         groups.setdefault(instrument.line_spreads(band), []).append(number)
-    kernel = partial(regularize, min_valid=min_valid)
-    parts = []
-    for spreads, numbers in groups.items():
-        _check_scene(spreads, scene, min_valid, f"{instrument.name} {', '.join(bands[n].name for n in numbers)}")
-        rows, columns = _operators(spreads, scene, pixels, shifts)
-        part = array if len(groups) == 1 else array.isel(band=numbers)
-        parts.append(chunks.resample(kernel, rows, columns, part, pixels))
+    parts = [
+        means(
+            array if len(groups) == 1 else array.isel(band=numbers), spreads, ", ".join(bands[n].name for n in numbers)
+        )
+        for spreads, numbers in groups.items()
+    ]
     if len(parts) == 1:
         return parts[0]
-    order = np.argsort(np.concatenate(list(groups.values())))
     joined = xr.concat(parts, dim="band", combine_attrs="override", coords="minimal", compat="override", join="exact")
-    return grids.place(joined.isel(band=order), pixels)
+    return joined.isel(band=np.argsort(np.concatenate(list(groups.values()))))
 
 
 def directions_on(pixels, geometry):
@@ -200,9 +221,7 @@ def directions_on(pixels, geometry):
     """
 
     def mean(array):
-        scene = grids.geobox(array)
-        rows, columns = _operators([Boxcar(size) for size in grids.cell_size(pixels)], scene, pixels, (0.0, 0.0))
-        return chunks.resample(partial(regularize, min_valid=0.01), rows, columns, array, pixels)
+        return regularized(array, areas(pixels), pixels, min_valid=0.01)
 
     def azimuth(array):
         radians = np.radians(array)
@@ -214,18 +233,6 @@ def directions_on(pixels, geometry):
         return geometry
     kept = {name: geometry[name].variable for name in geometry.data_vars if name not in names}
     return xr.Dataset(kept | {name: averaged[name](geometry[name]) for name in names})
-
-
-def _operators(spreads, scene, pixels, shifts):
-    axes = (
-        (scene.affine.f, scene.affine.e, scene.shape.y, pixels.affine.f, pixels.affine.e, pixels.shape.y),
-        (scene.affine.c, scene.affine.a, scene.shape.x, pixels.affine.c, pixels.affine.a, pixels.shape.x),
-    )
-    names = ("cell_origin", "cell_size", "n_cells", "pixel_origin", "pixel_size", "n_pixels")
-    return [
-        axis_operator(spread, **dict(zip(names, axis, strict=True)), shift=shift)
-        for spread, axis, shift in zip(spreads, axes, shifts, strict=True)
-    ]
 
 
 def _shift(offset, size, pixel, axis):
@@ -241,14 +248,17 @@ def _shift(offset, size, pixel, axis):
 
 def _check_scene(spreads, scene, min_valid, name):
     """Refuse a point spread of which no pixel can hold enough."""
-    shares, sizes = [], []
-    for spread, cells, cell in zip(spreads, scene.shape, grids.cell_size(scene), strict=True):
-        reach = cells * cell / 2
-        shares.append(float(spread.cumulative(reach) - spread.cumulative(-reach)))
-        sizes.append(f"{2 * spread.half_width:.1f}")
-    if np.prod(shares) < min(min_valid, 1.0) - 1e-9:
-        height, width = (n * cell for n, cell in zip(scene.shape, grids.cell_size(scene), strict=True))
+    along, across = spreads
+    height, width = (count * size for count, size in zip(scene.shape, grids.cell_size(scene), strict=True))
+    share = _within(along, height) * _within(across, width)
+    if share < min(min_valid, 1.0) - 1e-9:
         raise ValueError(
-            f"the point spread of {name}, {' x '.join(sizes)} m, is wider than the scene of {height:g} x {width:g} m, "
-            f"which holds {np.prod(shares):.0%} of it: simulate a larger scene, or accept it with min_valid="
+            f"the point spread of {name}, {2 * along.half_width:.1f} x {2 * across.half_width:.1f} m, is wider than "
+            f"the scene of {height:g} x {width:g} m, which holds {share:.0%} of it: simulate a larger scene, or accept "
+            "it with min_valid="
         )
+
+
+def _within(spread, size):
+    """Share of a response that a scene of this size holds around its middle."""
+    return float(spread.cumulative(size / 2) - spread.cumulative(-size / 2))

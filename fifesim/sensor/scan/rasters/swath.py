@@ -2,22 +2,22 @@
 
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
-import dask.array as da
 import numpy as np
 import xarray as xr
 
-from fifesim.rasters import cf
+from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.raster import MIN_VALID, as_radiance, recorded
 from fifesim.sensor.response.rasters.noise import noisy
-from fifesim.sensor.response.rasters.pixels import common_size, matching_bands
+from fifesim.sensor.response.rasters.pixels import by_line_spread, common_size, matching_bands
 from fifesim.sensor.scan import track as scan
 from fifesim.sensor.scan.rasters.view import degrees, find_track, transformer
 from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_operator
 
-# Pixels along each side of a block.
+# Pixels along each side of a block: the operator of a whole image would fill the memory.
 _BLOCK = 128
 
 # Displacement on the ground by which the frame of a pixel is found. [m]
@@ -157,51 +157,39 @@ def _cells(scene, latitude, longitude):
     return (y - scene.affine.f) / scene.affine.e, (x - scene.affine.c) / scene.affine.a
 
 
+class _Seen(NamedTuple):
+    """What pixels see of an array, as `fifesim.rasters.chunks.windows` reads it."""
+
+    array: object
+    footprints: Footprints
+
+    def window(self, lines, samples):
+        """Rows and columns of the cells that a block of pixels touches."""
+        return self.footprints[lines, samples].window(self.array.shape[-2:])
+
+
 def _means(toa, description, bands, pixels, min_valid):
     """Means over the footprints, by band; lazy where the scene is."""
     if not 0 <= min_valid <= 1:
         raise ValueError(f"min_valid must be in [0, 1], got {min_valid}: it is a share of the footprint")
-    groups = {}
-    for number, band in enumerate(bands):
-        groups.setdefault(description.line_spreads(band), []).append(number)
-    lazy = isinstance(toa.data, da.Array)
-    parts = []
-    for spreads, numbers in groups.items():
-        lines, samples = _cuts(pixels.row.shape)
-        blocks = [[_block(toa.data, numbers, spreads, pixels, i, j, min_valid) for j in samples] for i in lines]
-        parts.append((da if lazy else np).block(blocks))
-    order = np.argsort(np.concatenate(list(groups.values())))
-    data = (da if lazy else np).concatenate(parts)[order]
-    coords = {name: value for name, value in toa.coords.items() if not {"y", "x"} & set(value.dims)}
-    return xr.DataArray(data, dims=("band", "line", "sample"), coords=coords, attrs=toa.attrs)
+
+    def means(part, spreads, names):
+        footprints = Footprints(pixels.row, pixels.column, pixels.frame, *spreads)
+        kernel = partial(_block_means, footprints, part.shape[-2:], min_valid)
+        shape = part.sizes["band"], *pixels.row.shape
+        data = chunks.in_blocks(kernel, [_Seen(part.data, footprints)], shape, _BLOCK)
+        coords = chunks.other_coordinates(part)
+        return xr.DataArray(data, dims=("band", "line", "sample"), coords=coords, attrs=toa.attrs)
+
+    return by_line_spread(means, toa, description, bands)
 
 
-def _cuts(shape):
-    """Slices of blocks, whose operators are made one after the other: that of a whole image would fill the memory."""
-    return tuple([slice(at, min(at + _BLOCK, size)) for at in range(0, size, _BLOCK)] for size in shape)
-
-
-def _block(data, numbers, spreads, pixels, lines, samples, min_valid):
-    """A block of the image, from the window of the scene that its footprints touch."""
-    shape = lines.stop - lines.start, samples.stop - samples.start
-    footprints = Footprints(
-        pixels.row[lines, samples].ravel(),
-        pixels.column[lines, samples].ravel(),
-        pixels.frame[lines, samples].reshape(-1, 2, 2),
-        *spreads,
-    )
-    window = footprints.window(data.shape[-2:])
-    cells = data[(..., *window)][numbers]
-    kernel = partial(_regularize, footprints=footprints, window=window, shape=shape, min_valid=min_valid)
-    if not isinstance(cells, da.Array):
-        return kernel(cells)
-    cells = cells.rechunk(-1)
-    return cells.map_blocks(kernel, dtype=float, chunks=((len(numbers),), (shape[0],), (shape[1],)))
-
-
-def _regularize(cells, footprints, window, shape, min_valid):
-    operator = footprint_operator(footprints, *window)
-    return apply_operator(operator, cells.reshape(cells.shape[0], -1), min_valid).reshape(-1, *shape)
+def _block_means(footprints, shape, min_valid, lines, samples, cells):
+    """Means over the footprints of a block of pixels, from the cells that they touch."""
+    seen = footprints[lines, samples]
+    operator = footprint_operator(seen, *seen.window(shape))
+    means = apply_operator(operator, cells.reshape(len(cells), -1), min_valid)
+    return means.reshape(len(cells), lines.stop - lines.start, samples.stop - samples.start)
 
 
 def _coordinates(scene, pixels, description):

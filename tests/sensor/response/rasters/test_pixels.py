@@ -12,8 +12,13 @@ from fifesim.base.geometry import Geometry
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.spatial_response import (
+    BoxcarResponse,
+    CosineResponse,
+    GaussianResponse,
+    TwoAxesResponse,
+)
 from fifesim.sensor.response.rasters.pixels import matching_bands
-from fifesim.sensor.response.spatial_response import BoxcarResponse, CosineResponse, GaussianResponse, TwoAxesResponse
 
 TM = instrument("TM")
 INTERVAL = 43e-6 * 705e3

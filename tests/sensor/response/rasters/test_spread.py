@@ -7,7 +7,7 @@ import pytest
 
 import fifesim
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.response.spatial_response import BoxcarResponse, CosineResponse, TwoAxesResponse
+from fifesim.sensor.description.spatial_response import BoxcarResponse, CosineResponse, TwoAxesResponse
 
 TM = instrument("TM")
 

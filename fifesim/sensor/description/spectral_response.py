@@ -12,28 +12,14 @@ from pyrsr.rsr import RSR_reader
 
 from fifesim.base import datasets
 from fifesim.base.bands import Band
-from fifesim.sensor.response.spatial_response import CONFIG, Number
-
-Name = Annotated[str, Field(strict=True, min_length=1)]
+from fifesim.sensor.description.fields import CONFIG, Name, Number
 
 # No band of these instruments reaches 100 um, and none begins below 100 nm.
 _LONGEST = 100.0
 
 
-@dataclass(frozen=True, config=CONFIG)
-class PyrsrResponse:
-    """
-    Relative spectral response among those that pyrsr distributes.
-
-    Parameters
-    ----------
-    satellite, sensor, band : str
-        Names in pyrsr, such as ``"Landsat-5"``, ``"TM"``, ``"3"``.
-    """
-
-    satellite: Name
-    sensor: Name
-    band: Name
+class NamedResponse:
+    """Relative spectral response as a file names it: each kind finds it, ``_read(name)``."""
 
     def read(self, name):
         """
@@ -51,13 +37,32 @@ class PyrsrResponse:
         Raises
         ------
         ValueError
-            If pyrsr has no such response.
+            If there is no such response, its wavelengths are not in um or do not increase, or it is negative.
         """
+        return self._read(name)
+
+
+@dataclass(frozen=True, config=CONFIG)
+class PyrsrResponse(NamedResponse):
+    """
+    Relative spectral response among those that pyrsr distributes.
+
+    Parameters
+    ----------
+    satellite, sensor, band : str
+        Names in pyrsr, such as ``"Landsat-5"``, ``"TM"``, ``"3"``.
+    """
+
+    satellite: Name
+    sensor: Name
+    band: Name
+
+    def _read(self, name):
         return _read_pyrsr(name, self)
 
 
 @dataclass(frozen=True, config=CONFIG)
-class ResponseTable:
+class ResponseTable(NamedResponse):
     """
     Relative spectral response in a CSV table with columns satellite, band, wavelength [um] and response.
 
@@ -76,29 +81,12 @@ class ResponseTable:
     band: Name
     folder: str = ""
 
-    def read(self, name):
-        """
-        The response.
-
-        Parameters
-        ----------
-        name : str
-            Of the band that it is made for.
-
-        Returns
-        -------
-        response : fifesim.base.bands.Band
-
-        Raises
-        ------
-        ValueError
-            If there is no such table, or it has no such rows.
-        """
+    def _read(self, name):
         return _read_table(name, self)
 
 
 @dataclass(frozen=True, config=CONFIG)
-class ResponseList:
+class ResponseList(NamedResponse):
     """
     Relative spectral response written out in the file.
 
@@ -113,24 +101,7 @@ class ResponseList:
     wavelength: Annotated[tuple[Number, ...], Field(min_length=2)]
     response: Annotated[tuple[Number, ...], Field(min_length=2)]
 
-    def read(self, name):
-        """
-        The response.
-
-        Parameters
-        ----------
-        name : str
-            Of the band that it is made for.
-
-        Returns
-        -------
-        response : fifesim.base.bands.Band
-
-        Raises
-        ------
-        ValueError
-            If the wavelengths are not in um, do not increase, or a response is negative.
-        """
+    def _read(self, name):
         if max(self.wavelength) > _LONGEST:
             raise ValueError(
                 f"srf.wavelength = {max(self.wavelength):g}: wavelengths are in um, these look like nm: divide by 1000"

@@ -7,33 +7,14 @@ Spatial responses as instrument files give them: angles, which an altitude turns
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from pydantic import ConfigDict, Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
 from fifesim.base.footprints import Boxcar
+from fifesim.sensor.description.axes import TwoAxes
+from fifesim.sensor.description.fields import CONFIG, Count, Number, Positive, Share
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread, TableSpread
 from fifesim.sensor.response.transfer import Diffraction, LowPass, SystemSpread
-
-CONFIG = ConfigDict(extra="forbid")
-
-# Strict: TOML has types, and text where a number belongs is a mistake.
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-Count = Annotated[int, Field(strict=True, gt=0)]
-Share = Annotated[float, Field(strict=True, gt=0, lt=1, allow_inf_nan=False)]
-
-
-class AlongAcross(NamedTuple):
-    """
-    Two values in the order of a raster's axes: along the track, by rows, and across it, by columns.
-
-    Parameters
-    ----------
-    along, across : float or line spread function
-    """
-
-    along: object
-    across: object
 
 
 class View(NamedTuple):
@@ -81,23 +62,27 @@ class View(NamedTuple):
         return self.ifov * self.altitude
 
 
+class OneAxis:
+    """Response of one axis: each kind gives its line spread function, ``_spread(view)``."""
+
+    def spread(self, view):
+        """
+        Line spread function on the ground.
+
+        Parameters
+        ----------
+        view : View
+
+        Returns
+        -------
+        lsf : line spread function
+            As `fifesim.base.footprints` takes it.
+        """
+        return self._spread(view)
+
+
 @dataclass(frozen=True, config=CONFIG)
-class Angles:
-    """
-    An angle that differs between the axes.
-
-    Parameters
-    ----------
-    along, across : float
-        Along and across the track. [rad]
-    """
-
-    along: Positive
-    across: Positive
-
-
-@dataclass(frozen=True, config=CONFIG)
-class CosineResponse:
+class CosineResponse(OneAxis):
     """
     A cosine truncated at half amplitude, sampled at angles, as tables of sensors give it.
 
@@ -114,23 +99,12 @@ class CosineResponse:
     step: Positive
     count: Count
 
-    def spread(self, view):
-        """
-        Line spread function on the ground.
-
-        Parameters
-        ----------
-        view : View
-
-        Returns
-        -------
-        lsf : fifesim.sensor.response.spatial.CosineSpread
-        """
+    def _spread(self, view):
         return CosineSpread(self.count * self.step * view.altitude)
 
 
 @dataclass(frozen=True, config=CONFIG)
-class BoxcarResponse:
+class BoxcarResponse(OneAxis):
     """
     The detector alone: uniform over an angle.
 
@@ -144,23 +118,12 @@ class BoxcarResponse:
     kind: Literal["boxcar"]
     width: Positive | None = None
 
-    def spread(self, view):
-        """
-        Line spread function on the ground.
-
-        Parameters
-        ----------
-        view : View
-
-        Returns
-        -------
-        lsf : fifesim.base.footprints.Boxcar
-        """
+    def _spread(self, view):
         return Boxcar(view.width("boxcar") if self.width is None else self.width * view.altitude)
 
 
 @dataclass(frozen=True, config=CONFIG)
-class GaussianResponse:
+class GaussianResponse(OneAxis):
     r"""
     A Gaussian, by one of three measures.
 
@@ -194,18 +157,7 @@ class GaussianResponse:
         if len(given) != 1:
             raise ValueError(f"give one of fwhm, mtf_at_nyquist and eifov, got {' and '.join(given) or 'none'}")
 
-    def spread(self, view):
-        """
-        Line spread function on the ground.
-
-        Parameters
-        ----------
-        view : View
-
-        Returns
-        -------
-        lsf : fifesim.sensor.response.spatial.GaussianSpread
-        """
+    def _spread(self, view):
         if self.mtf_at_nyquist is not None:
             return GaussianSpread.from_mtf(self.mtf_at_nyquist, view.interval * view.altitude)
         fwhm = self.fwhm if self.eifov is None else 4 * np.log(2) / np.pi * self.eifov
@@ -213,7 +165,7 @@ class GaussianResponse:
 
 
 @dataclass(frozen=True, config=CONFIG)
-class TableResponse:
+class TableResponse(OneAxis):
     """
     A measured response, linear between angles and zero beyond them.
 
@@ -234,23 +186,12 @@ class TableResponse:
         # Raises what is wrong with the table before anything is simulated.
         TableSpread(self.angles, self.values)
 
-    def spread(self, view):
-        """
-        Line spread function on the ground.
-
-        Parameters
-        ----------
-        view : View
-
-        Returns
-        -------
-        lsf : fifesim.sensor.response.spatial.TableSpread
-        """
+    def _spread(self, view):
         return TableSpread(tuple(angle * view.altitude for angle in self.angles), self.values)
 
 
 @dataclass(frozen=True, config=CONFIG)
-class SystemResponse:
+class SystemResponse(OneAxis):
     """
     Product of the modulation transfers of an instrument's parts, in units of its own field of view and interval.
 
@@ -282,18 +223,7 @@ class SystemResponse:
     poles: Count = 1
     truncation: Share = 1e-3
 
-    def spread(self, view):
-        """
-        Line spread function on the ground.
-
-        Parameters
-        ----------
-        view : View
-
-        Returns
-        -------
-        lsf : fifesim.sensor.response.transfer.SystemSpread
-        """
+    def _spread(self, view):
         width, interval = view.width("system"), view.interval * view.altitude
         parts = [Boxcar(self.detector * width)]
         if self.smear is not None:
@@ -313,7 +243,7 @@ AxisResponse = Annotated[
 
 
 @dataclass(frozen=True, config=CONFIG)
-class TwoAxesResponse:
+class TwoAxesResponse(TwoAxes):
     """
     Spatial response that differs between the axes.
 
@@ -327,42 +257,11 @@ class TwoAxesResponse:
     across: AxisResponse
 
 
-def _angle_form(value):
-    return "axes" if isinstance(value, dict | Angles) else "number"
-
-
-def _response_form(value):
+def _form(value):
     keys = value if isinstance(value, dict) else vars(value) if hasattr(value, "__dict__") else ()
     return "axes" if {"along", "across"} & set(keys) else "both"
 
 
-# One value for both axes, or one for each.
-Angle = Annotated[Annotated[Positive, Tag("number")] | Annotated[Angles, Tag("axes")], Discriminator(_angle_form)]
 SpatialResponse = Annotated[
-    Annotated[AxisResponse, Tag("both")] | Annotated[TwoAxesResponse, Tag("axes")], Discriminator(_response_form)
+    Annotated[AxisResponse, Tag("both")] | Annotated[TwoAxesResponse, Tag("axes")], Discriminator(_form)
 ]
-
-
-def by_axes(value):
-    """
-    A value of both axes, where it may be given for each.
-
-    Parameters
-    ----------
-    value : Angles, TwoAxesResponse or one value
-        None stays None for both.
-
-    Returns
-    -------
-    values : AlongAcross
-
-    Examples
-    --------
-    >>> by_axes(Angles(along=1.3e-3, across=0.95e-3)).across
-    0.00095
-    >>> by_axes(42.5e-6).along
-    4.25e-05
-    """
-    if isinstance(value, Angles | TwoAxesResponse):
-        return AlongAcross(value.along, value.across)
-    return AlongAcross(value, value)

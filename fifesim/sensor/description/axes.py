@@ -1,0 +1,71 @@
+"""Along the track and across it: values of both axes, or one that serves for both."""
+
+from typing import Annotated, NamedTuple
+
+from pydantic import Discriminator, Tag
+from pydantic.dataclasses import dataclass
+
+from fifesim.sensor.description.fields import CONFIG, Positive
+
+
+class AlongAcross(NamedTuple):
+    """
+    Two values in the order of a raster's axes: along the track, by rows, and across it, by columns.
+
+    Parameters
+    ----------
+    along, across : float or line spread function
+    """
+
+    along: object
+    across: object
+
+
+class TwoAxes:
+    """What an instrument file gives for each axis: ``along`` and ``across`` the track."""
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Angles(TwoAxes):
+    """
+    An angle that differs between the axes.
+
+    Parameters
+    ----------
+    along, across : float
+        Along and across the track. [rad]
+    """
+
+    along: Positive
+    across: Positive
+
+
+def _form(value):
+    return "axes" if isinstance(value, dict | Angles) else "number"
+
+
+# One value for both axes, or one for each.
+Angle = Annotated[Annotated[Positive, Tag("number")] | Annotated[Angles, Tag("axes")], Discriminator(_form)]
+
+
+def by_axes(value):
+    """
+    A value of both axes, where it may be given for each.
+
+    Parameters
+    ----------
+    value : TwoAxes or one value
+        None stays None for both.
+
+    Returns
+    -------
+    values : AlongAcross
+
+    Examples
+    --------
+    >>> by_axes(Angles(along=1.3e-3, across=0.95e-3)).across
+    0.00095
+    >>> by_axes(42.5e-6).along
+    4.25e-05
+    """
+    return AlongAcross(value.along, value.across) if isinstance(value, TwoAxes) else AlongAcross(value, value)

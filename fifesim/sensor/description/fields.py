@@ -1,0 +1,14 @@
+"""What the fields of an instrument file may hold: numbers and names, none of them of another type."""
+
+from typing import Annotated
+
+from pydantic import ConfigDict, Field
+
+CONFIG = ConfigDict(extra="forbid")
+
+# Strict: TOML has types, and text where a number belongs is a mistake.
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+Count = Annotated[int, Field(strict=True, gt=0)]
+Share = Annotated[float, Field(strict=True, gt=0, lt=1, allow_inf_nan=False)]
+Name = Annotated[str, Field(strict=True, min_length=1)]
