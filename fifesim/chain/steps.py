@@ -260,7 +260,7 @@ def to_surface(
 
     See Also
     --------
-    fifesim.atmosphere.schemes.coupling.surface_reflectance
+    fifesim.atmosphere.schemes.coupling.corrected_reflectance
     """
     reflectance = planetary_reflectance(reflectance)
     light = _light(reflectance, atmosphere, geometry, instrument)

@@ -53,7 +53,7 @@ def test_fife_case_is_that_of_a_build_with_more_digits(band):
     first = next(rows.itertuples())
     rows = rows[rows["altitude"] == first.altitude]
     terms = terms_with_own_filter(first, first.altitude)
-    ours = apparent_reflectance(rows["surface_reflectance"].to_numpy(), *terms[:5])
+    ours = apparent_reflectance(rows["surface_reflectance"].to_numpy(), **terms.uniform)
     np.testing.assert_allclose(ours, rows["toa_reflectance"], atol=3e-5)
     assert terms.transmittance_down == pytest.approx(first.transmittance_down, abs=6e-6)
     assert terms.spherical_albedo == pytest.approx(first.spherical_albedo, abs=6e-6)
@@ -75,13 +75,14 @@ def test_fife_case_from_published_responses_is_that_of_the_engine_s_own_filters(
         bands = [Band(name, *RESPONSES[name[2:]].T) for name in names]
         terms = six_s.band_terms(atmosphere, bands, first.sza, first.vza, first.raa)
         index = [names.index(name) for name in rows["band"]]
-        ours = apparent_reflectance(rows["surface_reflectance"].to_numpy(), *(values[index] for values in terms[:5]))
+        of_rows = {name: values[index] for name, values in terms.uniform.items()}
+        ours = apparent_reflectance(rows["surface_reflectance"].to_numpy(), **of_rows)
         np.testing.assert_allclose(ours, rows["toa_reflectance"], atol=5e-4)
 
 
 @pytest.mark.parametrize("row", list(GRID.sample(3, random_state=0).itertuples()), ids=lambda row: row.band)
 def test_other_angles_are_those_of_a_build_with_more_digits(row):
-    ours = apparent_reflectance(0.3, *terms_with_own_filter(row, 0.0)[:5])
+    ours = apparent_reflectance(0.3, **terms_with_own_filter(row, 0.0).uniform)
     assert ours == pytest.approx(row.toa_reflectance, abs=2e-6)
 
 
@@ -91,7 +92,7 @@ def test_band_formula_gives_the_apparent_reflectance_of_the_engine():
     terms = six_s.band_terms(Atmosphere(visibility=8.0), bands, **GEOMETRY)
     for reflectance in (0.0, 0.5):
         engine = [engine_reflectance(band, reflectance, 8.0, **GEOMETRY) for band in bands]
-        np.testing.assert_allclose(apparent_reflectance(reflectance, *terms[:5]), engine, atol=5e-5)
+        np.testing.assert_allclose(apparent_reflectance(reflectance, **terms.uniform), engine, atol=5e-5)
 
 
 def test_filter_keeps_the_integral_of_linear_spectra():
@@ -179,7 +180,7 @@ def test_opaque_band_has_finite_terms():
     opaque = Band("opaque", (2.62, 2.72), (1, 1))
     terms = six_s.band_terms(Atmosphere(), [opaque], 70.0, 0.0, 0.0)
     assert np.isfinite(terms).all()
-    assert 0 <= apparent_reflectance(1.0, *terms[:5])[0] < 1e-3
+    assert 0 <= apparent_reflectance(1.0, **terms.uniform)[0] < 1e-3
 
 
 def test_nothing_is_shown_but_on_a_terminal(capfd):
