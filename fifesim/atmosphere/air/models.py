@@ -8,7 +8,7 @@ import numpy as np
 
 from fifesim.atmosphere.air import aerosols, molecules
 from fifesim.atmosphere.air.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
-from fifesim.atmosphere.air.summary import describe
+from fifesim.atmosphere.air.summary import atmosphere_in_words
 
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
@@ -109,7 +109,7 @@ class Atmosphere:
             object.__setattr__(self, name, value)
 
     def __str__(self):
-        return describe(self)
+        return atmosphere_in_words(self)
 
     @property
     def text(self):

