@@ -116,7 +116,7 @@ def budget(
         files = budget_to_folder(found, output, overwrite=overwrite, **options)
     except ValueError as error:
         _stop(error, Exit.MISTAKE)
-    except (OSError, MemoryError) as error:
+    except (OSError, MemoryError, RuntimeError, ImportError) as error:
         _stop(error, Exit.FAILURE)
     for path in files:
         typer.echo(path)
@@ -178,7 +178,7 @@ def _errors_in_one_line(output):
         yield
     except ValueError as error:
         _stop(error, Exit.MISTAKE)
-    except (OSError, MemoryError, RuntimeError) as error:
+    except (OSError, MemoryError, RuntimeError, ImportError) as error:
         _stop(error, Exit.FAILURE)
     except KeyboardInterrupt:
         _stop(f"interrupted; what is finished is kept, go on with --resume -o {output}", Exit.INTERRUPTED)

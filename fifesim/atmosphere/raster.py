@@ -9,7 +9,6 @@ from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
 
 _REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
-_UNIFORM = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
 
 
 def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacency=False, surroundings=None):
@@ -44,7 +43,8 @@ def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacenc
 
     See Also
     --------
-    fifesim.atmosphere.schemes.coupling.apparent_reflectance, fifesim.atmosphere.adjacency.environment.inhomogeneous_reflectance
+    fifesim.atmosphere.schemes.coupling.apparent_reflectance,
+    fifesim.atmosphere.schemes.coupling.inhomogeneous_reflectance
     """
     cf.check_quantity(reflectance, "surface_reflectance")
     said = ("toa_reflectance", "to_toa")
@@ -74,7 +74,7 @@ def to_surface(reflectance, atmosphere, bands, geometry, *, elevation=None, adja
 
     See Also
     --------
-    fifesim.atmosphere.schemes.coupling.surface_reflectance
+    fifesim.atmosphere.schemes.coupling.corrected_reflectance
     """
     cf.check_quantity(reflectance, "toa_reflectance")
     said = ("surface_reflectance", "to_surface")
@@ -133,8 +133,8 @@ def _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency,
 
 def _uniform(verb, reflectance, atmosphere, bands, geometry):
     terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
-    kernel = coupling.apparent_reflectance if verb == "to_toa" else coupling.surface_reflectance
-    per_band = (xr.DataArray(getattr(terms, term), dims="band") for term in _UNIFORM)
+    kernel = coupling.apparent_reflectance if verb == "to_toa" else coupling.corrected_reflectance
+    per_band = (xr.DataArray(values, dims="band") for values in terms.uniform.values())
     return chunks.pointwise(kernel, reflectance, *per_band)
 
 
@@ -163,5 +163,6 @@ def _with_adjacency(verb, reflectance, atmosphere, bands, geometry, elevation, s
         what = "elevation" if elevation is not None else "rasters of " + ", ".join(cf.varying(geometry))
         raise ValueError(f"adjacency takes one geometry and one altitude, got {what}: leave one of the two out")
     terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
-    step = adjacency_raster.apparent_reflectance if verb == "to_toa" else adjacency_raster.surface_reflectance
-    return step(reflectance, terms, geometry.vza, surroundings)
+    if verb == "to_toa":
+        return adjacency_raster.apparent_reflectance_of_scene(reflectance, terms, geometry.vza, surroundings)
+    return adjacency_raster.corrected_reflectance_of_scene(reflectance, terms, geometry.vza, surroundings)

@@ -251,7 +251,7 @@ def to_surface(
 
     See Also
     --------
-    fifesim.atmosphere.schemes.coupling.surface_reflectance
+    fifesim.atmosphere.schemes.coupling.corrected_reflectance
     """
     reflectance = planetary_reflectance(reflectance)
     light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)

@@ -47,7 +47,7 @@ def test_to_toa_keeps_its_word_and_equals_the_kernel(ground):
 def test_to_surface_keeps_its_word_and_equals_the_kernel(ground):
     toa = upward(ground)
     result = check_raster_function(downward, toa, quantity="surface_reflectance")
-    np.testing.assert_array_equal(result, coupling.surface_reflectance(toa.values, *FACTORS))
+    np.testing.assert_array_equal(result, coupling.corrected_reflectance(toa.values, *FACTORS))
 
 
 def test_there_and_back_is_the_same(ground):

@@ -1,9 +1,8 @@
 """
 The environment of a scene on a coarse grid of blocks of its cells.
 
-The mean of the ground around a target varies slowly. It is computed for the centres of the blocks of
-`fifesim.atmosphere.adjacency.blocks`, with the point spread of `fifesim.atmosphere.adjacency.environment`. Outside of the scene lies what its
-surroundings are said to be; cells that are NaN are left out.
+The mean of the ground around a target varies slowly. It is computed for the centres of blocks, with the point spread of
+`adjacency.environment`. Outside of the scene lies what its surroundings are said to be; cells that are NaN are left out.
 """
 
 from typing import NamedTuple
@@ -123,7 +122,7 @@ def _around(total, valid, surroundings, spread, known):
     return far + spread(field) / known
 
 
-def environment_of_target(moments, surroundings, spread, factors):
+def environment_of_target(moments, surroundings, spread, terms):
     r"""
     Mean reflectance around each block, from apparent reflectance.
 
@@ -137,20 +136,20 @@ def environment_of_target(moments, surroundings, spread, factors):
     surroundings : None, float or array
         As in `environment`. [1]
     spread : Spread
-    factors : sequence of float
-        Those of `adjacency.target_reflectance` from path_reflectance on. [1]
+    terms : coupling.TargetTerms
+        Each a float. [1]
 
     Returns
     -------
     environment : array, shape (y + 2, x + 2)
-        That of which `adjacency.target_reflectance` makes a scene with this environment, within 1e-12. [1]
+        That of which `coupling.target_reflectance` makes a scene with this environment, within 1e-12. [1]
 
     Raises
     ------
     RuntimeError
         If the iteration does not converge, for want of direct light.
     """
-    path, down, direct, diffuse, albedo, gas = factors
+    path, down, direct, diffuse, albedo, gas = terms
     total, valid = moments.sum(axis=(1, 2))
     bare = (total / gas - path * valid) / (down * direct)
     slope = moments[0] * (albedo / (down * direct * gas))

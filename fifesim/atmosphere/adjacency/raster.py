@@ -2,16 +2,15 @@
 
 from functools import partial
 
-import dask.array as da
 import numpy as np
 import xarray as xr
 from affine import Affine
-from dask.graph_manipulation import bind
 from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.adjacency import blocks, environment_grid
 from fifesim.atmosphere.adjacency import environment as adjacency
-from fifesim.rasters import chunks
+from fifesim.atmosphere.schemes import coupling
+from fifesim.rasters import chunks, passes
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
 
@@ -54,7 +53,7 @@ def environment(reflectance, weight_molecules, weight_aerosol, vza, *, surroundi
     return _on_cells(_environment(reflectance, (weight_molecules, weight_aerosol), vza, surroundings), reflectance)
 
 
-def apparent_reflectance(reflectance, terms, vza, surroundings=None):
+def apparent_reflectance_of_scene(reflectance, terms, vza, surroundings=None):
     """
     Apparent reflectance at the top of the atmosphere, with the light that the surroundings of each cell add.
 
@@ -84,24 +83,25 @@ def apparent_reflectance(reflectance, terms, vza, surroundings=None):
 
     See Also
     --------
-    fifesim.atmosphere.adjacency.environment.inhomogeneous_reflectance
+    fifesim.atmosphere.schemes.coupling.inhomogeneous_reflectance
     """
     reflectance = _banded(reflectance)
     weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
     coarse = _environment(reflectance, weights, vza, surroundings)
-    return _couple(adjacency.inhomogeneous_reflectance, reflectance, coarse, terms)
+    return _couple(coupling.inhomogeneous_reflectance, reflectance, coarse, _factors(terms, reflectance))
 
 
-def surface_reflectance(toa_reflectance, terms, vza, surroundings=None):
+def corrected_reflectance_of_scene(toa_reflectance, terms, vza, surroundings=None):
     """
-    Surface reflectance without the light that the surroundings of each cell add; the inverse of `apparent_reflectance`.
+    Surface reflectance without the light that the surroundings of each cell add; the inverse of
+    `apparent_reflectance_of_scene`.
 
     Parameters
     ----------
     toa_reflectance : xarray.DataArray, dims ([band], y, x)
         [1]
     terms : object
-        As in `apparent_reflectance`. [1]
+        As in `apparent_reflectance_of_scene`. [1]
     vza : float or array, shape (band,)
         [degree]
     surroundings : float or sequence or xarray.DataArray, optional
@@ -110,7 +110,7 @@ def surface_reflectance(toa_reflectance, terms, vza, surroundings=None):
     Returns
     -------
     reflectance : xarray.DataArray, dims (band, y, x)
-        Lazy where an input is; computes a lazy input twice, as `apparent_reflectance`. [1]
+        Lazy where an input is; computes a lazy input twice, as `apparent_reflectance_of_scene`. [1]
 
     Raises
     ------
@@ -121,14 +121,16 @@ def surface_reflectance(toa_reflectance, terms, vza, surroundings=None):
 
     See Also
     --------
-    fifesim.atmosphere.adjacency.environment_grid.environment_of_target, fifesim.atmosphere.adjacency.environment.target_reflectance
+    fifesim.atmosphere.adjacency.environment_grid.environment_of_target,
+    fifesim.atmosphere.schemes.coupling.target_reflectance
     """
     toa_reflectance = _banded(toa_reflectance)
     weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
-    factors = _per_band(np.stack(np.broadcast_arrays(*_factors(terms)), axis=-1), toa_reflectance, "a term")
-    solve = [partial(environment_grid.environment_of_target, factors=tuple(row)) for row in factors.tolist()]
+    factors = _factors(terms, toa_reflectance)
+    by_band = [coupling.TargetTerms(*row) for row in np.stack(factors, axis=-1).tolist()]
+    solve = [partial(environment_grid.environment_of_target, terms=each) for each in by_band]
     coarse = _on_blocks(blocks.block_moments, solve, toa_reflectance, weights, vza, surroundings)
-    return _couple(adjacency.target_reflectance, toa_reflectance, coarse, terms)
+    return _couple(coupling.target_reflectance, toa_reflectance, coarse, factors)
 
 
 def _banded(array):
@@ -138,19 +140,25 @@ def _banded(array):
     return array.transpose("band", "y", "x")
 
 
-def _factors(terms):
-    """Those of the kernels of `adjacency`, in their order."""
-    diffuse = np.asarray(terms.transmittance_up) - terms.direct_transmittance_up
-    before = terms.path_reflectance, terms.transmittance_down, terms.direct_transmittance_up
-    return (*before, diffuse, terms.spherical_albedo, terms.gas_transmittance)
+def _factors(terms, array):
+    """Terms of the equation of a target in its environment, shape (band,) each."""
+    found = coupling.TargetTerms(
+        path_reflectance=terms.path_reflectance,
+        transmittance_down=terms.transmittance_down,
+        direct_transmittance_up=terms.direct_transmittance_up,
+        diffuse_transmittance_up=np.asarray(terms.transmittance_up) - terms.direct_transmittance_up,
+        spherical_albedo=terms.spherical_albedo,
+        gas_transmittance=terms.gas_transmittance,
+    )
+    return coupling.TargetTerms(*(_per_band(values, array, "a term") for values in found))
 
 
 def _per_band(values, array, what):
-    """Values for each band along the first axis, from one for all or one for each."""
+    """Values of all bands, from one for all or one for each."""
     values, bands = np.asarray(values, float), array.sizes["band"]
     if values.ndim and len(values) not in (1, bands):
         raise ValueError(f"{what} must be one number, or one for each of the {bands} bands, got {len(values)}")
-    return np.broadcast_to(values, (bands, *values.shape[1:]))
+    return np.broadcast_to(values, bands)
 
 
 def _environment(reflectance, weights, vza, surroundings):
@@ -161,22 +169,18 @@ def _environment(reflectance, weights, vza, surroundings):
 def _on_blocks(summarize, solve, array, weights, vza, surroundings):
     """Environment at the blocks and a ring around them, shape (band, y, x): one task for each band."""
     grid = grids.geobox(array)
-    cell = grids.cell_size(grid)
     along = _blocks(grid)
     margin, fars, outer = _surroundings(surroundings, array, along)
-    molecules, aerosol = (_per_band(values, array, "a weight") for values in weights)
-    vza = _per_band(vza, array, "vza")
-    lazy = array.chunks is not None or (outer is not None and outer.chunks is not None)
-    pieces, sums = _sums(summarize, array.data, along)
+    molecules, aerosol = (_per_band(values, array, "a weight").tolist() for values in weights)
+    pieces, sums = _sums(summarize, array, along)
+    kernels = []
+    for band, angle in enumerate(_per_band(vza, array, "vza").tolist()):
+        spread = (*along, grids.cell_size(grid), margin, angle, molecules[band], aerosol[band])
+        kernels.append(partial(_whole, solve[band], pieces, spread, fars[band]))
     shape = tuple(axis.count + 2 for axis in along)
-    sizes = tuple((size,) for size in shape) if lazy else None
-    bands = []
-    for band, each in enumerate(solve):
-        spread = (*along, cell, margin, *(float(values[band]) for values in (vza, molecules, aerosol)))
-        kernel = partial(_whole, each, pieces, spread, fars[band])
-        reads = [sums[band]] if outer is None else [sums[band], outer.data[band]]
-        bands.append(chunks.windows(kernel, [_all_of(part, shape) for part in reads], shape, sizes))
-    return da.stack(bands) if lazy else np.stack(bands)
+    lazy = array.chunks is not None or (outer is not None and outer.chunks is not None)
+    reads = [passes.whole_reads(each, shape) for each in ([sums] if outer is None else [sums, outer.data])]
+    return passes.windows_by_band(kernels, reads, (1,) * len(kernels), shape, _one_chunk(shape) if lazy else None)
 
 
 def _blocks(grid):
@@ -184,69 +188,49 @@ def _blocks(grid):
     return tuple(blocks.blocks_along(*axis) for axis in place)
 
 
+def _one_chunk(shape):
+    return tuple((size,) for size in shape)
+
+
 def _whole(solve, pieces, spread, far, rows, columns, sums, outer=None):
     """Environment at all blocks of one band."""
-    return solve(
-        blocks.whole_blocks(sums, *pieces),
-        far if outer is None else outer,
-        environment_grid.spread_over(*spread),
-    )
+    around = far if outer is None else outer[0]
+    return solve(blocks.whole_blocks(sums[0], *pieces), around, environment_grid.spread_over(*spread))[None]
 
 
-def _all_of(array, shape):
-    """Reads of the whole array by every cell of a result."""
-    rows, columns = ((np.zeros(size, int), np.full(size, n)) for size, n in zip(shape, array.shape[-2:], strict=True))
-    return chunks.Reads(array, rows, columns)
-
-
-def _sums(summarize, data, along):
+def _sums(summarize, array, along):
     """Sums over pieces of blocks, and these; each chunk is let go before the next is made."""
-    lazy = isinstance(data, da.Array)
-    cuts = data.chunks[1:] if lazy else [(size,) for size in data.shape[1:]]
-    pieces, sizes = zip(*(axis.pieces(cut) for axis, cut in zip(along, cuts, strict=True)), strict=True)
+    cuts = array.chunks or _one_chunk(array.shape)
+    pieces, sizes = zip(*(axis.pieces(cut) for axis, cut in zip(along, cuts[1:], strict=True)), strict=True)
     kernel = partial(summarize, along_y=pieces[0], along_x=pieces[1])
     leading = (2, 1, 1) if summarize is blocks.block_sums else (2, 3, 3)
+    reads = [chunks.Reads(array.data, *((each.start, each.stop) for each in pieces))]
     shape = (*leading, *(len(each.start) for each in pieces))
-    edges = [(each.start, each.stop) for each in pieces]
-    if lazy:
-        return pieces, _by_bands(kernel, data, data.chunks[0], edges, shape, sizes)
-    return pieces, chunks.windows(kernel, [chunks.Reads(data, *edges)], (len(data), *shape))
-
-
-def _by_bands(kernel, data, bands, edges, shape, sizes):
-    """Windows of the bands of one chunk at a time."""
-    parts = []
-    for end, count in zip(np.cumsum(bands).tolist(), bands, strict=True):
-        reads = [chunks.Reads(data[end - count : end], *edges)]
-        parts.append(chunks.windows(kernel, reads, (count, *shape), sizes))
-    return da.concatenate(parts)
+    sizes = None if array.chunks is None else sizes
+    return pieces, passes.windows_by_band([kernel] * len(cuts[0]), reads, cuts[0], shape, sizes)
 
 
 def _on_cells(coarse, array):
     """Raster of the environment on the cells, in the chunks of the array."""
     along_y, along_x = (axis.interpolation for axis in _blocks(grids.geobox(array)))
     kernel = partial(blocks.on_cells, along_y=along_y, along_x=along_x)
-    edges = [(axis.start, axis.start + axis.count) for axis in (along_y, along_x)]
-    if isinstance(coarse, da.Array):
-        sizes = array.chunks or tuple((size,) for size in array.shape)
-        data = _by_bands(kernel, coarse, sizes[0], edges, array.shape[1:], sizes[1:])
-    else:
-        data = chunks.windows(kernel, [chunks.Reads(coarse, *edges)], array.shape)
+    reads = [chunks.Reads(coarse, *((axis.start, axis.start + axis.count) for axis in (along_y, along_x)))]
+    sizes = array.chunks or _one_chunk(array.shape)
+    lazy = not isinstance(coarse, np.ndarray)
+    data = passes.windows_by_band(
+        [kernel] * len(sizes[0]), reads, sizes[0], array.shape[1:], sizes[1:] if lazy else None
+    )
     place = {name: value for name, value in array.coords.items() if not {"y", "x"} & set(value.dims)}
     # xarray would take over dask's name.
     out = xr.DataArray(data, dims=("band", "y", "x"), coords=place).rename(None)
     return grids.place(out, grids.geobox(array))
 
 
-def _couple(kernel, array, coarse, terms):
-    """Apply a kernel of `adjacency` to the cells and their environment."""
-    around = _on_cells(coarse, array)
-    if array.chunks is not None:
-        # Made afresh once the environment is known, or all cells would be held until then.
-        array = array.copy(data=bind(array.data, coarse, seed=coarse.name))
-    per_band = [xr.DataArray(_per_band(values, array, "a term"), dims="band") for values in _factors(terms)]
-    plain = [each.drop_vars("band", errors="ignore") for each in (array, around)]
-    out = chunks.pointwise(kernel, *plain, *per_band)
+def _couple(kernel, array, coarse, factors):
+    """Apply a kernel of `coupling` to the cells and their environment."""
+    cells = passes.second_pass(array, coarse), _on_cells(coarse, array)
+    plain = [each.drop_vars("band", errors="ignore") for each in cells]
+    out = chunks.pointwise(kernel, *plain, *(xr.DataArray(values, dims="band") for values in factors))
     if "band" in array.coords:
         out = out.assign_coords(band=array["band"])
     return grids.place(out, grids.geobox(array))

@@ -1,14 +1,14 @@
 """The state of the atmosphere: profile of the air, aerosol and how much there is of each."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 import numpy as np
 
 from fifesim.atmosphere.air import aerosols, molecules
 from fifesim.atmosphere.air.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
-from fifesim.atmosphere.air.summary import describe
+from fifesim.atmosphere.air.summary import atmosphere_in_words
 
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
@@ -109,7 +109,7 @@ class Atmosphere:
             object.__setattr__(self, name, value)
 
     def __str__(self):
-        return describe(self)
+        return atmosphere_in_words(self)
 
     @property
     def text(self):
@@ -155,13 +155,31 @@ class Atmosphere:
     def levels(self):
         """Profile above the ground with the user's columns, as `profiles.Levels`."""
         levels = profile_above(self.profile, self.altitude)
-        columns = {"h2o": (self.h2o, water_vapour_column), "o3": (self.o3, ozone_column)}
-        scaled = {
-            name: getattr(levels, name) * wanted / measure(levels)
-            for name, (wanted, measure) in columns.items()
-            if wanted is not None
-        }
-        return levels._replace(**scaled)
+        own = {name: getattr(levels, name) * column / measure(levels) for name, column, measure in self._own_columns()}
+        return levels._replace(**own)
+
+    def above(self, altitude):
+        """
+        The same air above other ground.
+
+        Parameters
+        ----------
+        altitude : float
+            [km]
+
+        Returns
+        -------
+        atmosphere : Atmosphere
+            A column of the user's own is that at the altitude of this one, and scales the profile at the other.
+        """
+        here, there = (profile_above(self.profile, z) for z in (self.altitude, altitude))
+        own = {name: measure(there) / measure(here) * column for name, column, measure in self._own_columns()}
+        return replace(self, altitude=altitude, **own)
+
+    def _own_columns(self):
+        """Name of each column that the user gave, the column, and how that of a profile is measured."""
+        columns = ("h2o", self.h2o, water_vapour_column), ("o3", self.o3, ozone_column)
+        return [each for each in columns if each[1] is not None]
 
     @property
     def pressure(self):

@@ -9,7 +9,7 @@ from fifesim.atmosphere.schemes import scattering
 _BANDS = ((0.45, 0.52), (0.52, 0.60), (0.63, 0.69), (0.76, 0.90), (1.55, 1.75), (2.08, 2.35))
 
 
-def describe(atmosphere):
+def atmosphere_in_words(atmosphere):
     """
     Columns, optical depths and band transmittances of an atmosphere.
 

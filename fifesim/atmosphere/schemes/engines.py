@@ -18,7 +18,7 @@ SCATTERING = {
 }
 
 
-def band_terms(atmosphere, bands, sza, vza, raa):
+def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     """
     What the atmosphere does in each band, by its engine.
 
@@ -31,6 +31,8 @@ def band_terms(atmosphere, bands, sza, vza, raa):
         0 to 75. [degree]
     raa : float
         0 has sun and sensor on the same side. [degree]
+    each : callable, optional
+        Goes through the runs of 6S, one for each band, such as with a progress bar.
 
     Returns
     -------
@@ -39,6 +41,8 @@ def band_terms(atmosphere, bands, sza, vza, raa):
 
     Raises
     ------
+    ImportError
+        If the engine is 6S and not installed.
     ValueError
         If a zenith angle is out of range, or a band reaches beyond the gas table.
 
@@ -58,7 +62,7 @@ def band_terms(atmosphere, bands, sza, vza, raa):
     check_zenith("sza", sza)
     check_zenith("vza", vza)
     if atmosphere.engine == "6S":
-        return six_s.band_terms(atmosphere, tuple(bands), sza, vza, raa)
+        return six_s.band_terms(atmosphere, bands, sza, vza, raa, each=each)
     return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
 
 

@@ -1,6 +1,5 @@
 """Reflectance through an atmosphere whose sun, view or ground altitude varies from cell to cell."""
 
-import dataclasses
 import threading
 from functools import lru_cache
 from typing import NamedTuple
@@ -9,8 +8,7 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import CubicSpline
 
-from fifesim.atmosphere.air.models import ozone_column, water_vapour_column
-from fifesim.atmosphere.air.profiles import profile_above
+from fifesim.atmosphere.schemes.coupling import apparent_reflectance_of_cell, corrected_reflectance_of_cell
 from fifesim.atmosphere.schemes.engines import LARGEST_ZENITH, terms_at
 from fifesim.atmosphere.schemes.single_scattering import once_on_nodes, once_reflectance, scattered_once
 from fifesim.base.geometry import relative_azimuth
@@ -23,6 +21,23 @@ HIGHEST = 4.0  # ground altitude that the profiles hold to [km]
 LINEAR, CUBIC = 2, 4  # nodes that an interpolation takes
 
 _lock = threading.Lock()
+
+
+class ByAxis(NamedTuple):
+    """One thing for each axis of the tables."""
+
+    altitude: object
+    sza: object
+    vza: object
+    raa: object
+
+
+class Lattice(NamedTuple):
+    """Nodes of one axis of the tables: a stretch of all, or one value of its own."""
+
+    step: float
+    size: int  # of all; 1 for a value of its own
+    first: int  # of all nodes, with which the stretch begins
 
 
 class Tables(NamedTuple):
@@ -78,23 +93,23 @@ def varying_reflectance(reflectance, altitude, sza, saa, vza, vaa, *, atmosphere
     ----------
     [Tanre1990]_
     """
-    cells = reflectance.shape[:-1]
+    cells, n_bands = reflectance.shape[:-1], reflectance.shape[-1]
     altitude = _in_range("altitude", altitude, HIGHEST, "km")
-    sza, vza = (_in_range(name, angle, LARGEST_ZENITH, "degrees") for name, angle in (("sza", sza), ("vza", vza)))
+    sza, vza = _in_range("sza", sza, LARGEST_ZENITH, "degrees"), _in_range("vza", vza, LARGEST_ZENITH, "degrees")
     raa = relative_azimuth(saa, vaa)
-    axes = (
-        _axis(altitude, ALTITUDE_STEP, HIGHEST, LINEAR, True),
-        _axis(sza, ZENITH_STEP, LARGEST_ZENITH, CUBIC, True),
-        _axis(vza, ZENITH_STEP, LARGEST_ZENITH, CUBIC, False),
-        _axis(raa, AZIMUTH_STEP, 180.0, CUBIC, False),
+    axes = ByAxis(
+        altitude=_axis(altitude, ALTITUDE_STEP, HIGHEST, LINEAR, stretch=True),
+        sza=_axis(sza, ZENITH_STEP, LARGEST_ZENITH, CUBIC, stretch=True),
+        vza=_axis(vza, ZENITH_STEP, LARGEST_ZENITH, CUBIC, stretch=False),
+        raa=_axis(raa, AZIMUTH_STEP, 180.0, CUBIC, stretch=False),
     )
+    lattices, nodes = ByAxis(*(lattice for lattice, _ in axes)), ByAxis(*(nodes for _, nodes in axes))
     once = scattered_once(atmosphere, tuple(bands))
-    tables = _tables(atmosphere, tuple(bands), once, *(axis.nodes for axis in axes))
-    places = (np.broadcast_to(np.asarray(values, float), cells).ravel() for values in (altitude, sza, vza, raa))
-    lattices = tuple((axis.step, axis.size, axis.first) for axis in axes)
-    out = np.empty((reflectance.shape[-1], int(np.prod(cells))))
-    values = np.ascontiguousarray(reflectance, float).reshape(-1, reflectance.shape[-1])
-    _through(values, *places, lattices, tables, once, to_surface, out)
+    tables = _tables(atmosphere, tuple(bands), once, nodes)
+    spread = (np.broadcast_to(np.asarray(values, float), cells).ravel() for values in (altitude, sza, vza, raa))
+    out = np.empty((n_bands, int(np.prod(cells))))
+    values = np.ascontiguousarray(reflectance, float).reshape(-1, n_bands)
+    _through(values, ByAxis(*spread), lattices, tables, once, to_surface, out)
     # The kernel marks what does not converge.
     if np.any(np.isinf(out)):
         raise ValueError(
@@ -132,7 +147,7 @@ def varying_diffuse_fraction(sza, *, atmosphere, bands):
     sza = _in_range("sza", sza, LARGEST_ZENITH, "degrees")
     nodes = np.arange(round(LARGEST_ZENITH / ZENITH_STEP) + 1) * ZENITH_STEP
     terms = [_node(atmosphere, tuple(bands), node, (0.0,), (0.0,)) for node in nodes.tolist()]
-    spline = CubicSpline(nodes, [each.diffuse_fraction[0, 0] for each in terms])
+    spline = CubicSpline(nodes, [at_node.diffuse_fraction[0, 0] for at_node in terms])
     return np.moveaxis(spline(sza), -1, 0)
 
 
@@ -145,55 +160,39 @@ def _in_range(name, values, high, unit):
     return values
 
 
-class _Axis(NamedTuple):
-    """Nodes of one dimension of the tables: a stretch of the lattice, or one value of its own."""
-
-    nodes: np.ndarray
-    step: float  # of the lattice
-    size: int  # nodes of the whole lattice; 1 for a value of its own
-    first: int  # node of the lattice with which the stretch begins
-
-
-def _axis(values, step, high, order, stretch):
+def _axis(values, step, high, order, *, stretch):
+    """Lattice of one axis, and its nodes that the values need: a stretch of them, or all."""
     if values.ndim == 0:
-        return _Axis(values.reshape(1), 1.0, 1, 0)
-    lattice = np.arange(round(high / step) + 1) * step
+        return Lattice(1.0, 1, 0), values.reshape(1)
+    nodes = np.arange(round(high / step) + 1) * step
     known = values[np.isfinite(values)]
-    first, last = 0, lattice.size - order
+    first, last = 0, nodes.size - order
     if stretch:
         ends = (known.min(), known.max()) if known.size else (0.0, 0.0)
         first, last = (min(max(int(end / step) - (order // 2 - 1), 0), last) for end in ends)
-    return _Axis(lattice[first : last + order], step, lattice.size, first)
+    return Lattice(step, nodes.size, first), nodes[first : last + order]
 
 
-def _at_altitude(atmosphere, altitude):
-    """The same air above other ground."""
-    here, there = (profile_above(atmosphere.profile, z) for z in (atmosphere.altitude, altitude))
-    own = {
-        name: column(there) / column(here) * getattr(atmosphere, name)
-        for name, column in (("h2o", water_vapour_column), ("o3", ozone_column))
-        if getattr(atmosphere, name) is not None
-    }
-    return dataclasses.replace(atmosphere, altitude=altitude, **own)
-
-
-def _tables(atmosphere, bands, once, altitude, sza, vza, raa):
-    nodes = [
-        [_node(_at_altitude(atmosphere, z), bands, s, tuple(vza), tuple(raa)) for s in sza.tolist()]
-        for z in altitude.tolist()
+def _tables(atmosphere, bands, once, nodes):
+    vza, raa = nodes.vza, nodes.raa
+    grid = [
+        [_node(atmosphere.above(z), bands, s, tuple(vza), tuple(raa)) for s in nodes.sza.tolist()]
+        for z in nodes.altitude.tolist()
     ]
-    path, albedo, gas = (
-        np.array([[getattr(node, name) for node in row] for row in nodes])
-        for name in ("path_reflectance", "spherical_albedo", "gas_transmittance")
+
+    def gathered(term, views=1):
+        values = np.array([[getattr(terms, term)[:, 0] for terms in row] for row in grid])
+        return np.broadcast_to(values, (*values.shape[:2], views, len(bands)))
+
+    scattered = np.array([[terms.path_reflectance for terms in row] for row in grid])
+    tables = Tables(
+        path_reflectance=scattered - once_on_nodes(nodes.sza, vza, raa, once),
+        transmittance_down=gathered("transmittance_down")[:, :, 0],
+        transmittance_up=gathered("transmittance_up", vza.size)[:, 0],
+        spherical_albedo=gathered("spherical_albedo", vza.size),
+        gas_transmittance=gathered("gas_transmittance", vza.size),
     )
-    shape = (altitude.size, sza.size, vza.size, raa.size, len(bands))
-    return Tables(
-        path - once_on_nodes(sza, vza, raa, *once),
-        np.array([[node.transmittance_down[0, 0] for node in row] for row in nodes]),
-        np.array([np.broadcast_to(row[0].transmittance_up[:, 0], (vza.size, len(bands))) for row in nodes]),
-        np.ascontiguousarray(np.broadcast_to(albedo[:, :, :, 0], (*shape[:3], len(bands)))),
-        np.ascontiguousarray(np.broadcast_to(gas[:, :, :, 0], (*shape[:3], len(bands)))),
-    )
+    return Tables(*(np.ascontiguousarray(values) for values in tables))
 
 
 def _node(atmosphere, bands, sza, vza, raa):
@@ -210,61 +209,69 @@ def _node_terms(atmosphere, bands, sza, vza, raa):
 @njit(nogil=True, cache=True)
 def _stencil(value, lattice, order, weights):
     """Weights of Lagrange's polynomial on the nodes around a value; the first of them in the table, and how many."""
-    step, size, first = lattice
-    if size == 1:
+    if lattice.size == 1:
         weights[0] = 1.0
         return 0, 1
-    place = value / step
-    start = min(max(int(place) - (order // 2 - 1), 0), size - order)
+    place = value / lattice.step
+    start = min(max(int(place) - (order // 2 - 1), 0), lattice.size - order)
     for i in range(order):
         weights[i] = 1.0
         for j in range(order):
             if j != i:
                 weights[i] *= (place - start - j) / (i - j)
-    return start - first, order
+    return start - lattice.first, order
 
 
 @njit(nogil=True, cache=True)
-def _through(reflectance, altitude, sza, vza, raa, lattices, tables, once, to_surface, out):
-    path, down, up, albedo, gas = tables
-    n_bands = path.shape[-1]
-    wa, ws, wv, wr = np.empty(2), np.empty(4), np.empty(4), np.empty(4)
-    terms = np.empty((5, n_bands))
-    for cell in range(reflectance.shape[0]):
-        if np.isnan(altitude[cell] + sza[cell] + vza[cell] + raa[cell]):
+def _interpolate(place, lattices, tables, weights, terms):
+    """Terms of all bands at one place, from the tables."""
+    a, n_altitudes = _stencil(place.altitude, lattices.altitude, LINEAR, weights.altitude)
+    s, n_suns = _stencil(place.sza, lattices.sza, CUBIC, weights.sza)
+    v, n_views = _stencil(place.vza, lattices.vza, CUBIC, weights.vza)
+    r, n_azimuths = _stencil(place.raa, lattices.raa, CUBIC, weights.raa)
+    bands = range(terms.path_reflectance.size)
+    for b in bands:
+        terms.path_reflectance[b] = terms.transmittance_down[b] = terms.transmittance_up[b] = 0.0
+        terms.spherical_albedo[b] = terms.gas_transmittance[b] = 0.0
+    for i in range(n_altitudes):
+        for j in range(n_suns):
+            weight = weights.altitude[i] * weights.sza[j]
+            for b in bands:
+                terms.transmittance_down[b] += weight * tables.transmittance_down[a + i, s + j, b]
+        for k in range(n_views):
+            weight = weights.altitude[i] * weights.vza[k]
+            for b in bands:
+                terms.transmittance_up[b] += weight * tables.transmittance_up[a + i, v + k, b]
+        for j in range(n_suns):
+            for k in range(n_views):
+                weight = weights.altitude[i] * weights.sza[j] * weights.vza[k]
+                at = a + i, s + j, v + k
+                for b in bands:
+                    terms.spherical_albedo[b] += weight * tables.spherical_albedo[at[0], at[1], at[2], b]
+                    terms.gas_transmittance[b] += weight * tables.gas_transmittance[at[0], at[1], at[2], b]
+                for m in range(n_azimuths):
+                    for b in bands:
+                        path = tables.path_reflectance[at[0], at[1], at[2], r + m, b]
+                        terms.path_reflectance[b] += weight * weights.raa[m] * path
+
+
+@njit(nogil=True, cache=True)
+def _through(reflectance, places, lattices, tables, once, to_surface, out):
+    n_bands = out.shape[0]
+    terms = Tables(np.empty(n_bands), np.empty(n_bands), np.empty(n_bands), np.empty(n_bands), np.empty(n_bands))
+    weights = ByAxis(np.empty(LINEAR), np.empty(CUBIC), np.empty(CUBIC), np.empty(CUBIC))
+    for cell in range(out.shape[1]):
+        place = ByAxis(places.altitude[cell], places.sza[cell], places.vza[cell], places.raa[cell])
+        if np.isnan(place.altitude + place.sza + place.vza + place.raa):
             out[:, cell] = np.nan
             continue
-        a, na = _stencil(altitude[cell], lattices[0], LINEAR, wa)
-        s, ns = _stencil(sza[cell], lattices[1], CUBIC, ws)
-        v, nv = _stencil(vza[cell], lattices[2], CUBIC, wv)
-        r, nr = _stencil(raa[cell], lattices[3], CUBIC, wr)
-        terms[:] = 0.0
-        for i in range(na):
-            for j in range(ns):
-                for b in range(n_bands):
-                    terms[1, b] += wa[i] * ws[j] * down[a + i, s + j, b]
-            for k in range(nv):
-                for b in range(n_bands):
-                    terms[2, b] += wa[i] * wv[k] * up[a + i, v + k, b]
-            for j in range(ns):
-                for k in range(nv):
-                    weight = wa[i] * ws[j] * wv[k]
-                    for b in range(n_bands):
-                        terms[3, b] += weight * albedo[a + i, s + j, v + k, b]
-                        terms[4, b] += weight * gas[a + i, s + j, v + k, b]
-                    for m in range(nr):
-                        for b in range(n_bands):
-                            terms[0, b] += weight * wr[m] * path[a + i, s + j, v + k, r + m, b]
+        _interpolate(place, lattices, tables, weights, terms)
         for b in range(n_bands):
-            rho = reflectance[cell, b]
-            two_way = terms[1, b] * terms[2, b]
-            terms[0, b] += once_reflectance(
-                sza[cell], vza[cell], raa[cell], once[0][b], once[1][b], once[2][b], once[3][b]
-            )
+            rho, albedo, gas = reflectance[cell, b], terms.spherical_albedo[b], terms.gas_transmittance[b]
+            path = terms.path_reflectance[b] + once_reflectance(place.sza, place.vza, place.raa, once, b)
+            # One transmittance of both ways stands for the two.
+            two_way = terms.transmittance_down[b] * terms.transmittance_up[b]
             if to_surface:
-                ground = (rho / terms[4, b] - terms[0, b]) / two_way
-                out[b, cell] = ground / (1 + terms[3, b] * ground)
-            elif terms[3, b] * rho >= 1:
-                out[b, cell] = np.inf
+                out[b, cell] = corrected_reflectance_of_cell(rho, path, two_way, 1.0, albedo, gas)
             else:
-                out[b, cell] = terms[4, b] * (terms[0, b] + two_way * rho / (1 - terms[3, b] * rho))
+                out[b, cell] = apparent_reflectance_of_cell(rho, rho, path, two_way, 1.0, albedo, gas)

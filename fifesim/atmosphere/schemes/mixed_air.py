@@ -35,7 +35,8 @@ def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
 
     See Also
     --------
-    fifesim.atmosphere.schemes.successive_orders.path_reflectance, fifesim.atmosphere.schemes.successive_orders.flux_transmittance
+    fifesim.atmosphere.schemes.successive_orders.path_reflectance,
+    fifesim.atmosphere.schemes.successive_orders.flux_transmittance
 
     Examples
     --------

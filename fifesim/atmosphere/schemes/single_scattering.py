@@ -38,9 +38,10 @@ def scattered_once(atmosphere, bands):
     """
     wavelength = np.array([band.center for band in bands])
     cosine = np.cos(np.radians(np.arange(0, 180 + STEP / 2, STEP)))
+    none = np.zeros(wavelength.size)
     if atmosphere.aot == 0:
-        return Once(*np.zeros((3, wavelength.size)), np.zeros((wavelength.size, cosine.size)))
-    overlying = np.zeros(wavelength.size)
+        return Once(none, none, none, np.zeros((wavelength.size, cosine.size)))
+    overlying = none
     if atmosphere.engine != "5S":
         # The closed forms know of no molecules above the aerosol.
         overlying = dataclasses.replace(atmosphere, altitude=0.0).rayleigh_optical_depth(wavelength)
@@ -50,7 +51,7 @@ def scattered_once(atmosphere, bands):
 
 
 @njit(nogil=True, cache=True)
-def once_reflectance(sza, vza, raa, albedo, depth, overlying, phase):
+def once_reflectance(sza, vza, raa, once, band):
     r"""
     Reflectance by single scattering in one band.
 
@@ -60,9 +61,9 @@ def once_reflectance(sza, vza, raa, albedo, depth, overlying, phase):
     ----------
     sza, vza, raa : float
         [degree]
-    albedo, depth, overlying : float
-    phase : array, shape (721,)
-        As in `Once`. [1]
+    once : Once
+    band : int
+        Number of the band in it.
 
     Returns
     -------
@@ -77,21 +78,24 @@ def once_reflectance(sza, vza, raa, albedo, depth, overlying, phase):
     --------
     No aerosol scatters nothing:
 
-    >>> once_reflectance(30.0, 10.0, 50.0, 0.9, 0.0, 0.1, np.ones(721))
+    >>> one = np.ones(1)
+    >>> once_reflectance(30.0, 10.0, 50.0, Once(albedo=one, depth=0 * one, overlying=one, phase=np.ones((1, 721))), 0)
     0.0
     """
     mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))
     sines = np.sin(np.radians(sza)) * np.sin(np.radians(vza))
     cosine = min(max(-mu_s * mu_v - sines * np.cos(np.radians(raa)), -1.0), 1.0)
     place = np.degrees(np.arccos(cosine)) / STEP
+    phase = once.phase[band]
     index = min(int(place), phase.size - 2)
     between = phase[index] + (place - index) * (phase[index + 1] - phase[index])
     air_mass = 1 / mu_s + 1 / mu_v
-    return albedo * between / (4 * (mu_s + mu_v)) * -np.expm1(-air_mass * depth) * np.exp(-air_mass * overlying)
+    turned = once.albedo[band] * between / (4 * (mu_s + mu_v))
+    return turned * -np.expm1(-air_mass * once.depth[band]) * np.exp(-air_mass * once.overlying[band])
 
 
 @njit(nogil=True, cache=True)
-def once_on_nodes(sza, vza, raa, albedo, depth, overlying, phase):
+def once_on_nodes(sza, vza, raa, once):
     """
     The same at all combinations of some angles and bands.
 
@@ -99,8 +103,7 @@ def once_on_nodes(sza, vza, raa, albedo, depth, overlying, phase):
     ----------
     sza, vza, raa : array, shape (S,), (V,) and (R,)
         [degree]
-    albedo, depth, overlying, phase : array
-        As in `Once`. [1]
+    once : Once
 
     Returns
     -------
@@ -114,15 +117,13 @@ def once_on_nodes(sza, vza, raa, albedo, depth, overlying, phase):
     Examples
     --------
     >>> one = np.ones(1)
-    >>> once_on_nodes(30 * one, one, one, one, 0 * one, one, np.ones((1, 721))).shape
+    >>> once_on_nodes(30 * one, one, one, Once(one, 0 * one, one, np.ones((1, 721)))).shape
     (1, 1, 1, 1)
     """
-    out = np.empty((sza.size, vza.size, raa.size, albedo.size))
+    out = np.empty((sza.size, vza.size, raa.size, once.albedo.size))
     for s in range(sza.size):
         for v in range(vza.size):
             for r in range(raa.size):
-                for b in range(albedo.size):
-                    out[s, v, r, b] = once_reflectance(
-                        sza[s], vza[v], raa[r], albedo[b], depth[b], overlying[b], phase[b]
-                    )
+                for b in range(once.albedo.size):
+                    out[s, v, r, b] = once_reflectance(sza[s], vza[v], raa[r], once, b)
     return out

@@ -1,15 +1,12 @@
 """The engine 6S itself, run through Py6S: one run a band. An optional extra."""
 
 import subprocess
-import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from fifesim.atmosphere.air import aerosols, profiles
 from fifesim.atmosphere.schemes.terms import BandTerms
@@ -25,7 +22,6 @@ LIMITS = (0.25, 4.0)  # of the engine's spectrum [um]
 STEP = 0.0025  # of its spectrum [um]
 SURFACE_REFLECTANCE = 0.3  # of the uniform ground in a run; see `terms_of`
 PROCESSES = 2  # runs at a time
-LARGEST_ZENITH = 75.0  # nearer to the horizon the Earth is round, the engine's atmosphere is not [degree]
 COARSE = 1.0  # below it the last digit of a radiance or an irradiance is more than 0.1 % [W m-2 um-1]
 LEAST_GAS_TRANSMITTANCE = 1e-6  # where no light of the ground arrives, so that the path can be divided by it [1]
 
@@ -57,7 +53,7 @@ def check_installed():
         )
 
 
-def band_terms(atmosphere, bands, sza, vza, raa, *, progress=None):
+def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     """
     Terms of the coupling equation in each band, from 6SV1.1.
 
@@ -67,11 +63,11 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, progress=None):
     bands : sequence of Band, length (band,)
         Within 0.25 to 4 um.
     sza, vza : float
-        0 to 75. [degree]
+        In the range of `engines.check_zenith`. [degree]
     raa : float
         0 has sun and sensor on the same side. [degree]
-    progress : bool, optional
-        Show how many bands are done; by default on a terminal, where there is more than one.
+    each : callable, optional
+        Goes through the runs, such as with a progress bar.
 
     Returns
     -------
@@ -83,7 +79,7 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, progress=None):
     ImportError
         If the engine is not installed.
     ValueError
-        If an angle is out of range, or a band reaches beyond the engine's spectrum.
+        If a band reaches beyond the engine's spectrum.
     RuntimeError
         If the engine gives no result.
 
@@ -98,23 +94,10 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, progress=None):
     [Vermote1997]_
     """
     check_installed()
-    for name, angle in (("sza", sza), ("vza", vza)):
-        if not 0 <= angle <= LARGEST_ZENITH:
-            raise ValueError(
-                f"{name} must be from 0 to {LARGEST_ZENITH:g} degrees, got {angle:g}: "
-                "the plane-parallel atmosphere of 6S does not hold below"
-            )
-    progress = len(bands) > 1 if progress is None else progress
-    return _all_bands(atmosphere, tuple(bands), float(sza), float(vza), float(raa), progress and sys.stderr.isatty())
-
-
-@lru_cache(maxsize=256)
-def _all_bands(atmosphere, bands, sza, vza, raa, progress):
+    case = atmosphere, float(sza), float(vza), float(raa)
     with ThreadPoolExecutor(PROCESSES) as pool:
-        runs = pool.map(lambda band: _one_band(atmosphere, band, sza, vza, raa), bands)
-        console = Console(file=sys.stderr)
-        shown = track(runs, "6S, band by band", len(bands), console=console, transient=True, disable=not progress)
-        parts = list(shown)
+        runs = [pool.submit(_one_band, band, *case) for band in bands]
+        parts = [run.result() for run in each(runs)]
     terms = BandTerms(*np.array(parts).T)
     for values in terms:
         values.flags.writeable = False
@@ -122,7 +105,7 @@ def _all_bands(atmosphere, bands, sza, vza, raa, progress):
 
 
 @lru_cache(maxsize=4096)
-def _one_band(atmosphere, band, sza, vza, raa):
+def _one_band(band, atmosphere, sza, vza, raa):
     wavelength, response = filter_function(band)
     model = model_of(atmosphere, sza, vza, raa)
     model.wavelength = Py6S.Wavelength(float(wavelength[0]), float(wavelength[-1]), np.round(response, 7).tolist())

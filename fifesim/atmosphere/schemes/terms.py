@@ -56,6 +56,12 @@ class BandTerms(NamedTuple):
     diffuse_up_molecules: np.ndarray  # ground to sensor, scattered by the molecules alone
     diffuse_up_aerosol: np.ndarray  # by the aerosol alone
 
+    @property
+    def uniform(self):
+        """Those of `coupling.apparent_reflectance`, the equation over a uniform surface, by name and in its order."""
+        names = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
+        return {name: getattr(self, name) for name in names}
+
 
 def nodes_of(bands):
     """

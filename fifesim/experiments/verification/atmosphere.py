@@ -8,7 +8,7 @@ import pandas as pd
 
 from fifesim.atmosphere.adjacency import environment as adjacency
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.coupling import apparent_reflectance
+from fifesim.atmosphere.schemes.coupling import apparent_reflectance, inhomogeneous_reflectance
 from fifesim.atmosphere.schemes.engines import band_terms
 from fifesim.atmosphere.schemes.terms import BandTerms
 from fifesim.base import datasets
@@ -76,7 +76,7 @@ def _optical_depths():
 
 def _five_s_at_fife():
     table = datasets.table("verification/sixs_fife.csv")
-    found = apparent_reflectance(table["surface_reflectance"].to_numpy(), *_terms(table, "5S")[:5])
+    found = apparent_reflectance(table["surface_reflectance"].to_numpy(), **_terms(table, "5S").uniform)
     for band, bound in zip(_BANDS, _FIFE_BOUNDS, strict=True):
         rows = (table["band"] == band).to_numpy()
         worst = largest(found[rows], table["toa_reflectance"][rows])
@@ -86,7 +86,7 @@ def _five_s_at_fife():
 def _five_s():
     table = datasets.table("verification/sixs_grid.csv")
     terms = _terms(table, "5S")
-    found, expected = apparent_reflectance(0.3, *terms[:5]), table["toa_reflectance"].to_numpy()
+    found, expected = apparent_reflectance(0.3, **terms.uniform), table["toa_reflectance"].to_numpy()
     clear = _clear(table)
     for band, bound in zip(_BANDS, _CLEAR_BOUNDS, strict=True):
         rows = (table["band"] == band).to_numpy() & clear
@@ -112,7 +112,7 @@ def _successive_orders():
         terms = _terms(rows, engine)
         found = {
             "path": (terms.path_reflectance * terms.gas_transmittance, 1.0),
-            "toa": (apparent_reflectance(0.3, *terms[:5]), 0.3),
+            "toa": (apparent_reflectance(0.3, **terms.uniform), 0.3),
         }
         for (name, (values, bound)), band in product(found.items(), _VISIBLE):
             of_band = (rows["band"] == band).to_numpy()
@@ -134,7 +134,7 @@ def _adjacency():
     gas = table["gas_transmittance"]
     names = "transmittance_down", "direct_transmittance_up", "diffuse_transmittance_up", "spherical_albedo"
     factors = table["path_reflectance"] / gas, *(table[name] for name in names), gas
-    found = adjacency.inhomogeneous_reflectance(table["target_reflectance"], around, *factors)
+    found = inhomogeneous_reflectance(table["target_reflectance"], around, *factors)
     worst = largest(found, table["toa_reflectance"])
     yield _deviation("round target, apparent reflectance", worst, 0.002, "1")
 

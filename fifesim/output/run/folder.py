@@ -19,6 +19,7 @@ from fifesim.chain.images import ndvi
 from fifesim.output import report
 from fifesim.output.folders import UNFINISHED, check_folder
 from fifesim.output.progress import CellProgress
+from fifesim.output.run.engine import run_engine
 from fifesim.output.run.products import make_scene_store, products_of, wanted_blocks
 from fifesim.output.run.saved import save_block, saved_array, saved_blocks
 from fifesim.output.run.schedule import ordered_blocks, run_on_client, run_on_threads
@@ -85,6 +86,7 @@ def simulate_to_folder(
     check_folder(folder, overwrite, resume)
     complete = scenario.complete()
     with _unfinished(folder, complete, scene, resume) as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
+        run_engine(complete)
         tree = simulate(complete)
         found = products_of(tree, unfinished / SCENE if scene else None)
         if scene and not (unfinished / SCENE).exists():

@@ -10,11 +10,10 @@ from scipy.integrate import dblquad, quad
 from fifesim.atmosphere.adjacency.environment import (
     environment_function,
     environment_weights,
-    inhomogeneous_reflectance,
     mixed_environment_function,
     point_spread,
-    target_reflectance,
 )
+from fifesim.atmosphere.schemes.coupling import inhomogeneous_reflectance, target_reflectance
 
 SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_adjacency.csv", comment="#")
 TERMS = (0.09, 0.8, 0.52, 0.31, 0.19, 0.98)

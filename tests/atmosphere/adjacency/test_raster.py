@@ -116,7 +116,7 @@ def test_apparent_reflectance_in_the_middle_of_a_disc_agrees_with_6s(row):
         path_reflectance=np.array([row.path_reflectance_with_gas / row.gas_transmittance]),
         **{name: np.array([getattr(row, name)]) for name in Terms._fields[1:]},
     )
-    toa = adjacency_raster.apparent_reflectance(disc, terms, row.vza, row.environment_reflectance)
+    toa = adjacency_raster.apparent_reflectance_of_scene(disc, terms, row.vza, row.environment_reflectance)
     assert float(toa[0, size // 2, size // 2]) == pytest.approx(row.toa_reflectance, abs=1e-3)
 
 
@@ -198,23 +198,23 @@ def test_there_and_back_is_the_same(cell, terms):
     values[0, 7:12, 3:30] = np.nan
     ground = raster(values, cell)
     for surroundings in (None, 0.3, [0.1, 0.4], surroundings_of(ground)):
-        toa = adjacency_raster.apparent_reflectance(ground, terms, 40.0, surroundings)
-        back = adjacency_raster.surface_reflectance(toa, terms, 40.0, surroundings)
+        toa = adjacency_raster.apparent_reflectance_of_scene(ground, terms, 40.0, surroundings)
+        back = adjacency_raster.corrected_reflectance_of_scene(toa, terms, 40.0, surroundings)
         np.testing.assert_allclose(back, ground, rtol=0, atol=1e-10)
 
 
 def test_no_direct_light_is_said(scene):
     blind = HAZE._replace(direct_transmittance_up=np.array([1e-6, 1e-6]))
     with pytest.raises(RuntimeError, match="of the light of a target 1e-06 comes to the sensor unscattered"):
-        adjacency_raster.surface_reflectance(scene, blind, 0.0)
+        adjacency_raster.corrected_reflectance_of_scene(scene, blind, 0.0)
 
 
 def forth(array, surroundings=None):
-    return adjacency_raster.apparent_reflectance(array, HAZE, 20.0, surroundings)
+    return adjacency_raster.apparent_reflectance_of_scene(array, HAZE, 20.0, surroundings)
 
 
 def back(array, surroundings=None):
-    return adjacency_raster.surface_reflectance(array, HAZE, 20.0, surroundings)
+    return adjacency_raster.corrected_reflectance_of_scene(array, HAZE, 20.0, surroundings)
 
 
 @pytest.mark.parametrize("function", [environment, forth, back])

@@ -9,7 +9,7 @@ import pytest
 from pyrsr.rsr import RSR_reader
 
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.coupling import apparent_reflectance, surface_reflectance
+from fifesim.atmosphere.schemes.coupling import apparent_reflectance, corrected_reflectance
 from fifesim.atmosphere.schemes.engines import band_terms
 from fifesim.base.bands import Band, solar_irradiance
 
@@ -30,7 +30,7 @@ def terms_of(row, altitude):
 def errors_of(table, reflectance, altitude):
     """Apparent reflectance less that of 6S, by row. [1]"""
     ours = [
-        apparent_reflectance(rho, *terms_of(row, z)[:5])
+        apparent_reflectance(rho, **terms_of(row, z).uniform)
         for row, rho, z in zip(table.itertuples(), reflectance, altitude, strict=True)
     ]
     return np.array(ours) - table["toa_reflectance"].to_numpy()
@@ -74,15 +74,15 @@ def test_band_factors_stand_for_the_spectral_sum(visibility):
     slices = [Band("slice", (low, high), (1, 1)) for low, high in pairwise(edges)]
     whole = Band("whole", (edges[0], edges[-1]), (1, 1))
     weight = np.array([solar_irradiance(part) for part in slices])
-    parts = apparent_reflectance(0.5, *band_terms(atmosphere, slices, 40.0, 20.0, 60.0)[:5])
-    once = apparent_reflectance(0.5, *band_terms(atmosphere, [whole], 40.0, 20.0, 60.0)[:5])
+    parts = apparent_reflectance(0.5, **band_terms(atmosphere, slices, 40.0, 20.0, 60.0).uniform)
+    once = apparent_reflectance(0.5, **band_terms(atmosphere, [whole], 40.0, 20.0, 60.0).uniform)
     assert once[0] == pytest.approx(np.average(parts, weights=weight), abs=5e-4)
 
 
 def test_inverse_is_exact():
-    terms = band_terms(Atmosphere(visibility=10), BANDS, 60.0, 30.0, 45.0)[:5]
+    terms = band_terms(Atmosphere(visibility=10), BANDS, 60.0, 30.0, 45.0).uniform
     rho = np.broadcast_to(np.linspace(0, 1, 11)[:, None], (11, len(BANDS)))
-    np.testing.assert_allclose(surface_reflectance(apparent_reflectance(rho, *terms), *terms), rho, atol=1e-12)
+    np.testing.assert_allclose(corrected_reflectance(apparent_reflectance(rho, **terms), **terms), rho, atol=1e-12)
 
 
 def test_missing_cell_stays_missing():
@@ -97,7 +97,7 @@ def test_percent_is_refused():
 
 def test_terms_are_fractions_and_the_blue_sky_is_the_most_diffuse():
     terms = band_terms(Atmosphere(), BANDS, 30.0, 0.0, 0.0)
-    for values in terms[:5] + terms[6:]:
+    for values in terms._replace(optical_depth=terms.spherical_albedo):
         assert np.all((values > 0) & (values < 1))
     assert np.all(np.diff(terms.diffuse_fraction[:4]) < 0)
 
@@ -139,7 +139,7 @@ def test_terms_cannot_be_changed():
 def test_gas_is_applied_once():
     """A dark surface shows the path reflectance times the gas transmittance, and no more."""
     terms = band_terms(Atmosphere(), BANDS, 30.0, 0.0, 0.0)
-    dark = apparent_reflectance(0.0, *terms[:5])
+    dark = apparent_reflectance(0.0, **terms.uniform)
     np.testing.assert_allclose(dark, terms.path_reflectance * terms.gas_transmittance, rtol=1e-15)
 
 

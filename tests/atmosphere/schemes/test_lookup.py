@@ -25,7 +25,7 @@ def one_by_one(atmosphere, reflectance, altitude, sza, saa, vza, vaa):
     places = zip(reflectance, altitude, sza, vza, relative_azimuth(saa, vaa), strict=True)
     found = [
         apparent_reflectance(
-            rho, *band_terms(dataclasses.replace(atmosphere, altitude=z), BANDS, sun, view, azimuth)[:5]
+            rho, **band_terms(dataclasses.replace(atmosphere, altitude=z), BANDS, sun, view, azimuth).uniform
         )
         for rho, z, sun, view, azimuth in places
     ]
@@ -66,7 +66,7 @@ def test_one_geometry_is_exact():
     atmosphere, rho = Atmosphere(), cells(5, 70)[0]
     places = [np.array(value) for value in (0.4, 33.3, 120.0, 12.1, 200.0)]
     table = varying_reflectance(rho, *places, atmosphere=atmosphere, bands=BANDS)
-    exact = apparent_reflectance(rho, *band_terms(atmosphere, BANDS, 33.3, 12.1, 80.0)[:5])
+    exact = apparent_reflectance(rho, **band_terms(atmosphere, BANDS, 33.3, 12.1, 80.0).uniform)
     np.testing.assert_allclose(table, exact.T, rtol=1e-13)
 
 
