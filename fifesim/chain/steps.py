@@ -92,7 +92,7 @@ def surface_reflectance(
 
     See Also
     --------
-    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.raster.surface_reflectance,
+    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.raster.level_reflectance,
     fifesim.ground.terrain.rasters.light.terrain_reflectance
     """
     if dem is None and horizon is not None:
@@ -105,7 +105,7 @@ def surface_reflectance(
     names = [band.name for band in selected]
     responses = tuple(band.response for band in selected)
     leaf_reflectance, leaf_transmittance = optics.leaf_optics(responses, leaf_optics)
-    level = ground.surface_reflectance(
+    level = ground.level_reflectance(
         lai,
         bands=names,
         wavelengths=[band.wavelength for band in selected],

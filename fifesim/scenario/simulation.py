@@ -6,6 +6,7 @@ import xarray as xr
 from fifesim.analysis.rasters import regression as analysis
 from fifesim.chain import steps as chain
 from fifesim.ground.canopy import raster as ground
+from fifesim.ground.landscape.raster import lai_scene, open_lai
 from fifesim.ground.terrain.rasters import light as terrain_raster
 from fifesim.ground.terrain.rasters import sky as sky_raster
 from fifesim.ground.terrain.rasters.elevation import fine_dem, source_dem
@@ -168,8 +169,8 @@ def leaf_area(scenario, grid, chunks=None):
     """
     land = scenario.ground
     if land.lai_file:
-        return ground.open_lai(land.lai_file, grid, chunks=chunks)
-    return ground.lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+        return open_lai(land.lai_file, grid, chunks=chunks)
+    return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
 
 
 def surface_reflectance(scenario, lai, instrument, dem=None, horizon=None):

@@ -12,6 +12,7 @@ from fifesim.base import datasets
 from fifesim.chain import steps as chain
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.landscape.distribution import treatments, truncated_normal
+from fifesim.ground.landscape.raster import lai_scene
 from fifesim.ground.terrain.rasters.hills import flint_hills
 from fifesim.rasters import sites
 from fifesim.sensor import raster as sensor
@@ -166,7 +167,7 @@ def landscape(case, treatment, arp, seed):
     lai, fpar : xarray.DataArray, dims (y, x)
         By the paper's own route: one Fourier transform of the scene, and exact ranks.
     """
-    lai = ground.lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method="periodic")
+    lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method="periodic")
     return lai, ground.fpar(lai)
 
 
