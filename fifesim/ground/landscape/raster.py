@@ -5,6 +5,7 @@ from pathlib import Path
 import psutil
 import xarray as xr
 
+from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.optics import check_lai
 from fifesim.ground.landscape import field as random_field
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
@@ -30,7 +31,7 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     arp : float, optional
         Autoregressive parameter in [0, 0.25). [1]
     seed : int, optional
-        In [0, 2**64).
+        In [0, 2**63).
     method : {"streaming", "periodic"}, optional
         ``streaming`` is a function of (seed, row, column): a window is a slice of the whole, and chunks change nothing.
         ``periodic`` is the paper's: one Fourier transform of the whole scene and exact ranks, in memory.
@@ -46,6 +47,8 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     ------
     ValueError
         If the grid, arp, seed, distribution or method is not one allowed.
+    TypeError
+        If the seed is no whole number.
 
     References
     ----------
@@ -57,18 +60,18 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     """
     grids.check_grid(grid)
     random_field.check_arp(arp)
-    random_field.check_seed(seed)
+    seed = check_seed(seed)
     density = lai_distribution(distribution)
     if method not in FIELD_METHODS:
         raise ValueError(f"method must be one of {', '.join(FIELD_METHODS)}, got {method!r}")
     make = _streaming_scene if method == "streaming" else _periodic_scene
-    lai = make(grid, density, arp, int(seed), chunks)
+    lai = make(grid, density, arp, seed, chunks)
     return cf.label(
         lai,
         "lai",
         history=f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}",
         arp=float(arp),
-        rng_seed=str(int(seed)),
+        rng_seed=str(seed),
         lai_distribution=_distribution_name(distribution),
         method=method,
         references=_REFERENCE,
