@@ -33,8 +33,8 @@ class DataArrayAccessor:
 
     surface_reflectance = _Method("chain.steps")
     fpar = _Method("ground.canopy.raster")
-    slope = _Method("ground.terrain.rasters.light")
-    aspect = _Method("ground.terrain.rasters.light")
+    slope = _Method("ground.terrain.rasters.slopes")
+    aspect = _Method("ground.terrain.rasters.slopes")
     horizon = _Method("ground.terrain.rasters.sky")
     sky_view = _Method("ground.terrain.rasters.light")
     terrain_view = _Method("ground.terrain.rasters.light")

@@ -159,12 +159,12 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
 
     See Also
     --------
-    fifesim.ground.terrain.light.kt
+    fifesim.ground.terrain.light.topographic_factor
     """
     atmosphere, bands, geometry = _light(reflectance, atmosphere, geometry, instrument)
     geometry.uniform("kt")
     terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
-    return terrain.kt(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
+    return terrain.kt_on_slopes(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
 
 
 def to_toa(
