@@ -16,6 +16,7 @@ from chain import BANDS, own_peak, seconds
 import fifesim
 from fifesim.base.geometry import fife_geometry
 from fifesim.ground.terrain.rasters import sky as sky_raster
+from fifesim.ground.terrain.rasters.dem import source_resolution
 from fifesim.rasters import grid as grids
 
 
@@ -59,7 +60,7 @@ def main():
     lai = fifesim.lai_scene(grid, arp=0.15, seed=7)
     level = lai.fifesim.surface_reflectance("TM", bands=BANDS)
     geometry, known = fife_geometry(), fifesim.horizon(dem)
-    sky = (dem.values, grid, sky_raster.source_resolution(dem))
+    sky = (dem.values, grid, source_resolution(dem))
     rows = {
         "chain, level, lazy": lambda: chain(scene()).compute(),
         "chain, terrain, lazy": lambda: chain(scene(), chunked).compute(),

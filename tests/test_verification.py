@@ -9,7 +9,7 @@ from fifesim.cli import app
 from fifesim.experiments.verification import areas, atmosphere, canopy
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.canopy import absorption
-from fifesim.ground.terrain import slope as terrain
+from fifesim.ground.terrain import sky
 from fifesim.ground.terrain import spline as dem
 from fifesim.sensor.response import calibration
 
@@ -37,8 +37,8 @@ def test_installation_is_within_all_bounds():
     "area, owner, name, wrong, said",
     [
         ("canopy", absorption, "extinction_coefficient", 1.01, "canopy: extinction by spherical leaves"),
-        ("terrain", terrain, "sky_view", 1.01, "terrain: sky seen from a wide plane"),
-        ("terrain", terrain, "sky_view", np.nan, "terrain: Kt of planes"),
+        ("terrain", sky, "sky_view", 1.01, "terrain: sky seen from a wide plane"),
+        ("terrain", sky, "sky_view", np.nan, "terrain: Kt of planes"),
         ("terrain", dem, "spline_grid", np.nan, "terrain: wave of six cells"),
         ("sensor", calibration, "gain_offset", 1.01, "sensor: counts of TM's radiances"),
     ],

@@ -84,7 +84,7 @@ def surface_reflectance(
 
     See Also
     --------
-    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.raster.surface_reflectance,
+    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.raster.level_reflectance,
     fifesim.ground.terrain.rasters.light.terrain_reflectance
     """
     if dem is None and horizon is not None:
@@ -96,7 +96,7 @@ def surface_reflectance(
     names = [band.name for band in selected]
     responses = tuple(band.response for band in selected)
     leaf_reflectance, leaf_transmittance = optics.leaf_optics(responses, leaf_optics)
-    level = ground.surface_reflectance(
+    level = ground.level_reflectance(
         lai,
         bands=names,
         wavelengths=[band.wavelength for band in selected],
@@ -150,12 +150,12 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
 
     See Also
     --------
-    fifesim.ground.terrain.light.kt
+    fifesim.ground.terrain.light.topographic_factor
     """
     atmosphere, bands, geometry = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)
     geometry = cf.uniform_geometry(geometry, "kt")
     terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
-    return terrain.kt(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
+    return terrain.kt_on_slopes(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
 
 
 def to_toa(

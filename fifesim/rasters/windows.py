@@ -70,6 +70,25 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
     return da.Array(layers, name, sizes, dtype=dtype, meta=np.empty((0,) * len(sizes), dtype))
 
 
+def lazy_together(*arrays):
+    """
+    Some arrays, all of them lazy where one is.
+
+    Parameters
+    ----------
+    *arrays : numpy.ndarray or dask.array.Array, shape (..., y, x), or None
+        None stays.
+
+    Returns
+    -------
+    arrays : tuple of numpy.ndarray or dask.array.Array
+        In chunks that hold all of their leading axes.
+    """
+    if not any(isinstance(array, da.Array) for array in arrays):
+        return arrays
+    return tuple(None if array is None else _lazy(array) for array in arrays)
+
+
 def slices(sizes):
     """
     Slices of chunks.

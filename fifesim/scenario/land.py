@@ -4,6 +4,7 @@ import numpy as np
 
 from fifesim.ground.terrain.rasters import light as terrain_raster
 from fifesim.ground.terrain.rasters import sky as sky_raster
+from fifesim.ground.terrain.rasters import slopes
 from fifesim.ground.terrain.rasters.elevation import fine_dem, source_dem
 from fifesim.ground.terrain.rasters.hills import flint_hills
 from fifesim.rasters import grid as grids
@@ -68,7 +69,7 @@ def _middle(shape):
 def _check_sun(middle, around, horizon, geometry):
     """Somewhere the sun must shine: on lazy elevation no chunk knows whether it reaches another."""
     # Where no slope is as steep as the sun is high, all face it, and what hides it from them is lit itself.
-    if float(terrain_raster.slope(middle).max()) < 90 - geometry.sza:
+    if float(slopes.slope(middle).max()) < 90 - geometry.sza:
         return
     light = terrain_raster.illumination(around, geometry, horizon)
     for block in light.data.blocks.ravel():

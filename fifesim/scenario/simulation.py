@@ -10,7 +10,8 @@ from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.ground.canopy import raster as ground
-from fifesim.ground.terrain.rasters import light as terrain_raster
+from fifesim.ground.landscape.raster import lai_scene, open_lai
+from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
@@ -57,7 +58,7 @@ def simulate(scenario, chunks="auto"):
     else:
         reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), lai)
         kt = chain.kt(level, dem, horizon=horizon)
-        dem, slope = _cut(dem, grid), _cut(terrain_raster.slope(dem), grid)
+        dem, slope = _cut(dem, grid), _cut(slopes.slope(dem), grid)
         nodes["scene"]["dem"] = dem
         nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt)}
         nodes["level"] = {"dn": image_of(setup, level)}
@@ -89,8 +90,8 @@ def leaf_area(scenario, grid, chunks=None):
     """
     land = scenario.ground
     if land.lai_file:
-        return ground.open_lai(land.lai_file, grid, chunks=chunks)
-    return ground.lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+        return open_lai(land.lai_file, grid, chunks=chunks)
+    return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
 
 
 def setup_of(scenario):

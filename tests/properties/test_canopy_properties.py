@@ -4,9 +4,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fifesim.ground.canopy.background import with_background
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
-from fifesim.ground.canopy.sail_model import sail, with_background
+from fifesim.ground.canopy.sail_model import sail
 
 modest = settings(derandomize=True, max_examples=80, deadline=None)
 zenith = st.floats(0, 89.9)

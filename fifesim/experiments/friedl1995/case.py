@@ -14,6 +14,7 @@ from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.landscape.distribution import treatments, truncated_normal
+from fifesim.ground.landscape.raster import lai_scene
 from fifesim.ground.terrain.rasters.hills import flint_hills
 from fifesim.rasters import sites
 from fifesim.sensor.description.instruments import instrument as find_instrument
@@ -177,7 +178,7 @@ def landscape(case, treatment, arp, seed):
     lai, fpar : xarray.DataArray, dims (y, x)
         By the paper's own route: one Fourier transform of the scene, and exact ranks.
     """
-    lai = ground.lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method="periodic")
+    lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method="periodic")
     return lai, ground.fpar(lai)
 
 

@@ -4,11 +4,11 @@ import importlib.metadata
 import platform
 from pathlib import Path
 
+from fifesim.base.seeds import check_seed
 from fifesim.experiments.friedl1995 import effects, figures
 from fifesim.experiments.friedl1995 import report as friedl1995_report
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import Case
-from fifesim.ground.landscape.field import check_seed
 from fifesim.output.folders import check_folder, whole_files
 from fifesim.output.progress import steps
 

@@ -6,8 +6,8 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.analysis.attribution import by_itself, shapley, taken_away
+from fifesim.base.seeds import check_seed
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
-from fifesim.ground.landscape.field import check_seed
 from fifesim.rasters import grid as grids
 from fifesim.scenario.scenario import Scenario, grid_keys
 from fifesim.scenario.simulation import leaf_area

@@ -8,8 +8,9 @@ from scipy.integrate import quad
 from fifesim.base import datasets
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.canopy import absorption
+from fifesim.ground.canopy.background import with_background
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes, leaf_projection
-from fifesim.ground.canopy.sail_model import sail, volume_scattering, with_background
+from fifesim.ground.canopy.sail_model import sail, volume_scattering
 
 _deviation = partial(Deviation, "canopy")
 

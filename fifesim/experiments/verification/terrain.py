@@ -7,6 +7,7 @@ import numpy as np
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.terrain import horizon
 from fifesim.ground.terrain import light as illumination
+from fifesim.ground.terrain import sky as skies
 from fifesim.ground.terrain import slope as terrain
 from fifesim.ground.terrain import spline as dem
 
@@ -39,16 +40,16 @@ def _slopes():
 def _skies():
     """A horizon is known in 32 directions, and is a great circle between them: half a percent in a valley."""
     slopes, open_sky = np.array([0.0, 5.0, 30.0, 60.0]), np.full((32, 1), 90.0)
-    wide = [terrain.sky_view(slope, 100.0, open_sky[:, 0]) for slope in slopes]
+    wide = [skies.sky_view(slope, 100.0, open_sky[:, 0]) for slope in slopes]
     analytic = (1 + np.cos(np.radians(slopes))) / 2
     yield _deviation("sky seen from a wide plane", largest(wide, analytic), 1e-12, "1", "(1 + cos slope) / 2")
     walls = np.array([5.0, 20.0, 45.0])
     across = np.abs(np.sin(np.radians(horizon.azimuths(32))))
     valleys = [horizon.zenith(np.tan(np.radians(wall)) * across) for wall in walls]
-    floor = [terrain.sky_view(0.0, 0.0, valley) for valley in valleys]
+    floor = [skies.sky_view(0.0, 0.0, valley) for valley in valleys]
     worst = 100 * largest(floor, np.cos(np.radians(walls)), relative=True)
     yield _deviation("sky seen from the floor of a V valley", worst, 0.5, "%", "cos(wall)")
-    foot = [terrain.sky_view(wall, 90.0, valley) for wall, valley in zip(walls, valleys, strict=True)]
+    foot = [skies.sky_view(wall, 90.0, valley) for wall, valley in zip(walls, valleys, strict=True)]
     worst = 100 * largest(foot, (1 + np.cos(np.radians(2 * walls))) / 2, relative=True)
     yield _deviation("sky seen from the foot of its wall", worst, 0.5, "%", "(1 + cos 2 wall) / 2")
 
@@ -63,7 +64,7 @@ def _valley_of_cells():
     directions = horizon.azimuths(32)
     slope, aspect = terrain.slope_aspect(np.pad(elevation, 1, mode="edge"), cell, cell)
     zenith = horizon.horizon_zenith(padded, cell, cell, directions, reach)
-    sky = terrain.sky_view(slope, aspect, zenith, directions)[2]
+    sky = skies.sky_view(slope, aspect, zenith, directions)[2]
     rim = np.arctan(np.tan(wall) / 3)  # the far one, half a depth up and three quarters of a width away
     found, analytic = sky[[3 * half, 3 * half + half // 2]], [np.cos(wall), (1 + np.cos(rim + wall)) / 2]
     worst = 100 * largest(found, analytic, relative=True)
@@ -76,10 +77,11 @@ def _light():
     mu_s = np.cos(np.radians(sza))
     worst = 0.0
     for plane in _PLANES:
-        slope, aspect = terrain.slope_aspect(_plane(*plane), 20.0, 30.0)
-        sky = terrain.sky_view(*plane, np.full(32, 90.0))
-        sun = np.maximum(illumination.local_cosine(slope, aspect, sza, saa), 0.0)
-        found = illumination.kt(sky, terrain.terrain_view(plane[0], sky), 0.3, sun, mu_s, direct, total)
+        east, north = terrain.gradient(_plane(*plane), 20.0, 30.0)
+        sky = skies.sky_view(*plane, np.full(32, 90.0))
+        sun = np.maximum(terrain.along_normal(illumination.direction_vector(sza, saa), east, north), 0.0)
+        ct = skies.terrain_view(sky, np.cos(np.radians(plane[0])))
+        found = illumination.topographic_factor(sky, ct, 0.3, sun, mu_s, direct, total)
         beam = max(_vector(*plane) @ _vector(sza, saa), 0.0) / mu_s * direct
         expected = (beam + (1 + np.cos(np.radians(plane[0]))) / 2 * (total - direct)) / total
         worst = np.maximum(worst, largest(found, expected))

@@ -48,16 +48,64 @@ def exponential_chain(lai, *rates):
     >>> float(exponential_chain(3.0, 0.0, 0.0, 0.0))
     4.5
     """
-    rates = np.stack(np.broadcast_arrays(*(np.asarray(rate, float) for rate in rates)), axis=-1)
-    return _chain(np.asarray(lai, float), rates)
+    lai, *rates = np.broadcast_arrays(np.asarray(lai, float), *rates)
+    chains = np.empty(lai.size)
+    _chains(lai.ravel(), np.stack([rate.ravel() for rate in rates], dtype=float), chains)
+    return chains.reshape(lai.shape)[()]
 
 
-@numba.njit(cache=True)
-def _series(x, start, count):
+@numba.njit(nogil=True, cache=True)
+def _chains(lai, rates, chains):
+    """Divided difference of the exponential over all exponents of a cell, times the power of its depth."""
+    count = rates.shape[0]
+    x, difference, homogeneous = np.empty(count), np.empty(count), np.empty(count)
+    for cell in range(lai.size):
+        _sort_exponents(lai[cell], rates[:, cell], x)
+        if math.isnan(x[0]):
+            chains[cell] = math.nan
+            continue
+        if x[count - 1] - x[0] < _SPREAD:
+            difference[0] = _series(x, 0, count, homogeneous)
+        else:
+            _recursion(x, difference, homogeneous)
+        chains[cell] = lai[cell] ** (count - 1) * difference[0]
+
+
+@numba.njit(nogil=True, cache=True)
+def _sort_exponents(lai, rates, x):
+    """By insertion: the recursion divides by the widest difference. What is not a number comes first."""
+    for i in range(x.size):
+        exponent = -rates[i] * lai
+        if math.isnan(exponent):
+            x[0] = math.nan
+            return
+        j = i
+        while j > 0 and x[j - 1] > exponent:
+            x[j] = x[j - 1]
+            j -= 1
+        x[j] = exponent
+
+
+@numba.njit(nogil=True, cache=True)
+def _recursion(x, difference, homogeneous):
+    """Divided differences over distant exponents, from those of fewer."""
+    for i in range(x.size):
+        difference[i] = np.exp(x[i])
+    for order in range(1, x.size):
+        for i in range(x.size - order):
+            spread = x[i + order] - x[i]
+            if spread < _SPREAD:
+                difference[i] = _series(x, i, order + 1, homogeneous)
+            else:
+                difference[i] = (difference[i + 1] - difference[i]) / spread
+
+
+@numba.njit(nogil=True, cache=True)
+def _series(x, start, count, homogeneous):
     """Divided difference over close exponents: e^c sum_n h_n(x - c) / (n + count - 1)!, h_n homogeneous."""
     centre = (x[start] + x[start + count - 1]) / 2
     # homogeneous[j] is the complete homogeneous polynomial of one degree in the first j + 1 offsets.
-    homogeneous = np.ones(count)
+    homogeneous[:count] = 1.0
     factorial = 1.0
     for n in range(2, count):
         factorial *= n
@@ -69,34 +117,3 @@ def _series(x, start, count):
             homogeneous[j] = homogeneous[j - 1] + (x[start + j] - centre) * homogeneous[j]
         total += homogeneous[count - 1] / factorial
     return math.exp(centre) * total
-
-
-# Not cached: processes that fill numba's cache of universal functions side by side can crash.
-@numba.guvectorize(["(float64, float64[:], float64[:])"], "(),(n)->()")
-def _chain(lai, rates, chain):
-    """Divided difference of the exponential over all exponents, times the power of the depth."""
-    count = rates.size
-    x = np.empty(count)
-    for i in range(count):
-        exponent = -rates[i] * lai
-        if math.isnan(exponent):
-            chain[0] = math.nan
-            return
-        # Sorted by insertion: the recursion divides by the widest difference.
-        j = i
-        while j > 0 and x[j - 1] > exponent:
-            x[j] = x[j - 1]
-            j -= 1
-        x[j] = exponent
-    if x[count - 1] - x[0] < _SPREAD:
-        chain[0] = lai ** (count - 1) * _series(x, 0, count)
-        return
-    difference = np.exp(x)
-    for order in range(1, count):
-        for i in range(count - order):
-            spread = x[i + order] - x[i]
-            if spread < _SPREAD:
-                difference[i] = _series(x, i, order + 1)
-            else:
-                difference[i] = (difference[i + 1] - difference[i]) / spread
-    chain[0] = lai ** (count - 1) * difference[0]

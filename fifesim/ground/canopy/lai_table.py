@@ -4,8 +4,10 @@ from dataclasses import dataclass, field
 
 import numba
 import numpy as np
+from numba.extending import register_jitable
 from scipy.interpolate import CubicSpline
 
+from fifesim.ground.canopy.background import over_background
 from fifesim.ground.canopy.optics import LARGEST_LAI
 
 LIMIT = LARGEST_LAI
@@ -116,19 +118,17 @@ def interpolate(table, lai):
 
 
 def interpolate_over(table, lai, background):
-    r"""
+    """
     Reflectance of a canopy over a background that varies from cell to cell, from a table of its layer.
-
-    .. math:: \rho = A + B \, r + C \, \frac{r}{1 - r \, D}
 
     Parameters
     ----------
     table : LaiTable
-        Columns A, B, C, D of each band in turn; D is the layer's rdd.
+        Four columns for each band, the terms of `over_background`.
     lai : array
         NaN, and all outside 0 to `LIMIT`, gives NaN. [m2 m-2]
     background : array, shape (band,) + lai.shape or broadcastable
-        Reflectance :math:`r` of the background. [1]
+        Reflectance of the background. [1]
 
     Returns
     -------
@@ -143,37 +143,39 @@ def interpolate_over(table, lai, background):
     return values.reshape(-1, *lai.shape)
 
 
+@register_jitable
+def _place(lai, rate, step, last):
+    """Interval of a leaf area index in a table, and its place in that, which is NaN where there is none."""
+    if not 0 <= lai <= LIMIT:
+        return 0, np.nan
+    position = rate * lai / (1 + rate * lai) * step
+    interval = min(int(position), last)
+    return interval, position - interval
+
+
+@register_jitable
+def _cubic(coefficients, interval, column, share):
+    c = coefficients[interval, column]
+    return c[0] + share * (c[1] + share * (c[2] + share * c[3]))
+
+
 @numba.njit(nogil=True, cache=True)
 def _interpolate(lai, coefficients, rate, step, values):
-    last, columns = coefficients.shape[0] - 1, coefficients.shape[1]
+    last = coefficients.shape[0] - 1
     for i in range(lai.size):
-        if not 0 <= lai[i] <= LIMIT:
-            for column in range(columns):
-                values[column, i] = np.nan
-            continue
-        position = rate * lai[i] / (1 + rate * lai[i]) * step
-        interval = min(int(position), last)
-        share = position - interval
-        for column in range(columns):
-            c = coefficients[interval, column]
-            values[column, i] = c[0] + share * (c[1] + share * (c[2] + share * c[3]))
+        interval, share = _place(lai[i], rate, step, last)
+        for column in range(values.shape[0]):
+            values[column, i] = _cubic(coefficients, interval, column, share)
 
 
 @numba.njit(nogil=True, cache=True)
 def _interpolate_over(lai, background, coefficients, rate, step, values):
     last = coefficients.shape[0] - 1
-    terms = np.empty(4)
     for i in range(lai.size):
-        if not 0 <= lai[i] <= LIMIT:
-            for band in range(values.shape[0]):
-                values[band, i] = np.nan
-            continue
-        position = rate * lai[i] / (1 + rate * lai[i]) * step
-        interval = min(int(position), last)
-        share = position - interval
+        interval, share = _place(lai[i], rate, step, last)
         for band in range(values.shape[0]):
-            for k in range(4):
-                c = coefficients[interval, 4 * band + k]
-                terms[k] = c[0] + share * (c[1] + share * (c[2] + share * c[3]))
-            r = background[band, i]
-            values[band, i] = terms[0] + r * (terms[1] + terms[2] / (1 - r * terms[3]))
+            alone = _cubic(coefficients, interval, 4 * band, share)
+            hot = _cubic(coefficients, interval, 4 * band + 1, share)
+            through = _cubic(coefficients, interval, 4 * band + 2, share)
+            rdd = _cubic(coefficients, interval, 4 * band + 3, share)
+            values[band, i] = over_background(alone, hot, through, rdd, background[band, i])

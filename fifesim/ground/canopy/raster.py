@@ -1,9 +1,6 @@
-"""The ground scene on labelled rasters: leaf area, its reflectance and the light that it absorbs."""
-
-from pathlib import Path
+"""The canopy on labelled rasters: its reflectance on level ground, and the light that it absorbs."""
 
 import numpy as np
-import psutil
 import xarray as xr
 
 from fifesim.base.geometry import ANGLES, relative_azimuth
@@ -11,105 +8,12 @@ from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_lai
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
-from fifesim.ground.landscape import field as random_field
-from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
-from fifesim.rasters import cf, warp
+from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 
-FIELD_METHODS = ("streaming", "periodic")
 
-_REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
-
-
-def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="streaming", chunks=None):
-    """
-    Leaf area index of a simulated landscape.
-
-    Parameters
-    ----------
-    grid : odc.geo.geobox.GeoBox
-        Of ground cells, in a projected CRS.
-    distribution : str, path or frozen scipy distribution, optional
-        As `ground.distribution.lai_distribution` takes it.
-    arp : float, optional
-        Autoregressive parameter in [0, 0.25). [1]
-    seed : int, optional
-        In [0, 2**64).
-    method : {"streaming", "periodic"}, optional
-        ``streaming`` is a function of (seed, row, column): a window is a slice of the whole, and chunks change nothing.
-        ``periodic`` is the paper's: one Fourier transform of the whole scene and exact ranks, in memory.
-    chunks : mapping or int, optional
-        Makes the streaming scene lazy.
-
-    Returns
-    -------
-    lai : xarray.DataArray, dims (y, x)
-        [m2 m-2]
-
-    Raises
-    ------
-    ValueError
-        If the grid, arp, seed, distribution or method is not one allowed.
-
-    References
-    ----------
-    [Friedl1995]_, Fig. 2
-
-    See Also
-    --------
-    fifesim.ground.landscape.field.streaming_field, fifesim.ground.landscape.distribution.lai_distribution
-    """
-    grids.check_grid(grid)
-    random_field.check_arp(arp)
-    random_field.check_seed(seed)
-    density = lai_distribution(distribution)
-    if method not in FIELD_METHODS:
-        raise ValueError(f"method must be one of {', '.join(FIELD_METHODS)}, got {method!r}")
-    make = _streaming_scene if method == "streaming" else _periodic_scene
-    lai = make(grid, density, arp, int(seed), chunks)
-    return cf.label(
-        lai,
-        "lai",
-        history=f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}",
-        arp=float(arp),
-        rng_seed=str(int(seed)),
-        lai_distribution=_distribution_name(distribution),
-        method=method,
-        references=_REFERENCE,
-    )
-
-
-def open_lai(path, grid, chunks=None):
-    """
-    A user's own map of leaf area index on a grid.
-
-    Parameters
-    ----------
-    path : str or path
-        Any raster that GDAL opens; its first band is LAI. [m2 m-2]
-    grid : odc.geo.geobox.GeoBox
-        Of ground cells. Cells no larger than the map's are interpolated bilinearly, larger ones hold means.
-    chunks : mapping or int, optional
-        Makes the result lazy.
-
-    Returns
-    -------
-    lai : xarray.DataArray, dims (y, x)
-        NaN where the map has no data. [m2 m-2]
-
-    Raises
-    ------
-    ValueError
-        If the file is missing, has no CRS, does not overlap the grid, or needs a change of datum whose accuracy is
-        unknown; and, when computed, if LAI is negative.
-    """
-    lai = chunking.pointwise(_checked, warp.file_onto_grid(path, grid, chunks))
-    name = Path(path).name
-    return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
-
-
-def surface_reflectance(
+def level_reflectance(
     lai,
     *,
     bands,
@@ -144,7 +48,7 @@ def surface_reflectance(
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset
         Carried on as coordinates. Where an angle is a raster, SAIL is evaluated at every cell.
     leaf_angles : optional
-        As `ground.leaf_angles.leaf_angle_classes` takes them.
+        As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
     hotspot : float, optional
         Leaf size over canopy height; 0 is none. [1]
     exact : bool, optional
@@ -215,7 +119,7 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     geometry : fifesim.base.geometry.Geometry, optional
         The sun's; by default that which the array carries, else the paper's.
     leaf_angles : optional
-        As `ground.leaf_angles.leaf_angle_classes` takes them.
+        As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
     fpar_inf : float, optional
         Of an infinitely thick canopy. [1]
 
@@ -255,42 +159,6 @@ def _check_scene(lai):
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
 
 
-def _streaming_scene(grid, density, arp, seed, chunks):
-    row, column = grids.lattice_position(grid)
-    table = quantile_table(density)
-
-    def cells(first_row, first_column, shape):
-        field = random_field.streaming_field(seed, arp, row + first_row, column + first_column, shape)
-        return quantile_map(field, table)
-
-    # A first window raises what streaming_field refuses before anything lazy is built.
-    cells(0, 0, (0, 0))
-    return chunking.tiles(cells, grid, chunks, tile=random_field.TILE)
-
-
-def _periodic_scene(grid, density, arp, seed, chunks):
-    # Noise, spectrum, field, ranks, quantiles and result are in memory together.
-    needed, free = 48 * grid.shape.x * grid.shape.y, psutil.virtual_memory().available
-    if needed > free:
-        raise ValueError(
-            f"a periodic field of {grid.shape.y} x {grid.shape.x} cells needs {needed / 1e9:.1f} GB of memory, "
-            f'{free / 1e9:.1f} GB are free: use method="streaming", which needs no more for a larger scene'
-        )
-    field = xr.DataArray(rank_map(random_field.periodic_field(seed, arp, tuple(grid.shape)), density), dims=("y", "x"))
-    return grids.place(field if chunks is None else field.chunk(chunks), grid)
-
-
-def _distribution_name(source):
-    if hasattr(source, "dist"):
-        return f"{source.dist.name}({', '.join(f'{value:g}' for value in [*source.args, *source.kwds.values()])})"
-    return Path(source).name
-
-
-def _checked(lai):
-    check_lai(lai)
-    return lai
-
-
 def _reflectance(lai, background_raster=None, *, background=None, **parameters):
     if background is None:
         # apply_ufunc hands the bands over as the last axis.
@@ -323,7 +191,8 @@ def _directions(geometry):
 
 
 def _fpar(lai, **parameters):
-    return absorption.fpar(_checked(lai), **parameters)
+    check_lai(lai)
+    return absorption.fpar(lai, **parameters)
 
 
 def _background_bands(background, bands):

@@ -5,10 +5,11 @@ from functools import lru_cache
 import numpy as np
 
 from fifesim.ground.canopy.absorption import extinction_coefficient
+from fifesim.ground.canopy.background import over_background, reflectance_factor, with_background
 from fifesim.ground.canopy.lai_table import interpolate, interpolate_over, tabulate
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_background, check_lai, check_leaf_optics
-from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
+from fifesim.ground.canopy.sail_model import sail
 
 _BLOCK = 2**15  # cells evaluated exactly at a time, to bound memory
 
@@ -207,14 +208,14 @@ def _layer_table(scene):
 
     def terms(lai):
         c, sky = _sail(lai, scene)
-        scattered = reflectance_factor(c.rso, c.rdo, sky)
+        alone = reflectance_factor(c.rso, c.rdo, sky)
         hot = (1 - sky) * (c.tsstoo - c.tss * c.too)
         through = reflectance_factor(c.tss + c.tsd, c.tdd, sky) * (c.too + c.tdo)
-        columns = np.broadcast_arrays(scattered, hot, through, c.rdd)
+        columns = np.broadcast_arrays(alone, hot, through, c.rdd)
         return np.stack(columns, axis=1).reshape(-1, lai.size)
 
     def reflectances(values):
-        scattered, hot, through, rdd = values.reshape(-1, 4, values.shape[1]).swapaxes(0, 1)
-        return np.stack([scattered + r * (hot + through / (1 - r * rdd)) for r in (0.0, 0.5, 1.0)])
+        alone, hot, through, rdd = values.reshape(-1, 4, values.shape[1]).swapaxes(0, 1)
+        return np.stack([over_background(alone, hot, through, rdd, r) for r in (0.0, 0.5, 1.0)])
 
     return tabulate(terms, _rate(scene), reflectances)

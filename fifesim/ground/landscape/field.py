@@ -12,6 +12,7 @@ import numpy as np
 from scipy import fft, optimize, special
 
 from fifesim.base.lattice import assemble
+from fifesim.base.seeds import check_seed, generator
 from fifesim.ground.landscape.noise import white_noise
 
 # Field tile. [cell]
@@ -22,6 +23,9 @@ TILE = 1008
 # less than 1e-6.
 DECAY_LENGTHS = 18
 LARGEST_STREAMING_ARP = 0.2498
+
+# Stream of the periodic field's noise.
+_PERIODIC = 1
 
 # The correlation length is where the correlation has fallen to this value: the practical range of geostatistics.
 PRACTICAL_RANGE = 0.05
@@ -261,7 +265,7 @@ def streaming_field(seed, arp, row, column, shape):
     Parameters
     ----------
     seed : int
-        In [0, 2**64).
+        In [0, 2**63).
     arp : float
         In [0, 0.2498]. [1]
     row, column : int
@@ -278,6 +282,8 @@ def streaming_field(seed, arp, row, column, shape):
     ------
     ValueError
         If arp or seed is out of range.
+    TypeError
+        If the seed is no whole number.
 
     References
     ----------
@@ -307,7 +313,7 @@ def periodic_field(seed, arp, shape):
     Parameters
     ----------
     seed : int
-        In [0, 2**64).
+        In [0, 2**63).
     arp : float
         [1]
     shape : (int, int)
@@ -322,6 +328,8 @@ def periodic_field(seed, arp, shape):
     ------
     ValueError
         If arp or seed is out of range.
+    TypeError
+        If the seed is no whole number.
 
     References
     ----------
@@ -329,25 +337,7 @@ def periodic_field(seed, arp, shape):
     """
     check_arp(arp)
     check_seed(seed)
-    noise = np.random.Generator(np.random.Philox(key=_key(seed, 1))).standard_normal(shape)
-    return _filter(noise, _half_response(arp, tuple(shape), float))
-
-
-def check_seed(seed):
-    """
-    Refuse a seed that is not a whole number from 0 to 2**64 - 1.
-
-    Parameters
-    ----------
-    seed : int
-
-    Raises
-    ------
-    ValueError
-        If it is out of range or not whole.
-    """
-    if isinstance(seed, bool) or int(seed) != seed or not 0 <= seed < 2**64:
-        raise ValueError(f"seed must be a whole number from 0 to 2**64 - 1, got {seed!r}")
+    return _filter(generator(seed, _PERIODIC).standard_normal(shape), _half_response(arp, tuple(shape), float))
 
 
 # Chunks smaller than tiles, or cut elsewhere, ask for a tile more than once. Twelve tiles are 49 MB.
@@ -361,11 +351,6 @@ def _tile(seed, arp, tile_row, tile_column):
     tile = _filter(noise, _half_response(arp, (size, size), np.float32))[inside, inside].copy()
     tile.flags.writeable = False
     return tile
-
-
-def _key(seed, method):
-    """Philox key; a list of numbers from 2**63 up would go through floating point, and neighbours be the same."""
-    return np.array([seed, method], dtype=np.uint64)
 
 
 def _filter(noise, half_response):

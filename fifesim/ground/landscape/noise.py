@@ -34,7 +34,7 @@ def white_noise(seed, row, column, shape):
     Parameters
     ----------
     seed : int
-        In [0, 2**64).
+        In [0, 2**63).
     row, column : int
         Place of the first cell.
     shape : (int, int)

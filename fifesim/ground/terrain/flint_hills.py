@@ -16,6 +16,7 @@ import numpy as np
 from scipy import interpolate
 
 from fifesim.base.lattice import assemble
+from fifesim.base.seeds import generator
 from fifesim.ground.terrain.spline import spline_coefficients, spline_grid, spline_points
 
 # An upland is a square of nodes between rivers, seen along axes that smooth noise bends. [m]
@@ -71,8 +72,10 @@ _WATERSHED = np.array([334.0, 341.0, 352.0, 379.0, 400.0, 412.0, 434.0, 440.0, 4
 # Standard deviation of a quintic spline of white noise, the value at 0 of the B-spline of degree 11.
 _SPLINE_DEVIATION = 0.3939255651755652
 
-# Noise is drawn in blocks of this size; the first keys of a seed are those of the random field. [lattice node]
+# Noise is drawn in blocks of this size. [lattice node]
 _BLOCK = 64
+
+# The first of the hills' streams of random numbers.
 _FIRST_STREAM = 16
 
 _lock = threading.Lock()
@@ -85,7 +88,7 @@ def elevation(seed, northing, easting):
     Parameters
     ----------
     seed : int
-        In [0, 2**64).
+        In [0, 2**63).
     northing, easting : array, shape (y,), (x,)
         Of rows and columns; northing falls, easting rises. [m]
 
@@ -142,7 +145,7 @@ def _bent_uplands(seed, south, east):
     turn = np.radians(AXES_ANGLE)
     along = (np.cos(turn) * bent[0] + np.sin(turn) * bent[1]) / UPLAND
     across = (np.cos(turn) * bent[1] - np.sin(turn) * bent[0]) / UPLAND
-    origin = _generator(seed, 65, 0, 0).random(2)
+    origin = generator(seed, _FIRST_STREAM + 65).random(2)
     along, across = along + origin[0], across + origin[1] * SHIFTS.size
     line = np.floor(across).astype(int)
     along = along - SHIFTS[line % SHIFTS.size]
@@ -221,13 +224,7 @@ def smooth_noise(seed, stream, step, south, east):
 @lru_cache(maxsize=256)
 def _noise_block(seed, stream, block_row, block_column):
     """White noise of one lattice block: its place is the upper half of the Philox counter."""
-    return _generator(seed, stream, block_row, block_column).standard_normal((_BLOCK, _BLOCK))
-
-
-def _generator(seed, stream, row, column):
-    counter = np.array([0, 0, row % 2**64, column % 2**64], dtype=np.uint64)
-    key = np.array([seed, _FIRST_STREAM + stream], dtype=np.uint64)
-    return np.random.Generator(np.random.Philox(counter=counter, key=key))
+    return generator(seed, _FIRST_STREAM + stream, (0, 0, block_row, block_column)).standard_normal((_BLOCK, _BLOCK))
 
 
 def upland(seed, line, column):
@@ -252,12 +249,12 @@ def upland(seed, line, column):
 
 @lru_cache(maxsize=128)
 def _upland(seed, line, column):
-    generator = _generator(seed, 64, line, column)
+    drawn = generator(seed, _FIRST_STREAM + 64, (0, 0, line, column))
     erodibility, cost = (
-        np.exp(sum(size * _noise_square(generator, step) for size, step in noise))
+        np.exp(sum(size * _noise_square(drawn, step) for size, step in noise))
         for noise in (ERODIBILITY_NOISE, WAY_NOISE)
     )
-    preference = np.exp(PREFERENCE_NOISE * generator.standard_normal((8, NODES * NODES)))
+    preference = np.exp(PREFERENCE_NOISE * drawn.standard_normal((8, NODES * NODES)))
     ground = START + TILT * NODE * _ways(cost)
     valley = BASE + SADDLE * (1 - np.abs(np.linspace(-1, 1, NODES))) ** 0.6
     ground[0] = ground[-1] = BASE
@@ -267,11 +264,11 @@ def _upland(seed, line, column):
     return coefficients[_REACH:-_REACH, _REACH:-_REACH]
 
 
-def _noise_square(generator, step):
+def _noise_square(drawn, step):
     """Smooth noise on the nodes of an upland."""
     positions = 3 + np.arange(NODES) * (NODE / step)
     size = int(positions[-1]) + 5
-    return spline_grid(generator.standard_normal((size, size)), positions, positions) / _SPLINE_DEVIATION
+    return spline_grid(drawn.standard_normal((size, size)), positions, positions) / _SPLINE_DEVIATION
 
 
 @numba.njit(nogil=True, cache=True)

@@ -1,8 +1,46 @@
 """The light that falls on a slope, and what of the light that it sends up is seen (Eqs. 4 and 5)."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
+
+from fifesim.ground.terrain.sky import sky_factor, terrain_view
+from fifesim.ground.terrain.slope import Vector, along_normal, rise, slope_cosine
+
+
+class Sky(NamedTuple):
+    """
+    The sky at places around, and where each row and each column of cells lies between these: which place is before it,
+    and the share of that after it.
+    """
+
+    layers: np.ndarray
+    """Vector of `sky.sky_vector` and tangent of the horizon toward the sun, shape (4, places, places). [1]"""
+    row: np.ndarray
+    row_share: np.ndarray
+    column: np.ndarray
+    column_share: np.ndarray
+
+
+class SlopeLight(NamedTuple):
+    """What the light on slopes depends on, each an array of cells. [1]"""
+
+    cosine: np.ndarray  # of the slope
+    sky_view: np.ndarray
+    mu_s_local: np.ndarray  # 0 in shadow
+    upwelling: np.ndarray  # Eq. 5
+
+
+class _Setting(NamedTuple):
+    """Unit vectors toward sun and sensor, tangent of the sun's elevation, and what makes a rise a gradient [1/m]."""
+
+    sun: Vector
+    sun_tangent: float
+    sensor: Vector
+    per_y: float
+    per_x: float
 
 
 def direction_vector(zenith, azimuth):
@@ -16,41 +54,16 @@ def direction_vector(zenith, azimuth):
 
     Returns
     -------
-    vector : array, shape (3,)
-        Eastward, northward and up. [1]
-    """
-    zenith, azimuth = np.radians(zenith), np.radians(azimuth)
-    return np.array([np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith)])
-
-
-def local_cosine(slope, aspect, zenith, azimuth):
-    r"""
-    Cosine of the angle between the normal of a slope and a direction.
-
-    .. math:: \mu = \cos S \cos \theta + \sin S \sin \theta \cos(\phi - A)
-
-    Parameters
-    ----------
-    slope, aspect : array
-        Aspect down the slope, clockwise from north. [degree]
-    zenith, azimuth : array
-        Of the direction toward the sun or the sensor, clockwise from north. [degree]
-
-    Returns
-    -------
-    cosine : array
-        Negative where the slope faces away. [1]
+    vector : fifesim.ground.terrain.slope.Vector
+        [1]
 
     Examples
     --------
-    The sun stands square on a slope that faces it:
-
-    >>> round(float(local_cosine(30.0, 120.0, 30.0, 120.0)), 12)
+    >>> direction_vector(0.0, 120.0).z.item()
     1.0
     """
-    slope, zenith = np.radians(slope), np.radians(zenith)
-    across = np.cos(np.radians(np.subtract(azimuth, aspect)))
-    return np.cos(slope) * np.cos(zenith) + np.sin(slope) * np.sin(zenith) * across
+    zenith, azimuth = np.radians(zenith), np.radians(azimuth)
+    return Vector(np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith))
 
 
 def horizon_toward(tangents, directions, azimuth):
@@ -83,12 +96,12 @@ def horizon_toward(tangents, directions, azimuth):
     position = ((azimuth - directions[0]) % 360) / step
     first = int(position) % count
     part, step = np.radians((position - int(position)) * step), np.radians(step)
-    weights = np.sin(step - part) / np.sin(step), np.sin(part) / np.sin(step)
-    return weights[0] * tangents[first] + weights[1] * tangents[(first + 1) % count]
+    before, after = np.sin(step - part) / np.sin(step), np.sin(part) / np.sin(step)
+    return before * tangents[first] + after * tangents[(first + 1) % count]
 
 
 @register_jitable
-def kt(sky_view, terrain_view, reflectance, mu_s_local, mu_s, direct_transmittance, transmittance_down):
+def topographic_factor(sky_view, terrain_view, reflectance, mu_s_local, mu_s, direct_transmittance, transmittance_down):
     r"""
     Topographic correction factor: irradiance on a slope over that on level ground.
 
@@ -127,7 +140,7 @@ def kt(sky_view, terrain_view, reflectance, mu_s_local, mu_s, direct_transmittan
 
     Examples
     --------
-    >>> float(kt(1.0, 0.0, 0.3, 0.8, 0.8, 0.6, 0.9))
+    >>> float(topographic_factor(1.0, 0.0, 0.3, 0.8, 0.8, 0.6, 0.9))
     1.0
     """
     return (
@@ -137,7 +150,8 @@ def kt(sky_view, terrain_view, reflectance, mu_s_local, mu_s, direct_transmittan
     )
 
 
-def upwelling_factor(mu_v_local, vza):
+@register_jitable
+def upwelling_factor(mu_v_local, mu_v):
     r"""
     Cosine correction of the light that leaves a slope toward the sensor.
 
@@ -147,8 +161,8 @@ def upwelling_factor(mu_v_local, vza):
     ----------
     mu_v_local : array
         Cosine of the sensor's zenith angle on the slope, :math:`\mu_v`. [1]
-    vza : float
-        The same angle on level ground. [degree]
+    mu_v : float
+        The same on level ground, :math:`\cos \theta_v`. [1]
 
     Returns
     -------
@@ -161,52 +175,38 @@ def upwelling_factor(mu_v_local, vza):
 
     Examples
     --------
-    >>> upwelling_factor([0.5, 1.0, -0.1], 60.0).round(12).tolist()
+    >>> upwelling_factor(np.array([0.5, 1.0, -0.1]), 0.5).tolist()
     [1.0, 2.0, 0.0]
     """
-    return np.fmax(mu_v_local, 0.0) / np.cos(np.radians(vza)) + np.multiply(mu_v_local, 0)
+    return np.maximum(mu_v_local, 0.0) / mu_v
 
 
-def slope_light(dem, sky, rows, columns, cell_y, cell_x, geometry):
+def slope_light(dem, sky, cell, geometry):
     """
-    What a cell's slope makes of the sky, the sun and the view.
+    What the light on slopes depends on.
 
     Parameters
     ----------
     dem : array, shape (rows + 2, columns + 2)
         Elevation, north up, with a margin of one cell, which may be NaN. [m]
-    sky : array, shape (4, coarse rows, coarse columns)
-        Sky vector of `terrain.sky_vector`, and tangent of the horizon toward the sun, at places around. [1]
-    rows, columns : (array of int, array), shape (rows,) and (columns,)
-        Where each cell lies between these places: the one before, and the share of the one after.
-    cell_y, cell_x : float
-        [m]
+    sky : Sky
+    cell : (float, float)
+        Size of a cell, down and across. [m]
     geometry : fifesim.base.geometry.Geometry
         Of sun and sensor.
 
     Returns
     -------
-    light : array, shape (4, rows, columns)
-        Cosine of the slope, sky view factor, cosine of the local solar zenith (0 in shadow), and Eq. 5's factor. [1]
+    light : SlopeLight
+        Fields of shape (rows, columns); NaN where elevation is. [1]
     """
-    out = np.empty((4, dem.shape[0] - 2, dem.shape[1] - 2))
-    _slope_light(*_arguments(dem, sky, rows, columns, cell_y, cell_x, geometry), out)
-    return out
+    rows, columns = dem.shape
+    light = SlopeLight(*np.empty((len(SlopeLight._fields), rows - 2, columns - 2)))
+    _slope_light(*_contiguous(dem, sky), _setting(cell, geometry), light)
+    return light
 
 
-def slope_reflectance(
-    reflectance,
-    dem,
-    sky,
-    rows,
-    columns,
-    cell_y,
-    cell_x,
-    geometry,
-    direct_transmittance,
-    transmittance_down,
-    upwelling=True,
-):
+def slope_reflectance(reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down, upwelling=True):
     r"""
     Reflectance factor of cells on slopes, as seen against the irradiance of level ground.
 
@@ -216,10 +216,10 @@ def slope_reflectance(
     ----------
     reflectance : array, shape (band, rows, columns)
         Of level ground. [1]
-    dem, sky, rows, columns, cell_y, cell_x, geometry
+    dem, sky, cell, geometry
         As in `slope_light`.
     direct_transmittance, transmittance_down : array, shape (band,)
-        As in `kt`. [1]
+        As in `topographic_factor`. [1]
     upwelling : bool, optional
         Whether with the factor of Eq. 5.
 
@@ -234,88 +234,85 @@ def slope_reflectance(
     """
     reflectance = np.ascontiguousarray(reflectance, float)
     out = np.empty(reflectance.shape)
-    direct, total = (np.asarray(values, float) for values in (direct_transmittance, transmittance_down))
-    light = _arguments(dem, sky, rows, columns, cell_y, cell_x, geometry)
-    _slope_reflectance(reflectance, *light, direct, total, geometry.mu_s, upwelling, out)
+    direct, total = np.asarray(direct_transmittance, float), np.asarray(transmittance_down, float)
+    dem, sky = _contiguous(dem, sky)
+    _slope_reflectance(reflectance, dem, sky, _setting(cell, geometry), direct, total, upwelling, out)
     return out
 
 
-def _arguments(dem, sky, rows, columns, cell_y, cell_x, geometry):
-    sun = direction_vector(geometry.sza, geometry.saa)
-    view = direction_vector(geometry.vza, geometry.vaa)
-    # The tangent of the sun's elevation; overhead, no horizon reaches it.
-    sun_tangent = sun[2] / np.hypot(sun[0], sun[1]) if geometry.sza > 0 else np.inf
-    dem, sky = (np.ascontiguousarray(array, float) for array in (dem, sky))
-    return dem, sky, *rows, *columns, 0.5 / cell_y, 0.5 / cell_x, sun, sun_tangent, view
+def _contiguous(dem, sky):
+    return np.ascontiguousarray(dem, float), sky._replace(layers=np.ascontiguousarray(sky.layers, float))
+
+
+def _setting(cell, geometry):
+    sun, view = direction_vector(geometry.sza, geometry.saa), direction_vector(geometry.vza, geometry.vaa)
+    # Overhead, no horizon reaches the sun.
+    sun_tangent = sun.z / np.hypot(sun.x, sun.y) if geometry.sza > 0 else np.inf
+    cell_y, cell_x = cell
+    return _Setting(sun, sun_tangent, view, 0.5 / cell_y, 0.5 / cell_x)
 
 
 @njit(nogil=True, cache=True)
-def _slope_light(dem, sky, row, row_share, column, column_share, per_y, per_x, sun, sun_tangent, view, out):
-    around = np.empty((4, sky.shape[2]))
-    for i in range(out.shape[1]):
-        _between(sky, row[i], row_share[i], around)
-        _light_of_row(dem[i : i + 3], around, column, column_share, per_y, per_x, sun, sun_tangent, view, out[:, i])
+def _slope_light(dem, sky, setting, light):
+    above = np.empty((4, sky.layers.shape[2]))
+    for i in range(light.cosine.shape[0]):
+        _between_rows(sky, i, above)
+        line = SlopeLight(light.cosine[i], light.sky_view[i], light.mu_s_local[i], light.upwelling[i])
+        _light_of_row(dem[i : i + 3], above, sky, setting, line)
 
 
 @njit(nogil=True, cache=True)
-def _slope_reflectance(
-    rho, dem, sky, row, row_share, column, column_share, per_y, per_x, sun, sun_tangent, view, direct, total, mu_s,
-    upwelling, out,
-):  # fmt: skip
-    around, light = np.empty((4, sky.shape[2])), np.empty((4, out.shape[2]))
+def _slope_reflectance(rho, dem, sky, setting, direct, total, upwelling, out):
+    above, columns = np.empty((4, sky.layers.shape[2])), out.shape[2]
+    line = SlopeLight(np.empty(columns), np.empty(columns), np.empty(columns), np.empty(columns))
     for i in range(out.shape[1]):
-        _between(sky, row[i], row_share[i], around)
-        _light_of_row(dem[i : i + 3], around, column, column_share, per_y, per_x, sun, sun_tangent, view, light)
+        _between_rows(sky, i, above)
+        _light_of_row(dem[i : i + 3], above, sky, setting, line)
         for band in range(out.shape[0]):
-            for j in range(out.shape[2]):
-                sky_view = light[1, j]
-                factor = kt(
-                    sky_view, (1 + light[0, j]) / 2 - sky_view, rho[band, i, j], light[2, j], mu_s, direct[band],
-                    total[band],
+            for j in range(columns):
+                sky_view = line.sky_view[j]
+                factor = topographic_factor(
+                    sky_view, terrain_view(sky_view, line.cosine[j]), rho[band, i, j], line.mu_s_local[j],
+                    setting.sun.z, direct[band], total[band],
                 )  # fmt: skip
-                out[band, i, j] = rho[band, i, j] * factor * (light[3, j] if upwelling else 1.0)
+                out[band, i, j] = rho[band, i, j] * factor * (line.upwelling[j] if upwelling else 1.0)
+
+
+@register_jitable
+def _between(before, after, share):
+    return (1 - share) * before + share * after
 
 
 @njit(nogil=True, cache=True)
-def _between(sky, row, share, out):
-    """One line of the sky between two rows of places."""
-    after = min(row + 1, sky.shape[1] - 1)
-    for layer in range(sky.shape[0]):
-        for j in range(sky.shape[2]):
-            out[layer, j] = (1 - share) * sky[layer, row, j] + share * sky[layer, after, j]
+def _between_rows(sky, i, out):
+    """The sky of one row of cells, at the columns of places."""
+    row, share = sky.row[i], sky.row_share[i]
+    after = min(row + 1, sky.layers.shape[1] - 1)
+    for layer in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[layer, j] = _between(sky.layers[layer, row, j], sky.layers[layer, after, j], share)
 
 
 @njit(nogil=True, cache=True)
-def _rise(low, here, high):
-    """As `terrain.gradient` differences, over two cells."""
-    if np.isnan(low):
-        low = 2 * here - high
-    elif np.isnan(high):
-        high = 2 * here - low
-    return 0.0 if np.isnan(high - low) else high - low
-
-
-@njit(nogil=True, cache=True)
-def _light_of_row(dem, around, column, share, per_y, per_x, sun, sun_tangent, view, out):
-    last = around.shape[1] - 1
-    sky = np.empty(4)
-    for j in range(out.shape[1]):
+def _light_of_row(dem, above, sky, setting, light):
+    last = above.shape[1] - 1
+    for j in range(light.cosine.size):
         here = dem[1, j + 1]
         if np.isnan(here):
-            out[:, j] = np.nan
+            light.cosine[j] = light.sky_view[j] = light.mu_s_local[j] = light.upwelling[j] = np.nan
             continue
-        east = _rise(dem[1, j], here, dem[1, j + 2]) * per_x
-        north = _rise(dem[2, j + 1], here, dem[0, j + 1]) * per_y
-        before = column[j]
+        east = rise(dem[1, j], here, dem[1, j + 2]) * setting.per_x
+        north = rise(dem[2, j + 1], here, dem[0, j + 1]) * setting.per_y
+        before, share = sky.column[j], sky.column_share[j]
         after = min(before + 1, last)
-        for layer in range(4):
-            sky[layer] = (1 - share[j]) * around[layer, before] + share[j] * around[layer, after]
-        cosine = 1 / np.sqrt(1 + east * east + north * north)
-        # A plane sees no more of the sky than a wide one of its slope.
-        sky_view = min((sky[2] - east * sky[0] - north * sky[1]) * cosine, (1 + cosine) / 2)
-        mu_s = (sun[2] - east * sun[0] - north * sun[1]) * cosine
-        mu_v = (view[2] - east * view[0] - north * view[1]) * cosine
-        out[0, j] = cosine
-        out[1, j] = max(sky_view, 0.0)
-        out[2, j] = mu_s if mu_s > 0 and sky[3] <= sun_tangent else 0.0
-        out[3, j] = max(mu_v, 0.0) / view[2]
+        seen = Vector(
+            _between(above[0, before], above[0, after], share),
+            _between(above[1, before], above[1, after], share),
+            _between(above[2, before], above[2, after], share),
+        )
+        horizon = _between(above[3, before], above[3, after], share)
+        mu_s = along_normal(setting.sun, east, north)
+        light.cosine[j] = slope_cosine(east, north)
+        light.sky_view[j] = sky_factor(seen, east, north)
+        light.mu_s_local[j] = mu_s if mu_s > 0 and horizon <= setting.sun_tangent else 0.0
+        light.upwelling[j] = upwelling_factor(along_normal(setting.sensor, east, north), setting.sensor.z)

@@ -1,9 +1,45 @@
-"""The shape of the ground: slope, aspect, and how much of the sky and of the land around a slope sees."""
+"""The shape of the ground: its gradient, slope and aspect."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
-from fifesim.ground.terrain.horizon import tangent
+
+class Vector(NamedTuple):
+    """Components eastward, northward and up; each a number or an array."""
+
+    x: float
+    y: float
+    z: float
+
+
+@register_jitable
+def rise(low, here, high):
+    """
+    Rise of the ground over two cells.
+
+    Parameters
+    ----------
+    low, here, high : float
+        Elevations in a line. [m]
+
+    Returns
+    -------
+    rise : float
+        Where an end is missing, of the straight line through the others; 0 where both are. [m]
+
+    Examples
+    --------
+    >>> rise(0.0, 1.0, 5.0), rise(np.nan, 1.0, 5.0), rise(np.nan, 1.0, np.nan)
+    (5.0, 8.0, 0.0)
+    """
+    if np.isnan(low):
+        low = 2 * here - high
+    elif np.isnan(high):
+        high = 2 * here - low
+    return 0.0 if np.isnan(high - low) else high - low
 
 
 def gradient(dem, cell_y, cell_x, rows=None, columns=None):
@@ -33,14 +69,68 @@ def gradient(dem, cell_y, cell_x, rows=None, columns=None):
     -----
     Where a neighbour is NaN the difference is one-sided, as if the ground went on straight; a NaN cell gives NaN.
     """
-    dem = np.asarray(dem, float)
-    i = np.arange(1, dem.shape[0] - 1) if rows is None else rows
-    j = np.arange(1, dem.shape[1] - 1) if columns is None else columns
-    here = dem[np.ix_(i, j)]
-    return (
-        _difference(dem[np.ix_(i, j - 1)], here, dem[np.ix_(i, j + 1)]) / (2 * cell_x),
-        _difference(dem[np.ix_(i + 1, j)], here, dem[np.ix_(i - 1, j)]) / (2 * cell_y),
-    )
+    dem = np.ascontiguousarray(dem, float)
+    rows = np.arange(1, dem.shape[0] - 1) if rows is None else np.asarray(rows)
+    columns = np.arange(1, dem.shape[1] - 1) if columns is None else np.asarray(columns)
+    out = np.empty((2, rows.size, columns.size))
+    _gradient(dem, rows, columns, 2 * cell_y, 2 * cell_x, out)
+    return out[0], out[1]
+
+
+@register_jitable
+def slope_cosine(east, north):
+    r"""
+    Cosine of a slope.
+
+    .. math:: \cos S = (1 + |\nabla z|^2)^{-1/2}
+
+    Parameters
+    ----------
+    east, north : array
+        Rise eastward and northward. [m m-1]
+
+    Returns
+    -------
+    cosine : array
+        [1]
+
+    Examples
+    --------
+    >>> round(float(slope_cosine(0.0, 1.0) ** 2), 12)
+    0.5
+    """
+    return 1 / np.sqrt(1 + east * east + north * north)
+
+
+@register_jitable
+def along_normal(vector, east, north):
+    r"""
+    Component of a vector along the normal of a slope.
+
+    .. math:: \mathbf{n} \cdot \mathbf{v}
+        = \left( v_z - \frac{\partial z}{\partial x} v_x - \frac{\partial z}{\partial y} v_y \right) \cos S
+
+    Of the unit vector toward the sun or the sensor it is the cosine of the local zenith angle.
+
+    Parameters
+    ----------
+    vector : Vector
+    east, north : array
+        Rise eastward and northward. [m m-1]
+
+    Returns
+    -------
+    component : array
+        Negative where the slope faces away. [unit of the vector]
+
+    Examples
+    --------
+    Ground that rises to the east leans west:
+
+    >>> round(float(along_normal(Vector(-0.5**0.5, 0.0, 0.5**0.5), 1.0, 0.0)), 12)
+    1.0
+    """
+    return (vector.z - east * vector.x - north * vector.y) * slope_cosine(east, north)
 
 
 def slope_aspect(dem, cell_y, cell_x):
@@ -107,167 +197,37 @@ def angles(east, north):
     return slope, np.where(aspect == 360, 0.0, aspect)
 
 
-def sky_vector(tangents, directions, east, north):
-    r"""
-    The part of the sky that a slope sees, as a vector.
-
-    .. math::
-
-        \mathbf{F} = \frac{1}{\pi} \int_{\text{sky}} \boldsymbol\omega \, d\omega
-            = \frac{1}{2\pi} \oint \boldsymbol\Gamma \, d\Theta
-
-    The sky factor of a surface with the unit normal n is :math:`V_d = \mathbf{n} \cdot \mathbf{F}`, which is
-    Eq. 7b of Dozier and Frew. The sky is bounded by the horizon, taken as great circles between the directions, and by
-    the plane of the slope; Lambert's integral along great circles is exact.
-
-    Parameters
-    ----------
-    tangents : array, shape (direction, ...)
-        cot H of the horizon of the land around. [1]
-    directions : array, shape (direction,)
-        Evenly spaced azimuths, clockwise from north. [degree]
-    east, north : array, shape (...)
-        Gradient of the slope itself, which gives its own horizon. NaN is level. [m m-1]
-
-    Returns
-    -------
-    vector : array, shape (3, ...)
-        Eastward, northward and up. [1]
-
-    References
-    ----------
-    [Lambert1760]_; [DozierFrew1990]_, Eqs. 7b and 10
+def plane_gradient(slope, aspect):
     """
-    tangents = np.ascontiguousarray(tangents, float)
-    azimuth = np.radians(np.asarray(directions, float))
-    shape = tangents.shape[1:]
-    own = [np.nan_to_num(np.broadcast_to(each, shape), nan=0.0).ravel() for each in (east, north)]
-    out = np.zeros((3, own[0].size))
-    _sky_vector(tangents.reshape(azimuth.size, -1), np.sin(azimuth), np.cos(azimuth), *own, out)
-    return out.reshape(3, *shape)
-
-
-def sky_view(slope, aspect, horizon, directions=None):
-    r"""
-    Sky view factor: diffuse light from a uniform sky on a slope over that on an open plain.
-
-    .. math::
-
-        V_d = \frac{1}{2\pi} \int_0^{2\pi} \left[ \cos S \sin^2 H
-            + \sin S \cos(\phi - A) \, (H - \sin H \cos H) \right] d\phi
-
-    with H the lower of the zenith angles of the horizon of the land around, of the slope's own, and 90 degrees.
+    Gradient of a plane; the inverse of `angles`.
 
     Parameters
     ----------
     slope, aspect : array
-        [degree]
-    horizon : array, shape (direction, ...)
-        Zenith angle H of the horizon of the land around. [degree]
-    directions : array, shape (direction,), optional
-        Its azimuths, clockwise from north and evenly spaced; by default from north on. [degree]
+        As of `slope_aspect`. [degree]
 
     Returns
     -------
-    sky_view : array
-        1 on an open plain. [1]
-
-    Notes
-    -----
-    The integral is exact for a horizon of great circles between the directions, such as that of any plane.
-
-    References
-    ----------
-    [DozierFrew1990]_, Eq. 7b
+    east, north : array
+        Rise eastward and northward. [m m-1]
 
     Examples
     --------
-    A wide plane of 60 degrees sees (1 + cos 60) / 2:
-
-    >>> round(float(sky_view(60.0, 10.0, np.full(16, 90.0))), 12)
-    0.75
+    >>> angles(*plane_gradient(30.0, 120.0))[1].round(9).item()
+    120.0
     """
-    horizon = np.asarray(horizon, float)
-    count = horizon.shape[0]
-    directions = np.arange(count) * (360 / count) if directions is None else directions
-    shape = np.broadcast_shapes(np.shape(slope), np.shape(aspect), horizon.shape[1:])
     steep, azimuth = np.tan(np.radians(slope)), np.radians(aspect)
-    east, north = (np.broadcast_to(-steep * each(azimuth), shape) for each in (np.sin, np.cos))
-    missing = len(shape) + 1 - horizon.ndim
-    tangents = tangent(horizon).reshape(count, *(1,) * missing, *horizon.shape[1:])
-    x, y, z = sky_vector(np.broadcast_to(tangents, (count, *shape)), directions, east, north)
-    return (z - east * x - north * y) / np.sqrt(1 + east**2 + north**2)
-
-
-def terrain_view(slope, sky_view):
-    r"""
-    Terrain configuration factor: the share of a slope's view that land takes, so far as the plane of the slope is open.
-
-    .. math:: C_t = \frac{1 + \cos S}{2} - V_d
-
-    Parameters
-    ----------
-    slope : array
-        [degree]
-    sky_view : array
-        [1]
-
-    Returns
-    -------
-    terrain_view : array
-        0 on any wide plane. [1]
-
-    References
-    ----------
-    [DozierFrew1990]_, Eq. 9b
-
-    Examples
-    --------
-    >>> float(terrain_view(0.0, 0.75))
-    0.25
-    """
-    return (1 + np.cos(np.radians(slope))) / 2 - sky_view
-
-
-def _difference(low, here, high):
-    """High less low, over two cells; a missing one is where a straight line through the others leads."""
-    low, high = np.where(np.isnan(low), 2 * here - high, low), np.where(np.isnan(high), 2 * here - low, high)
-    # here - here is 0, or NaN where the cell itself is missing.
-    return np.where(np.isnan(high - low), 0.0, high - low) + (here - here)
+    return -steep * np.sin(azimuth), -steep * np.cos(azimuth)
 
 
 @njit(nogil=True, cache=True)
-def _sky_vector(tangents, sin, cos, east, north, out):
-    count = tangents.shape[0]
-    for cell in range(out.shape[1]):
-        for k in range(count):
-            n = (k + 1) % count
-            land, next_land = tangents[k, cell], tangents[n, cell]
-            own = east[cell] * sin[k] + north[cell] * cos[k]
-            next_own = east[cell] * sin[n] + north[cell] * cos[n]
-            above, next_above = land - own, next_land - next_own
-            a, b = (sin[k], cos[k], max(land, own)), (sin[n], cos[n], max(next_land, next_own))
-            if above * next_above < 0:
-                # The slope's plane and the land's horizon cross between the two directions.
-                w, v = abs(next_above), abs(above)
-                c = (
-                    w * sin[k] + v * sin[n],
-                    w * cos[k] + v * cos[n],
-                    w * land + v * next_land,
-                )
-                _add_arc(a, c, cell, out)
-                _add_arc(c, b, cell, out)
-            else:
-                _add_arc(a, b, cell, out)
-
-
-@njit(nogil=True, cache=True)
-def _add_arc(a, b, cell, out):
-    """Lambert's term of the great circle from a to b, clockwise seen from above: its angle times its normal."""
-    x, y, z = b[1] * a[2] - b[2] * a[1], b[2] * a[0] - b[0] * a[2], b[0] * a[1] - b[1] * a[0]
-    sine = np.sqrt(x * x + y * y + z * z)
-    if sine > 0:
-        factor = np.arctan2(sine, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) / (2 * np.pi * sine)
-        out[0, cell] += factor * x
-        out[1, cell] += factor * y
-        out[2, cell] += factor * z
+def _gradient(dem, rows, columns, over_y, over_x, out):
+    for i in range(rows.size):
+        for j in range(columns.size):
+            row, column = rows[i], columns[j]
+            here = dem[row, column]
+            if np.isnan(here):
+                out[:, i, j] = np.nan
+                continue
+            out[0, i, j] = rise(dem[row, column - 1], here, dem[row, column + 1]) / over_x
+            out[1, i, j] = rise(dem[row + 1, column], here, dem[row - 1, column]) / over_y

@@ -1,9 +1,10 @@
 """Noise of a detector: shot, thermal and fixed pattern, drawn by scan line from counters."""
 
 from dataclasses import dataclass
-from numbers import Integral
 
 import numpy as np
+
+from fifesim.base.seeds import generator
 
 # What can be switched on by name.
 KINDS = ("shot", "thermal", "fixed-pattern")
@@ -13,8 +14,6 @@ _TILE = 1024
 
 # Keeps the streams apart from those of a landscape with the same seed.
 _SENSOR = 2**40
-
-_MASK = 2**64 - 1
 
 
 @dataclass(frozen=True)
@@ -199,23 +198,6 @@ def check_kinds(kinds):
     return kinds
 
 
-def check_seed(seed):
-    """
-    Refuse a seed that is not a whole number from 0 to 2**64 - 1.
-
-    Parameters
-    ----------
-    seed : int
-
-    Raises
-    ------
-    ValueError
-        If it is out of range or not whole.
-    """
-    if isinstance(seed, bool) or not isinstance(seed, Integral) or not 0 <= seed < 2**64:
-        raise ValueError(f"the seed of noise must be a whole number from 0 to 2**64 - 1, got {seed!r}")
-
-
 def fixed_pattern(model, seed, band):
     """
     Gain and offset of each detector.
@@ -322,8 +304,5 @@ def add_noise(radiance, model, kinds, *, seed, band, row=0, column=0):
     return out
 
 
-def _normals(seed, band, counter, size):
-    # A list of numbers from 2**63 up would go through floating point, and neighbours be the same.
-    counter = np.array([value & _MASK for value in counter], np.uint64)
-    key = np.array([seed, _SENSOR + band], np.uint64)
-    return np.random.Generator(np.random.Philox(counter=counter, key=key)).standard_normal(size)
+def _normals(seed, band, place, size):
+    return generator(seed, _SENSOR + band, place).standard_normal(size)

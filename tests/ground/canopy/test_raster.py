@@ -1,17 +1,15 @@
-"""The ground scene on labelled rasters: labels, laziness, and the kernel's numbers."""
+"""The canopy on labelled rasters: labels, laziness, and the kernel's numbers."""
 
 import numpy as np
 import pytest
 import xarray as xr
-from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_compute
+from lazy import ODD_CHUNKS, check_raster_function, in_chunks, no_compute
 
 import fifesim
 from fifesim.base.geometry import Geometry
 from fifesim.ground.canopy import absorption
-from fifesim.ground.canopy.raster import surface_reflectance
+from fifesim.ground.canopy.raster import level_reflectance
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
-from fifesim.ground.landscape import field as random_field
-from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 
@@ -26,63 +24,7 @@ BANDS = {
 
 
 def reflectance(lai, background=(0.1, 0.2), **options):
-    return surface_reflectance(lai, background=background, geometry=SUN, **BANDS, **options)
-
-
-def test_scene_is_the_field_mapped_to_the_distribution(site):
-    row, column = grids.lattice_position(site)
-    field = random_field.streaming_field(7, 0.15, row, column, tuple(site.shape))
-    lai = fifesim.lai_scene(site, "unburned-ungrazed", arp=0.15, seed=7)
-    table = quantile_table(lai_distribution("unburned-ungrazed"))
-    np.testing.assert_array_equal(lai, quantile_map(field, table))
-
-
-def test_scene_is_labelled_and_placed(site, lai):
-    check_place(lai, site.crs)
-    assert lai.name == "lai" and cf.attributes("lai").items() <= lai.attrs.items()
-    assert lai.attrs["arp"] == 0.15 and lai.attrs["rng_seed"] == "7"
-    assert lai.attrs["lai_distribution"] == "burned-grazed" and lai.attrs["method"] == "streaming"
-    assert grids.same_grid(grids.geobox(lai), site)
-
-
-@pytest.mark.parametrize("chunks", [ODD_CHUNKS, 20, "auto", {"y": -1}])
-def test_scene_has_the_same_bits_in_any_chunks(site, lai, chunks):
-    with no_compute():
-        lazy = fifesim.lai_scene(site, "burned-grazed", arp=0.15, seed=7, chunks=chunks)
-    assert lazy.chunks is not None
-    xr.testing.assert_identical(lazy.compute(), lai)
-
-
-def test_window_of_the_site_is_a_slice_of_it(lai):
-    larger = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((80, 140), (170, 240))), arp=0.15, seed=7)
-    xr.testing.assert_identical(larger[10:55, 10:64].assign_coords(spatial_ref=lai["spatial_ref"]), lai)
-
-
-def test_periodic_scene_is_made_at_once_and_its_chunks_change_nothing(site):
-    whole = fifesim.lai_scene(site, method="periodic", seed=3)
-    xr.testing.assert_identical(fifesim.lai_scene(site, method="periodic", seed=3, chunks=11).compute(), whole)
-
-
-@pytest.mark.parametrize(
-    "options, message",
-    [
-        ({"arp": 0.3}, r"arp must be in \[0, 0\.25\), got 0\.3"),
-        ({"seed": -1}, "seed must be"),
-        ({"method": "fft"}, "method must be one of streaming, periodic, got 'fft'"),
-        ({"arp": 0.24999, "chunks": 10}, "at most"),
-        ({"distribution": "grazed"}, "unknown LAI distribution 'grazed'"),
-        ({"chunks": {"band": 1}}, "y and x"),
-    ],
-)
-def test_impossible_scene_is_refused_before_it_computes(site, options, message):
-    with pytest.raises(ValueError, match=message):
-        fifesim.lai_scene(site, **options)
-
-
-def test_scene_too_large_for_memory_names_the_streaming_method():
-    grid = fifesim.grid_at("EPSG:26914", 0, 5e6, 4e6, 4e6, 1.0)
-    with pytest.raises(ValueError, match=r"needs .* GB of memory.*method=\"streaming\""):
-        fifesim.lai_scene(grid, method="periodic")
+    return level_reflectance(lai, background=background, geometry=SUN, **BANDS, **options)
 
 
 def test_reflectance_keeps_its_word_and_equals_the_kernel(lai_with_hole):

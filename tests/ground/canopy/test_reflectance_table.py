@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy.lai_table import LIMIT, interpolate, tabulate
-from fifesim.ground.canopy.reflectance_table import canopy_reflectance
-from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
+from fifesim.ground.canopy.background import reflectance_factor, with_background
+from fifesim.ground.canopy.lai_table import LIMIT
+from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
+from fifesim.ground.canopy.sail_model import sail
 
 RHO, TAU = np.array([0.07, 0.45, 0.5, 0.0, 0.6, 1.0]), np.array([0.04, 0.42, 0.5, 0.0, 0.4, 0.0])
 SKY, GROUND = np.array([0, 0.1, 0.2, 0.5, 1, 0.3]), np.array([0.15, 0.19, 1, 0, 1, 0.5])
@@ -102,14 +103,26 @@ def test_values_outside_their_range_are_refused(change, message):
         canopy_reflectance(**given, sza=30)
 
 
-def test_tables_meet_their_tolerance_or_say_so():
-    table = tabulate(lambda lai: np.stack([np.exp(-5 * lai), lai**2 / (1 + lai**2)]), rate=5.0)
-    lai = np.random.default_rng(2).uniform(0, LIMIT, 10_000)
-    np.testing.assert_allclose(interpolate(table, lai), [np.exp(-5 * lai), lai**2 / (1 + lai**2)], atol=2.5e-7)
-    with pytest.raises(ValueError, match="exact=True"):
-        tabulate(lambda lai: np.floor(lai)[None], rate=1.0)
-
-
-def test_outside_a_table_there_is_nothing():
-    table = tabulate(lambda lai: np.exp(-lai)[None], rate=1.0)
-    assert np.all(np.isnan(interpolate(table, [np.nan, -1e-9, LIMIT * 1.001, np.inf])))
+def test_directions_of_each_cell_are_those_of_the_whole_scene_at_them():
+    """Cell by cell beside `exact`; the relative azimuth is folded, and an angle without data gives no reflectance."""
+    rng = np.random.default_rng(3)
+    lai, background = rng.gamma(2, 0.5, 12), rng.uniform(0.05, 0.4, (12, 2))
+    sza, vza, raa = rng.uniform(0, [[85], [85], [360]], (3, 12))
+    vza[5] = np.nan
+    leaf, sky = {"leaf_reflectance": [0.07, 0.45], "leaf_transmittance": [0.04, 0.42]}, np.array([0.2, 0.1])
+    shape = {"leaf_angles": "planophile", "hotspot": 0.1}
+    angles = {"sza": sza, "vza": vza, "raa": raa}
+    found = directional_reflectance(lai, background=background, diffuse_fraction=sky, **angles, **leaf, **shape)
+    for cell in range(12):
+        if cell == 5:
+            assert np.isnan(found[:, cell]).all()
+            continue
+        here = {name: angle[cell] for name, angle in angles.items()}
+        alone = canopy_reflectance(
+            lai[cell], background=background[cell], diffuse_fraction=sky, exact=True, **here, **leaf, **shape
+        )
+        np.testing.assert_allclose(found[:, cell], alone, rtol=1e-13)
+    with pytest.raises(ValueError, match=r"sza must be in \[0, 90\) degrees in every cell, got 90"):
+        directional_reflectance(
+            lai, background=background, diffuse_fraction=sky, **(angles | {"sza": 90.0}), **leaf, **shape
+        )

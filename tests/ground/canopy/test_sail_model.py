@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from oracles_canopy import four_streams, sunlit_and_seen, turned_leaves
-from scipy.linalg import expm
 
-from fifesim.ground.canopy.divided_differences import exponential_chain
+from fifesim.ground.canopy.background import with_background
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes, leaf_projection
-from fifesim.ground.canopy.sail_model import reflectance_factor, sail, volume_scattering, with_background
+from fifesim.ground.canopy.sail_model import sail, volume_scattering
 
 SHAPES = ["spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform", "90: 1", "0: 1"]
 LAI = np.array([0, 1e-6, 0.01, 0.5, 2, 8, 20, 100])[:, None, None, None]
@@ -135,12 +134,6 @@ def test_black_leaves_reflect_nothing():
         np.testing.assert_array_equal(scattered, 0)
 
 
-@pytest.mark.parametrize("r", [0.0, 0.15, 1.0])
-def test_bare_ground_shows_the_background_exactly(r):
-    for reflectance in with_background(sail(0.0, RHO, 1 - RHO, sza=SZA, vza=VZA, hotspot=0.05), r):
-        assert np.all(reflectance == r)
-
-
 @pytest.mark.filterwarnings("error")
 def test_nan_stays_in_its_cell_and_nothing_warns():
     lai = np.array([1.0, np.nan, 3.0, 0.0])
@@ -168,16 +161,3 @@ def test_everything_broadcasts_at_once():
 def test_relative_azimuth_is_folded():
     first, second = (sail(1.0, 0.1, 0.1, sza=20, vza=40, raa=raa).rso for raa in (50, 310))
     np.testing.assert_allclose(first, second, rtol=1e-14)
-
-
-def test_skylight_mixes_the_two_reflectances():
-    assert reflectance_factor(0.3, 0.5, 0.0) == 0.3
-    assert reflectance_factor(0.3, 0.5, 1.0) == 0.5
-
-
-@pytest.mark.parametrize("gap", [0, 1e-12, 1e-6, 0.01, 0.66, 0.67, 0.68, 1, 10, 1000])
-def test_chain_matches_a_triangular_matrix_exponential(gap):
-    """Opitz: the corner of exp of a bidiagonal matrix is the divided difference. Across the series' limit too."""
-    rates = np.array([0.3, 0.3 + gap, 0.1, 0.3, 0.2 + 2 * gap])
-    corner = expm(3.0 * (np.diag(-rates) + np.diag(np.ones(4), 1)))[0, -1]
-    np.testing.assert_allclose(exponential_chain(3.0, *rates), corner, rtol=1e-11)

@@ -7,53 +7,54 @@ from oracles_terrain import hills, plane
 from fifesim.base.geometry import Geometry
 from fifesim.ground.terrain import horizon as horizons
 from fifesim.ground.terrain import light as lights
-from fifesim.ground.terrain import slope as terrain
+from fifesim.ground.terrain.sky import sky_vector, sky_view, terrain_view
+from fifesim.ground.terrain.slope import gradient
 
 AZIMUTHS = horizons.azimuths(32)
 
 
 def sky_of(dem, cell, reach, saa):
-    """Layers of `slope_light` at every cell of a raster, with the horizon at the same resolution."""
+    """Elevation and sky of `slope_light` at every cell of a raster, with the horizon at the same resolution."""
     m, n = horizons.horizon_margin(cell, cell, reach)
     padded = np.pad(dem, ((m, m), (n, n)), constant_values=np.nan)
     tangents = horizons.horizon_tangent(padded, cell, cell, AZIMUTHS, reach)
     edged = np.pad(dem, 1, constant_values=np.nan)
-    vector = terrain.sky_vector(tangents, AZIMUTHS, *terrain.gradient(edged, cell, cell))
-    return edged, np.concatenate([vector, lights.horizon_toward(tangents, AZIMUTHS, saa)[None]])
+    vector = sky_vector(tangents, AZIMUTHS, *gradient(edged, cell, cell))
+    layers = np.concatenate([vector, lights.horizon_toward(tangents, AZIMUTHS, saa)[None]])
+    row, column = (np.arange(size) for size in dem.shape)
+    return edged, lights.Sky(layers, row, np.zeros(row.size), column, np.zeros(column.size))
 
 
 def light_of(dem, cell, geometry, reach=500.0):
-    edged, layers = sky_of(dem, cell, reach, geometry.saa)
-    places = [(np.arange(size), np.zeros(size)) for size in dem.shape]
-    return lights.slope_light(edged, layers, *places, cell, cell, geometry)
+    return lights.slope_light(*sky_of(dem, cell, reach, geometry.saa), (cell, cell), geometry)
 
 
 def kt_of(light, rho, geometry, direct=0.7, total=0.9):
-    cosine, sky_view, mu_s_local, _ = light
-    return lights.kt(sky_view, (1 + cosine) / 2 - sky_view, rho, mu_s_local, geometry.mu_s, direct, total)
+    ct = terrain_view(light.sky_view, light.cosine)
+    return lights.topographic_factor(light.sky_view, ct, rho, light.mu_s_local, geometry.mu_s, direct, total)
 
 
-def test_cosine_is_that_of_vectors():
+def test_directions_point_where_angles_say():
     rng = np.random.default_rng(1)
-    slope, aspect, zenith, azimuth = rng.uniform(0, [[90], [360], [90], [360]], (4, 50))
-    normal, toward = (
-        np.stack([np.sin(a) * np.sin(b), np.sin(a) * np.cos(b), np.cos(a)])
-        for a, b in (np.radians((slope, aspect)), np.radians((zenith, azimuth)))
-    )
-    found = lights.local_cosine(slope, aspect, zenith, azimuth)
-    np.testing.assert_allclose(found, (normal * toward).sum(0), atol=1e-14)
+    zenith, azimuth = rng.uniform(0, [[90], [360]], (2, 50))
+    a, b = np.radians((zenith, azimuth))
+    toward = np.stack([np.sin(a) * np.sin(b), np.sin(a) * np.cos(b), np.cos(a)])
     np.testing.assert_allclose(lights.direction_vector(zenith, azimuth), toward, atol=1e-15)
 
 
 def test_kernel_on_planes_is_the_formulas():
-    """The path by gradients beside the one by angles."""
+    """The cosines by spherical trigonometry."""
     geometry = Geometry(50.0, 110.0, 20.0, 300.0)
+
+    def cosine(slope, aspect, zenith, azimuth):
+        (s, z), across = np.radians([slope, zenith]), np.cos(np.radians(azimuth - aspect))
+        return np.cos(s) * np.cos(z) + np.sin(s) * np.sin(z) * across
+
     for slope, aspect in ((0, 0), (15, 80), (40, 250), (60, 300)):
         light = light_of(plane((12, 14), 10.0, 10.0, slope, aspect), 10.0, geometry)
-        mu_s = max(float(lights.local_cosine(slope, aspect, 50.0, 110.0)), 0.0)
-        mu_v = float(lights.local_cosine(slope, aspect, 20.0, 300.0))
-        sky = terrain.sky_view(slope, aspect, np.full(32, 90.0))
-        wanted = [np.cos(np.radians(slope)), sky, mu_s, lights.upwelling_factor(mu_v, 20.0)]
+        mu_s, mu_v = (max(cosine(slope, aspect, *toward), 0.0) for toward in ((50.0, 110.0), (20.0, 300.0)))
+        sky = sky_view(slope, aspect, np.full(32, 90.0))
+        wanted = [np.cos(np.radians(slope)), sky, mu_s, mu_v / np.cos(np.radians(20.0))]
         for found, value, tolerance in zip(light, wanted, (1e-12, 2e-4, 1e-12, 1e-12), strict=True):
             np.testing.assert_allclose(found, value, rtol=0, atol=tolerance)
 
@@ -62,7 +63,7 @@ def test_kt_and_the_upwelling_factor_are_one_on_level_ground():
     for geometry in (Geometry(28.5, 117.0), Geometry(0.0, 0.0), Geometry(69.9, 300.0, 60.0, 100.0)):
         light = light_of(np.full((9, 9), 371.2), 30.0, geometry)
         np.testing.assert_allclose(kt_of(light, 0.4, geometry), 1, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(light[3], 1, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(light.upwelling, 1, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("azimuth", [90.0, 180.0, 270.0, 0.0])
@@ -73,7 +74,7 @@ def test_shadow_of_a_cliff_is_as_long_as_it_should_be(elevation, azimuth):
     dem[:, 60:] = 20.0
     dem = np.rot90(dem, (azimuth - 90) / -90)
     light = light_of(dem, 2.0, Geometry(90 - elevation, azimuth))
-    line = np.rot90(light[2] == 0, (azimuth - 90) / 90)[60]
+    line = np.rot90(light.mu_s_local == 0, (azimuth - 90) / 90)[60]
     assert line[:60].sum() * 2.0 == pytest.approx(20 / np.tan(np.radians(elevation)), abs=2.0 + 1e-9)
     # Cell 60 is on the cliff's face, which turns away.
     assert not line[61:].any()
@@ -85,14 +86,14 @@ def test_shadow_between_two_directions_of_the_horizon():
     dem = np.zeros((120, 120))
     dem[:, 60:] = 20.0
     azimuth = 90 - 17.3
-    line = light_of(dem, 2.0, Geometry(70.0, azimuth))[2][60] == 0
+    line = light_of(dem, 2.0, Geometry(70.0, azimuth)).mu_s_local[60] == 0
     length = 20 / np.tan(np.radians(20.0)) * np.sin(np.radians(azimuth))
     assert line[:60].sum() * 2.0 == pytest.approx(length, abs=2.0 + 1e-9)
 
 
 def test_slope_that_faces_away_is_dark():
     light = light_of(plane((8, 8), 10.0, 10.0, 30.0, 0.0), 10.0, Geometry(65.0, 180.0))
-    assert (light[2] == 0).all()
+    assert (light.mu_s_local == 0).all()
 
 
 def pit(size=121, radius=100.0, depth=0.4):
@@ -108,7 +109,7 @@ def test_skylight_and_sun_that_enter_a_closed_pit_fall_on_its_walls():
     dem, cell, inside, opening = pit()
     for geometry in (Geometry(20.0, 30.0), Geometry(50.0, 200.0), Geometry(70.0, 310.0)):
         light = light_of(dem, cell, geometry)
-        area = cell**2 / light[0]
+        area = cell**2 / light.cosine
         # The rim's cells are cut by it: 2 % of the opening is within half a cell of it.
         for direct in (0.0, 0.5, 0.9):
             flux = (kt_of(light, 0.0, geometry, direct) * area)[inside].sum()
@@ -120,9 +121,9 @@ def test_terrain_returns_what_the_walls_reflect_once():
     dem, cell, inside, _ = pit()
     geometry = Geometry(40.0, 100.0)
     light = light_of(dem, cell, geometry)
-    area = (cell**2 / light[0])[inside]
+    area = (cell**2 / light.cosine)[inside]
     gain = (kt_of(light, 0.5, geometry, 0.0) - kt_of(light, 0.0, geometry, 0.0))[inside]
-    sky, cosine = light[1][inside], light[0][inside]
+    sky, cosine = light.sky_view[inside], light.cosine[inside]
     # Ct is what the slope's hemisphere has besides sky: in the pit 1 - Vd less the level sky that its own plane hides.
     expected = 0.5 * ((1 + cosine) / 2 - sky)
     assert (gain * area).sum() == pytest.approx((expected * area).sum(), rel=1e-12)
@@ -135,21 +136,20 @@ def test_turning_ground_and_sun_together_turns_the_result():
     # Counterclockwise on paper is from east to north: azimuths fall by 90.
     after = light_of(np.rot90(dem), 10.0, Geometry(60.0, 305.0, 25.0, 200.0))
     np.testing.assert_allclose(np.rot90(before, axes=(1, 2)), after, rtol=0, atol=1e-9)
-    assert before[1].std() > 1e-3 and (before[2] == 0).any()
+    assert before.sky_view.std() > 1e-3 and (before.mu_s_local == 0).any()
 
 
 def test_fused_reflectance_is_rho_kt_and_the_view_factor():
     dem, geometry = hills((30, 35), seed=5, relief=60.0), Geometry(55.0, 100.0, 30.0, 20.0)
     dem[3, 4] = np.nan
-    edged, layers = sky_of(dem, 10.0, 300.0, geometry.saa)
-    places = [(np.arange(size), np.zeros(size)) for size in dem.shape]
+    edged, sky = sky_of(dem, 10.0, 300.0, geometry.saa)
     rho = np.random.default_rng(4).uniform(0, 0.6, (2, *dem.shape))
     direct, total = np.array([0.6, 0.8]), np.array([0.85, 0.95])
-    arguments = (rho, edged, layers, *places, 10.0, 10.0, geometry, direct, total)
+    arguments = (rho, edged, sky, (10.0, 10.0), geometry, direct, total)
     light = light_of(dem, 10.0, geometry, 300.0)
     expected = rho * kt_of(light, rho, geometry, direct[:, None, None], total[:, None, None])
     np.testing.assert_allclose(lights.slope_reflectance(*arguments, upwelling=False), expected, rtol=1e-13)
-    np.testing.assert_allclose(lights.slope_reflectance(*arguments), expected * light[3], rtol=1e-13)
+    np.testing.assert_allclose(lights.slope_reflectance(*arguments), expected * light.upwelling, rtol=1e-13)
     assert np.isnan(expected).sum() == 2
 
 
@@ -159,8 +159,7 @@ def test_places_between_are_interpolated():
     value = 0.6 + 0.01 * rows[:, None] + 0.005 * columns
     layers = np.zeros((4, 3, 3))
     layers[2] = value[4:17:6, 5:18:6]
-    before = [np.clip((axis - first).astype(int) // 6, 0, 1) for axis, first in ((rows, 4), (columns, 5))]
-    shares = [(axis - first - 6 * b) / 6 for axis, first, b in zip((rows, columns), (4, 5), before, strict=True)]
-    places = list(zip(before, shares, strict=True))
-    light = lights.slope_light(np.zeros((22, 26)), layers, *places, 1.0, 1.0, Geometry(30.0, 0.0))
-    np.testing.assert_allclose(light[1], np.clip(value, 0, 1), rtol=1e-12)
+    row, column = (np.clip((axis - first).astype(int) // 6, 0, 1) for axis, first in ((rows, 4), (columns, 5)))
+    sky = lights.Sky(layers, row, (rows - 4 - 6 * row) / 6, column, (columns - 5 - 6 * column) / 6)
+    light = lights.slope_light(np.zeros((22, 26)), sky, (1.0, 1.0), Geometry(30.0, 0.0))
+    np.testing.assert_allclose(light.sky_view, np.clip(value, 0, 1), rtol=1e-12)

@@ -1,10 +1,9 @@
-"""Slope, aspect and sky factors against planes, valleys, pits and Dozier's integral."""
+"""Slope, aspect and normals against planes and vectors."""
 
 import numpy as np
 import pytest
-from oracles_terrain import dozier, hills, plane
+from oracles_terrain import hills, plane
 
-from fifesim.ground.terrain import horizon as horizons
 from fifesim.ground.terrain import slope as terrain
 
 
@@ -35,100 +34,27 @@ def test_level_ground_faces_north_and_a_missing_cell_is_missing():
     assert np.nansum(np.abs(slope)) == np.nansum(np.abs(aspect)) == 0
 
 
-@pytest.mark.parametrize("count", [16, 17, 32])
-@pytest.mark.parametrize("slope", [0, 5, 30, 45, 60])
-def test_a_wide_plane_sees_the_sky_above_its_own_horizon(slope, count):
-    for aspect in (0.0, 3.0, 11.25, 100.0):
-        found = terrain.sky_view(slope, aspect, np.full(count, 90.0))
-        np.testing.assert_allclose(found, (1 + np.cos(np.radians(slope))) / 2, rtol=0, atol=1e-12)
+def test_gradient_is_that_of_numpy_at_any_cells():
+    dem = hills((20, 30), seed=3)
+    north, east = np.gradient(dem, -12.0, 7.0)
+    found = terrain.gradient(dem, 12.0, 7.0)
+    np.testing.assert_allclose(found, [east[1:-1, 1:-1], north[1:-1, 1:-1]], rtol=1e-12)
+    rows, columns = np.array([3, 4, 11]), np.array([1, 20])
+    some = terrain.gradient(dem, 12.0, 7.0, rows, columns)
+    np.testing.assert_array_equal(some, np.array(found)[:, rows[:, None] - 1, columns - 1])
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_sky_factor_is_doziers_integral(seed):
-    rng = np.random.default_rng(seed)
-    count = 24
-    horizon = rng.uniform(50, 90, count)
-    slope, aspect = rng.uniform(0, 60), rng.uniform(0, 360)
-    tangents, step = horizons.tangent(horizon), 2 * np.pi / count
-
-    def great_circles(phi):
-        first = (phi // step).astype(int)
-        part = phi - first * step
-        return (tangents[first] * np.sin(step - part) + tangents[(first + 1) % count] * np.sin(part)) / np.sin(step)
-
-    # The midpoint rule meets kinks of the horizon: 1e-9 with this many steps.
-    expected = dozier(slope, aspect, great_circles)
-    np.testing.assert_allclose(terrain.sky_view(slope, aspect, horizon), expected, rtol=0, atol=1e-8)
+def test_component_along_the_normal_is_that_of_vectors():
+    rng = np.random.default_rng(1)
+    slope, aspect, *vector = rng.uniform([[0], [0], [-1], [-1], [-1]], [[89], [360], [1], [1], [1]], (5, 50))
+    tilt, azimuth = np.radians((slope, aspect))
+    normal = np.stack([np.sin(tilt) * np.sin(azimuth), np.sin(tilt) * np.cos(azimuth), np.cos(tilt)])
+    east, north = terrain.plane_gradient(slope, aspect)
+    found = terrain.along_normal(terrain.Vector(*vector), east, north)
+    np.testing.assert_allclose(found, (normal * vector).sum(0), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(terrain.slope_cosine(east, north), normal[2], rtol=0, atol=1e-14)
 
 
-@pytest.mark.parametrize("wall", [5.0, 20.0, 45.0])
-def test_bottom_of_a_v_valley_sees_what_its_walls_leave(wall):
-    """Across a long valley Vd is half the sum of the sines from the normal to the two limits of the sky."""
-    azimuth = np.radians(np.arange(32) * 11.25)
-    horizon = horizons.zenith(np.tan(np.radians(wall)) * np.abs(np.sin(azimuth)))
-    np.testing.assert_allclose(terrain.sky_view(0.0, 0.0, horizon), np.cos(np.radians(wall)), rtol=5e-3)
-    # The foot of the west wall faces east: behind, its own plane, ahead, the other wall.
-    found = terrain.sky_view(wall, 90.0, horizon)
-    np.testing.assert_allclose(found, (1 + np.cos(np.radians(2 * wall))) / 2, rtol=5e-3)
-
-
-def test_horizon_below_the_horizontal_is_open_and_unknown_is_open():
-    assert terrain.sky_view(0.0, 0.0, np.full(16, 95.0)) == pytest.approx(1, abs=1e-12)
-    assert terrain.sky_view(0.0, 0.0, np.full(16, np.nan)) == pytest.approx(1, abs=1e-12)
-
-
-def cells_of(dem, cell, reach, count=32):
-    """Slope, aspect and sky factor on a raster, NaN beyond it."""
-    azimuths = horizons.azimuths(count)
-    m, n = horizons.horizon_margin(cell, cell, reach)
-    padded = np.pad(dem, ((m, m), (n, n)), constant_values=np.nan)
-    slope, aspect = terrain.slope_aspect(np.pad(dem, 1, constant_values=np.nan), cell, cell)
-    horizon = horizons.horizon_zenith(padded, cell, cell, azimuths, reach)
-    return slope, aspect, terrain.sky_view(slope, aspect, horizon)
-
-
-@pytest.mark.parametrize("slope", [0.0, 10.0, 30.0, 60.0])
-def test_plane_on_a_raster(slope):
-    """Where the plane dips below the horizontal between two directions, the horizon's great circle cuts the corner."""
-    found = cells_of(plane((40, 50), 30.0, 30.0, slope, 33.0), 30.0, 600.0)[2]
-    np.testing.assert_allclose(found, (1 + np.cos(np.radians(slope))) / 2, rtol=0, atol=1e-4)
-
-
-@pytest.mark.parametrize("depth", [0.2, 0.5, 0.8])
-def test_spherical_pit_on_a_raster(depth):
-    """Everywhere in a pit of a sphere of radius R: Vd = 1 - depth / 2R, for the light that enters is spread evenly."""
-    radius, size = 100.0, 281
-    rim = radius * np.sqrt(depth * (2 - depth))
-    cell = 2.1 * rim / size
-    y, x = (np.mgrid[:size, :size] - size // 2) * cell
-    wall = radius * (1 - depth) - np.sqrt(np.maximum(radius**2 - x**2 - y**2, 0))
-    dem = np.where(np.hypot(x, y) < rim, wall, 0.0)
-    slope, _, found = cells_of(dem, cell, 210.0)
-    inside = np.hypot(x, y) < 0.7 * rim
-    np.testing.assert_allclose(found[inside].mean(), 1 - depth / 2, rtol=5e-3)
-    # The rim is cut by cells, which single directions see.
-    np.testing.assert_allclose(found[inside], 1 - depth / 2, rtol=0.012)
-    view = terrain.terrain_view(slope, found)
-    np.testing.assert_allclose(view, (1 + np.cos(np.radians(slope))) / 2 - found, atol=1e-15)
-
-
-def test_v_valley_on_a_raster():
-    """Walls of 20 degrees that end at a level upland: on the floor, and half way up."""
-    wall, half, cell = np.radians(20.0), 60, 5.0
-    x = (np.arange(3 * half * 2 + 1) - 3 * half) * cell
-    profile = np.minimum(np.abs(x), half * cell) * np.tan(wall)
-    dem = np.broadcast_to(profile, (401, x.size))
-    _, _, found = cells_of(dem, cell, 1000.0)
-    middle = found[200]
-    # Half way up: behind, the plane of the wall; ahead the far rim, half a depth up and three quarters of a width away.
-    rim = np.arctan(np.tan(wall) / 3)
-    sky = (1 + np.cos(rim + wall)) / 2
-    np.testing.assert_allclose(middle[3 * half], np.cos(wall), rtol=5e-3)
-    np.testing.assert_allclose(middle[3 * half + half // 2], sky, rtol=5e-3)
-
-
-def test_open_hills_lose_no_sky_twice():
-    """Vd lies between nothing and a wide plane's."""
-    slope, _, found = cells_of(hills((60, 70)), 10.0, 300.0)
-    assert (found > 0.3).all()
-    assert (found <= (1 + np.cos(np.radians(slope))) / 2 + 1e-12).all()
+def test_angles_and_gradient_are_inverse():
+    slope, aspect = np.array([0.5, 45.0, 80.0]), np.array([359.0, 180.0, 37.0])
+    np.testing.assert_allclose(terrain.angles(*terrain.plane_gradient(slope, aspect)), [slope, aspect], rtol=1e-12)

@@ -1,6 +1,6 @@
 """The synthetic Flint Hills on a labelled raster."""
 
-from fifesim.ground.landscape.field import check_seed
+from fifesim.base.seeds import check_seed
 from fifesim.ground.terrain.flint_hills import elevation
 from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
@@ -24,7 +24,7 @@ def flint_hills(grid, seed=0, *, chunks=None):
     grid : odc.geo.geobox.GeoBox
         Of ground cells.
     seed : int, optional
-        In [0, 2**64).
+        In [0, 2**63).
     chunks : mapping or int or "auto", optional
         Makes the result lazy.
 
@@ -38,19 +38,20 @@ def flint_hills(grid, seed=0, *, chunks=None):
     ------
     ValueError
         If the grid or the seed is not one allowed, or cells are larger than 100 m, which lose the valleys.
+    TypeError
+        If the seed is no whole number.
 
     See Also
     --------
     fifesim.ground.terrain.flint_hills.elevation
     """
     grids.check_grid(grid)
-    check_seed(seed)
+    seed = check_seed(seed)
     if max(grids.cell_size(grid)) > _LARGEST_CELL:
         raise ValueError(
             f"cells must be at most {_LARGEST_CELL:g} m for the valleys to show, got "
             f"{max(grids.cell_size(grid)):g} m: make the terrain on smaller cells and .coarsen() it"
         )
-    seed = int(seed)
     northing, easting = (grids.coordinates(grid)[axis].values for axis in ("y", "x"))
 
     def cells(row, column, shape):

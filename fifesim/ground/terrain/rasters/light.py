@@ -1,73 +1,19 @@
-"""Terrain on labelled rasters: slope, horizon, sky and the light on a slope, from an elevation model."""
+"""Terrain on labelled rasters: sky, horizon and the light on a slope, from an elevation model."""
 
 from dataclasses import replace
 
-import dask.array as da
 import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import fife_geometry
-from fifesim.ground.terrain import light as lights
-from fifesim.ground.terrain import slope as terrain
-from fifesim.ground.terrain.rasters import sky as sky_raster
+from fifesim.ground.terrain import sky as skies
+from fifesim.ground.terrain.light import slope_light, slope_reflectance, topographic_factor
+from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid, source_resolution
+from fifesim.ground.terrain.rasters.sky import sky_above
 from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-
-# A numpy array beside a lazy one is cut into blocks of this many cells.
-_BLOCK = 1024
-
-
-def slope(dem):
-    """
-    Slope of the ground.
-
-    Parameters
-    ----------
-    dem : xarray.DataArray, dims (y, x)
-        [m]
-
-    Returns
-    -------
-    slope : xarray.DataArray, dims (y, x)
-        At every cell; one-sided at the edges and beside missing cells. [degree]
-
-    Raises
-    ------
-    ValueError
-        If the elevation is not in metres on a north-up grid in a projected CRS.
-
-    See Also
-    --------
-    fifesim.ground.terrain.slope.slope_aspect
-    """
-    return _slope_or_aspect(dem, "slope", 0)
-
-
-def aspect(dem):
-    """
-    Azimuth down the slope, clockwise from north.
-
-    Parameters
-    ----------
-    dem : xarray.DataArray, dims (y, x)
-        [m]
-
-    Returns
-    -------
-    aspect : xarray.DataArray, dims (y, x)
-        0 on level ground. [degree]
-
-    Raises
-    ------
-    ValueError
-        As in `slope`.
-
-    See Also
-    --------
-    fifesim.ground.terrain.slope.slope_aspect
-    """
-    return _slope_or_aspect(dem, "aspect", 1)
+from fifesim.rasters.windows import lazy_together
 
 
 def sky_view(dem, horizon=None):
@@ -90,7 +36,7 @@ def sky_view(dem, horizon=None):
     Raises
     ------
     ValueError
-        As in `slope`, or if the horizon does not cover the elevation.
+        As in `fifesim.ground.terrain.rasters.slopes.slope`, or if the horizon does not cover the elevation.
 
     Notes
     -----
@@ -99,9 +45,9 @@ def sky_view(dem, horizon=None):
 
     See Also
     --------
-    fifesim.ground.terrain.slope.sky_view, fifesim.ground.terrain.slope.sky_vector
+    fifesim.ground.terrain.sky.sky_factor, fifesim.ground.terrain.sky.sky_vector
     """
-    return _light(dem, horizon, None, "sky_view", lambda light: light[1])
+    return _light(dem, horizon, None, "sky_view", _sky_view)
 
 
 def terrain_view(dem, horizon=None):
@@ -125,9 +71,9 @@ def terrain_view(dem, horizon=None):
 
     See Also
     --------
-    fifesim.ground.terrain.slope.terrain_view
+    fifesim.ground.terrain.sky.terrain_view
     """
-    return _light(dem, horizon, None, "terrain_view", lambda light: (1 + light[0]) / 2 - light[1])
+    return _light(dem, horizon, None, "terrain_view", _terrain_view)
 
 
 def illumination(dem, geometry=None, horizon=None):
@@ -155,10 +101,9 @@ def illumination(dem, geometry=None, horizon=None):
 
     See Also
     --------
-    fifesim.ground.terrain.light.local_cosine, fifesim.ground.terrain.light.horizon_toward
+    fifesim.ground.terrain.slope.along_normal, fifesim.ground.terrain.light.horizon_toward
     """
-    geometry = cf.uniform_geometry(cf.given_geometry(geometry, dem), "illumination")
-    return _light(dem, horizon, geometry, "illumination", lambda light: light[2])
+    return _light(dem, horizon, _sun(dem, geometry), "illumination", _illumination)
 
 
 def shadow(dem, geometry=None, horizon=None):
@@ -180,11 +125,10 @@ def shadow(dem, geometry=None, horizon=None):
     ValueError
         As in `illumination`.
     """
-    geometry = cf.uniform_geometry(cf.given_geometry(geometry, dem), "shadow")
-    return _light(dem, horizon, geometry, "shadow", lambda light: np.where(np.isnan(light[2]), np.nan, light[2] == 0))
+    return _light(dem, horizon, _sun(dem, geometry), "shadow", _shadow)
 
 
-def kt(reflectance, dem, *, direct_transmittance, transmittance_down, geometry, horizon=None):
+def kt_on_slopes(reflectance, dem, *, direct_transmittance, transmittance_down, geometry, horizon=None):
     """
     Topographic correction factor Kt of each band.
 
@@ -212,15 +156,16 @@ def kt(reflectance, dem, *, direct_transmittance, transmittance_down, geometry, 
 
     See Also
     --------
-    fifesim.ground.terrain.light.kt
+    fifesim.ground.terrain.light.topographic_factor
     """
     direct, total = (np.reshape(each, (-1, 1, 1)) for each in (direct_transmittance, transmittance_down))
 
-    def kernel(rho, seen, *place):
-        cosine, vd, mu_s_local, _ = lights.slope_light(*place, seen)
-        return lights.kt(vd, (1 + cosine) / 2 - vd, rho, mu_s_local, geometry.mu_s, direct, total)
+    def kernel(rho, *ground):
+        light = slope_light(*ground)
+        ct = skies.terrain_view(light.sky_view, light.cosine)
+        return topographic_factor(light.sky_view, ct, rho, light.mu_s_local, geometry.mu_s, direct, total)
 
-    return _on_slopes(kernel, reflectance, dem, geometry, horizon, "kt", "kt: Eq. 4")
+    return _of_level(kernel, reflectance, dem, geometry, horizon, "kt", "kt: Eq. 4")
 
 
 def terrain_reflectance(
@@ -267,66 +212,76 @@ def terrain_reflectance(
     """
     cf.check_units(reflectance, "surface_reflectance")
 
-    def kernel(rho, seen, *place):
-        return lights.slope_reflectance(rho, *place, seen, direct_transmittance, transmittance_down, upwelling)
+    def kernel(rho, *ground):
+        return slope_reflectance(rho, *ground, direct_transmittance, transmittance_down, upwelling)
 
     said = f"terrain: Kt (Eq. 4){' and view cosine (Eq. 5)' if upwelling else ''}"
-    return _on_slopes(kernel, reflectance, dem, geometry, horizon, "surface_reflectance", said)
+    return _of_level(kernel, reflectance, dem, geometry, horizon, "surface_reflectance", said)
 
 
-def _slope_or_aspect(dem, name, which):
-    grid = sky_raster.elevation_grid(dem)
-
-    def kernel(block):
-        return terrain.slope_aspect(block, *grids.cell_size(grid))[which]
-
-    out = grids.place(chunking.neighbourhood(kernel, dem, 1), grid)
-    return cf.label(out, name, source=dem, history=f"{name}: central differences", references=sky_raster.REFERENCE)
+def _sky_view(light):
+    return light.sky_view
 
 
-def _light(dem, horizon, geometry, name, pick):
-    """One of the quantities that `slope_light` gives, at every cell."""
-    grid = sky_raster.elevation_grid(dem)
-    used = _from_grid_north(geometry or fife_geometry(), grid)
-    dem = dem.transpose("y", "x")
-    data, horizon = _lazy_together(dem.data, horizon)
-    sky, between = sky_raster.sky_above(
-        data, grid, sky_raster.source_resolution(dem), horizon, used, check=geometry is not None
-    )
-    cell, shape = grids.cell_size(grid), data.shape
+def _terrain_view(light):
+    return skies.terrain_view(light.sky_view, light.cosine)
 
-    def kernel(rows, columns, block, layers):
-        return pick(lights.slope_light(block, layers, *between.block(rows, columns, (0, 0)), *cell, used))
 
-    reads = [chunking.margin_reads(data, 1), between.reads(sky, (0, 0), shape)]
-    out = grids.place(xr.DataArray(chunking.windows(kernel, reads, shape, _chunks(data)), dims=("y", "x")), grid)
+def _illumination(light):
+    return light.mu_s_local
+
+
+def _shadow(light):
+    return np.where(np.isnan(light.mu_s_local), np.nan, light.mu_s_local == 0)
+
+
+def _sun(dem, geometry):
+    return cf.uniform_geometry(cf.given_geometry(geometry, dem), "a slope's light")
+
+
+def _light(dem, horizon, geometry, name, of_light):
+    """What a function makes of `slope_light`, at every cell."""
+    grid = elevation_grid(dem)
+
+    def kernel(*ground):
+        return of_light(slope_light(*ground))
+
+    data = _on_slopes(kernel, dem, horizon, geometry or fife_geometry(), check=geometry is not None)
+    out = grids.place(xr.DataArray(data, dims=("y", "x")), grid)
     out = out if geometry is None else cf.with_geometry(out, geometry)
     said = name if geometry is None else f"{name}: sza {geometry.sza:.2f}, saa {geometry.saa:.2f}"
-    return cf.label(out, name, source=dem, history=said, references=sky_raster.REFERENCE)
+    return cf.label(out, name, source=dem, history=said, references=REFERENCE)
 
 
-def _on_slopes(kernel, reflectance, dem, geometry, horizon, name, said):
+def _of_level(kernel, reflectance, dem, geometry, horizon, name, said):
     """A band raster made from level ground's reflectance and the light on its slopes."""
-    dem_grid, grid = sky_raster.elevation_grid(dem), grids.geobox(reflectance)
-    offset = _offset(dem_grid, grid)
-    reflectance, dem = reflectance.transpose("band", "y", "x"), dem.transpose("y", "x")
-    rho, data, horizon = _lazy_together(reflectance.data, dem.data, horizon)
-    seen = _from_grid_north(geometry, grid)
-    sky, between = sky_raster.sky_above(data, dem_grid, sky_raster.source_resolution(dem), horizon, seen)
-    cell, shape = grids.cell_size(grid), rho.shape
+    reflectance = reflectance.transpose("band", "y", "x")
+    out = reflectance.copy(data=_on_slopes(kernel, dem, horizon, geometry, reflectance))
+    out = cf.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)
+    return cf.label(out, name, source=reflectance, history=said, references=REFERENCE)
 
-    def block_kernel(rows, columns, block, elevation, layers):
-        return kernel(block, seen, elevation, layers, *between.block(rows, columns, offset), *cell)
 
-    reads = [
-        chunking.margin_reads(rho, 0),
-        chunking.margin_reads(data, 1, offset=offset, shape=shape[1:]),
-        between.reads(sky, offset, shape[1:]),
-    ]
-    out = chunking.windows(block_kernel, reads, shape, _chunks(rho))
-    out = grids.place(reflectance.copy(data=out), grid)
-    out = cf.with_geometry(out, geometry)
-    return cf.label(out, name, source=reflectance, history=said, references=sky_raster.REFERENCE)
+def _on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True):
+    """Array of a kernel that takes the reflectance, if there is one, and what `slope_light` takes."""
+    dem_grid = elevation_grid(dem)
+    grid = dem_grid if reflectance is None else grids.geobox(reflectance)
+    offset, shape = _offset(dem_grid, grid), tuple(grid.shape)
+    level = None if reflectance is None else reflectance.data
+    known = None if horizon is None else horizon.data
+    level, data, known = lazy_together(level, dem.transpose("y", "x").data, known)
+    horizon = None if horizon is None else horizon.copy(data=known)
+    geometry, cell = _from_grid_north(geometry, grid), grids.cell_size(grid)
+    layers, places = sky_above(data, dem_grid, source_resolution(dem), horizon, geometry, check)
+    between = places.between(offset, shape)
+
+    def block(rows, columns, elevation, layers, *rho):
+        return kernel(*rho, elevation, between.sky(layers, rows, columns), cell, geometry)
+
+    reads = [chunking.margin_reads(data, 1, offset=offset, shape=shape), between.reads(layers)]
+    of = data if level is None else level
+    reads += [] if level is None else [chunking.margin_reads(level, 0)]
+    chunks = None if isinstance(of, np.ndarray) else of.chunks[-2:]
+    return chunking.windows(block, reads, of.shape, chunks)
 
 
 def _from_grid_north(geometry, grid):
@@ -348,23 +303,3 @@ def _offset(dem_grid, grid):
     if rows < 0 or columns < 0 or beyond:
         raise ValueError(f"the dem spans {grids.extent(dem_grid)} and does not cover the raster's {grids.extent(grid)}")
     return rows, columns
-
-
-def _lazy_together(*arrays):
-    """All arrays lazy where one is."""
-    plain = [getattr(each, "data", None) if isinstance(each, xr.DataArray) else each for each in arrays]
-    if not any(isinstance(each, da.Array) for each in plain):
-        return arrays
-    return [_chunked(each) for each in arrays]
-
-
-def _chunked(array):
-    if array is None or isinstance(array, da.Array):
-        return array
-    if isinstance(array, xr.DataArray):
-        return array if array.chunks else array.chunk(dict.fromkeys(("y", "x"), _BLOCK))
-    return da.from_array(array, chunks=(-1,) * (array.ndim - 2) + (_BLOCK, _BLOCK), name=False)
-
-
-def _chunks(data):
-    return data.chunks[-2:] if isinstance(data, da.Array) else None

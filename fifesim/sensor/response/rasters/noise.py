@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 
+from fifesim.base.seeds import check_seed
 from fifesim.rasters import chunks
-from fifesim.sensor.response.noise import NoiseModel, add_noise, check_kinds, check_seed
+from fifesim.sensor.response.noise import NoiseModel, add_noise, check_kinds
 
 
 def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
@@ -34,6 +35,8 @@ def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
     ------
     ValueError
         If a kind or the name of a band is unknown, or a band has no noise of that kind.
+    TypeError
+        If the seed is no whole number.
 
     See Also
     --------

@@ -10,6 +10,7 @@ import fifesim
 from fifesim.base.geometry import Geometry
 from fifesim.ground.terrain.rasters import light as terrain_raster
 from fifesim.ground.terrain.rasters import sky as sky_raster
+from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
 
 SUN = Geometry(70.0, 117.0, 20.0, 40.0)
@@ -38,8 +39,8 @@ def around():
 
 
 FUNCTIONS = {
-    "slope": terrain_raster.slope,
-    "aspect": terrain_raster.aspect,
+    "slope": slopes.slope,
+    "aspect": slopes.aspect,
     "sky_view": terrain_raster.sky_view,
     "terrain_view": terrain_raster.terrain_view,
     "illumination": lambda dem: terrain_raster.illumination(dem, SUN),
@@ -62,7 +63,7 @@ def test_horizon_keeps_the_promises_of_rasters(dem):
 
 
 def test_kt_and_reflectance_keep_the_promises_of_rasters(level, dem):
-    check_raster_function(lambda rho, z: terrain_raster.kt(rho, z, **LIGHT), level, dem, quantity="kt")
+    check_raster_function(lambda rho, z: terrain_raster.kt_on_slopes(rho, z, **LIGHT), level, dem, quantity="kt")
     check_raster_function(
         lambda rho, z: terrain_raster.terrain_reflectance(rho, z, **LIGHT), level, dem, quantity="surface_reflectance"
     )

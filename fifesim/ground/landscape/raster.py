@@ -1,0 +1,143 @@
+"""Leaf area of the ground scene on labelled rasters: simulated, or a user's own map."""
+
+from pathlib import Path
+
+import psutil
+import xarray as xr
+
+from fifesim.base.seeds import check_seed
+from fifesim.ground.canopy.optics import check_lai
+from fifesim.ground.landscape import field as random_field
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
+from fifesim.rasters import cf, warp
+from fifesim.rasters import chunks as chunking
+from fifesim.rasters import grid as grids
+
+FIELD_METHODS = ("streaming", "periodic")
+
+_REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
+
+
+def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="streaming", chunks=None):
+    """
+    Leaf area index of a simulated landscape.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells, in a projected CRS.
+    distribution : str, path or frozen scipy distribution, optional
+        As `ground.landscape.distribution.lai_distribution` takes it.
+    arp : float, optional
+        Autoregressive parameter in [0, 0.25). [1]
+    seed : int, optional
+        In [0, 2**63).
+    method : {"streaming", "periodic"}, optional
+        ``streaming`` is a function of (seed, row, column): a window is a slice of the whole, and chunks change nothing.
+        ``periodic`` is the paper's: one Fourier transform of the whole scene and exact ranks, in memory.
+    chunks : mapping or int, optional
+        Makes the streaming scene lazy.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+
+    Raises
+    ------
+    ValueError
+        If the grid, arp, seed, distribution or method is not one allowed.
+    TypeError
+        If the seed is no whole number.
+
+    References
+    ----------
+    [Friedl1995]_, Fig. 2
+
+    See Also
+    --------
+    fifesim.ground.landscape.field.streaming_field, fifesim.ground.landscape.distribution.lai_distribution
+    """
+    grids.check_grid(grid)
+    random_field.check_arp(arp)
+    seed = check_seed(seed)
+    density = lai_distribution(distribution)
+    if method not in FIELD_METHODS:
+        raise ValueError(f"method must be one of {', '.join(FIELD_METHODS)}, got {method!r}")
+    make = _streaming_scene if method == "streaming" else _periodic_scene
+    lai = make(grid, density, arp, seed, chunks)
+    return cf.label(
+        lai,
+        "lai",
+        history=f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}",
+        arp=float(arp),
+        rng_seed=str(seed),
+        lai_distribution=_distribution_name(distribution),
+        method=method,
+        references=_REFERENCE,
+    )
+
+
+def open_lai(path, grid, chunks=None):
+    """
+    A user's own map of leaf area index on a grid.
+
+    Parameters
+    ----------
+    path : str or path
+        Any raster that GDAL opens; its first band is LAI. [m2 m-2]
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells. Cells no larger than the map's are interpolated bilinearly, larger ones hold means.
+    chunks : mapping or int, optional
+        Makes the result lazy.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+        NaN where the map has no data. [m2 m-2]
+
+    Raises
+    ------
+    ValueError
+        If the file is missing, has no CRS, does not overlap the grid, or needs a change of datum whose accuracy is
+        unknown; and, when computed, if LAI is negative.
+    """
+    lai = chunking.pointwise(_checked, warp.file_onto_grid(path, grid, chunks))
+    name = Path(path).name
+    return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
+
+
+def _streaming_scene(grid, density, arp, seed, chunks):
+    row, column = grids.lattice_position(grid)
+    table = quantile_table(density)
+
+    def cells(first_row, first_column, shape):
+        field = random_field.streaming_field(seed, arp, row + first_row, column + first_column, shape)
+        return quantile_map(field, table)
+
+    # A first window raises what streaming_field refuses before anything lazy is built.
+    cells(0, 0, (0, 0))
+    return chunking.tiles(cells, grid, chunks, tile=random_field.TILE)
+
+
+def _periodic_scene(grid, density, arp, seed, chunks):
+    # Noise, spectrum, field, ranks, quantiles and result are in memory together.
+    needed, free = 48 * grid.shape.x * grid.shape.y, psutil.virtual_memory().available
+    if needed > free:
+        raise ValueError(
+            f"a periodic field of {grid.shape.y} x {grid.shape.x} cells needs {needed / 1e9:.1f} GB of memory, "
+            f'{free / 1e9:.1f} GB are free: use method="streaming", which needs no more for a larger scene'
+        )
+    field = xr.DataArray(rank_map(random_field.periodic_field(seed, arp, tuple(grid.shape)), density), dims=("y", "x"))
+    return grids.place(field if chunks is None else field.chunk(chunks), grid)
+
+
+def _distribution_name(source):
+    if hasattr(source, "dist"):
+        return f"{source.dist.name}({', '.join(f'{value:g}' for value in [*source.args, *source.kwds.values()])})"
+    return Path(source).name
+
+
+def _checked(lai):
+    check_lai(lai)
+    return lai

@@ -1,0 +1,69 @@
+"""Slope and aspect of labelled elevation."""
+
+from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid
+from fifesim.ground.terrain.slope import slope_aspect
+from fifesim.rasters import cf
+from fifesim.rasters import chunks as chunking
+from fifesim.rasters import grid as grids
+
+
+def slope(dem):
+    """
+    Slope of the ground.
+
+    Parameters
+    ----------
+    dem : xarray.DataArray, dims (y, x)
+        [m]
+
+    Returns
+    -------
+    slope : xarray.DataArray, dims (y, x)
+        At every cell; one-sided at the edges and beside missing cells. [degree]
+
+    Raises
+    ------
+    ValueError
+        If the elevation is not in metres on a north-up grid in a projected CRS.
+
+    See Also
+    --------
+    fifesim.ground.terrain.slope.slope_aspect
+    """
+    return _slope_or_aspect(dem, "slope", 0)
+
+
+def aspect(dem):
+    """
+    Azimuth down the slope, clockwise from north.
+
+    Parameters
+    ----------
+    dem : xarray.DataArray, dims (y, x)
+        [m]
+
+    Returns
+    -------
+    aspect : xarray.DataArray, dims (y, x)
+        0 on level ground. [degree]
+
+    Raises
+    ------
+    ValueError
+        As in `slope`.
+
+    See Also
+    --------
+    fifesim.ground.terrain.slope.slope_aspect
+    """
+    return _slope_or_aspect(dem, "aspect", 1)
+
+
+def _slope_or_aspect(dem, name, which):
+    grid = elevation_grid(dem)
+
+    def kernel(block):
+        return slope_aspect(block, *grids.cell_size(grid))[which]
+
+    out = grids.place(chunking.neighbourhood(kernel, dem, 1), grid)
+    return cf.label(out, name, source=dem, history=f"{name}: central differences", references=REFERENCE)

@@ -1,0 +1,194 @@
+"""How much of the sky, and of the land around, a slope sees."""
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+
+from fifesim.ground.terrain.horizon import tangent
+from fifesim.ground.terrain.slope import Vector, along_normal, plane_gradient, slope_cosine
+
+
+def sky_vector(tangents, directions, east, north):
+    r"""
+    The part of the sky that a slope sees, as a vector.
+
+    .. math::
+
+        \mathbf{F} = \frac{1}{\pi} \int_{\text{sky}} \boldsymbol\omega \, d\omega
+            = \frac{1}{2\pi} \oint \boldsymbol\Gamma \, d\Theta
+
+    The sky factor of a surface with the unit normal n is :math:`V_d = \mathbf{n} \cdot \mathbf{F}`, which is
+    Eq. 7b of Dozier and Frew. The sky is bounded by the horizon, taken as great circles between the directions, and by
+    the plane of the slope; Lambert's integral along great circles is exact.
+
+    Parameters
+    ----------
+    tangents : array, shape (direction, ...)
+        cot H of the horizon of the land around. [1]
+    directions : array, shape (direction,)
+        Evenly spaced azimuths, clockwise from north. [degree]
+    east, north : array, shape (...)
+        Gradient of the slope itself, which gives its own horizon. NaN is level. [m m-1]
+
+    Returns
+    -------
+    vector : array, shape (3, ...)
+        Eastward, northward and up. [1]
+
+    References
+    ----------
+    [Lambert1760]_; [DozierFrew1990]_, Eqs. 7b and 10
+    """
+    tangents = np.ascontiguousarray(tangents, float)
+    azimuth = np.radians(np.asarray(directions, float))
+    shape = tangents.shape[1:]
+    own = [np.nan_to_num(np.broadcast_to(each, shape), nan=0.0).ravel() for each in (east, north)]
+    out = np.zeros((3, own[0].size))
+    _sky_vector(tangents.reshape(azimuth.size, -1), np.sin(azimuth), np.cos(azimuth), *own, out)
+    return out.reshape(3, *shape)
+
+
+@register_jitable
+def sky_factor(vector, east, north):
+    r"""
+    Sky view factor: diffuse light from a uniform sky on a slope over that on an open plain.
+
+    .. math:: V_d = \mathbf{n} \cdot \mathbf{F}, \qquad 0 \le V_d \le \frac{1 + \cos S}{2}
+
+    Parameters
+    ----------
+    vector : fifesim.ground.terrain.slope.Vector
+        Of `sky_vector`, of this slope or of one nearby. [1]
+    east, north : array
+        Gradient of the slope. [m m-1]
+
+    Returns
+    -------
+    sky_view : array
+        Not above that of a wide plane of the slope. [1]
+
+    References
+    ----------
+    [DozierFrew1990]_, Eq. 7b
+
+    Examples
+    --------
+    >>> float(sky_factor(Vector(0.0, 0.0, 0.75), 0.0, 0.0))
+    0.75
+    """
+    return np.maximum(np.minimum(along_normal(vector, east, north), (1 + slope_cosine(east, north)) / 2), 0.0)
+
+
+def sky_view(slope, aspect, horizon, directions=None):
+    r"""
+    Sky view factor of a slope under a known horizon.
+
+    .. math::
+
+        V_d = \frac{1}{2\pi} \int_0^{2\pi} \left[ \cos S \sin^2 H
+            + \sin S \cos(\phi - A) \, (H - \sin H \cos H) \right] d\phi
+
+    with H the lower of the zenith angles of the horizon of the land around, of the slope's own, and 90 degrees.
+
+    Parameters
+    ----------
+    slope, aspect : array
+        [degree]
+    horizon : array, shape (direction, ...)
+        Zenith angle H of the horizon of the land around. [degree]
+    directions : array, shape (direction,), optional
+        Its azimuths, clockwise from north and evenly spaced; by default from north on. [degree]
+
+    Returns
+    -------
+    sky_view : array
+        1 on an open plain. [1]
+
+    Notes
+    -----
+    The integral is exact for a horizon of great circles between the directions, such as that of any plane.
+
+    References
+    ----------
+    [DozierFrew1990]_, Eq. 7b
+
+    Examples
+    --------
+    A wide plane of 60 degrees sees (1 + cos 60) / 2:
+
+    >>> round(float(sky_view(60.0, 10.0, np.full(16, 90.0))), 12)
+    0.75
+    """
+    horizon = np.asarray(horizon, float)
+    count = horizon.shape[0]
+    directions = np.arange(count) * (360 / count) if directions is None else directions
+    shape = np.broadcast_shapes(np.shape(slope), np.shape(aspect), horizon.shape[1:])
+    east, north = plane_gradient(np.broadcast_to(slope, shape), np.broadcast_to(aspect, shape))
+    missing = len(shape) + 1 - horizon.ndim
+    tangents = tangent(horizon).reshape(count, *(1,) * missing, *horizon.shape[1:])
+    vector = Vector(*sky_vector(np.broadcast_to(tangents, (count, *shape)), directions, east, north))
+    return sky_factor(vector, east, north)
+
+
+@register_jitable
+def terrain_view(sky_view, cosine):
+    r"""
+    Terrain configuration factor: the share of a slope's view that land takes, so far as the plane of the slope is open.
+
+    .. math:: C_t = \frac{1 + \cos S}{2} - V_d
+
+    Parameters
+    ----------
+    sky_view : array
+        [1]
+    cosine : array
+        Of the slope. [1]
+
+    Returns
+    -------
+    terrain_view : array
+        0 on any wide plane. [1]
+
+    References
+    ----------
+    [DozierFrew1990]_, Eq. 9b
+
+    Examples
+    --------
+    >>> terrain_view(0.75, 1.0)
+    0.25
+    """
+    return (1 + cosine) / 2 - sky_view
+
+
+@njit(nogil=True, cache=True)
+def _sky_vector(tangents, sin, cos, east, north, out):
+    count = tangents.shape[0]
+    for cell in range(out.shape[1]):
+        for k in range(count):
+            n = (k + 1) % count
+            land, next_land = tangents[k, cell], tangents[n, cell]
+            own = east[cell] * sin[k] + north[cell] * cos[k]
+            next_own = east[cell] * sin[n] + north[cell] * cos[n]
+            above, next_above = land - own, next_land - next_own
+            here, there = Vector(sin[k], cos[k], max(land, own)), Vector(sin[n], cos[n], max(next_land, next_own))
+            if above * next_above < 0:
+                # The slope's plane and the land's horizon cross between the two directions.
+                w, v = abs(next_above), abs(above)
+                crossing = Vector(w * sin[k] + v * sin[n], w * cos[k] + v * cos[n], w * land + v * next_land)
+                _add_arc(here, crossing, out[:, cell])
+                _add_arc(crossing, there, out[:, cell])
+            else:
+                _add_arc(here, there, out[:, cell])
+
+
+@njit(nogil=True, cache=True)
+def _add_arc(a, b, out):
+    """Lambert's term of the great circle from a to b, clockwise seen from above: its angle times its normal."""
+    x, y, z = b.y * a.z - b.z * a.y, b.z * a.x - b.x * a.z, b.x * a.y - b.y * a.x
+    sine = np.sqrt(x * x + y * y + z * z)
+    if sine > 0:
+        factor = np.arctan2(sine, a.x * b.x + a.y * b.y + a.z * b.z) / (2 * np.pi * sine)
+        out[0] += factor * x
+        out[1] += factor * y
+        out[2] += factor * z
