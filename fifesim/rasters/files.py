@@ -18,7 +18,6 @@ import rioxarray
 import xarray as xr
 from dask.utils import SerializableLock
 from distributed import Lock, get_client
-from rasterio._err import CPLE_BaseError
 from rasterio.windows import Window
 
 from fifesim.base.geometry import ANGLES
@@ -75,7 +74,7 @@ def to_geotiff(raster, path):
             "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()",
             stacklevel=2,
         )
-    with _whole(path) as (streamed, finished), _errors_of_gdal(path):
+    with _whole(path) as (streamed, finished), _ErrorsOfGdal(path):
         _stream(array, grid, streamed, described=raster)
         rasterio.shutil.copy(
             streamed,
@@ -168,12 +167,18 @@ def _check_room(array, path):
         raise OSError(errno.ENOSPC, said, str(path))
 
 
-@contextmanager
-def _errors_of_gdal(path):
-    try:
-        yield
-    except (CPLE_BaseError, rasterio.errors.RasterioError) as error:
-        raise OSError(f"cannot write {path}: {error.__cause__ or error}") from error
+class _ErrorsOfGdal:
+    """A context in which what rasterio raises, of classes that it does not all publish, is an error of the system."""
+
+    def __init__(self, path):
+        self._path = path
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, traceback):
+        if kind is not None and kind.__module__.partition(".")[0] == "rasterio":
+            raise OSError(f"cannot write {self._path}: {error.__cause__ or error}") from error
 
 
 def _check_written(streamed, finished, array):
