@@ -78,11 +78,7 @@ def taken_away(values, causes):
     >>> taken_away(np.array([[0.0, 1.0], [2.0, 5.0]]), 2).tolist()
     [4.0, 3.0]
     """
-    values = _checked(values, causes)
-    everything = (1,) * causes
-    return np.array([values[everything] - values[_changed(everything, cause, 0)] for cause in range(causes)]).reshape(
-        causes, *values.shape[causes:]
-    )
+    return np.asarray(values, float)[(1,) * causes] - _one_apart(values, causes, 0)
 
 
 def by_itself(values, causes):
@@ -108,15 +104,14 @@ def by_itself(values, causes):
     >>> by_itself(np.array([[0.0, 1.0], [2.0, 5.0]]), 2).tolist()
     [2.0, 1.0]
     """
+    return _one_apart(values, causes, 1) - np.asarray(values, float)[(0,) * causes]
+
+
+def _one_apart(values, causes, state):
+    """Effect where one cause is at work, 1, or not, 0, and all others otherwise, shape (causes, ...)."""
     values = _checked(values, causes)
-    nothing = (0,) * causes
-    return np.array([values[_changed(nothing, cause, 1)] - values[nothing] for cause in range(causes)]).reshape(
-        causes, *values.shape[causes:]
-    )
-
-
-def _changed(index, position, value):
-    return (*index[:position], value, *index[position + 1 :])
+    sets = np.where(np.eye(causes, dtype=bool), state, 1 - state)
+    return np.array([values[tuple(each)] for each in sets]).reshape(causes, *values.shape[causes:])
 
 
 def _checked(values, causes):

@@ -149,6 +149,26 @@ def row_sums(y, x, y_origin, x_origin):
     return sums
 
 
+def totals(sums):
+    """
+    Totals of sums by rows, added up without rounding.
+
+    Parameters
+    ----------
+    sums : array, shape (rows, n)
+
+    Returns
+    -------
+    totals : list of float, shape (n,)
+
+    Examples
+    --------
+    >>> totals([[1e16, 1.0], [1.0, 2.0], [-1e16, 3.0]])
+    [1.0, 6.0]
+    """
+    return [math.fsum(column) for column in np.asarray(sums).T]
+
+
 def fit(sums, y_origin=0.0, x_origin=0.0):
     """
     Least-squares line from the sums of its data.
@@ -156,7 +176,7 @@ def fit(sums, y_origin=0.0, x_origin=0.0):
     Parameters
     ----------
     sums : array, shape (rows, 6)
-        From `row_sums`; added up without rounding.
+        From `row_sums`.
     y_origin, x_origin : float, optional
         As given to `row_sums`.
 
@@ -176,7 +196,7 @@ def fit(sums, y_origin=0.0, x_origin=0.0):
     >>> line.intercept, line.slope, line.r2
     (1.0, 2.0, 1.0)
     """
-    n, x, y, xx, xy, yy = (math.fsum(column) for column in np.asarray(sums).T)
+    n, x, y, xx, xy, yy = totals(sums)
     if n < 3:
         raise ValueError(f"a regression needs at least 3 pairs of values, got {n:.0f}: do the rasters overlap?")
     sxx, sxy, syy = xx - x * x / n, xy - x * y / n, yy - y * y / n

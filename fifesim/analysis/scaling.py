@@ -34,7 +34,7 @@ def ndvi_linearity(red, nir):
     >>> bool(ndvi_linearity(0.1 * light, 0.3 * light) < 0)
     True
     """
-    red, nir = (np.asarray(values, float).ravel() for values in (red, nir))
+    red, nir = np.asarray(red, float).ravel(), np.asarray(nir, float).ravel()
     valid = np.isfinite(red) & np.isfinite(nir)
     difference, inverse = (nir - red)[valid], 1.0 / (nir + red)[valid]
     difference, inverse = difference - difference.mean(), inverse - inverse.mean()
@@ -189,6 +189,6 @@ def share_kept(pixels, cells):
     >>> share_kept(np.array([1.0, 3.0]), np.array([0.0, 2.0, 4.0, 2.0]))
     (0.5, 0.5)
     """
-    pixels, cells = (np.asarray(values, float) for values in (pixels, cells))
-    pixels, cells = (values[np.isfinite(values)] for values in (pixels, cells))
+    pixels, cells = np.asarray(pixels, float), np.asarray(cells, float)
+    pixels, cells = pixels[np.isfinite(pixels)], cells[np.isfinite(cells)]
     return float(np.ptp(pixels) / np.ptp(cells)), float(pixels.var() / cells.var())

@@ -1,9 +1,9 @@
 """Uncertainty of a variable that is inferred from a vegetation index: relative equivalent noise."""
 
-import math
-
 import numba
 import numpy as np
+
+from fifesim.analysis.regression import totals
 
 SUMS = 4
 
@@ -88,7 +88,7 @@ def increment_moments(sums):
     Parameters
     ----------
     sums : array, shape (rows, 4 increments)
-        From `increment_sums`; added up without rounding.
+        From `increment_sums`.
 
     Returns
     -------
@@ -106,8 +106,7 @@ def increment_moments(sums):
     >>> count.tolist(), round(float(mean[0]), 12), round(float(deviation[0] ** 2), 12)
     ([2, 1], 0.2, 0.02)
     """
-    totals = np.array([math.fsum(column) for column in np.asarray(sums).T]).reshape(-1, SUMS)
-    count, value, index, square = totals.T
+    count, value, index, square = np.reshape(totals(sums), (-1, SUMS)).T
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = (square - index * index / count) / (count - 1)
         mean = np.where(count > 0, value / count, np.nan)

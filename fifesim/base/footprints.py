@@ -8,6 +8,7 @@ the product of one lsf per axis.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -307,7 +308,7 @@ def regularize(values, rows, columns, *, min_valid=0.98):
     """
     values = np.asarray(values)
     dtype = np.float32 if values.dtype == np.float32 else np.float64
-    wanted = tuple(axis.window.stop - axis.window.start for axis in (rows, columns))
+    wanted = rows.window.stop - rows.window.start, columns.window.stop - columns.window.start
     if values.shape[-2:] != wanted:
         raise ValueError(
             f"the operators want {wanted} cells along (y, x), the values have shape {values.shape}: "
@@ -316,34 +317,46 @@ def regularize(values, rows, columns, *, min_valid=0.98):
     if not 0 <= min_valid <= 1:
         raise ValueError(f"min_valid must be in [0, 1], got {min_valid}: it is a share of the footprint")
     means = np.empty((*values.shape[:-2], len(rows), len(columns)), dtype)
+    down, across = _axis(rows), _axis(columns)
     for layer in np.ndindex(values.shape[:-2]):
         cells = np.ascontiguousarray(values[layer], dtype)
-        _regularize(cells, *_kernel_arguments(rows), *_kernel_arguments(columns), min_valid, means[layer])
+        _regularize(cells, down, across, min_valid, means[layer])
     return means
 
 
-def _kernel_arguments(axis):
-    return axis.start - axis.window.start, axis.count, axis.weights, axis.share
+class _Axis(NamedTuple):
+    """Operator of an axis as the kernel takes it, its first cells counted from those at hand."""
+
+    start: np.ndarray
+    count: np.ndarray
+    weights: np.ndarray
+    share: np.ndarray
+
+
+def _axis(operator):
+    return _Axis(operator.start - operator.window.start, operator.count, operator.weights, operator.share)
 
 
 @njit(nogil=True, cache=True)
-def _regularize(values, y_start, y_count, y_weights, y_share, x_start, x_count, x_weights, x_share, min_valid, out):
+def _regularize(values, rows, columns, min_valid, out):
     line = np.empty(values.shape[1])
     for i in range(out.shape[0]):
+        top, height = rows.start[i], rows.count[i]
         # Rows first: this sum runs along contiguous memory, and leaves one line for the sum over columns.
         line[:] = 0.0
-        for k in range(y_count[i]):
-            weight = y_weights[i, k]
+        for k in range(height):
+            weight = rows.weights[i, k]
             for x in range(line.size):
-                line[x] += weight * values[y_start[i] + k, x]
+                line[x] += weight * values[top + k, x]
         for j in range(out.shape[1]):
+            left, width = columns.start[j], columns.count[j]
             total = 0.0
-            for k in range(x_count[j]):
-                total += x_weights[j, k] * line[x_start[j] + k]
-            share = y_share[i] * x_share[j]
+            for k in range(width):
+                total += columns.weights[j, k] * line[left + k]
+            share = rows.share[i] * columns.share[j]
             if np.isnan(total):
-                cells = values[y_start[i] : y_start[i] + y_count[i], x_start[j] : x_start[j] + x_count[j]]
-                total, share = _sum_valid(cells, y_weights[i], x_weights[j])
+                cells = values[top : top + height, left : left + width]
+                total, share = _sum_valid(cells, rows.weights[i], columns.weights[j])
             # The slack is rounding: a whole footprint sums to 1 within 1e-15 and must pass min_valid = 1.
             out[i, j] = total / share if share > 0 and share >= min_valid - 1e-9 else np.nan
 

@@ -1,7 +1,6 @@
 """What comes of all cells of a raster, to the bit the same whatever its chunks."""
 
 from functools import reduce
-from typing import NamedTuple
 
 import dask
 import numpy as np
@@ -95,32 +94,22 @@ def block_sums(kernel, array, shape, size, margin=(0, 0)):
     -------
     sums : array
     """
-    rows, columns = (_blocks(length, size, each) for length, each in zip(array.shape[-2:], margin, strict=True))
+    lengths = array.shape[-2:]
+    places = [np.arange(0, length, size) for length in lengths]
 
     def sums(row, column, cells):
-        return kernel(cells, (rows.margin(row.start), columns.margin(column.start)))[..., None, None]
+        first = row.start * size, column.start * size
+        margins = [
+            (min(at, reach), max(min(length - at - size, reach), 0))
+            for at, length, reach in zip(first, lengths, margin, strict=True)
+        ]
+        return kernel(cells, margins)[..., None, None]
 
+    edges = [
+        (np.maximum(first - reach, 0), np.minimum(first + size + reach, length))
+        for first, length, reach in zip(places, lengths, margin, strict=True)
+    ]
     # A result whose every cell is a block.
-    reads = [Reads(array, (rows.start, rows.stop), (columns.start, columns.stop))]
-    (found,) = computed(in_blocks(sums, reads, (*shape, len(rows.first), len(columns.first)), 1))
+    (found,) = computed(in_blocks(sums, [Reads(array, *edges)], (*shape, *map(len, places)), 1))
     # One after the other: numpy's own sum goes by the layout in memory.
     return reduce(np.add, np.moveaxis(found.reshape(*shape, -1), -1, 0))
-
-
-class _Blocks(NamedTuple):
-    """Blocks along one axis: first cell and the one behind the last, without their margin and with it."""
-
-    first: np.ndarray
-    last: np.ndarray
-    start: np.ndarray
-    stop: np.ndarray
-
-    def margin(self, number):
-        """Cells of margin that a block has before and after it."""
-        return int(self.first[number] - self.start[number]), int(self.stop[number] - self.last[number])
-
-
-def _blocks(length, size, margin):
-    first = np.arange(0, length, size)
-    last = np.minimum(first + size, length)
-    return _Blocks(first, last, np.maximum(first - margin, 0), np.minimum(last + margin, length))

@@ -48,25 +48,13 @@ def operators(spreads, cells, pixels, shifts=(0.0, 0.0)):
     south, east = shifts
     a, b = cells.affine, pixels.affine
     rows = axis_operator(
-        down,
-        cell_origin=a.f,
-        cell_size=a.e,
-        n_cells=cells.shape.y,
-        pixel_origin=b.f,
-        pixel_size=b.e,
-        n_pixels=pixels.shape.y,
-        shift=south,
-    )
+        down, cell_origin=a.f, cell_size=a.e, n_cells=cells.shape.y, pixel_origin=b.f, pixel_size=b.e,
+        n_pixels=pixels.shape.y, shift=south,
+    )  # fmt: skip
     columns = axis_operator(
-        across,
-        cell_origin=a.c,
-        cell_size=a.a,
-        n_cells=cells.shape.x,
-        pixel_origin=b.c,
-        pixel_size=b.a,
-        n_pixels=pixels.shape.x,
-        shift=east,
-    )
+        across, cell_origin=a.c, cell_size=a.a, n_cells=cells.shape.x, pixel_origin=b.c, pixel_size=b.a,
+        n_pixels=pixels.shape.x, shift=east,
+    )  # fmt: skip
     return rows, columns
 
 

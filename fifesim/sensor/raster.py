@@ -79,10 +79,7 @@ def sense(
     fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise,
     fifesim.sensor.response.calibration.radiance_to_dn
     """
-    cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
-    description = find_instrument(instrument)
-    toa = toa if "band" in toa.dims else toa.expand_dims("band")
-    bands = matching_bands(toa, description)
+    toa, description, bands = by_bands(toa, instrument)
     geometry = cf.given_geometry(geometry, toa)
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
     geometry = directions_on(pixels, geometry)
@@ -91,15 +88,35 @@ def sense(
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
-    history = _history(description, interval, offset, noise, seed, quantise)
-    image = recorded(radiance, description, bands, quantise)
-    image = cf.with_geometry(grids.place(image, pixels), geometry)
-    image = cf.label(
-        image, "dn" if quantise else "toa_radiance", source=toa, history=history, instrument=description.name
-    )
-    if quantise:
-        image.attrs["_FillValue"] = image.dtype.type(0)
-    return image
+    image = cf.with_geometry(grids.place(recorded(radiance, description, bands, quantise), pixels), geometry)
+    return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise))
+
+
+def by_bands(toa, instrument):
+    """
+    What an instrument looks at, and the bands in which it does.
+
+    Parameters
+    ----------
+    toa, instrument
+        As in `sense`.
+
+    Returns
+    -------
+    toa : xarray.DataArray, dims (band, y, x)
+    description : fifesim.sensor.description.instruments.Instrument
+    bands : tuple of fifesim.sensor.description.band.InstrumentBand
+        One for each of the array.
+
+    Raises
+    ------
+    ValueError
+        If the array is something else, or the instrument is unknown or has none of the bands.
+    """
+    cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
+    description = find_instrument(instrument)
+    toa = toa if "band" in toa.dims else toa.expand_dims("band")
+    return toa, description, matching_bands(toa, description)
 
 
 def recorded(radiance, description, bands, quantise):
@@ -121,33 +138,45 @@ def recorded(radiance, description, bands, quantise):
     image : xarray.DataArray
         Digital numbers, or the radiance itself.
     """
-    if not quantise:
-        return radiance.assign_coords(
-            cf.band_coordinates(
-                band=[band.name for band in bands],
-                wavelength=[band.wavelength for band in bands],
-                solar_irradiance=[band.solar_irradiance for band in bands],
-            )
+    along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
+    if quantise:
+        full_scale, lowest = [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands]
+        gain, offset = calibration.gain_offset(full_scale, lowest, description.bits)
+        radiance = chunks.pointwise(
+            calibration.radiance_to_dn,
+            radiance,
+            xr.DataArray(gain, dims="band"),
+            xr.DataArray(offset, dims="band"),
+            dtype=np.uint8 if description.bits <= 8 else np.uint16,
+            bits=description.bits,
         )
-    gain, offset = calibration.gain_offset(
-        [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands], description.bits
-    )
-    dn = chunks.pointwise(
-        calibration.radiance_to_dn,
-        radiance,
-        *(xr.DataArray(values, dims="band") for values in (gain, offset)),
-        dtype=np.uint8 if description.bits <= 8 else np.uint16,
-        bits=description.bits,
-    )
-    return dn.assign_coords(
-        cf.band_coordinates(
-            band=[band.name for band in bands],
-            wavelength=[band.wavelength for band in bands],
-            gain=gain,
-            offset=offset,
-            solar_irradiance=[band.solar_irradiance for band in bands],
-        )
-    )
+        along_band |= {"gain": gain, "offset": offset}
+    along_band["solar_irradiance"] = [band.solar_irradiance for band in bands]
+    return radiance.assign_coords(cf.band_coordinates(**along_band))
+
+
+def labelled(image, toa, description, history):
+    """
+    Image with the labels of what it is: digital numbers where it holds whole numbers, else radiance.
+
+    Parameters
+    ----------
+    image : xarray.DataArray
+        From `recorded`.
+    toa : xarray.DataArray
+        What it was sensed of.
+    description : fifesim.sensor.description.instruments.Instrument
+    history : str
+
+    Returns
+    -------
+    image : xarray.DataArray
+    """
+    name = "dn" if image.dtype.kind == "u" else "toa_radiance"
+    image = cf.label(image, name, source=toa, history=history, instrument=description.name)
+    if name == "dn":
+        image.attrs["_FillValue"] = image.dtype.type(0)
+    return image
 
 
 def _history(description, interval, offset, noise, seed, quantise):
@@ -188,7 +217,7 @@ def to_radiance(image):
     missing = {"gain", "offset"} - set(image.coords)
     if missing:
         raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
-    out = chunks.pointwise(calibration.dn_to_radiance, image, *_plain(image, "gain", "offset"))
+    out = chunks.pointwise(calibration.dn_to_radiance, image, _along_band(image, "gain"), _along_band(image, "offset"))
     out = _placed_as(out.drop_vars(["gain", "offset"]), image)
     return cf.label(out, "toa_radiance", source=image, history="to_radiance")
 
@@ -225,7 +254,7 @@ def to_reflectance(image):
     out = chunks.pointwise(
         calibration.radiance_to_reflectance,
         radiance,
-        *_plain(image, "solar_irradiance"),
+        _along_band(image, "solar_irradiance"),
         cf.mu_s(geometry),
         earth_sun_distance=float(geometry.earth_sun_distance),
     )
@@ -268,6 +297,6 @@ def as_radiance(array, bands, geometry):
     )
 
 
-def _plain(image, *names):
-    """Coordinates along band as arrays without names that would collide."""
-    return [xr.DataArray(image[name].values, dims=image[name].dims) for name in names]
+def _along_band(image, name):
+    """Coordinate along band without a name that would collide."""
+    return xr.DataArray(image[name].values, dims=image[name].dims)

@@ -6,6 +6,7 @@ import xarray as xr
 
 from fifesim.analysis import uncertainty
 from fifesim.analysis.rasters.pairs import matched
+from fifesim.analysis.regression import totals
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
 from fifesim.rasters.reductions import row_sums
@@ -84,26 +85,28 @@ def inversion_error(estimate, truth, *, pair="coordinates"):
     ValueError
         If the rasters do not match, no pixel has both, or a Dataset is not as `invert` gives it.
     """
-    if isinstance(estimate, xr.DataArray):
-        maps = [estimate] * 3
-    else:
-        variables = [name for name in estimate.data_vars if name not in _LIMITS]
-        if len(variables) != 1 or not set(_LIMITS) <= set(estimate.data_vars):
-            raise ValueError(
-                f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
-                "give a single map as a DataArray"
-            )
-        maps = [estimate[name] for name in (*variables, *_LIMITS)]
-    matched_maps = [matched(each, truth, pair) for each in maps]
-    arrays = [matched_maps[0][1], *(each for each, _ in matched_maps)]
-    sums = row_sums(uncertainty.error_sums, *arrays, count=4)
-    n, total, squares, inside = map(math.fsum, sums.T)
+    value, low, high = [estimate] * 3 if isinstance(estimate, xr.DataArray) else _map_and_limits(estimate)
+    value, true = matched(value, truth, pair)
+    low, _ = matched(low, truth, pair)
+    high, _ = matched(high, truth, pair)
+    n, total, squares, inside = totals(row_sums(uncertainty.error_sums, true, value, low, high, count=4))
     if n == 0:
         raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
     found = {"bias": total / n, "rmse": math.sqrt(squares / n), "n": int(n)}
     if isinstance(estimate, xr.Dataset):
         found["coverage"] = inside / n
     return xr.Dataset(found)
+
+
+def _map_and_limits(estimate):
+    """Variable of an estimate, and the ends of its interval."""
+    variables = [name for name in estimate.data_vars if name not in _LIMITS]
+    if len(variables) != 1 or not set(_LIMITS) <= set(estimate.data_vars):
+        raise ValueError(
+            f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
+            "give a single map as a DataArray"
+        )
+    return [estimate[name] for name in (*variables, *_LIMITS)]
 
 
 def _limit(fit, end, level):

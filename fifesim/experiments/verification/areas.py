@@ -1,13 +1,14 @@
 """Every check of the package, area by area."""
 
-from fifesim.experiments.verification import atmosphere, canopy, landscape, sensor, terrain
+from fifesim.experiments.verification import analysis, atmosphere, canopy, landscape, scan, sensor, terrain
 
 AREAS = {
     "random field": landscape.CHECKS,
     "canopy": canopy.CHECKS,
     "terrain": terrain.CHECKS,
-    "sensor": sensor.CHECKS,
+    "sensor": (*sensor.CHECKS, *scan.CHECKS),
     "atmosphere": atmosphere.CHECKS,
+    "analysis": analysis.CHECKS,
 }
 
 

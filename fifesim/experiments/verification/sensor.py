@@ -1,14 +1,24 @@
-"""Checks of the sensor against the line spread of Friedl et al. (1995), integrated and transformed by quadrature."""
+"""Checks of the sensor: line spreads by quadrature, calibration, bands and noise."""
 
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
+import xarray as xr
+from scipy.integrate import quad, trapezoid
+from scipy.signal import butter, freqs
+from scipy.stats import norm
 
-from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.bands import Band, solar_irradiance_steps, solar_spectrum
+from fifesim.base.footprints import Boxcar, axis_operator, regularize
 from fifesim.experiments.verification.deviations import Deviation, largest
+from fifesim.rasters import grid as grids
+from fifesim.rasters.regularization import regularized
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response import calibration
-from fifesim.sensor.response.spatial import CosineSpread
+from fifesim.sensor.response.noise import NoiseModel, add_noise, fixed_pattern
+from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread, TableSpread
+from fifesim.sensor.response.transfer import Diffraction, LowPass, SystemSpread
 
 _deviation = partial(Deviation, "sensor")
 
@@ -68,6 +78,12 @@ def _wave():
     yield _deviation("modulation transfer function", transfer, 1e-12, "1", "its Fourier transform, quadrature")
 
 
+def _weights(cells, cell, pixels, origin):
+    """Weights of cells in pixels, shape (pixels, cells)."""
+    left = np.arange(cells) * cell - (origin + (np.arange(pixels) + 0.5) * _PIXEL)[:, None]
+    return _integral(left, left + cell)
+
+
 def _constant():
     scene = np.full((90, 120), 204.3)
     rows, columns = (_axis(30 / 9, size, 20, 1.1) for size in scene.shape)
@@ -76,6 +92,85 @@ def _constant():
     seen = image[np.isfinite(image)]
     worst = largest(seen, 204.3, relative=True) if seen.size else np.nan
     yield _deviation("constant scene with holes stays constant", worst, 1e-13, "1", "theory")
+
+
+def _holes():
+    """Cells in the upper left corner of the pixels, whose grid is moved down and to the right by its shifts."""
+    cells = grids.grid_at("EPSG:26914", 705600.0, 4334000.0, 300.0, 250.0, 10 / 3)
+    pixels = grids.grid_at("EPSG:26914", 705612.0, 4333979.0, 240.0, 180.0, _PIXEL)
+    scene = np.random.default_rng(3).uniform(1, 2, tuple(cells.shape))
+    scene[::7, ::5] = np.nan
+    array = grids.place(xr.DataArray(scene, dims=("y", "x")), cells)
+    image = regularized(array, (CosineSpread(_WIDTH),) * 2, pixels, shifts=(5.5, 7.25), min_valid=0.3).values
+    rows, columns = _weights(75, 10 / 3, 6, 21 + 5.5), _weights(90, 10 / 3, 8, 12 + 7.25)
+    there = np.isfinite(scene).astype(float)
+    expected = (rows @ np.nan_to_num(scene) @ columns.T) / (rows @ there @ columns.T)
+    found = largest(image, expected, relative=True)
+    yield _deviation("image of a scene with holes, on a moved grid", found, 1e-12, "1", "sums over quadrature")
+
+
+def _shapes():
+    """Densities by their definition, integrated between their kinks and transformed; a system's table bends there."""
+    half, nodes = 15.0, ((-31.0, -12.5, 4.0, 38.0), (0.0, 0.4, 1.0, -0.1))
+    shapes = {
+        "boxcar": (Boxcar(2 * half), lambda x: 1.0 * (abs(x) <= half), (-half, half), 1e-9),
+        "Gaussian": (GaussianSpread(33.0), lambda x: 2.0 ** -((2 * x / 33.0) ** 2), (-85.0, 85.0), 1e-8),
+        "table": (TableSpread(*nodes), lambda x: np.interp(x, *nodes, left=0.0, right=0.0), nodes[0], 1e-9),
+        "two boxcars": (
+            SystemSpread((Boxcar(30.0), Boxcar(12.0)), 1e-9),
+            lambda x: np.clip((21.0 - abs(x)) / 12.0, 0.0, 1.0),
+            (-21.0, -9.0, 9.0, 21.0),
+            2e-5,
+        ),
+    }
+    for name, (spread, density, kinks, bound) in shapes.items():
+        whole = _between(density, kinks, kinks[-1])
+        share = [_between(density, kinks, x) / whole for x in (-14.0, 3.0, 17.5)]
+        worst = largest(spread.cumulative([-14.0, 3.0, 17.5]), share)
+        for frequency in (1 / 200, 1 / 60, 1 / 31):
+            cosine, sine = (
+                _between(lambda x: density(x) * wave(2 * np.pi * frequency * x), kinks, kinks[-1])  # noqa: B023
+                for wave in (np.cos, np.sin)
+            )
+            transfer = np.hypot(cosine, sine) if name == "table" else cosine
+            worst = np.maximum(worst, largest(spread.mtf(frequency), transfer / whole))
+        yield _deviation(f"line spread and transfer, {name}", worst, bound, "1", "its density, quadrature")
+
+
+def _between(function, kinks, last):
+    """Integral of a function with kinks, from the first of them on."""
+    edges = [x for x in kinks if x < last] + [last]
+    return sum(quad(function, a, b, epsabs=1e-10)[0] for a, b in pairwise(edges))
+
+
+def _parts():
+    """An aperture's overlap with itself and its tail, the poles of a filter, and two Gaussians in one."""
+    nu = np.array([0.0, 0.2, 0.55, 0.9, 1.3])
+    overlap = [4 / np.pi * quad(lambda t: np.sqrt(1 - t * t), min(each, 1), 1)[0] for each in nu]
+    worst = largest(Diffraction(0.4).mtf(-0.4 * nu), overlap)
+    yield _deviation("transfer of an aperture", worst, 1e-9, "1", "overlap of two disks, quadrature")
+    frequency = np.array([0.001, 0.01, 0.03])
+    poles = [abs(freqs(*butter(n, 0.01, analog=True), frequency)[1]) for n in (1, 3)]
+    worst = largest([LowPass(0.01, n).mtf(frequency) for n in (1, 3)], poles)
+    yield _deviation("transfer of electronics", worst, 1e-12, "1", "poles, scipy.signal")
+    system = SystemSpread((Diffraction(0.5), GaussianSpread(3.0)), 2e-3)
+    tail = 4 / (np.pi**3 * 0.5 * system.half_width)
+    worst = 100 * largest(system.truncated_share, tail, relative=True)
+    yield _deviation("share of an aperture's response cut off", worst, 2.0, "%", "Struve's asymptote")
+    both = SystemSpread((GaussianSpread(30.0), GaussianSpread(40.0)), 1e-6)
+    x = np.linspace(-60.0, 60.0, 13)
+    worst = largest(both.cumulative(x), norm.cdf(x, scale=50.0 / np.sqrt(8 * np.log(2))))
+    yield _deviation("line spread of two Gaussians", worst, 1e-5, "1", "their variances add")
+
+
+def _instruments():
+    """Angles on the ground, and a transfer that was measured: 40.8 m is half of the period that passes by half."""
+    tm, measured = instrument("TM"), instrument("L4TM").line_spread
+    found = [tm.line_spread.width / _WIDTH, tm.ground_interval / (43e-6 * 705e3), measured.mtf(0.5 / 40.8) / 0.5]
+    yield _deviation("TM's line spread on the ground", largest(found, 1), 1e-4, "1", "Schowengerdt et al. (1985)")
+    at_nyquist = GaussianSpread.from_mtf(0.3, 30.0)
+    worst = largest(at_nyquist.mtf(1 / 60), 0.3)
+    yield _deviation("Gaussian of a given transfer", worst, 1e-12, "1", "its definition")
 
 
 def _counts():
@@ -90,4 +185,89 @@ def _counts():
     yield _deviation("counts of TM's radiances", worst, 0.5 + 1e-9, "count", "Friedl et al. (1995), Table 1")
 
 
-CHECKS = (_impulse, _wave, _constant, _counts)
+def _radiances():
+    """Counts by hand; and what a Lambertian surface sends into all directions is what it reflects."""
+    gain, offset = calibration.gain_offset(204.3, -1.2, 8)
+    found = calibration.dn_to_radiance([1, 100, 255], gain, offset)
+    worst = largest((found + 1.2) * 255 / 205.5, [1, 100, 255])
+    yield _deviation("radiance of TM3's counts", worst, 1e-12, "count", "Friedl et al. (1995), Table 1")
+    reflectance, irradiance, mu_s, distance = 0.3, 1536.0, 0.7, 1.0148
+    radiance = calibration.reflectance_to_radiance(reflectance, irradiance, mu_s, distance)
+    sent = quad(lambda theta: 2 * np.pi * float(radiance) * np.cos(theta) * np.sin(theta), 0, np.pi / 2)[0]
+    received = irradiance * mu_s / distance**2
+    back = calibration.radiance_to_reflectance(radiance, irradiance, mu_s, distance)
+    worst = largest([sent / received, back], reflectance)
+    yield _deviation("radiance of a Lambertian surface", worst, 1e-12, "1", "its exitance, quadrature")
+
+
+def _bands():
+    """The trapezoidal rule on nodes of 1 nm; steps of a coarse spectrum keep the energy of the sun."""
+    wavelength = np.linspace(0.5, 0.8, 301)
+    band = Band("triangle", (0.55, 0.62, 0.75), (0.0, 1.0, 0.0))
+    found = band.mean(np.exp(-3 * wavelength), wavelength, weight=wavelength**2)
+
+    def weight(x):
+        return x**2 * np.interp(x, band.wavelength, band.response)
+
+    expected = _between(lambda x: weight(x) * np.exp(-3 * x), band.wavelength, 0.75)
+    worst = largest(found, expected / _between(weight, band.wavelength, 0.75), relative=True)
+    yield _deviation("mean of a spectrum over a band", worst, 1e-5, "1", "quadrature")
+    fine, irradiance = solar_spectrum()
+    coarse = np.linspace(0.4, 2.5, 211)
+    total = solar_irradiance_steps(coarse) @ np.append(np.insert(np.full(209, 0.01), 0, 0.005), 0.005)
+    inside = (fine >= 0.4) & (fine <= 2.5)
+    worst = largest(total, trapezoid(irradiance[inside], fine[inside]), relative=True)
+    yield _deviation("energy of the sun in steps", worst, 1e-9, "1", "ASTM G173, integrated")
+
+
+def _grey(level, shape, model, kinds, **place):
+    """Image of a grey scene."""
+    return add_noise(np.full(shape, level), model, kinds, **({"seed": 5, "band": 2} | place))
+
+
+def _noise():
+    """Four standard errors of 120 000 pixels, whose variance is linear in the light between two published ratios."""
+    model = NoiseModel.from_snr([50.0, 200.0], [100.0, 250.0])
+    kinds, shape = ("shot", "thermal"), (300, 400)
+    noise = _grey(80.0, shape, model, kinds, row=-7, column=1000) - 80.0
+    variance = 0.25 + (0.64 - 0.25) * 30 / 150
+    worst = largest(noise.var() / variance, 1)
+    yield _deviation("noise at a radiance between two", worst, 4 * np.sqrt(2 / noise.size), "1", "variances on a line")
+    one = NoiseModel.from_snr(50.0, 100.0, 0.3)
+    worst = largest(one.noise_equivalent_radiance([50.0, 12.5]) ** 2, [0.25, 0.25 * (0.7 + 0.3 / 4)])
+    yield _deviation("noise by one ratio and a share", worst, 1e-12, "1", "shot noise in proportion to light")
+    others = [_grey(80.0, shape, model, kinds, row=-7, column=1000, **key) for key in ({"seed": 6}, {"band": 3})]
+    rows = [each.ravel() for each in (noise, np.roll(noise, 1, 0), np.roll(noise, 1, 1), *others)]
+    worst = np.abs(np.corrcoef(rows) - np.eye(5)).max()
+    yield _deviation("noise of lines, pixels, bands and seeds", worst, 4.5 / np.sqrt(noise.size), "1", "independence")
+
+
+def _stripes():
+    """Sixteen detectors take turns; twenty thousand show what was asked for, within four standard errors."""
+    model = NoiseModel(0.3, 0.01, 16, 0.01, 0.2)
+    kinds = ("shot", "thermal", "fixed-pattern")
+    whole = _grey(80.0, (70, 400), model, kinds, row=-7, column=1000)
+    part = _grey(80.0, (40, 300), model, kinds, row=13, column=1020)
+    yield _deviation("noise of a window", largest(part, whole[20:60, 20:320]), 0.0, "1", "that of the whole")
+    gain, offset = fixed_pattern(model, 5, 2)
+    worst = largest(_grey(80.0, (48, 3), model, kinds[2:]), np.tile(gain * 80.0 + offset, 3)[:, None])
+    yield _deviation("stripes of sixteen detectors", worst, 1e-11, "1", "gain times light and offset")
+    gain, offset = fixed_pattern(NoiseModel(0.0, 0.0, 20_000, 0.01, 0.2, "columns"), 1, 0)
+    worst = largest([gain.std() / 0.01, offset.std() / 0.2, gain.mean(), 1 + offset.mean()], 1)
+    yield _deviation("spread of gains and offsets", worst, 4 / np.sqrt(2 * 20_000), "1", "what was asked for")
+
+
+CHECKS = (
+    _impulse,
+    _wave,
+    _constant,
+    _holes,
+    _shapes,
+    _parts,
+    _instruments,
+    _counts,
+    _radiances,
+    _bands,
+    _noise,
+    _stripes,
+)

@@ -3,6 +3,7 @@
 from dataclasses import field, replace
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
@@ -85,6 +86,11 @@ class Instrument:
                 self.source(number, band)
 
     @property
+    def max_angle(self):
+        """Largest scan angle from nadir, infinite where the file has no scan [degree]."""
+        return np.inf if self.scan is None else self.scan.max_angle
+
+    @property
     def line_spread(self):
         """Line spread function on the ground of the first band, across the track."""
         return self.line_spreads(self.bands[0]).across
@@ -122,7 +128,7 @@ class Instrument:
         intervals : AlongAcross
             [m]
         """
-        return AlongAcross(*(self.altitude * angle for angle in by_axes(band.interval or self.interval)))
+        return self._on_ground(band.interval or self.interval)
 
     def ground_fields(self, band):
         """
@@ -137,7 +143,11 @@ class Instrument:
         widths : AlongAcross
             None where the instrument's file has none. [m]
         """
-        return AlongAcross(*(angle and self.altitude * angle for angle in by_axes(band.ifov or self.ifov)))
+        return self._on_ground(band.ifov or self.ifov)
+
+    def _on_ground(self, angle):
+        along, across = by_axes(angle)
+        return AlongAcross(along and self.altitude * along, across and self.altitude * across)
 
     def line_spreads(self, band):
         """
@@ -152,10 +162,12 @@ class Instrument:
         lsf : AlongAcross
             As `fifesim.base.footprints` takes them: along for its rows, across for its columns.
         """
-        angles = zip(by_axes(band.ifov or self.ifov), by_axes(band.interval or self.interval), strict=True)
-        views = [View(self.altitude, ifov, interval, band) for ifov, interval in angles]
-        responses = by_axes(band.lsf or self.lsf)
-        return AlongAcross(*(response.spread(view) for response, view in zip(responses, views, strict=True)))
+        lsf, ifov, interval = map(
+            by_axes, (band.lsf or self.lsf, band.ifov or self.ifov, band.interval or self.interval)
+        )
+        along = lsf.along.spread(View(self.altitude, ifov.along, interval.along, band))
+        across = lsf.across.spread(View(self.altitude, ifov.across, interval.across, band))
+        return AlongAcross(along, across)
 
     def noise_model(self, band):
         """

@@ -298,9 +298,9 @@ def add_noise(radiance, model, kinds, *, seed, band, row=0, column=0):
             out[i] += sigma[i] * line_noise(seed, band, row + i, column, columns)
     if "fixed-pattern" in kinds:
         gain, offset = fixed_pattern(model, seed, band)
-        first, size, shape = (row, rows, (-1, 1)) if model.along == "rows" else (column, columns, (1, -1))
-        detector = (first + np.arange(size)) % model.detectors
-        out = gain[detector].reshape(shape) * out + offset[detector].reshape(shape)
+        place = row + np.arange(rows)[:, None] if model.along == "rows" else column + np.arange(columns)
+        detector = place % model.detectors
+        out = gain[detector] * out + offset[detector]
     return out
 
 

@@ -1,6 +1,7 @@
 """Footprints that are turned against the grid of the ground: one sparse operator over both axes."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -56,11 +57,8 @@ class Footprints:
         rows, columns : slice
             At least one cell.
         """
-        out = []
-        for center, half, size in zip((self.row, self.column), self.reach(), shape, strict=True):
-            first = int(np.clip(np.floor(np.min(center - half)), 0, size - 1))
-            out.append(slice(first, int(np.clip(np.ceil(np.max(center + half)), first + 1, size))))
-        return tuple(out)
+        half_row, half_column = self.reach()
+        return _touched(self.row, half_row, shape[0]), _touched(self.column, half_column, shape[1])
 
     def __getitem__(self, pixels):
         """Footprints of some of the pixels, one after the other."""
@@ -106,19 +104,16 @@ def footprint_operator(footprints, rows, columns):
     >>> round(float(footprint_operator(pixel, slice(0, 20), slice(0, 20)).sum()), 12)
     1.0
     """
-    tables = [_table(spread) for spread in (footprints.along, footprints.across)]
-    widths = [2 * half / (table.size - 1) / np.diff(table).max() for table, half in tables]
+    along, across = _table(footprints.along), _table(footprints.across)
     step = np.sqrt(np.abs(np.linalg.det(footprints.frame)))
-    pieces = np.clip(np.ceil(step / (_PIECE * min(widths))), 1, 64).astype(np.int64)
+    pieces = np.clip(np.ceil(step / (_PIECE * min(along.width, across.width))), 1, 64).astype(np.int64)
     half_row, half_column = footprints.reach()
+    boxes = _Boxes(footprints.row, footprints.column, footprints.frame, half_row, half_column, pieces)
     limit = np.sum((2 * half_row + 3).astype(np.int64) * (2 * half_column + 3).astype(np.int64))
     pointers = np.zeros(footprints.row.size + 1, np.int64)
     indices, weights = np.empty(limit, np.int64), np.empty(limit)
     window = np.array([rows.start, rows.stop, columns.start, columns.stop])
-    used = _fill(
-        footprints.row, footprints.column, footprints.frame, half_row, half_column, pieces,
-        *tables[0], *tables[1], window, pointers, indices, weights,
-    )  # fmt: skip
+    used = _fill(boxes, along, across, window, pointers, indices, weights)
     shape = footprints.row.size, (rows.stop - rows.start) * (columns.stop - columns.start)
     return csr_array((weights[:used].copy(), indices[:used].copy(), pointers), shape=shape)
 
@@ -153,61 +148,93 @@ def apply_operator(operator, values, min_valid):
     return out.reshape(*values.shape[:-1], operator.shape[0])
 
 
+def _touched(center, half, size):
+    """Cells of an axis from the first to the last that boxes touch."""
+    first = int(np.clip(np.floor(np.min(center - half)), 0, size - 1))
+    return slice(first, int(np.clip(np.ceil(np.max(center + half)), first + 1, size)))
+
+
+class _Table(NamedTuple):
+    """Cumulative line spread function at even nodes, the half width that they span, and their number a metre."""
+
+    cumulative: np.ndarray
+    half: float
+    scale: float
+
+    @property
+    def width(self):
+        """Of a boxcar as high as the response at its highest. [m]"""
+        return 2 * self.half / (self.cumulative.size - 1) / np.diff(self.cumulative).max()
+
+
 def _table(spread):
-    """Cumulative line spread function at even nodes, and the half width that they span."""
-    return spread.cumulative(np.linspace(-spread.half_width, spread.half_width, _NODES)), spread.half_width
+    half = spread.half_width
+    return _Table(spread.cumulative(np.linspace(-half, half, _NODES)), half, (_NODES - 1) / (2 * half))
+
+
+class _Boxes(NamedTuple):
+    """Pixels with half the box around each, and into how many pieces a side of a cell is cut."""
+
+    row: np.ndarray
+    column: np.ndarray
+    frame: np.ndarray
+    half_row: np.ndarray
+    half_column: np.ndarray
+    pieces: np.ndarray
 
 
 @njit(nogil=True, cache=True)
-def _cumulative(table, half, scale, x):
-    place = min(max((x + half) * scale, 0.0), table.size - 1.0)
-    index = min(int(place), table.size - 2)
+def _cumulative(table, x):
+    place = min(max((x + table.half) * table.scale, 0.0), table.cumulative.size - 1.0)
+    index = min(int(place), table.cumulative.size - 2)
     share = place - index
-    return table[index] * (1 - share) + table[index + 1] * share
+    return table.cumulative[index] * (1 - share) + table.cumulative[index + 1] * share
 
 
 @njit(nogil=True, cache=True)
-def _share(table, half, scale, x, reach):
-    return _cumulative(table, half, scale, x + reach) - _cumulative(table, half, scale, x - reach)
+def _share(table, x, reach):
+    return _cumulative(table, x + reach) - _cumulative(table, x - reach)
 
 
 @njit(nogil=True, cache=True)
-def _fill(
-    row, column, frame, half_row, half_column, pieces, along, along_half, across, across_half, window, pointers,
-    indices, weights,
-):  # fmt: skip
+def _in_frame(frame, down, right):
+    return frame[0, 0] * down + frame[0, 1] * right, frame[1, 0] * down + frame[1, 1] * right
+
+
+@njit(nogil=True, cache=True)
+def _cell_weight(i, j, row, column, frame, n, a, b, along, across):
+    # Most cells of the box lie beyond the footprint's turned sides.
+    u, v = _in_frame(frame, i + 0.5 - row, j + 0.5 - column)
+    if abs(u) > along.half + 2 * n * a or abs(v) > across.half + 2 * n * b:
+        return 0.0
+    piece = 1.0 / n
+    weight = 0.0
+    for k in range(n):
+        down = i + (k + 0.5) * piece - row
+        for m in range(n):
+            u, v = _in_frame(frame, down, j + (m + 0.5) * piece - column)
+            if abs(u) < along.half + a and abs(v) < across.half + b:
+                weight += _share(along, u, a) * _share(across, v, b)
+    return weight
+
+
+@njit(nogil=True, cache=True)
+def _fill(boxes, along, across, window, pointers, indices, weights):
     used = 0
-    width = window[3] - window[2]
-    # Nodes of the tables a metre.
-    s, t = (along.size - 1) / (2 * along_half), (across.size - 1) / (2 * across_half)
-    for pixel in range(row.size):
+    top, bottom, left, right = window
+    for pixel in range(boxes.row.size):
         start, total = used, 0.0
-        n = pieces[pixel]
-        piece = 1.0 / n
-        a = np.hypot(frame[pixel, 0, 0], frame[pixel, 0, 1]) / (2 * n)
-        b = np.hypot(frame[pixel, 1, 0], frame[pixel, 1, 1]) / (2 * n)
-        for i in range(int(np.floor(row[pixel] - half_row[pixel])), int(np.ceil(row[pixel] + half_row[pixel]))):
-            for j in range(
-                int(np.floor(column[pixel] - half_column[pixel])), int(np.ceil(column[pixel] + half_column[pixel]))
-            ):
-                # Most cells of the box lie beyond the footprint's turned sides.
-                down, right = i + 0.5 - row[pixel], j + 0.5 - column[pixel]
-                u = frame[pixel, 0, 0] * down + frame[pixel, 0, 1] * right
-                v = frame[pixel, 1, 0] * down + frame[pixel, 1, 1] * right
-                if abs(u) > along_half + 2 * n * a or abs(v) > across_half + 2 * n * b:
-                    continue
-                weight = 0.0
-                for k in range(n):
-                    down = i + (k + 0.5) * piece - row[pixel]
-                    for m in range(n):
-                        right = j + (m + 0.5) * piece - column[pixel]
-                        u = frame[pixel, 0, 0] * down + frame[pixel, 0, 1] * right
-                        v = frame[pixel, 1, 0] * down + frame[pixel, 1, 1] * right
-                        if abs(u) < along_half + a and abs(v) < across_half + b:
-                            weight += _share(along, along_half, s, u, a) * _share(across, across_half, t, v, b)
+        row, column, frame, n = boxes.row[pixel], boxes.column[pixel], boxes.frame[pixel], boxes.pieces[pixel]
+        half_row, half_column = boxes.half_row[pixel], boxes.half_column[pixel]
+        # Half sides of a piece.
+        a = np.hypot(frame[0, 0], frame[0, 1]) / (2 * n)
+        b = np.hypot(frame[1, 0], frame[1, 1]) / (2 * n)
+        for i in range(int(np.floor(row - half_row)), int(np.ceil(row + half_row))):
+            for j in range(int(np.floor(column - half_column)), int(np.ceil(column + half_column))):
+                weight = _cell_weight(i, j, row, column, frame, n, a, b, along, across)
                 total += weight
-                if weight != 0 and window[0] <= i < window[1] and window[2] <= j < window[3]:
-                    indices[used] = (i - window[0]) * width + j - window[2]
+                if weight != 0 and top <= i < bottom and left <= j < right:
+                    indices[used] = (i - top) * (right - left) + j - left
                     weights[used] = weight
                     used += 1
         for k in range(start, used):

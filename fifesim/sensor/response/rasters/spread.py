@@ -39,19 +39,19 @@ def psf(instrument="TM", band=None, *, spacing=None):
     fifesim.sensor.response.spatial, fifesim.sensor.response.transfer
     """
     description, band = _find(instrument, band)
-    spreads = description.line_spreads(band)
+    along, across = description.line_spreads(band)
     if spacing is None:
-        spacing = 2 * max(spread.half_width for spread in spreads) / _SAMPLES
+        spacing = 2 * max(along.half_width, across.half_width) / _SAMPLES
     if not 0 < spacing < np.inf:
         raise ValueError(f"spacing must be a positive number of metres, got {spacing}")
-    axes = [_line(spread, spacing) for spread in spreads]
-    (along, rows), (across, columns) = axes
+    y, rows = _line(along, spacing)
+    x, columns = _line(across, spacing)
     return xr.DataArray(
         np.outer(rows, columns),
         dims=("y", "x"),
         coords={
-            "y": ("y", along, {"long_name": "distance along the track, from the pixel's centre", "units": "m"}),
-            "x": ("x", across, {"long_name": "distance across the track, from the pixel's centre", "units": "m"}),
+            "y": ("y", y, {"long_name": "distance along the track, from the pixel's centre", "units": "m"}),
+            "x": ("x", x, {"long_name": "distance across the track, from the pixel's centre", "units": "m"}),
             "band": band.name,
         },
         name="psf",

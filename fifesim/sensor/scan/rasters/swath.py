@@ -9,12 +9,11 @@ import xarray as xr
 
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
-from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.raster import MIN_VALID, as_radiance, recorded
+from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled, recorded
 from fifesim.sensor.response.rasters.noise import noisy
-from fifesim.sensor.response.rasters.pixels import by_line_spread, common_size, matching_bands
+from fifesim.sensor.response.rasters.pixels import by_line_spread, common_size
 from fifesim.sensor.scan import track as scan
-from fifesim.sensor.scan.rasters.view import degrees, find_track, transformer
+from fifesim.sensor.scan.rasters.view import find_track, scan_nodes, transformer
 from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_operator
 
 # Pixels along each side of a block: the operator of a whole image would fill the memory.
@@ -22,8 +21,6 @@ _BLOCK = 128
 
 # Displacement on the ground by which the frame of a pixel is found. [m]
 _STEP = 100.0
-
-_OUTLINE = 65
 
 
 def sense_swath(
@@ -75,10 +72,7 @@ def sense_swath(
     --------
     fifesim.sensor.scan.swath.footprint_operator, fifesim.sensor.scan.track
     """
-    cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
-    description = find_instrument(instrument)
-    toa = toa if "band" in toa.dims else toa.expand_dims("band")
-    bands = matching_bands(toa, description)
+    toa, description, bands = by_bands(toa, instrument)
     geometry = cf.given_geometry(geometry, toa.drop_vars(["vza", "vaa"], errors="ignore"))
     geometry = cf.uniform_geometry(geometry, "sense_swath")
     scene = grids.geobox(toa)
@@ -87,17 +81,9 @@ def sense_swath(
     means = _means(toa.transpose("band", "y", "x"), description, bands, pixels, min_valid)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, pixels.first, noise_models)
     image = recorded(radiance, description, bands, quantise).assign_coords(_coordinates(scene, pixels, description))
-    image = _with_sun(image, geometry)
-    image = cf.label(
-        image,
-        "dn" if quantise else "toa_radiance",
-        source=toa,
-        history=f"sense_swath: {description.name}, track {track.heading:.2f} degrees",
-        instrument=description.name,
-    )
+    history = f"sense_swath: {description.name}, track {track.heading:.2f} degrees"
+    image = labelled(_with_sun(image, geometry), toa, description, history)
     image.encoding = {"grid_mapping": "spatial_ref"}
-    if quantise:
-        image.attrs["_FillValue"] = image.dtype.type(0)
     return image
 
 
@@ -118,9 +104,12 @@ def _pixels(scene, description, bands, track):
     """Pixels whose centres lie in the smallest box of lines and samples around a scene."""
     spacing, across = common_size(description, bands, description.ground_intervals)
     angle = np.degrees(across / description.altitude)
-    distance, scan_angle = _outline(scene, description, track)
-    lines = np.arange(int(np.ceil(distance.min() / spacing - 0.5)), int(np.floor(distance.max() / spacing - 0.5)) + 1)
-    samples = np.arange(int(np.ceil(scan_angle.min() / angle - 0.5)), int(np.floor(scan_angle.max() / angle - 0.5)) + 1)
+    distance, _, scan_angle, seen = scan_nodes(description, scene, track)
+    if not seen.any():
+        raise ValueError(
+            f"{description.name} does not see the scene, whose scan angles are beyond {description.max_angle:g} degrees"
+        )
+    lines, samples = _inside(distance[seen] / spacing), _inside(scan_angle[seen] / angle)
     if not (lines.size and samples.size):
         raise ValueError(
             f"no pixel of {description.name}, {spacing:g} m along the track, lies in the scene: simulate a larger one"
@@ -133,22 +122,15 @@ def _pixels(scene, description, bands, track):
     forward = _cells(scene, *scan.place_of(track, along + _STEP / parallel, aside))
     sideward = _cells(scene, *scan.place_of(track, along, aside + np.degrees(_STEP / scan.EARTH_RADIUS)))
     # A metre along and across the track (last axis) in rows and columns. The inverse takes cells to metres.
-    ahead, aside = (np.stack(each, axis=-1) - np.stack([row, column], axis=-1) for each in (forward, sideward))
-    steps = np.stack([ahead, aside], axis=-1)
+    here = np.stack([row, column], axis=-1)
+    steps = np.stack([np.stack(forward, axis=-1) - here, np.stack(sideward, axis=-1) - here], axis=-1)
     frame = np.linalg.inv(steps / _STEP) / np.stack(scan.growth(theta, description.altitude), axis=-1)[..., None]
     return _Pixels((int(lines[0]), int(samples[0])), latitude, longitude, row, column, frame, track)
 
 
-def _outline(scene, description, track):
-    """Distance along the track and scan angle at nodes of a scene, those that the instrument sees."""
-    rows, columns = (np.linspace(0, size, _OUTLINE) for size in scene.shape)
-    distance, aside = scan.place_beside(track, *degrees(scene, *np.meshgrid(rows, columns, indexing="ij")))
-    _, scan_angle = scan.view_from_ground(aside, description.altitude)
-    limit = np.inf if description.scan is None else description.scan.max_angle
-    seen = np.abs(scan_angle) <= limit
-    if not seen.any():
-        raise ValueError(f"{description.name} does not see the scene, whose scan angles are beyond {limit:g} degrees")
-    return distance[seen], scan_angle[seen]
+def _inside(places):
+    """Numbers of the lines or samples whose centres lie between the first and the last of some places."""
+    return np.arange(int(np.ceil(places.min() - 0.5)), int(np.floor(places.max() - 0.5)) + 1)
 
 
 def _cells(scene, latitude, longitude):

@@ -7,7 +7,8 @@ import pyproj
 import xarray as xr
 from scipy.interpolate import RectBivariateSpline
 
-from fifesim.rasters import cf, chunks
+from fifesim.rasters import cf
+from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.scan import track as scan
@@ -55,8 +56,7 @@ def scan_geometry(instrument, grid, track=None, *, nadir_offset=0.0, heading=180
     description = find_instrument(instrument)
     grids.check_grid(grid)
     track = find_track(grid, track, nadir_offset, heading)
-    limit = np.inf if description.scan is None else description.scan.max_angle
-    _check_swath(description, grid, track, limit)
+    _check_swath(description, grid, track)
     attrs = {
         "instrument": description.name,
         "altitude": description.altitude,
@@ -66,8 +66,8 @@ def scan_geometry(instrument, grid, track=None, *, nadir_offset=0.0, heading=180
     }
     out = {}
     for name in ("vza", "vaa"):
-        kernel = partial(_view, name, grid, track, description.altitude, limit)
-        array = _tiled(kernel, grid, chunks)
+        kernel = partial(_view, name, grid, track, description.altitude, description.max_angle)
+        array = chunking.tiles(kernel, grid, chunks, tile=_TILE)
         out[name] = cf.label(array, name, history=f"scan_geometry: {description.name}", instrument=description.name)
     return xr.Dataset(out, attrs=attrs)
 
@@ -103,10 +103,12 @@ def find_track(grid, track=None, nadir_offset=0.0, heading=180.0):
     here = scan.Track(float(latitude), float(longitude), heading)
     aside = np.degrees(nadir_offset / scan.EARTH_RADIUS)
     # The great circle that keeps the distance there: its point is abeam to the left, its heading that of the parallel.
-    latitude, longitude = (float(value) for value in scan.place_of(here, 0.0, -aside))
+    latitude, longitude = scan.place_of(here, 0.0, -aside)
     _, along, _ = here.axes()
-    _, east, north = scan.frame(latitude, longitude)
-    return scan.Track(latitude, longitude, float(np.degrees(np.arctan2(along @ east, along @ north)) % 360))
+    _, east, north = scan.frame(float(latitude), float(longitude))
+    return scan.Track(
+        float(latitude), float(longitude), float(np.degrees(np.arctan2(along @ east, along @ north)) % 360)
+    )
 
 
 def degrees(grid, rows, columns):
@@ -147,24 +149,52 @@ def transformer(crs):
     return pyproj.Transformer.from_crs(projected, projected.geodetic_crs, always_xy=True)
 
 
-def _tiled(kernel, grid, sizes):
-    return chunks.tiles(kernel, grid, sizes, tile=_TILE)
+def scan_nodes(instrument, grid, track):
+    """
+    Nodes over a grid as a scan sees them.
+
+    Parameters
+    ----------
+    instrument : fifesim.sensor.description.instruments.Instrument
+    grid : odc.geo.geobox.GeoBox
+    track : fifesim.sensor.scan.track.Track
+
+    Returns
+    -------
+    distance, central_angle : array
+        As `fifesim.sensor.scan.track.place_beside` gives them. [m], [degree]
+    scan_angle : array
+        NaN beyond the instrument's horizon. [degree]
+    seen : array of bool
+        Where the scan reaches.
+    """
+    distance, aside = scan.place_beside(track, *_nodes(grid)[2:])
+    _, scan_angle = scan.view_from_ground(aside, instrument.altitude)
+    return distance, aside, scan_angle, np.abs(scan_angle) <= instrument.max_angle
+
+
+def _nodes(grid):
+    """Rows and columns of nodes along the axes of a grid, and the latitudes and longitudes of all."""
+    rows, columns = np.linspace(0, grid.shape.y, _NODES), np.linspace(0, grid.shape.x, _NODES)
+    latitude, longitude = degrees(grid, *np.meshgrid(rows, columns, indexing="ij"))
+    return rows, columns, latitude, longitude
 
 
 @lru_cache(maxsize=4)
 def _splines(grid, track, altitude):
     """Direction to the sensor over a grid, as splines of row and column."""
-    rows, columns = (np.linspace(0, size, _NODES) for size in grid.shape)
-    latitude, longitude = degrees(grid, *np.meshgrid(rows, columns, indexing="ij"))
-    parts = scan.view_components(track, latitude, longitude, altitude)
+    rows, columns, latitude, longitude = _nodes(grid)
+    east, north = scan.view_components(track, latitude, longitude, altitude)
     # Beyond the horizon, which a spline cannot hold: a direction that no limit passes.
-    return [RectBivariateSpline(rows, columns, np.nan_to_num(part, nan=2.0)) for part in parts]
+    to_east = RectBivariateSpline(rows, columns, np.nan_to_num(east, nan=2.0))
+    return to_east, RectBivariateSpline(rows, columns, np.nan_to_num(north, nan=2.0))
 
 
 def _view(name, grid, track, altitude, limit, row, column, shape):
     """View zenith or azimuth of a block of cells."""
-    places = [first + np.arange(size) + 0.5 for first, size in zip((row, column), shape, strict=True)]
-    east, north = (spline(*places) for spline in _splines(grid, track, altitude))
+    rows, columns = row + np.arange(shape[0]) + 0.5, column + np.arange(shape[1]) + 0.5
+    to_east, to_north = _splines(grid, track, altitude)
+    east, north = to_east(rows, columns), to_north(rows, columns)
     sine = np.hypot(east, north)
     seen = sine < min(1.0, np.sin(np.radians(min(limit, 90.0))) * (1 + altitude / scan.EARTH_RADIUS) + 1e-12)
     if name == "vza":
@@ -172,13 +202,11 @@ def _view(name, grid, track, altitude, limit, row, column, shape):
     return np.where(seen, np.degrees(np.arctan2(east, north)) % 360, np.nan)
 
 
-def _check_swath(description, grid, track, limit):
-    rows, columns = (np.linspace(0, size, _NODES) for size in grid.shape)
-    _, aside = scan.place_beside(track, *degrees(grid, *np.meshgrid(rows, columns, indexing="ij")))
-    _, scan_angle = scan.view_from_ground(aside, description.altitude)
-    if not np.any(np.abs(scan_angle) <= limit):
+def _check_swath(description, grid, track):
+    _, aside, _, seen = scan_nodes(description, grid, track)
+    if not seen.any():
         near = np.min(np.abs(aside)) * np.pi / 180 * scan.EARTH_RADIUS / 1000
         raise ValueError(
             f"{description.name} does not see the grid: it begins {near:.0f} km from the track, where the scan angle "
-            f"is beyond {limit:g} degrees; give a nearer track or a smaller nadir_offset"
+            f"is beyond {description.max_angle:g} degrees; give a nearer track or a smaller nadir_offset"
         )

@@ -1,0 +1,177 @@
+"""Checks of the analysis beside numpy, scipy and pandas, brute force and closed forms."""
+
+from functools import partial
+from itertools import permutations
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from fifesim.analysis import attribution, density, scaling, uncertainty, variogram
+from fifesim.analysis.indices import normalized_difference
+from fifesim.analysis.regression import fit, row_sums
+from fifesim.base.footprints import Boxcar, axis_operator
+from fifesim.experiments.verification.deviations import Deviation, largest
+
+_deviation = partial(Deviation, "analysis")
+
+
+def _pairs():
+    """Values of y and x of one shape, some of them missing, and those that pair."""
+    rng = np.random.default_rng(8)
+    x = rng.uniform(0.3, 0.8, (20, 30))
+    y = -1.2 + 3.4 * x + rng.normal(0, 0.2, x.shape)
+    x[3, 4], y[5, :2] = np.nan, np.inf
+    there = np.isfinite(x) & np.isfinite(y)
+    return y, x, y[there], x[there]
+
+
+def _regression():
+    """Origins near the means; the interval of a line by the inverse of its normal equations."""
+    y, x, paired_y, paired_x = _pairs()
+    line = fit(row_sums(y, x, 0.5, 0.6), 0.5, 0.6)
+    (slope, intercept), covariance = np.polyfit(paired_x, paired_y, 1, cov=True)
+    found = [
+        line.slope,
+        line.intercept,
+        line.slope_error**2,
+        line.intercept_error**2,
+        line.r2,
+        line.n,
+        line.predict(0.4),
+    ]
+    expected = [slope, intercept, *np.diag(covariance), np.corrcoef(paired_x, paired_y)[0, 1] ** 2, paired_x.size]
+    worst = largest(found, [*expected, intercept + 0.4 * slope], relative=True)
+    yield _deviation("least-squares line and its errors", worst, 1e-10, "1", "numpy.polyfit")
+    at = np.array([0.1, 0.9])
+    own = np.sum((paired_y - intercept - slope * paired_x) ** 2) / (paired_x.size - 2)
+    point = np.stack([at, np.ones(2)])
+    of_mean = np.einsum("ik,ij,jk->k", point, covariance, point)
+    half = stats.t.ppf(0.975, paired_x.size - 2) * np.sqrt([of_mean, of_mean + own])
+    found = [line.confidence_interval(at), line.prediction_interval(at)]
+    expected = [[intercept + slope * at - each, intercept + slope * at + each] for each in half]
+    yield _deviation("intervals of a line", largest(found, expected), 1e-10, "1", "covariance of numpy.polyfit")
+
+
+def _indices():
+    nir, red = np.random.default_rng(0).uniform(0.01, 1, (2, 100))
+    worst = largest(normalized_difference(nir, red), np.tanh(np.log(nir / red) / 2))
+    yield _deviation("normalized difference", worst, 1e-12, "1", "tanh(log(nir / red) / 2)")
+
+
+def _increments():
+    """Relative noise by increments of the true variable; error, its square and coverage of a map."""
+    y, x, _, _ = _pairs()
+    sums = uncertainty.increment_sums(x, y, 6, 0.05, 11, 0.5)
+    count, mean, deviation = uncertainty.increment_moments(sums)
+    table = pd.DataFrame({"x": x.ravel(), "y": y.ravel()})
+    groups = table[np.isfinite(table).all(axis=1)].groupby(lambda k: np.floor(table["x"][k] / 0.05))
+    numbers = np.array([*groups.groups]).astype(int) - 6
+    found = np.stack([count, mean, deviation, uncertainty.equivalent_noise(deviation, 3.4, mean)])[:, numbers]
+    of_x, of_y = groups["x"].mean(), groups["y"].std()
+    worst = largest(found, [groups.size(), of_x, of_y, of_y / of_x / 3.4])
+    yield _deviation("noise by increments", worst, 1e-11, "1", "groups of pandas")
+    low, high = x - 0.1, x + 0.3
+    error = (y - x)[np.isfinite(y - x)]
+    inside = np.sum((x >= low) & (x <= high) & np.isfinite(y) & (np.abs(x - 0.5) < 0.2))
+    low[np.abs(x - 0.5) >= 0.2] = 9.0
+    estimate = np.where(np.isfinite(y), y, np.nan)
+    totals = uncertainty.error_sums(x, estimate, low, high).sum(axis=0)
+    worst = largest(totals, [error.size, error.sum(), np.sum(error**2), inside])
+    yield _deviation("errors of a map", worst, 1e-10, "1", "numpy, all at once")
+
+
+def _lags():
+    """Pair by pair, in two blocks that have a margin between them."""
+    cells = np.random.default_rng(11).normal(5, 1, (17, 13))
+    cells[4:7, 3:5] = np.nan
+    upper = variogram.lag_sums(cells[:12], ((0, 3), (0, 0)), (3, 3), 5.0)
+    sums = upper + variogram.lag_sums(cells[9:], ((0, 0), (0, 0)), (3, 3), 5.0)
+    found, expected = [], []
+    for down, across in ((0, 0), (0, 1), (0, -3), (2, -1), (3, 3)):
+        columns = slice(max(-across, 0), 13 - max(across, 0)), slice(max(across, 0), 13 + min(across, 0))
+        one, two = cells[: 17 - down, columns[0]], cells[down:, columns[1]]
+        there = np.isfinite(one + two)
+        about = (one[there] - np.nanmean(cells)) * (two[there] - np.nanmean(cells))
+        expected.append([there.sum(), about.mean(), np.mean((one[there] - two[there]) ** 2) / 2])
+        maps = sums[0], variogram.covariance(sums), variogram.semivariance(sums)
+        found.append([each[down, across + 3] for each in maps])
+    yield _deviation("covariance and semivariance by lag", largest(found, expected), 1e-10, "1", "pairs, one by one")
+    lag = np.arange(10.0)
+    worst = largest(
+        [variogram.crossing(lag, np.exp(-lag / 2)), variogram.crossing(lag, 1 - lag / 4)], [2 * np.log(20), 3.8]
+    )
+    yield _deviation("practical range", worst, 1e-12, "cell", "exponential and line")
+
+
+def _footprint_variance():
+    """All pairs of cells of one pixel, of a process whose covariance falls off with both distances."""
+    axis = axis_operator(
+        Boxcar(7.3), cell_origin=0, cell_size=1, n_cells=30, pixel_origin=2.2, pixel_size=7, n_pixels=1
+    )
+    weights = axis.weights[0, : axis.count[0]]
+    products = variogram.weight_correlation(axis, 9)
+    by_lag = np.exp(-np.abs(np.arange(-9, 10)) / 3) * np.exp(-np.arange(10)[:, None] / 2)
+    place = np.arange(weights.size)
+    apart = np.abs(place[:, None] - place)
+    expected = (weights @ np.exp(-apart / 2) @ weights) * (weights @ np.exp(-apart / 3) @ weights)
+    found = variogram.footprint_variance(by_lag, products, products)
+    yield _deviation("variance that a footprint leaves", largest(found, expected), 1e-12, "1", "all pairs of its cells")
+
+
+def _scales():
+    """Derivatives by differences; means of exp(-K LAI) and of a square of a normal variable, which are known."""
+    red, nir, h = 0.08, 0.3, 1e-4
+    steps = [(a, b) for a in ((h, 0.0), (0.0, h)) for b in ((h, 0.0), (0.0, h))]
+    signs = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
+    differences = [
+        sum(k * normalized_difference(nir + s * a[1] + t * b[1], red + s * a[0] + t * b[0]) for s, t, k in signs)
+        for a, b in steps
+    ]
+    worst = largest(scaling.ndvi_hessian(red, nir).ravel(), np.array(differences) / (4 * h * h))
+    yield _deviation("second derivatives of NDVI", worst, 1e-4, "1", "differences")
+    mean, deviation, extinction = 1.2, 0.05, 0.57
+    exact = 0.94 * np.exp(-extinction * mean) * -np.expm1((extinction * deviation) ** 2 / 2)
+    worst = largest(scaling.beer_bias(mean, deviation**2, extinction, 0.94), exact, relative=True)
+    yield _deviation("FPAR lost by averaging LAI", worst, (extinction * deviation) ** 2 / 3, "1", "normal LAI, exactly")
+    covariance = np.array([[2.0, 0.7], [0.7, 3.0]])
+    worst = largest(scaling.second_order_bias([[2.0, 1.0], [1.0, -4.0]], covariance), 2.0 + 0.7 - 6.0)
+    yield _deviation("bias of a form of second degree", worst, 1e-12, "1", "its mean, exactly")
+    of_red, of_nir = np.random.default_rng(1).uniform(0.05, 0.5, (2, 500))
+    expected = np.corrcoef(of_nir - of_red, 1 / (of_nir + of_red))[0, 1]
+    worst = largest(scaling.ndvi_linearity(of_red, of_nir), expected)
+    yield _deviation("linearity of NDVI", worst, 1e-12, "1", "numpy.corrcoef")
+    kept = scaling.share_kept(of_red[:50], np.append(of_nir, np.nan))
+    expected = np.ptp(of_red[:50]) / np.ptp(of_nir), np.var(of_red[:50]) / np.var(of_nir)
+    yield _deviation("range and variance kept", largest(kept, expected), 1e-12, "1", "numpy")
+
+
+def _densities():
+    samples = np.append(np.random.default_rng(4).gamma(3.0, 0.3, 300), np.nan)
+    at, kept = np.linspace(0, 3, 20), samples[:-1]
+    spread = min(kept.std(ddof=1), stats.iqr(kept) / 1.34)
+    theirs = stats.gaussian_kde(kept, bw_method=0.9 * spread * 300**-0.2 / kept.std(ddof=1))
+    worst = largest(density.sample_density(samples, at), theirs(at))
+    yield _deviation("kernel density", worst, 1e-12, "1", "scipy.stats, bandwidth by the rule of thumb")
+
+
+def _causes():
+    """Mean over all orders in which three causes can come; with and without each."""
+    values = np.random.default_rng(3).normal(size=(2, 2, 2))
+    expected = np.zeros(3)
+    for order in permutations(range(3)):
+        state = [0, 0, 0]
+        for cause in order:
+            before = values[tuple(state)]
+            state[cause] = 1
+            expected[cause] += (values[tuple(state)] - before) / 6
+    yield _deviation(
+        "shares of three causes", largest(attribution.shapley(values, 3), expected), 1e-12, "1", "all orders"
+    )
+    alone = [values[1, 0, 0], values[0, 1, 0], values[0, 0, 1]] - values[0, 0, 0]
+    gone = values[1, 1, 1] - [values[0, 1, 1], values[1, 0, 1], values[1, 1, 0]]
+    worst = largest([attribution.by_itself(values, 3), attribution.taken_away(values, 3)], [alone, gone])
+    yield _deviation("a cause by itself, and taken away", worst, 1e-12, "1", "two of eight sets")
+
+
+CHECKS = (_regression, _indices, _increments, _lags, _footprint_variance, _scales, _densities, _causes)
