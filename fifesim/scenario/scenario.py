@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator, model_validator
 
-from fifesim.atmosphere.air import aerosols, models
+from fifesim.atmosphere.air import mixtures, models
 from fifesim.base import geometry
 from fifesim.ground.terrain.spline import metres_per_unit
 from fifesim.rasters import grid as grids
@@ -139,7 +139,7 @@ class Air(_Section):
     @field_validator("aerosol")
     @classmethod
     def _known_aerosol(cls, value):
-        return value if value == "none" else aerosols.canonical(value)
+        return value if value == "none" else mixtures.canonical(value)
 
     @model_validator(mode="after")
     def _possible(self):

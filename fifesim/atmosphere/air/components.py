@@ -1,6 +1,7 @@
 """Optics of the components of the aerosol, from tables that Mie theory made."""
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,12 +38,10 @@ def cross_sections(component, wavelength):
     >>> bool(extinction > scattering)
     True
     """
-    nodes, log_extinction, log_scattering, asymmetry = _optics(component)
-    logarithm = np.log(wavelength)
-    extinction, scattering = (
-        np.exp(np.interp(logarithm, nodes, values)) for values in (log_extinction, log_scattering)
-    )
-    return extinction, scattering, scattering * np.interp(logarithm, nodes, asymmetry)
+    table, logarithm = _optics(component), np.log(wavelength)
+    extinction = np.exp(np.interp(logarithm, table.log_wavelength, table.log_extinction))
+    scattering = np.exp(np.interp(logarithm, table.log_wavelength, table.log_scattering))
+    return extinction, scattering, scattering * np.interp(logarithm, table.log_wavelength, table.asymmetry)
 
 
 def phase(component, scattering_cosine, wavelength):
@@ -165,18 +164,26 @@ def _angle_place(scattering_cosine):
 
 def _wavelength_place(wavelength):
     """Column of the tables before each wavelength, and the share of the next."""
-    nodes, _, _, _ = _optics(COMPONENTS[0])
+    nodes = _optics(COMPONENTS[0]).log_wavelength
     logarithm = np.log(wavelength)
     column = np.clip(np.searchsorted(nodes, logarithm) - 1, 0, nodes.size - 2)
     return column, (logarithm - nodes[column]) / (nodes[column + 1] - nodes[column])
 
 
+class _Optics(NamedTuple):
+    """Optics of a component at the tabulated wavelengths, shape (wavelength,)."""
+
+    log_wavelength: np.ndarray
+    log_extinction: np.ndarray
+    log_scattering: np.ndarray
+    asymmetry: np.ndarray
+
+
 @lru_cache
 def _optics(component):
-    """Logarithms of the tabulated wavelengths, of extinction and of scattering; asymmetry."""
     table = datasets.table("aerosol_optics.csv").query("component == @component")
     wavelength, extinction, scattering, directed = table.drop(columns="component").to_numpy(float).T
-    return np.log(wavelength), np.log(extinction), np.log(scattering), directed / scattering
+    return _Optics(np.log(wavelength), np.log(extinction), np.log(scattering), directed / scattering)
 
 
 @lru_cache
@@ -201,7 +208,8 @@ def _quadrature():
 
 
 def _on_quadrature(log_phase):
-    row, low = _angle_place(_quadrature()[0])
+    cosine, _ = _quadrature()
+    row, low = _angle_place(cosine)
     low = low[:, None]
     return np.exp(log_phase[row] * (1 - low) + log_phase[row + 1] * low)
 
@@ -210,7 +218,8 @@ def _on_quadrature(log_phase):
 def _log_phase(component):
     """Logarithm of the phase function, scaled so that the mean of what is read from the table is 1."""
     table = np.log(_by_angle("aerosol_phase.csv", component))
-    return table - np.log(_quadrature()[1] @ _on_quadrature(table))
+    _, weights = _quadrature()
+    return table - np.log(weights @ _on_quadrature(table))
 
 
 @lru_cache

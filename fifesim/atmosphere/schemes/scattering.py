@@ -190,7 +190,7 @@ def spherical_albedo(tau, single_scattering_albedo, asymmetry):
     >>> abs(float(spherical_albedo(0.0, 0.9, 0.6))) < 1e-12
     True
     """
-    layer = (np.asarray(value, float)[..., None] for value in (tau, single_scattering_albedo, asymmetry))
+    layer = [np.asarray(value, float)[..., None] for value in (tau, single_scattering_albedo, asymmetry)]
     albedo, _ = delta_eddington(*layer, _MU)
     return 2 * albedo @ (_MU * _MU_WEIGHTS)
 
