@@ -157,12 +157,8 @@ def aerosol_polarization(aerosol, scattering_cosine, wavelength):
 
     Parameters
     ----------
-    aerosol : str or mapping
-        As in `mixture`.
-    scattering_cosine : array, broadcastable with wavelength
-        Cosine of the scattering angle. [1]
-    wavelength : array
-        0.35 to 3.75. [um]
+    aerosol, scattering_cosine, wavelength
+        As in `aerosol_phase`.
 
     Returns
     -------
@@ -187,11 +183,11 @@ def aerosol_polarization(aerosol, scattering_cosine, wavelength):
     """
     wavelength = _checked_wavelength(wavelength)
     fractions = mixture(aerosol)
-    first, second = (
-        _weighted_mean(fractions, wavelength, lambda name: element(name, scattering_cosine, wavelength))  # noqa: B023
-        for element in (components.phase, components.polarized_phase)
-    )
-    return second / first
+
+    def mean(element):
+        return _weighted_mean(fractions, wavelength, lambda name: element(name, scattering_cosine, wavelength))
+
+    return mean(components.polarized_phase) / mean(components.phase)
 
 
 def phase_moments(aerosol, wavelength, count):

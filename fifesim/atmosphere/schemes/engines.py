@@ -121,7 +121,7 @@ def scattering(atmosphere, wavelength, sza, vza, raa):
         [um]
     sza : float
     vza, raa : array, shape (V,) and (R,)
-        [degree]
+        raa of 0 has sun and sensor on the same side. [degree]
 
     Returns
     -------

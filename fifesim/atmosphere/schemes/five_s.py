@@ -17,12 +17,8 @@ def five_s_scattering(atmosphere, wavelength, sza, vza, raa):
 
     Parameters
     ----------
-    atmosphere : models.Atmosphere
-    wavelength : array, shape (n,)
-        [um]
-    sza : float
-    vza, raa : array, shape (V,) and (R,)
-        raa of 0 has sun and sensor on the same side. [degree]
+    atmosphere, wavelength, sza, vza, raa
+        As in `engines.scattering`.
 
     Returns
     -------

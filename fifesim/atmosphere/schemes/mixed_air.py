@@ -20,12 +20,8 @@ def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
 
     Parameters
     ----------
-    atmosphere : models.Atmosphere
-    wavelength : array, shape (n,)
-        [um]
-    sza : float
-    vza, raa : array, shape (V,) and (R,)
-        raa of 0 has sun and sensor on the same side. [degree]
+    atmosphere, wavelength, sza, vza, raa
+        As in `engines.scattering`.
     polarized : bool, optional
         Whether light is polarized, by molecules and aerosol.
 

@@ -210,10 +210,8 @@ def sobolev_reflectance(tau, single_scattering_albedo, asymmetry, phase, mu_s, m
     ----------
     tau, single_scattering_albedo, asymmetry : array
         As in `delta_eddington`, of the whole phase function with its forward peak. [1]
-    phase : array
-        Phase function at the scattering angle, :math:`P`. [1]
-    mu_s, mu_v : array
-        Cosines of the zenith angles of sun and sensor. [1]
+    phase, mu_s, mu_v : array
+        As in `sobolev_conservative_reflectance`. [1]
 
     Returns
     -------

@@ -59,13 +59,10 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
 
     Parameters
     ----------
-    atmosphere : models.Atmosphere
+    atmosphere, sza, vza, raa
+        As in `engines.band_terms`, which checks them.
     bands : sequence of Band, length (band,)
         Within 0.25 to 4 um.
-    sza, vza : float
-        In the range of `engines.check_zenith`. [degree]
-    raa : float
-        0 has sun and sensor on the same side. [degree]
     each : callable, optional
         Goes through the runs, such as with a progress bar.
 
