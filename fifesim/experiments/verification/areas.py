@@ -1,13 +1,13 @@
 """Every check of the package, area by area."""
 
-from fifesim.experiments.verification import atmosphere, canopy, landscape, sensor, terrain
+from fifesim.experiments.verification import adjacency, atmosphere, canopy, landscape, scattering, sensor, terrain
 
 AREAS = {
     "random field": landscape.CHECKS,
     "canopy": canopy.CHECKS,
     "terrain": terrain.CHECKS,
     "sensor": sensor.CHECKS,
-    "atmosphere": atmosphere.CHECKS,
+    "atmosphere": scattering.CHECKS + adjacency.CHECKS + atmosphere.CHECKS,
 }
 
 
