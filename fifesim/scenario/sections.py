@@ -4,7 +4,7 @@ from dataclasses import asdict, fields
 
 from pydantic import field_validator, model_validator
 
-from fifesim.atmosphere.air import aerosols, models
+from fifesim.atmosphere.air import mixtures, models
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.prospect import Leaf
@@ -141,7 +141,7 @@ class Air(AirKeys):
     @field_validator("aerosol")
     @classmethod
     def _known_aerosol(cls, value):
-        return value if value == "none" else aerosols.canonical(value)
+        return value if value == "none" else mixtures.canonical(value)
 
     @model_validator(mode="after")
     def _possible(self):

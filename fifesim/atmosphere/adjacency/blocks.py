@@ -122,7 +122,7 @@ def blocks_along(position, cell_size, n_cells):
     return Blocks(cells, position % cells, n_cells)
 
 
-def block_sums(rows, columns, values, *, along_y, along_x):
+def block_sums(rows, columns, values, *, along_y, along_x, linear=False):
     """
     Sums over the valid cells of pieces of blocks, and their number, both as shares of a whole block's cells.
 
@@ -133,35 +133,22 @@ def block_sums(rows, columns, values, *, along_y, along_x):
     values : array, shape (..., y, x)
         Their cells, NaN where they are missing.
     along_y, along_x : Pieces
+    linear : bool, optional
+        Weight the cells as they interpolate between each pair of blocks: for the block before, the own one and that
+        behind, along either axis.
 
     Returns
     -------
     sums : array of int, shape (..., 2, 1, 1, rows, columns)
-        Of the values, and of 1, in units that `whole_blocks` knows.
+        Of the values, and of 1, in units that `whole_blocks` knows; (..., 2, 3, 3, rows, columns) with ``linear``.
     """
-    weights = (np.full((along.blocks.cells, 1), 1 / along.blocks.cells) for along in (along_y, along_x))
-    return _moments(rows, columns, values, along_y, along_x, *weights)
-
-
-def block_moments(rows, columns, values, *, along_y, along_x):
-    """
-    The sums of `block_sums`, with cells weighted as they interpolate between each pair of blocks.
-
-    Parameters
-    ----------
-    rows, columns : slice
-        Of the pieces.
-    values : array, shape (..., y, x)
-        Their cells, NaN where they are missing.
-    along_y, along_x : Pieces
-
-    Returns
-    -------
-    moments : array of int, shape (..., 2, 3, 3, rows, columns)
-        Of the values, and of 1; by the block before, the own one and that behind, along y and along x.
-    """
-    weights = (along.blocks.interpolation_weights / along.blocks.cells for along in (along_y, along_x))
-    return _moments(rows, columns, values, along_y, along_x, *weights)
+    down, across = _cells_of(along_y, rows, linear), _cells_of(along_x, columns, linear)
+    size = down.weights.shape[1], across.weights.shape[1], rows.stop - rows.start, columns.stop - columns.start
+    sums = np.zeros((*values.shape[:-2], 2, *size), np.int64)
+    dtype = np.float32 if values.dtype == np.float32 else np.float64
+    for layer in np.ndindex(values.shape[:-2]):
+        _add_moments(np.ascontiguousarray(values[layer], dtype), down, across, sums[layer])
+    return sums
 
 
 def whole_blocks(sums, along_y, along_x):
@@ -171,7 +158,7 @@ def whole_blocks(sums, along_y, along_x):
     Parameters
     ----------
     sums : array of int, shape (..., rows, columns)
-        Of pieces, from `block_sums` or `block_moments`.
+        Of pieces, from `block_sums`.
     along_y, along_x : Pieces
 
     Returns
@@ -187,38 +174,37 @@ def whole_blocks(sums, along_y, along_x):
     return whole
 
 
-def _moments(rows, columns, values, along_y, along_x, y_weights, x_weights):
-    size = rows.stop - rows.start, columns.stop - columns.start
-    sums = np.zeros((*values.shape[:-2], 2, y_weights.shape[1], x_weights.shape[1], *size), np.int64)
-    dtype = np.float32 if values.dtype == np.float32 else np.float64
-    places = [_places(along, pieces) for along, pieces in ((along_y, rows), (along_x, columns))]
-    for layer in np.ndindex(values.shape[:-2]):
-        cells = np.ascontiguousarray(values[layer], dtype)
-        _add_moments(cells, *places[0], *places[1], y_weights, x_weights, sums[layer])
-    return sums
+class _Cells(NamedTuple):
+    """Cells along one axis of pieces of blocks."""
+
+    piece: np.ndarray  # of each cell
+    place: np.ndarray  # of each cell in its block
+    weights: np.ndarray  # by place, shape (cells, 1 or 3) [1]
 
 
-def _places(along, pieces):
-    """Piece of each cell, and the cell's place in its block."""
+def _cells_of(along, pieces, linear):
     cells = np.arange(along.start[pieces.start], along.stop[pieces.stop - 1])
     piece = np.searchsorted(along.start[pieces], cells, side="right") - 1
-    return piece, (cells + along.blocks.offset) % along.blocks.cells
+    size = along.blocks.cells
+    weights = along.blocks.interpolation_weights / size if linear else np.full((size, 1), 1 / size)
+    return _Cells(piece, (cells + along.blocks.offset) % size, weights)
 
 
 @njit(nogil=True, cache=True)
-def _add_moments(values, row, y, column, x, y_weights, x_weights, sums):
+def _add_moments(values, down, across, sums):
     """Whole numbers have the same sum in any order."""
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
             value = np.float64(values[i, j])
             if not np.isnan(value):
                 value = min(max(value, -_LARGEST), _LARGEST)
-                for k in range(y_weights.shape[1]):
-                    for m in range(x_weights.shape[1]):
-                        weight = y_weights[y[i], k] * x_weights[x[j], m] * _UNIT
+                row, column = down.piece[i], across.piece[j]
+                for k in range(down.weights.shape[1]):
+                    for m in range(across.weights.shape[1]):
+                        weight = down.weights[down.place[i], k] * across.weights[across.place[j], m] * _UNIT
                         if weight > 0:
-                            sums[0, k, m, row[i], column[j]] += np.int64(np.rint(weight * value))
-                            sums[1, k, m, row[i], column[j]] += np.int64(np.rint(weight))
+                            sums[0, k, m, row, column] += np.int64(np.rint(weight * value))
+                            sums[1, k, m, row, column] += np.int64(np.rint(weight))
 
 
 def on_cells(rows, columns, around, *, along_y, along_x):

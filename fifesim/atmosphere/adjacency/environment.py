@@ -1,11 +1,20 @@
 """The adjacency effect: how far around a target the ground adds to what a satellite sees of it."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 # Nodes of the Gauss-Legendre rule along the edges of cells, and how many rows and columns of cells around the centre
 # have the finer one. The flux through an edge varies over a length of its distance from the centre.
 _FINE_NODES, _COARSE_NODES = 24, 3
 _FINE_CELLS = 8
+
+
+class Scatterers(NamedTuple):
+    """Something of the molecules and of the aerosol, which scatter light into the view."""
+
+    molecules: object
+    aerosol: object
 
 
 def environment_function(radius, vza=0.0):
@@ -66,7 +75,7 @@ def environment_function(radius, vza=0.0):
     b = (-1.479 - 1.5275 * log_mu_v) * log_mu_v
     molecules = molecules * (1 + log_mu_v * (1 - molecules))
     aerosol = aerosol * (1 + a + aerosol * (b - (a + b) * aerosol))
-    return np.maximum(molecules, 0.0), aerosol
+    return Scatterers(np.maximum(molecules, 0.0), aerosol)
 
 
 def environment_weights(diffuse_up_molecules, diffuse_up_aerosol):
@@ -97,7 +106,7 @@ def environment_weights(diffuse_up_molecules, diffuse_up_aerosol):
     )
     total = molecules + aerosol
     total = np.where(total > 0, total, 1.0)
-    return molecules / total, aerosol / total
+    return Scatterers(molecules / total, aerosol / total)
 
 
 def mixed_environment_function(radius, vza, diffuse_up_molecules, diffuse_up_aerosol):
@@ -135,12 +144,12 @@ def mixed_environment_function(radius, vza, diffuse_up_molecules, diffuse_up_aer
     0.0
     """
     weights = environment_weights(diffuse_up_molecules, diffuse_up_aerosol)
-    return _mixed(environment_function(radius, vza), weights)
+    # What neither has is the target's own.
+    return _weighted(weights, environment_function(radius, vza)) + (1 - weights.molecules - weights.aerosol)
 
 
-def _mixed(functions, weights):
-    """What neither has is the target's own."""
-    return weights[0] * functions[0] + weights[1] * functions[1] + (1 - weights[0] - weights[1])
+def _weighted(weights, functions):
+    return weights.molecules * functions.molecules + weights.aerosol * functions.aerosol
 
 
 def point_spread(shape, cell, vza, weight_molecules, weight_aerosol):
@@ -186,11 +195,10 @@ def point_spread(shape, cell, vza, weight_molecules, weight_aerosol):
     >>> bool(weights[0, 0] > weights[0, 1] > weights[1, 1]), bool(weights[0, 1] == weights[1, 0])
     (True, True)
     """
-    scattered = _flux_differences(shape, cell, vza, (weight_molecules, weight_aerosol), _COARSE_NODES)
-    near = tuple(min(size, _FINE_CELLS) for size in shape)
-    scattered[: near[0], : near[1]] = _flux_differences(
-        near, cell, vza, (weight_molecules, weight_aerosol), _FINE_NODES
-    )
+    weights = Scatterers(weight_molecules, weight_aerosol)
+    scattered = _flux_differences(shape, cell, vza, weights, _COARSE_NODES)
+    rows, columns = (min(size, _FINE_CELLS) for size in shape)
+    scattered[:rows, :columns] = _flux_differences((rows, columns), cell, vza, weights, _FINE_NODES)
     scattered[0, 0] += 1 - weight_molecules - weight_aerosol
     return scattered
 
@@ -213,7 +221,6 @@ def _edge_flux(distance, middle, length, vza, weights, nodes):
     # By rows, which stay in the processor's cache: a scene of 185 km has ten million blocks.
     for row in range(len(flux)):
         r_squared = distance[row] ** 2 + (middle[row] + node * length / 2) ** 2
-        functions = environment_function(np.sqrt(r_squared), vza)
-        scattered = weights[0] * functions[0] + weights[1] * functions[1]
+        scattered = _weighted(weights, environment_function(np.sqrt(r_squared), vza))
         flux[row] = (weight * scattered / r_squared).sum(axis=0) * distance[row]
     return flux * length / (4 * np.pi)

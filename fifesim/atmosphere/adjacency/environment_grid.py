@@ -1,8 +1,9 @@
 """
 The environment of a scene on a coarse grid of blocks of its cells.
 
-The mean of the ground around a target varies slowly. It is computed for the centres of blocks, with the point spread of
-`adjacency.environment`. Outside of the scene lies what its surroundings are said to be; cells that are NaN are left out.
+The mean of the ground around a target varies slowly. It is computed for the centres of the blocks, with the point
+spread of `adjacency.environment`. Outside of the scene lies what its surroundings are said to be; cells that are NaN
+are left out.
 """
 
 from typing import NamedTuple
@@ -132,7 +133,7 @@ def environment_of_target(moments, surroundings, spread, terms):
     Parameters
     ----------
     moments : array, shape (2, 3, 3, y, x)
-        Of the apparent reflectance, from `block_moments`.
+        Of the apparent reflectance, from `block_sums` with ``linear``.
     surroundings : None, float or array
         As in `environment`. [1]
     spread : Spread

@@ -1,6 +1,7 @@
 """The adjacency effect on labelled rasters: what the ground around each cell adds to it, and how to take it off."""
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -129,7 +130,7 @@ def corrected_reflectance_of_scene(toa_reflectance, terms, vza, surroundings=Non
     factors = _factors(terms, toa_reflectance)
     by_band = [coupling.TargetTerms(*row) for row in np.stack(factors, axis=-1).tolist()]
     solve = [partial(environment_grid.environment_of_target, terms=each) for each in by_band]
-    coarse = _on_blocks(blocks.block_moments, solve, toa_reflectance, weights, vza, surroundings)
+    coarse = _on_blocks(solve, toa_reflectance, weights, vza, surroundings, linear=True)
     return _couple(coupling.target_reflectance, toa_reflectance, coarse, factors)
 
 
@@ -163,16 +164,16 @@ def _per_band(values, array, what):
 
 def _environment(reflectance, weights, vza, surroundings):
     solve = [environment_grid.environment] * reflectance.sizes["band"]
-    return _on_blocks(blocks.block_sums, solve, reflectance, weights, vza, surroundings)
+    return _on_blocks(solve, reflectance, weights, vza, surroundings, linear=False)
 
 
-def _on_blocks(summarize, solve, array, weights, vza, surroundings):
+def _on_blocks(solve, array, weights, vza, surroundings, *, linear):
     """Environment at the blocks and a ring around them, shape (band, y, x): one task for each band."""
     grid = grids.geobox(array)
     along = _blocks(grid)
     margin, fars, outer = _surroundings(surroundings, array, along)
     molecules, aerosol = (_per_band(values, array, "a weight").tolist() for values in weights)
-    pieces, sums = _sums(summarize, array, along)
+    pieces, sums = _sums(array, along, linear)
     kernels = []
     for band, angle in enumerate(_per_band(vza, array, "vza").tolist()):
         spread = (*along, grids.cell_size(grid), margin, angle, molecules[band], aerosol[band])
@@ -198,14 +199,15 @@ def _whole(solve, pieces, spread, far, rows, columns, sums, outer=None):
     return solve(blocks.whole_blocks(sums[0], *pieces), around, environment_grid.spread_over(*spread))[None]
 
 
-def _sums(summarize, array, along):
+def _sums(array, along, linear):
     """Sums over pieces of blocks, and these; each chunk is let go before the next is made."""
     cuts = array.chunks or _one_chunk(array.shape)
     pieces, sizes = zip(*(axis.pieces(cut) for axis, cut in zip(along, cuts[1:], strict=True)), strict=True)
-    kernel = partial(summarize, along_y=pieces[0], along_x=pieces[1])
-    leading = (2, 1, 1) if summarize is blocks.block_sums else (2, 3, 3)
-    reads = [chunks.Reads(array.data, *((each.start, each.stop) for each in pieces))]
-    shape = (*leading, *(len(each.start) for each in pieces))
+    along_y, along_x = pieces
+    kernel = partial(blocks.block_sums, along_y=along_y, along_x=along_x, linear=linear)
+    reads = [chunks.Reads(array.data, (along_y.start, along_y.stop), (along_x.start, along_x.stop))]
+    leading = (2, 3, 3) if linear else (2, 1, 1)
+    shape = (*leading, along_y.start.size, along_x.start.size)
     sizes = None if array.chunks is None else sizes
     return pieces, passes.windows_by_band([kernel] * len(cuts[0]), reads, cuts[0], shape, sizes)
 
@@ -260,22 +262,30 @@ def _outer(surroundings, array, along):
             f"the surroundings must be in the CRS of the scene, {here.crs}, got {there.crs}: reproject them"
         )
     a, b = here.affine, there.affine
-    rows = _outer_axis(along[0], a.f, a.e, b.f, b.e, there.shape.y)
-    columns = _outer_axis(along[1], a.c, a.a, b.c, b.a, there.shape.x)
-    if rows is None or columns is None:
+    along_y, along_x = along
+    down = _outer_axis(along_y, a.f, a.e, b.f, b.e, there.shape.y)
+    across = _outer_axis(along_x, a.c, a.a, b.c, b.a, there.shape.x)
+    if down is None or across is None:
         raise ValueError(
             f"the surroundings must lie within {REACH / 1000:g} km of the scene, {grids.extent(here)}, "
             f"got {grids.extent(there)}"
         )
-    north, down, above = rows
-    west, across, left = columns
-    shape = along[0].count + 2 * above, along[1].count + 2 * left
-    grid = GeoBox(shape, Affine(across, 0.0, west, 0.0, down, north), here.crs)
-    return (above, left), regularized(_same_bands(surroundings, array), areas(grid), grid, min_valid=0.0)
+    shape = along[0].count + 2 * down.margin, along[1].count + 2 * across.margin
+    grid = GeoBox(shape, Affine(across.block, 0.0, across.edge, 0.0, down.block, down.edge), here.crs)
+    wanted = _same_bands(surroundings, array)
+    return (down.margin, across.margin), regularized(wanted, areas(grid), grid, min_valid=0.0)
+
+
+class _OuterAxis(NamedTuple):
+    """Blocks that a raster of the surroundings is brought onto, along one axis."""
+
+    edge: float  # first [m]
+    block: float  # signed size [m]
+    margin: int  # blocks before the scene's, and behind
 
 
 def _outer_axis(along, origin, cell, outer_origin, outer_cell, outer_cells):
-    """First edge, signed size and margin of the blocks that a raster is brought onto; or None."""
+    """Blocks of the scene and around it, as far as a raster reaches; None where it is too far away."""
     direction, size = np.sign(cell), along.cells * abs(cell)
     before = direction * (origin - outer_origin)
     behind = abs(outer_cells * outer_cell) - before - abs(along.n_cells * cell)
@@ -283,7 +293,7 @@ def _outer_axis(along, origin, cell, outer_origin, outer_cell, outer_cells):
         return None
     margin = max(1, int(np.ceil(min(max(before, behind), REACH) / size)))
     first = origin - direction * (along.offset * abs(cell) + margin * size)
-    return first, direction * size, margin
+    return _OuterAxis(first, direction * size, margin)
 
 
 def _same_bands(surroundings, array):

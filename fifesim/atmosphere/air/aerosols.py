@@ -1,29 +1,16 @@
 """Amount and optics of the aerosol."""
 
-from collections.abc import Mapping
-from difflib import get_close_matches
-from numbers import Real
-
 import numpy as np
 
 from fifesim.atmosphere.air import components
-from fifesim.atmosphere.air.components import COMPONENTS
+from fifesim.atmosphere.air.mixtures import mixture
 from fifesim.base import datasets
-
-# Volume fractions of the components. [1] World Climate Programme WCP-55 (1983); Tanre et al. (1990).
-MODELS = {
-    "continental": {"dust": 0.70, "water_soluble": 0.29, "soot": 0.01},
-    "maritime": {"water_soluble": 0.05, "oceanic": 0.95},
-    "urban": {"dust": 0.17, "water_soluble": 0.61, "soot": 0.22},
-}
 
 WAVELENGTH_RANGE = (0.35, 3.75)  # of the tables [um]
 REFERENCE_WAVELENGTH = 0.55  # at which the amount is given [um]
 
 # Extinction per particle at 0.55 um with which the number profiles give the visibility at the ground. [km-1 cm3]
 _EXTINCTION_PER_PARTICLE = 5.6032e-5
-
-_EXAMPLE = "dust:0.5+water_soluble:0.5"
 
 
 def aerosol_optical_thickness(visibility):
@@ -64,82 +51,6 @@ def aerosol_optical_thickness(visibility):
     number = clear + slope * (1 / visibility - 1 / 23)
     layers = np.sqrt(number[1:] * number[:-1]) * np.diff(levels["altitude"])
     return float(_EXTINCTION_PER_PARTICLE * layers.sum())
-
-
-def mixture(aerosol):
-    """
-    Volume fractions of the components of an aerosol.
-
-    Parameters
-    ----------
-    aerosol : str or mapping
-        One of `MODELS`; or a text like ``"dust:0.5+water_soluble:0.5"``, or a mapping of components to fractions.
-
-    Returns
-    -------
-    fractions : dict
-        In the order of `COMPONENTS`, without those that are 0. [1]
-
-    Raises
-    ------
-    ValueError
-        If a model or a component is unknown, a fraction is negative, or their sum is not 1 within 1e-6.
-    TypeError
-        If the aerosol is neither text nor mapping, or a fraction is not a number.
-
-    Examples
-    --------
-    >>> mixture({"soot": 0.25, "dust": 0.75})
-    {'dust': 0.75, 'soot': 0.25}
-    >>> mixture("urban") == MODELS["urban"]
-    True
-    """
-    if isinstance(aerosol, Mapping):
-        return _checked_fractions(aerosol, aerosol)
-    if not isinstance(aerosol, str):
-        raise TypeError(f"aerosol must be a text or a mapping, got {aerosol!r}: type aerosol={_EXAMPLE!r}")
-    if aerosol in MODELS:
-        return dict(MODELS[aerosol])
-    if ":" not in aerosol:
-        nearest = get_close_matches(aerosol, MODELS, n=1, cutoff=0.0)[0]
-        raise ValueError(
-            f"aerosol must be one of {', '.join(MODELS)}, or a mixture such as {_EXAMPLE}, got {aerosol!r}: "
-            f"type aerosol={nearest!r}"
-        )
-    return _checked_fractions(_parsed(aerosol), aerosol)
-
-
-def canonical(aerosol):
-    """
-    The one text that names an aerosol.
-
-    Parameters
-    ----------
-    aerosol : str or mapping
-        As in `mixture`.
-
-    Returns
-    -------
-    name : str
-        One of `MODELS` where the fractions are a model's; else the mixture, its components in order.
-
-    Raises
-    ------
-    ValueError, TypeError
-        As `mixture`.
-
-    Examples
-    --------
-    >>> canonical({"soot": 0.25, "dust": 0.75})
-    'dust:0.75+soot:0.25'
-    >>> canonical(mixture("maritime"))
-    'maritime'
-    """
-    fractions = mixture(aerosol)
-    for name, model in MODELS.items():
-        if fractions == model:
-            return name
-    return "+".join(f"{name}:{np.format_float_positional(value, trim='-')}" for name, value in fractions.items())
 
 
 def aerosol_optics(aerosol, wavelength):
@@ -246,12 +157,8 @@ def aerosol_polarization(aerosol, scattering_cosine, wavelength):
 
     Parameters
     ----------
-    aerosol : str or mapping
-        As in `mixture`.
-    scattering_cosine : array, broadcastable with wavelength
-        Cosine of the scattering angle. [1]
-    wavelength : array
-        0.35 to 3.75. [um]
+    aerosol, scattering_cosine, wavelength
+        As in `aerosol_phase`.
 
     Returns
     -------
@@ -276,11 +183,11 @@ def aerosol_polarization(aerosol, scattering_cosine, wavelength):
     """
     wavelength = _checked_wavelength(wavelength)
     fractions = mixture(aerosol)
-    first, second = (
-        _weighted_mean(fractions, wavelength, lambda name: element(name, scattering_cosine, wavelength))  # noqa: B023
-        for element in (components.phase, components.polarized_phase)
-    )
-    return second / first
+
+    def mean(element):
+        return _weighted_mean(fractions, wavelength, lambda name: element(name, scattering_cosine, wavelength))
+
+    return mean(components.polarized_phase) / mean(components.phase)
 
 
 def phase_moments(aerosol, wavelength, count):
@@ -325,42 +232,6 @@ def phase_moments(aerosol, wavelength, count):
     return _weighted_mean(
         mixture(aerosol), wavelength[:, None], lambda name: components.phase_moments(name, wavelength, count)
     )
-
-
-def _parsed(text):
-    """Fractions of a mixture text, as yet unchecked."""
-    fractions = {}
-    for part in text.split("+"):
-        name, _, number = part.partition(":")
-        try:
-            value = float(number)
-        except ValueError:
-            raise ValueError(
-                f"aerosol must give each component a number after a colon, got {part.strip()!r} in {text!r}: "
-                f"type aerosol={_EXAMPLE!r}"
-            ) from None
-        if name.strip() in fractions:
-            raise ValueError(f"aerosol must name each component once, got {name.strip()!r} twice in {text!r}: add up")
-        fractions[name.strip()] = value
-    return fractions
-
-
-def _checked_fractions(fractions, given):
-    for name, value in fractions.items():
-        if name not in COMPONENTS:
-            nearest = get_close_matches(str(name), COMPONENTS, n=1, cutoff=0.0)[0]
-            raise ValueError(
-                f"aerosol component must be one of {', '.join(COMPONENTS)}, got {name!r} in {given!r}: type {nearest!r}"
-            )
-        if not isinstance(value, Real) or isinstance(value, bool):
-            raise TypeError(f"aerosol fraction of {name} must be a number from 0 to 1, got {value!r}: type 0.5")
-        if not value >= 0:
-            raise ValueError(f"aerosol fraction of {name} must be from 0 to 1, got {value:g}: type 0 to leave it out")
-    total = sum(fractions.values())
-    if not abs(total - 1) <= 1e-6:
-        scaled = "+".join(f"{name}:{value / total:.4g}" for name, value in fractions.items()) if total > 0 else _EXAMPLE
-        raise ValueError(f"aerosol fractions must add up to 1, got {total:g} in {given!r}: type aerosol={scaled!r}")
-    return {name: float(fractions[name]) for name in COMPONENTS if fractions.get(name, 0) > 0}
 
 
 def _checked_wavelength(wavelength):

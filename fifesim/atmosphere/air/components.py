@@ -1,6 +1,7 @@
 """Optics of the components of the aerosol, from tables that Mie theory made."""
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,12 +38,10 @@ def cross_sections(component, wavelength):
     >>> bool(extinction > scattering)
     True
     """
-    nodes, log_extinction, log_scattering, asymmetry = _optics(component)
-    logarithm = np.log(wavelength)
-    extinction, scattering = (
-        np.exp(np.interp(logarithm, nodes, values)) for values in (log_extinction, log_scattering)
-    )
-    return extinction, scattering, scattering * np.interp(logarithm, nodes, asymmetry)
+    table, logarithm = _optics(component), np.log(wavelength)
+    extinction = np.exp(np.interp(logarithm, table.log_wavelength, table.log_extinction))
+    scattering = np.exp(np.interp(logarithm, table.log_wavelength, table.log_scattering))
+    return extinction, scattering, scattering * np.interp(logarithm, table.log_wavelength, table.asymmetry)
 
 
 def phase(component, scattering_cosine, wavelength):
@@ -53,10 +52,8 @@ def phase(component, scattering_cosine, wavelength):
     ----------
     component : str
         One of `COMPONENTS`.
-    scattering_cosine : array, broadcastable with wavelength
-        Cosine of the scattering angle. [1]
-    wavelength : array
-        0.35 to 3.75. [um]
+    scattering_cosine, wavelength : array, broadcastable
+        As in `aerosols.aerosol_phase`. [1, um]
 
     Returns
     -------
@@ -73,11 +70,8 @@ def phase(component, scattering_cosine, wavelength):
     >>> bool(phase("dust", 1.0, 0.55) > 100 * phase("soot", 1.0, 0.55))
     True
     """
-    row, low = _angle_place(scattering_cosine)
-    column, share = _wavelength_place(wavelength)
-    table = _log_phase(component)
-    near, far = (np.exp(table[row, at] * (1 - low) + table[row + 1, at] * low) for at in (column, column + 1))
-    return near * (1 - share) + far * share
+    log_phase = _by_angle(_log_phase(component), scattering_cosine)
+    return _by_wavelength(lambda column: np.exp(log_phase(column)), wavelength)
 
 
 def polarized_phase(component, scattering_cosine, wavelength):
@@ -86,12 +80,8 @@ def polarized_phase(component, scattering_cosine, wavelength):
 
     Parameters
     ----------
-    component : str
-        One of `COMPONENTS`.
-    scattering_cosine : array, broadcastable with wavelength
-        Cosine of the scattering angle. [1]
-    wavelength : array
-        0.35 to 3.75. [um]
+    component, scattering_cosine, wavelength
+        As in `phase`.
 
     Returns
     -------
@@ -109,32 +99,21 @@ def polarized_phase(component, scattering_cosine, wavelength):
     >>> float(polarized_phase("dust", 1.0, 0.55)), float(polarized_phase("dust", -1.0, 0.55))
     (0.0, 0.0)
     """
-    row, low = _angle_place(scattering_cosine)
-    column, share = _wavelength_place(wavelength)
-    tables = _log_phase(component), _by_angle("aerosol_polarization.csv", component)
-    near, far = (
-        np.exp(first) * degree
-        for first, degree in (
-            [table[row, at] * (1 - low) + table[row + 1, at] * low for table in tables] for at in (column, column + 1)
-        )
-    )
-    return near * (1 - share) + far * share
+    log_phase = _by_angle(_log_phase(component), scattering_cosine)
+    degree = _by_angle(_table("aerosol_polarization.csv", component), scattering_cosine)
+    return _by_wavelength(lambda column: np.exp(log_phase(column)) * degree(column), wavelength)
 
 
 def phase_moments(component, wavelength, count):
-    r"""
+    """
     Legendre moments of the phase function of a component.
-
-    .. math:: \chi_l = \frac{1}{2} \int_{-1}^{1} P(\mu) P_l(\mu) \, \mathrm{d}\mu
 
     Parameters
     ----------
     component : str
         One of `COMPONENTS`.
-    wavelength : array, shape (n,)
-        0.35 to 3.75. [um]
-    count : int
-        Number of moments, from :math:`\chi_0 = 1` on. [1]
+    wavelength, count
+        As in `aerosols.phase_moments`.
 
     Returns
     -------
@@ -155,6 +134,18 @@ def phase_moments(component, wavelength, count):
     return table[column] * (1 - share) + table[column + 1] * share
 
 
+def _by_angle(table, scattering_cosine):
+    """Values between the angles of a table, for the number of a column."""
+    row, low = _angle_place(scattering_cosine)
+    return lambda column: table[row, column] * (1 - low) + table[row + 1, column] * low
+
+
+def _by_wavelength(values, wavelength):
+    """Values between the wavelengths of the tables, from those of the columns."""
+    column, share = _wavelength_place(wavelength)
+    return values(column) * (1 - share) + values(column + 1) * share
+
+
 def _angle_place(scattering_cosine):
     """Row of the angle tables before each scattering angle, and the share of the next."""
     nodes = _angles()
@@ -165,23 +156,31 @@ def _angle_place(scattering_cosine):
 
 def _wavelength_place(wavelength):
     """Column of the tables before each wavelength, and the share of the next."""
-    nodes, _, _, _ = _optics(COMPONENTS[0])
+    nodes = _optics(COMPONENTS[0]).log_wavelength
     logarithm = np.log(wavelength)
     column = np.clip(np.searchsorted(nodes, logarithm) - 1, 0, nodes.size - 2)
     return column, (logarithm - nodes[column]) / (nodes[column + 1] - nodes[column])
 
 
+class _Optics(NamedTuple):
+    """Optics of a component at the tabulated wavelengths, shape (wavelength,)."""
+
+    log_wavelength: np.ndarray
+    log_extinction: np.ndarray
+    log_scattering: np.ndarray
+    asymmetry: np.ndarray
+
+
 @lru_cache
 def _optics(component):
-    """Logarithms of the tabulated wavelengths, of extinction and of scattering; asymmetry."""
     table = datasets.table("aerosol_optics.csv").query("component == @component")
     wavelength, extinction, scattering, directed = table.drop(columns="component").to_numpy(float).T
-    return np.log(wavelength), np.log(extinction), np.log(scattering), directed / scattering
+    return _Optics(np.log(wavelength), np.log(extinction), np.log(scattering), directed / scattering)
 
 
 @lru_cache
-def _by_angle(name, component):
-    """Table by angle and wavelength."""
+def _table(name, component):
+    """By angle and wavelength."""
     return datasets.table(name).query("component == @component").drop(columns=["component", "angle"]).to_numpy(float)
 
 
@@ -201,16 +200,16 @@ def _quadrature():
 
 
 def _on_quadrature(log_phase):
-    row, low = _angle_place(_quadrature()[0])
-    low = low[:, None]
-    return np.exp(log_phase[row] * (1 - low) + log_phase[row + 1] * low)
+    cosine, _ = _quadrature()
+    return np.exp(_by_angle(log_phase, cosine[:, None])(np.arange(log_phase.shape[1])))
 
 
 @lru_cache
 def _log_phase(component):
     """Logarithm of the phase function, scaled so that the mean of what is read from the table is 1."""
-    table = np.log(_by_angle("aerosol_phase.csv", component))
-    return table - np.log(_quadrature()[1] @ _on_quadrature(table))
+    table = np.log(_table("aerosol_phase.csv", component))
+    _, weights = _quadrature()
+    return table - np.log(weights @ _on_quadrature(table))
 
 
 @lru_cache

@@ -1,6 +1,7 @@
 """Absorption by the gases of the air."""
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,7 +10,8 @@ from fifesim.base import datasets
 
 # Volume mixing ratios of the uniformly mixed gases, in the years of AFGL's 1982 line list. [1]
 MIXING_RATIO = {"co2": 330e-6, "o2": 0.20947, "n2o": 310e-9, "ch4": 1.72e-6}
-GASES = ("h2o", "o3", *MIXING_RATIO)
+DRY_GASES = ("o3", *MIXING_RATIO)
+GASES = ("h2o", *DRY_GASES)
 
 STANDARD_PRESSURE = 1013.25  # [hPa]
 REFERENCE_TEMPERATURE = 250.0  # [K]
@@ -176,22 +178,35 @@ def table_wavelengths():
     return np.round(np.linspace(0.4, 2.5, 841), 4)
 
 
+class _Lines(NamedTuple):
+    """Parameters of a gas at the wavelengths of the table where it absorbs."""
+
+    index: np.ndarray  # of these wavelengths
+    strength: np.ndarray
+    saturation: np.ndarray
+    strength_temperature: np.ndarray  # shape (2, n) [K-1, K-2]
+    width_temperature: np.ndarray
+
+
 @lru_cache
-def _parameters(gas):
-    """Places of the absorbing wavelengths in the table; strength, saturation, two pairs of temperature coefficients."""
+def _lines(gas):
     table = datasets.table("gas_absorption.csv").query("gas == @gas")
-    index = np.searchsorted(table_wavelengths(), table["wavelength"].to_numpy() - 1e-6)
-    temperature = (table[[name, f"{name}_2"]].to_numpy().T for name in ("strength_temperature", "width_temperature"))
-    return index, table["strength"].to_numpy(), table["saturation"].to_numpy(), *temperature
+    return _Lines(
+        index=np.searchsorted(table_wavelengths(), table["wavelength"].to_numpy() - 1e-6),
+        strength=table["strength"].to_numpy(),
+        saturation=table["saturation"].to_numpy(),
+        strength_temperature=table[["strength_temperature", "strength_temperature_2"]].to_numpy().T,
+        width_temperature=table[["width_temperature", "width_temperature_2"]].to_numpy().T,
+    )
 
 
 @lru_cache(maxsize=256)
 def _vertical(atmosphere, gas):
     """Where a gas absorbs in the table, and its weak-line optical depth and saturation there at air mass 1."""
-    index, strength, saturation, *temperature = _parameters(gas)
-    amount, broadening = effective_amounts(atmosphere.levels, gas, *temperature)
+    lines = _lines(gas)
+    amount, broadening = effective_amounts(atmosphere.levels, gas, lines.strength_temperature, lines.width_temperature)
     ratio = np.divide(amount, broadening, out=np.zeros_like(amount), where=broadening > 0)  # no gas: not saturated
-    return index, strength * amount, saturation * amount * ratio
+    return lines.index, lines.strength * amount, lines.saturation * amount * ratio
 
 
 def gas_transmittance(wavelength, atmosphere, air_mass, *, gases=GASES):
@@ -259,7 +274,8 @@ def _optical_depth(atmosphere, air_mass, gases, first, last):
     depth = np.zeros((*air_mass.shape, last - first))
     for gas in gases:
         index, weak, saturation = _vertical(atmosphere, gas)
-        used = slice(*np.searchsorted(index, (first, last)))
+        start, stop = np.searchsorted(index, (first, last))
+        used = slice(start, stop)
         mass = air_mass[..., None]
         depth[..., index[used] - first] += BAND_MODEL[gas](weak[used] * mass, saturation[used] * mass)
     return depth

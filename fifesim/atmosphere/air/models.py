@@ -6,7 +6,7 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from fifesim.atmosphere.air import aerosols, molecules
+from fifesim.atmosphere.air import aerosols, mixtures, molecules
 from fifesim.atmosphere.air.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
 from fifesim.atmosphere.air.summary import atmosphere_in_words
 
@@ -29,8 +29,8 @@ class Atmosphere:
     profile : str, optional
         Pressure, temperature, water vapour and ozone by altitude, one of `PROFILES`.
     aerosol : str or mapping, optional
-        Optical properties of the aerosol: one of `aerosols.MODELS`, "none", or a mixture of
-        `aerosols.COMPONENTS` by volume, such as ``{"dust": 0.5, "water_soluble": 0.5}``.
+        Optical properties of the aerosol: one of `mixtures.MODELS`, "none", or a mixture of
+        `components.COMPONENTS` by volume, such as ``{"dust": 0.5, "water_soluble": 0.5}``.
     visibility : float, optional
         Meteorological range at the ground, 5 to 100; 45 where there is no ``aot``. [km]
     altitude : float, optional
@@ -80,7 +80,7 @@ class Atmosphere:
     def __post_init__(self):
         _check_name("profile", self.profile, PROFILES)
         _check_name("engine", self.engine, ENGINES)
-        aerosol = self.aerosol if self.aerosol == "none" else aerosols.canonical(self.aerosol)
+        aerosol = self.aerosol if self.aerosol == "none" else mixtures.canonical(self.aerosol)
         self._set(aerosol=aerosol, altitude=_checked("altitude", self.altitude, 0, 4, "km"))
         for name, high, unit in (("h2o", 10, "g cm-2"), ("o3", 1, "cm-atm")):
             if getattr(self, name) is not None:

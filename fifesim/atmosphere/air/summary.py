@@ -54,7 +54,7 @@ def _of_band(atmosphere, low, high):
     through_aerosol = np.ones_like(aerosol)
     if atmosphere.aot > 0:
         _, albedo, asymmetry = aerosols.aerosol_optics(atmosphere.aerosol, wavelength)
-        through_aerosol = scattering.delta_eddington(aerosol, albedo, asymmetry, 1.0)[1]
+        _, through_aerosol = scattering.delta_eddington(aerosol, albedo, asymmetry, 1.0)
     total = scattering.conservative_transmittance(molecules, 1.0) * through_aerosol
     rows = {"optical depth, molecules": molecules, "optical depth, aerosol": aerosol}
     rows |= {"transmittance, direct": np.exp(-molecules - aerosol), "transmittance, with skylight": total}

@@ -121,7 +121,7 @@ def scattering(atmosphere, wavelength, sza, vza, raa):
         [um]
     sza : float
     vza, raa : array, shape (V,) and (R,)
-        [degree]
+        raa of 0 has sun and sensor on the same side. [degree]
 
     Returns
     -------
@@ -139,7 +139,8 @@ def scattering(atmosphere, wavelength, sza, vza, raa):
 
 @lru_cache(maxsize=256)
 def _band_terms(atmosphere, bands, sza, vza, raa):
-    terms = BandTerms(*(values[0, 0] for values in terms_at(atmosphere, bands, sza, np.array([vza]), np.array([raa]))))
+    found = terms_at(atmosphere, bands, sza, np.array([vza]), np.array([raa]))
+    terms = BandTerms(*(values.squeeze((0, 1)) for values in found))
     for values in terms:
         values.flags.writeable = False
     return terms

@@ -17,12 +17,8 @@ def five_s_scattering(atmosphere, wavelength, sza, vza, raa):
 
     Parameters
     ----------
-    atmosphere : models.Atmosphere
-    wavelength : array, shape (n,)
-        [um]
-    sza : float
-    vza, raa : array, shape (V,) and (R,)
-        raa of 0 has sun and sensor on the same side. [degree]
+    atmosphere, wavelength, sza, vza, raa
+        As in `engines.scattering`.
 
     Returns
     -------
@@ -51,21 +47,18 @@ def five_s_scattering(atmosphere, wavelength, sza, vza, raa):
     molecules_reflectance = scattering.sobolev_conservative_reflectance(
         tau_r, molecules.rayleigh_phase(cosine), mu_s, mu_v
     )
-    layer, aerosol_reflectance = _aerosol(atmosphere, tau_a, cosine, wavelength, mu_s, mu_v)
-    (down_r, up_r), (down_a, up_a) = (
-        [transmittance(mu) for mu in (mu_s, mu_v)]
-        for transmittance in (
-            lambda mu: scattering.conservative_transmittance(tau_r, mu),
-            lambda mu: scattering.delta_eddington(*layer, mu)[1],
-        )
-    )
+    albedo, asymmetry, aerosol_reflectance = _aerosol(atmosphere, tau_a, cosine, wavelength, mu_s, mu_v)
+    down_r, up_r = (scattering.conservative_transmittance(tau_r, mu) for mu in (mu_s, mu_v))
+    (_, down_a), (_, up_a) = (scattering.delta_eddington(tau_a, albedo, asymmetry, mu) for mu in (mu_s, mu_v))
+    spherical_r = scattering.conservative_spherical_albedo(tau_r)
+    spherical_a = scattering.spherical_albedo(tau_a, albedo, asymmetry)
     tau = tau_r + tau_a
     return Scattering(
         reflectance=molecules_reflectance + aerosol_reflectance,
         molecules_reflectance=molecules_reflectance,
         transmittance_down=down_r * down_a,
         transmittance_up=up_r * up_a,
-        spherical_albedo=scattering.conservative_spherical_albedo(tau_r) + scattering.spherical_albedo(*layer),
+        spherical_albedo=spherical_r + spherical_a,
         optical_depth=tau,
         direct_transmittance_down=np.exp(-tau / mu_s),
         direct_transmittance_up=np.exp(-tau / mu_v),
@@ -75,10 +68,9 @@ def five_s_scattering(atmosphere, wavelength, sza, vza, raa):
 
 
 def _aerosol(atmosphere, tau, cosine, wavelength, mu_s, mu_v):
-    """Optical depth, single scattering albedo and asymmetry of the aerosol, and its reflectance."""
+    """Single scattering albedo and asymmetry of the aerosol, and its reflectance."""
     if atmosphere.aot == 0:
-        return (tau, np.zeros_like(tau), np.zeros_like(tau)), np.zeros(cosine.shape[:-1] + tau.shape)
+        return np.zeros_like(tau), np.zeros_like(tau), np.zeros(cosine.shape[:-1] + tau.shape)
     _, albedo, asymmetry = aerosols.aerosol_optics(atmosphere.aerosol, wavelength)
-    layer = tau, albedo, asymmetry
     phase = aerosols.aerosol_phase(atmosphere.aerosol, cosine, wavelength)
-    return layer, scattering.sobolev_reflectance(*layer, phase, mu_s, mu_v)
+    return albedo, asymmetry, scattering.sobolev_reflectance(tau, albedo, asymmetry, phase, mu_s, mu_v)

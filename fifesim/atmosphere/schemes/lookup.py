@@ -106,7 +106,8 @@ def varying_reflectance(reflectance, altitude, sza, saa, vza, vaa, *, atmosphere
     lattices, nodes = ByAxis(*(lattice for lattice, _ in axes)), ByAxis(*(nodes for _, nodes in axes))
     once = scattered_once(atmosphere, tuple(bands))
     tables = _tables(atmosphere, tuple(bands), once, nodes)
-    spread = (np.broadcast_to(np.asarray(values, float), cells).ravel() for values in (altitude, sza, vza, raa))
+    # Copies: numba compiles a kernel anew for arrays that cannot be written.
+    spread = (np.broadcast_to(np.asarray(values, float), cells).flatten() for values in (altitude, sza, vza, raa))
     out = np.empty((n_bands, int(np.prod(cells))))
     values = np.ascontiguousarray(reflectance, float).reshape(-1, n_bands)
     _through(values, ByAxis(*spread), lattices, tables, once, to_surface, out)
@@ -245,13 +246,12 @@ def _interpolate(place, lattices, tables, weights, terms):
         for j in range(n_suns):
             for k in range(n_views):
                 weight = weights.altitude[i] * weights.sza[j] * weights.vza[k]
-                at = a + i, s + j, v + k
                 for b in bands:
-                    terms.spherical_albedo[b] += weight * tables.spherical_albedo[at[0], at[1], at[2], b]
-                    terms.gas_transmittance[b] += weight * tables.gas_transmittance[at[0], at[1], at[2], b]
+                    terms.spherical_albedo[b] += weight * tables.spherical_albedo[a + i, s + j, v + k, b]
+                    terms.gas_transmittance[b] += weight * tables.gas_transmittance[a + i, s + j, v + k, b]
                 for m in range(n_azimuths):
                     for b in bands:
-                        path = tables.path_reflectance[at[0], at[1], at[2], r + m, b]
+                        path = tables.path_reflectance[a + i, s + j, v + k, r + m, b]
                         terms.path_reflectance[b] += weight * weights.raa[m] * path
 
 

@@ -20,12 +20,8 @@ def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
 
     Parameters
     ----------
-    atmosphere : models.Atmosphere
-    wavelength : array, shape (n,)
-        [um]
-    sza : float
-    vza, raa : array, shape (V,) and (R,)
-        raa of 0 has sun and sensor on the same side. [degree]
+    atmosphere, wavelength, sza, vza, raa
+        As in `engines.scattering`.
     polarized : bool, optional
         Whether light is polarized, by molecules and aerosol.
 
@@ -53,9 +49,7 @@ def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
 @lru_cache(maxsize=1024)
 def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
     at = np.array([wavelength])
-    tau_r, tau_a = (
-        float(depth[0]) for depth in (atmosphere.rayleigh_optical_depth(at), atmosphere.aerosol_optical_depth(at))
-    )
+    tau_r, tau_a = float(atmosphere.rayleigh_optical_depth(at)[0]), float(atmosphere.aerosol_optical_depth(at)[0])
     albedo, moments, phase = _aerosol(
         atmosphere, at, scattering_angle_cosine(sza, np.array(vza)[:, None], np.array(raa)), polarized
     )
@@ -72,9 +66,9 @@ def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
         zenith=(sza, *vza),
         polarized=polarized,
     )
-    (total, spherical_albedo), (molecules, _), (aerosol, _) = (
-        flux(*depths) for depths in ((tau_r, tau_a), (tau_r, 0.0), (0.0, tau_a))
-    )
+    total, spherical_albedo = flux(tau_r, tau_a)
+    molecules, _ = flux(tau_r, 0.0)
+    aerosol, _ = flux(0.0, tau_a)
     mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))[:, None]
     tau = tau_r + tau_a
     return Scattering(
@@ -104,6 +98,6 @@ def _aerosol(atmosphere, wavelength, cosine, polarized):
 def _moments(aerosol, wavelength, polarized):
     if not polarized:
         return aerosols.phase_moments(aerosol, np.array([wavelength]), _MOMENTS)[0]
-    functions = aerosols.aerosol_phase, aerosols.aerosol_polarization
-    matrix = (function(aerosol, _COSINES, wavelength) for function in functions)
-    return matrix_moments(*matrix, _COSINES, _WEIGHTS, _MOMENTS)
+    phase = aerosols.aerosol_phase(aerosol, _COSINES, wavelength)
+    polarization = aerosols.aerosol_polarization(aerosol, _COSINES, wavelength)
+    return matrix_moments(phase, polarization, _COSINES, _WEIGHTS, _MOMENTS)

@@ -190,7 +190,7 @@ def spherical_albedo(tau, single_scattering_albedo, asymmetry):
     >>> abs(float(spherical_albedo(0.0, 0.9, 0.6))) < 1e-12
     True
     """
-    layer = (np.asarray(value, float)[..., None] for value in (tau, single_scattering_albedo, asymmetry))
+    layer = [np.asarray(value, float)[..., None] for value in (tau, single_scattering_albedo, asymmetry)]
     albedo, _ = delta_eddington(*layer, _MU)
     return 2 * albedo @ (_MU * _MU_WEIGHTS)
 
@@ -210,10 +210,8 @@ def sobolev_reflectance(tau, single_scattering_albedo, asymmetry, phase, mu_s, m
     ----------
     tau, single_scattering_albedo, asymmetry : array
         As in `delta_eddington`, of the whole phase function with its forward peak. [1]
-    phase : array
-        Phase function at the scattering angle, :math:`P`. [1]
-    mu_s, mu_v : array
-        Cosines of the zenith angles of sun and sensor. [1]
+    phase, mu_s, mu_v : array
+        As in `sobolev_conservative_reflectance`. [1]
 
     Returns
     -------

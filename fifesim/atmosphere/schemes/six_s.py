@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fifesim.atmosphere.air import aerosols, profiles
+from fifesim.atmosphere.air import mixtures, profiles
 from fifesim.atmosphere.schemes.terms import BandTerms
 from fifesim.base import datasets
 
@@ -59,13 +59,10 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
 
     Parameters
     ----------
-    atmosphere : models.Atmosphere
+    atmosphere, sza, vza, raa
+        As in `engines.band_terms`, which checks them.
     bands : sequence of Band, length (band,)
         Within 0.25 to 4 um.
-    sza, vza : float
-        In the range of `engines.check_zenith`. [degree]
-    raa : float
-        0 has sun and sensor on the same side. [degree]
     each : callable, optional
         Goes through the runs, such as with a progress bar.
 
@@ -227,7 +224,7 @@ def _profile(atmosphere):
 def _aerosol(name):
     if name in _AEROSOLS:
         return Py6S.AeroProfile.PredefinedType(_AEROSOLS[name])
-    share = {"dust": 0.0, "water_soluble": 0.0, "oceanic": 0.0, "soot": 0.0} | dict(aerosols.mixture(name))
+    share = {"dust": 0.0, "water_soluble": 0.0, "oceanic": 0.0, "soot": 0.0} | dict(mixtures.mixture(name))
     return Py6S.AeroProfile.User(
         dust=share["dust"], water=share["water_soluble"], oceanic=share["oceanic"], soot=share["soot"]
     )

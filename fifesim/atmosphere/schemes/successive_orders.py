@@ -7,16 +7,13 @@ import numpy as np
 from numba import njit
 
 from fifesim.atmosphere.air.molecules import rayleigh_phase
-from fifesim.atmosphere.schemes.phase_expansion import rayleigh_expansion, stokes_basis, truncated_expansion, wigner
+from fifesim.atmosphere.schemes.column import mixed_column
+from fifesim.atmosphere.schemes.phase_expansion import stokes_basis, wigner
 
-# Scale heights. [km] Their ratio makes the aerosol column above an altitude the fourth power of that of the molecules.
-MOLECULES_HEIGHT, AEROSOL_HEIGHT = 8.0, 2.0
 STREAMS = 16  # directions per hemisphere
 LAYERS = 60
 TOLERANCE = 1e-6  # of the field, for what is left out of the sums over orders and over Fourier modes [1]
 MOST_ORDERS = 1000
-
-_LEAST_DEPTH = 1e-12  # optical depth that stands for none [1]
 
 
 def path_reflectance(
@@ -95,12 +92,12 @@ def path_reflectance(
     >>> bool(abs(there - back) < 2e-5)
     True
     """
-    column = _column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, 2 * streams, layers)
+    column = mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, 2 * streams, layers)
     mu_s, mu_v = np.cos(np.radians(float(sza))), np.cos(np.radians(np.asarray(vza, float)))
     azimuth = np.radians(np.asarray(raa, float))
     nodes, _ = _quadrature(streams)
     upward = np.concatenate([nodes[:streams], mu_v])
-    escape = _escape(column, upward)
+    escape = column.escape(upward)
     reflectance = _single_scattering(column, np.asarray(phase, float), mu_s, mu_v, azimuth)
     field_size, largest, small = 0.0, 0.0, 0
     for mode in range(2 * streams):
@@ -163,74 +160,23 @@ def flux_transmittance(
     >>> bool(1 > thin > thick), bool(0 < little < more)
     (True, True)
     """
-    column = _column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, 2 * streams, layers)
+    column = mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, 2 * streams, layers)
     count, components = 2 * streams, 3 if polarized else 1
     nodes, weights = _quadrature(streams)
     up, zenith_up = nodes[:streams], np.cos(np.radians(np.asarray(zenith, float)))
     direct = np.zeros((layers, components * count))
-    direct[:, :streams] = _layer_mean(column, up)[::-1]
+    direct[:, :streams] = column.layer_mean(up)[::-1]
     basis, mixing = stokes_basis(0, nodes, count, components), column.mixing(0, components)
     shares = np.tile(weights / 2, components)
     source = _scattered(direct * shares, basis, mixing) @ basis.T
-    field, _ = _sum_orders(source, basis, shares, mixing, *_steps(column, up), TOLERANCE, 0.0, MOST_ORDERS)
+    through, averaged = column.steps(up)
+    field, _ = _sum_orders(source, _Mode(basis, shares, mixing, through, averaged), 0.0)
     coefficients = _scattered((direct + field) * shares, basis, mixing)[:, :count]
     # Down from the surface, the layers come in the opposite order.
-    out = _escape(column, zenith_up) * (wigner(0, 0, zenith_up, count).T @ coefficients.T)
-    back = _escape(column, up) * (wigner(0, 0, -up, count).T @ coefficients[::-1].T)
+    out = column.escape(zenith_up) * (wigner(0, 0, zenith_up, count).T @ coefficients.T)
+    back = column.escape(up) * (wigner(0, 0, -up, count).T @ coefficients[::-1].T)
     transmittance = np.exp(-layers * column.depth / zenith_up) + out.sum(axis=1)
     return transmittance, float(2 * (back.sum(axis=1) * up * weights[:streams]).sum())
-
-
-class _Column(NamedTuple):
-    """An atmosphere cut in layers of equal optical depth, from the top down."""
-
-    depth: float  # of one layer [1]
-    molecules: np.ndarray  # scattering over extinction, shape (layers,) [1]
-    aerosol: np.ndarray  # the same, without the forward peak [1]
-    aerosol_once: np.ndarray  # the same, of all that is scattered [1]
-    molecules_expansion: np.ndarray  # shape (count, 4) [1]
-    aerosol_expansion: np.ndarray
-
-    def polarizes(self, mode):
-        """Whether Q and U of a Fourier mode are anything but 0."""
-        return mode < 3 or bool(self.aerosol_expansion[:, 1:].any())
-
-    def mixing(self, mode, components):
-        """Scattering matrix of each layer in the basis, shape (layers, degrees, components, components)."""
-        pure = np.stack([self.molecules_expansion[mode:], self.aerosol_expansion[mode:]])
-        beta, alpha, zeta, gamma = np.einsum("ak,alc->ckl", np.stack([self.molecules, self.aerosol]), pure)
-        if components == 1:
-            return np.ascontiguousarray(beta[..., None, None])
-        none = np.zeros_like(beta)
-        return np.ascontiguousarray(
-            np.moveaxis(np.array([[beta, gamma, none], [gamma, alpha, none], [none, none, zeta]]), (0, 1), (2, 3))
-        )
-
-
-def _column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, count, layers):
-    expansion, peak = truncated_expansion(moments, count)
-    thinned = tau_aerosol * (1 - single_scattering_albedo * peak)
-    tau_molecules = np.maximum(tau_molecules, _LEAST_DEPTH)
-    depth = (tau_molecules + thinned) / layers
-    edges = _edges(tau_molecules, thinned, layers)
-    air, particles = (
-        tau_molecules * np.diff(edges) / depth,
-        np.diff(edges ** (MOLECULES_HEIGHT / AEROSOL_HEIGHT)) / depth,
-    )
-    scattered = tau_aerosol * single_scattering_albedo * particles
-    return _Column(depth, air, scattered * (1 - peak), scattered, rayleigh_expansion(count), expansion)
-
-
-def _edges(tau_molecules, tau_aerosol, layers):
-    """Share of the molecules above the edges of layers of equal optical depth, by Newton's method."""
-    ratio = MOLECULES_HEIGHT / AEROSOL_HEIGHT
-    above = (tau_molecules + tau_aerosol) * np.arange(1, layers) / layers
-    share = np.ones(layers - 1)
-    # The depth above is a convex function of the share: from 1 the steps go down to the root and never beyond.
-    for _ in range(60):
-        excess = tau_molecules * share + tau_aerosol * share**ratio - above
-        share = share - excess / (tau_molecules + ratio * tau_aerosol * share ** (ratio - 1))
-    return np.concatenate([[0.0], share, [1.0]])
 
 
 @lru_cache
@@ -241,32 +187,14 @@ def _quadrature(streams):
     return np.concatenate([upward, -upward]), np.concatenate([weights, weights]) / 2
 
 
-def _steps(column, upward):
-    """What one layer lets through, and the mean over the layer of what enters it, shape (directions,)."""
-    slant = column.depth / upward
-    return np.exp(-slant), -np.expm1(-slant) / slant
-
-
-def _layer_mean(column, cosine):
-    """Mean over each layer, from the top down, of light 1 entering at the top, shape (layers, directions)."""
-    _, averaged = _steps(column, cosine)
-    return np.exp(-np.arange(len(column.molecules))[:, None] * column.depth / cosine) * averaged
-
-
-def _escape(column, cosine):
-    """Light leaving the top per source of each layer, shape (directions, layers)."""
-    through, _ = _steps(column, cosine)
-    return (np.exp(-np.arange(len(column.molecules))[:, None] * column.depth / cosine) * (1 - through)).T
-
-
 def _single_scattering(column, phase, mu_s, mu_v, azimuth):
     """Reflectance of the light scattered once, shape (views, azimuths)."""
     sines = np.sqrt((1 - mu_s**2) * (1 - mu_v**2))[:, None]
     molecules = rayleigh_phase(-mu_s * mu_v[:, None] - sines * np.cos(azimuth))
     slant = 1 / mu_s + 1 / mu_v
-    reached = _layer_mean(column, 1 / slant) * column.depth
-    share = [(reached.T @ scattered)[:, None] for scattered in (column.molecules, column.aerosol_once)]
-    return (share[0] * molecules + share[1] * phase) / (4 * mu_s * mu_v[:, None])
+    reached = column.layer_mean(1 / slant) * column.depth
+    by_molecules, by_aerosol = (reached.T @ column.molecules)[:, None], (reached.T @ column.aerosol_once)[:, None]
+    return (by_molecules * molecules + by_aerosol * phase) / (4 * mu_s * mu_v[:, None])
 
 
 def _rescattered(column, mode, components, mu_s, streams, least):
@@ -281,11 +209,21 @@ def _rescattered(column, mode, components, mu_s, streams, least):
     weights = np.tile(weights / 2, components)
     mixing = column.mixing(mode, components)
     sun = wigner(mode, 0, np.array([-mu_s]), count)[mode:, 0]
-    beam = _layer_mean(column, np.array([mu_s])) * (0.25 if mode == 0 else 0.5)
+    beam = column.layer_mean(np.array([mu_s])) * (0.25 if mode == 0 else 0.5)
     once = np.moveaxis(mixing[..., 0] * sun[:, None], 2, 1).reshape(len(beam), -1)
-    steps = _steps(column, nodes[:streams])
-    field, size = _sum_orders(beam * once @ basis.T, basis, weights, mixing, *steps, TOLERANCE, least, MOST_ORDERS)
+    through, averaged = column.steps(nodes[:streams])
+    field, size = _sum_orders(beam * once @ basis.T, _Mode(basis, weights, mixing, through, averaged), least)
     return _scattered(field * weights, basis, mixing)[:, : count - mode], size
+
+
+class _Mode(NamedTuple):
+    """What scatters and carries the light of one Fourier mode."""
+
+    basis: np.ndarray  # shape (components * directions, basis) [1]
+    weights: np.ndarray  # of the directions, for each component [1]
+    mixing: np.ndarray  # of `_Column.mixing` [1]
+    through: np.ndarray  # of what enters a layer, shape (directions of a hemisphere,) [1]
+    averaged: np.ndarray  # its mean over the layer [1]
 
 
 @njit(nogil=True, cache=True)
@@ -322,7 +260,7 @@ def _travel(source, through, averaged):
 
 
 @njit(nogil=True, cache=True)
-def _sum_orders(source, basis, weights, mixing, through, averaged, tolerance, least, most):
+def _sum_orders(source, mode, least):
     """
     Light of all orders of scattering from the source of the first, the tail closed as a geometric series.
 
@@ -330,21 +268,21 @@ def _sum_orders(source, basis, weights, mixing, through, averaged, tolerance, le
     of the tail, were the ratio of successive orders to go on changing as it last did, is held below the tolerance
     times the size, or times `least` where that is larger.
     """
-    backward = np.ascontiguousarray(basis.T)
+    backward = np.ascontiguousarray(mode.basis.T)
     total = np.zeros_like(source)
     size, last, last_ratio = 0.0, 0.0, 2.0
-    for _ in range(most):
-        field = _travel(source, through, averaged)
+    for _ in range(MOST_ORDERS):
+        field = _travel(source, mode.through, mode.averaged)
         total += field
-        strength = (np.abs(field) * weights).sum()
+        strength = (np.abs(field) * mode.weights).sum()
         size += strength
         ratio = strength / last if last > 0 else 0.0
         if last > 0 and ratio < 1:
             left = strength * abs(ratio - last_ratio) / (1 - ratio) ** 2
-            if left <= tolerance * max(size, least):
+            if left <= TOLERANCE * max(size, least):
                 return total + field * (ratio / (1 - ratio)), size
         if not strength > 0:
             break
         last, last_ratio = strength, ratio
-        source = np.dot(_scattered(field * weights, basis, mixing), backward)
+        source = np.dot(_scattered(field * mode.weights, mode.basis, mode.mixing), backward)
     return total, size

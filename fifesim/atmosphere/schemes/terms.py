@@ -192,21 +192,15 @@ def _one_band(scattering, nodes, atmosphere, band, sza, vza):
     wavelength, weight = _steps(band.limits, band.name)
     light = on_wavelengths(scattering, nodes, wavelength)
     air_mass = 1 / np.cos(np.radians(sza)) + 1 / np.cos(np.radians(vza))[:, None]
-    gas, dry = (
-        gases.gas_transmittance(wavelength, atmosphere, air_mass, gases=names)
-        for names in (gases.GASES, gases.GASES[1:])
-    )
+    gas = gases.gas_transmittance(wavelength, atmosphere, air_mass)
+    dry = gases.gas_transmittance(wavelength, atmosphere, air_mass, gases=gases.DRY_GASES)
     ground = gas * light.transmittance_down * light.transmittance_up
     path = light.reflectance * gas + light.molecules_reflectance * (dry - gas)
 
     def mean(spectrum):
         return band.mean(spectrum, wavelength, weight)
 
-    down, up, direct = (
-        mean(light.transmittance_down),
-        mean(light.transmittance_up),
-        mean(light.direct_transmittance_down),
-    )
+    down, up, direct = map(mean, (light.transmittance_down, light.transmittance_up, light.direct_transmittance_down))
     used = mean(ground)
     return BandTerms(
         path_reflectance=mean(path) * down * up / used,

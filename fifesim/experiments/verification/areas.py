@@ -1,13 +1,23 @@
 """Every check of the package, area by area."""
 
-from fifesim.experiments.verification import analysis, atmosphere, canopy, landscape, scan, sensor, terrain
+from fifesim.experiments.verification import (
+    adjacency,
+    analysis,
+    atmosphere,
+    canopy,
+    landscape,
+    scan,
+    scattering,
+    sensor,
+    terrain,
+)
 
 AREAS = {
     "random field": landscape.CHECKS,
     "canopy": canopy.CHECKS,
     "terrain": terrain.CHECKS,
     "sensor": (*sensor.CHECKS, *scan.CHECKS),
-    "atmosphere": atmosphere.CHECKS,
+    "atmosphere": (*scattering.CHECKS, *adjacency.CHECKS, *atmosphere.CHECKS),
     "analysis": analysis.CHECKS,
 }
 

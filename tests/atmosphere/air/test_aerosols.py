@@ -5,16 +5,9 @@ import pandas as pd
 import pytest
 
 from fifesim.atmosphere.air import components
-from fifesim.atmosphere.air.aerosols import (
-    COMPONENTS,
-    MODELS,
-    aerosol_optics,
-    aerosol_phase,
-    aerosol_polarization,
-    canonical,
-    mixture,
-    phase_moments,
-)
+from fifesim.atmosphere.air.aerosols import aerosol_optics, aerosol_phase, aerosol_polarization, phase_moments
+from fifesim.atmosphere.air.components import COMPONENTS
+from fifesim.atmosphere.air.mixtures import MODELS
 
 DATA = Path(__file__).parents[2] / "data"
 OPTICS = pd.read_csv(DATA / "sixs_aerosol_optics.csv", comment="#")
@@ -138,47 +131,6 @@ def test_missing_wavelength_stays_missing():
     assert np.isnan(aerosol_phase("urban", np.nan, 0.5))
 
 
-@pytest.mark.parametrize(
-    "aerosol, name",
-    [
-        ("urban", "urban"),
-        ({"soot": 0.01, "dust": 0.7, "water_soluble": 0.29}, "continental"),
-        ("oceanic:0.95+water_soluble:0.05", "maritime"),
-        ({"water_soluble": 0.5, "dust": 0.5, "soot": 0}, "dust:0.5+water_soluble:0.5"),
-        (" soot : 0.25 + dust:0.75", "dust:0.75+soot:0.25"),
-        ({"oceanic": 1}, "oceanic:1"),
-    ],
-)
-def test_an_aerosol_has_one_name(aerosol, name):
-    assert canonical(aerosol) == name
-    assert canonical(canonical(aerosol)) == name
-    assert mixture(canonical(aerosol)) == mixture(aerosol)
-
-
-@pytest.mark.parametrize(
-    "aerosol, message",
-    [
-        ("continentl", "aerosol must be one of .*, got 'continentl': type aerosol='continental'"),
-        ({"dusk": 1.0}, "component must be one of .*, got 'dusk' .*: type 'dust'"),
-        ("dust:1.5+soot:-0.5", "fraction of soot must be from 0 to 1, got -0.5"),
-        ({"dust": float("nan"), "soot": 1}, "fraction of dust must be from 0 to 1, got nan"),
-        ("dust:2+soot:2", "must add up to 1, got 4 .*: type aerosol='dust:0.5[+]soot:0.5'"),
-        ({}, "must add up to 1, got 0"),
-        ("dust:half", "a number after a colon, got 'dust:half'"),
-        ("dust:0.5+dust:0.5", "each component once, got 'dust' twice"),
-    ],
-)
-def test_a_mistake_in_a_mixture_is_named(aerosol, message):
-    with pytest.raises(ValueError, match=message):
-        mixture(aerosol)
-
-
-@pytest.mark.parametrize("aerosol", [3.0, None, {"dust": "1"}, {"dust": True}])
-def test_an_aerosol_of_the_wrong_kind_is_refused(aerosol):
-    with pytest.raises(TypeError, match="aerosol"):
-        canonical(aerosol)
-
-
 @pytest.mark.parametrize("wavelength", [0.3, 4.0, 550.0])
 def test_wavelength_outside_the_tables_is_refused(wavelength):
     calls = (
@@ -190,10 +142,3 @@ def test_wavelength_outside_the_tables_is_refused(wavelength):
     for call in calls:
         with pytest.raises(ValueError, match=f"wavelength must be from 0.35 to 3.75 um, got {wavelength:g}"):
             call()
-
-
-def test_giving_a_mapping_leaves_it_untouched():
-    given = {"soot": 0.0, "dust": 1.0}
-    mixture(given)["dust"] = 7
-    mixture("urban")["dust"] = 7
-    assert given == {"soot": 0.0, "dust": 1.0} and MODELS["urban"]["dust"] == 0.17

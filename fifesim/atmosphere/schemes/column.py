@@ -1,0 +1,164 @@
+"""An atmosphere of molecules and aerosol cut in layers of even composition, and light that goes through them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fifesim.atmosphere.schemes.phase_expansion import rayleigh_expansion, truncated_expansion
+
+# Scale heights. [km] Their ratio makes the aerosol column above an altitude the fourth power of that of the molecules.
+MOLECULES_HEIGHT, AEROSOL_HEIGHT = 8.0, 2.0
+
+_LEAST_DEPTH = 1e-12  # optical depth that stands for none [1]
+
+
+class Column(NamedTuple):
+    """An atmosphere cut in layers of equal optical depth, from the top down."""
+
+    depth: float  # of one layer [1]
+    molecules: np.ndarray  # scattering over extinction, shape (layers,) [1]
+    aerosol: np.ndarray  # the same, without the forward peak [1]
+    aerosol_once: np.ndarray  # the same, of all that is scattered [1]
+    molecules_expansion: np.ndarray  # shape (count, 4) [1]
+    aerosol_expansion: np.ndarray
+
+    def polarizes(self, mode):
+        """
+        Whether Q and U of a Fourier mode are anything but 0.
+
+        Parameters
+        ----------
+        mode : int
+
+        Returns
+        -------
+        answer : bool
+        """
+        return mode < 3 or bool(self.aerosol_expansion[:, 1:].any())
+
+    def mixing(self, mode, components):
+        """
+        Scattering matrix of each layer in the basis of `phase_expansion.stokes_basis`.
+
+        Parameters
+        ----------
+        mode, components : int
+
+        Returns
+        -------
+        mixing : array, shape (layers, degrees, components, components)
+            [1]
+        """
+        pure = np.stack([self.molecules_expansion[mode:], self.aerosol_expansion[mode:]])
+        beta, alpha, zeta, gamma = np.einsum("ak,alc->ckl", np.stack([self.molecules, self.aerosol]), pure)
+        if components == 1:
+            return np.ascontiguousarray(beta[..., None, None])
+        none = np.zeros_like(beta)
+        return np.ascontiguousarray(
+            np.moveaxis(np.array([[beta, gamma, none], [gamma, alpha, none], [none, none, zeta]]), (0, 1), (2, 3))
+        )
+
+    def steps(self, cosine):
+        """
+        What one layer does to light.
+
+        Parameters
+        ----------
+        cosine : array, shape (directions,)
+            Of the angle from the vertical. [1]
+
+        Returns
+        -------
+        through, averaged : array, shape (directions,)
+            What it lets through, and the mean over the layer of what enters it. [1]
+        """
+        slant = self.depth / cosine
+        return np.exp(-slant), -np.expm1(-slant) / slant
+
+    def layer_mean(self, cosine):
+        """
+        Mean over each layer of light 1 that enters at the top.
+
+        Parameters
+        ----------
+        cosine : array, shape (directions,)
+            [1]
+
+        Returns
+        -------
+        light : array, shape (layers, directions)
+            [1]
+        """
+        _, averaged = self.steps(cosine)
+        return self._from_top(cosine) * averaged
+
+    def escape(self, cosine):
+        """
+        Light that leaves the top for a source of 1 in each layer.
+
+        Parameters
+        ----------
+        cosine : array, shape (directions,)
+            [1]
+
+        Returns
+        -------
+        light : array, shape (directions, layers)
+            [1]
+        """
+        through, _ = self.steps(cosine)
+        return (self._from_top(cosine) * (1 - through)).T
+
+    def _from_top(self, cosine):
+        """Transmittance from the top to each layer, shape (layers, directions)."""
+        return np.exp(-np.arange(len(self.molecules))[:, None] * self.depth / cosine)
+
+
+def mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, count, layers):
+    """
+    Molecules and aerosol whose density falls off exponentially, with scale heights of 8 and 2 km.
+
+    Parameters
+    ----------
+    tau_molecules, tau_aerosol, single_scattering_albedo : float
+    moments : array, shape (terms,) or (terms, 4)
+        As in `successive_orders.path_reflectance`. [1]
+    count, layers : int
+        Terms of the expansions, and number of layers.
+
+    Returns
+    -------
+    column : Column
+        The forward peak of the aerosol counts as not scattered.
+
+    References
+    ----------
+    [Wiscombe1977]_, forward peak
+
+    Examples
+    --------
+    >>> column = mixed_column(0.2, 0.0, 1.0, [1.0], 4, 10)
+    >>> round(float(column.depth), 12), column.molecules.round(9).tolist() == [1.0] * 10
+    (0.02, True)
+    """
+    expansion, peak = truncated_expansion(moments, count)
+    thinned = tau_aerosol * (1 - single_scattering_albedo * peak)
+    tau_molecules = np.maximum(tau_molecules, _LEAST_DEPTH)
+    depth = (tau_molecules + thinned) / layers
+    edges = _edges(tau_molecules, thinned, layers)
+    air = tau_molecules * np.diff(edges) / depth
+    particles = np.diff(edges ** (MOLECULES_HEIGHT / AEROSOL_HEIGHT)) / depth
+    scattered = tau_aerosol * single_scattering_albedo * particles
+    return Column(depth, air, scattered * (1 - peak), scattered, rayleigh_expansion(count), expansion)
+
+
+def _edges(tau_molecules, tau_aerosol, layers):
+    """Share of the molecules above the edges of layers of equal optical depth, by Newton's method."""
+    ratio = MOLECULES_HEIGHT / AEROSOL_HEIGHT
+    above = (tau_molecules + tau_aerosol) * np.arange(1, layers) / layers
+    share = np.ones(layers - 1)
+    # The depth above is a convex function of the share: from 1 the steps go down to the root and never beyond.
+    for _ in range(60):
+        excess = tau_molecules * share + tau_aerosol * share**ratio - above
+        share = share - excess / (tau_molecules + ratio * tau_aerosol * share ** (ratio - 1))
+    return np.concatenate([[0.0], share, [1.0]])
