@@ -8,9 +8,6 @@ import dask.array as da
 import numpy as np
 from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
 
-# Begins the names of tasks that cut a part off a chunk.
-_CUT = "cut-"
-
 # Of an array in memory beside lazy ones. [cell]
 _CHUNK = 1024
 
@@ -134,22 +131,6 @@ def gather(array, window):
     return _joined(_Plan(shape, tuple(parts) != tuple(window), (tuple(into),), (tuple(parts),)), [array])
 
 
-def is_cut(key):
-    """
-    Whether a task only cuts off a part of a chunk.
-
-    Parameters
-    ----------
-    key : tuple or str
-        Of a task.
-
-    Returns
-    -------
-    answer : bool
-    """
-    return isinstance(key, tuple) and str(key[0]).startswith(_CUT)
-
-
 class _MadeByPlace(MaterializedLayer):
     """Layer of an array whose blocks are made from their place alone, as any part of it can be."""
 
@@ -216,7 +197,7 @@ def _plan(array, edges, window, graph):
             key = (array.name, *(0,) * (array.ndim - 2), i, j)
             part = (row_taken, column_taken)
             if 2 * (row_taken.stop - row_taken.start) * (column_taken.stop - column_taken.start) < whole:
-                cut = (f"{_CUT}{array.name}", i, j, *(edge for each in part for edge in (each.start, each.stop)))
+                cut = (f"cut-{array.name}", i, j, *(edge for each in part for edge in (each.start, each.stop)))
                 graph[cut] = _part(array, (edges[0][i], edges[1][j]), part, key)
                 key, part = cut, (slice(None), slice(None))
             into.append((row_into, column_into))

@@ -8,7 +8,7 @@ from dask.utils import format_bytes, format_time
 
 from fifesim.output.progress import memory
 from fifesim.output.run.products import products_of, wanted_blocks
-from fifesim.output.run.schedule import ordered_blocks, run_on_threads
+from fifesim.output.run.schedule import run_on_threads, tasks_of
 from fifesim.output.run.workers import usable_cores
 from fifesim.rasters import grid as grids
 from fifesim.scenario.simulation import simulate
@@ -51,7 +51,7 @@ def estimate(scenario, *, threads=None, scene=False):
     tree = simulate(complete)
     found = products_of(tree)
     lai, image = tree["scene"]["lai"], found.arrays["image"]
-    tasks = ordered_blocks(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))[0]
+    tasks = tasks_of(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))[0]
     rate, used = _calibrate(complete, threads)
     bands = image.shape[0]
     pixels = image.shape[-2] * image.shape[-1]
@@ -103,7 +103,7 @@ def _calibrate(scenario, threads):
         tree = simulate(piece)
         found = products_of(tree)
         lai = tree["scene"]["lai"]
-        tasks = ordered_blocks(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))
+        tasks = tasks_of(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))
         start = time.monotonic()
         run_on_threads(*tasks, lambda name, index, block: None, threads)
         taken = time.monotonic() - start

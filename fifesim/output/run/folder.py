@@ -22,7 +22,7 @@ from fifesim.output.progress import CellProgress
 from fifesim.output.run.engine import run_engine
 from fifesim.output.run.products import make_scene_store, products_of, wanted_blocks
 from fifesim.output.run.saved import save_block, saved_array, saved_blocks
-from fifesim.output.run.schedule import ordered_blocks, run_on_client, run_on_threads
+from fifesim.output.run.schedule import run_on_client, run_on_threads, tasks_of
 from fifesim.output.run.workers import found_client, usable_cores
 from fifesim.rasters import grid as grids
 from fifesim.rasters.files import to_geotiff
@@ -188,7 +188,7 @@ def _compute(found, lai, folder, client, threads, as_json):
             if name == "image":
                 progress.advance(sizes[index])
 
-        tasks = ordered_blocks(found.arrays, wanted)
+        tasks = tasks_of(found.arrays, wanted)
         if client is None:
             run_on_threads(*tasks, deliver, threads)
         else:

@@ -1,23 +1,20 @@
-"""Compute blocks of lazy arrays one after the other, in an order that leaves little waiting in memory."""
+"""Blocks of lazy arrays computed by dask, in an order that leaves little waiting in memory."""
 
-import heapq
-from collections import defaultdict
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
-import dask
-from dask.core import get_dependencies
+import dask.threaded
 from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
+from dask.order import order
 from distributed import KilledWorker, as_completed
-
-from fifesim.rasters.windows import is_cut
 
 # A worker that dies takes a task with it; one that kills its workers this often is at fault itself.
 _RETRIES = 3
 
 
-def ordered_blocks(arrays, wanted):
+def tasks_of(arrays, wanted):
     """
-    Tasks of blocks, and the order to run them in.
+    Tasks of blocks.
 
     Parameters
     ----------
@@ -28,37 +25,25 @@ def ordered_blocks(arrays, wanted):
     Returns
     -------
     graph : dict
-        Task of each key.
+        Task of each key. What several arrays need is in it once, as it would not be if dask optimised each of them.
     outputs : dict of key to (str, tuple of int)
-    order : dict of key to int
-        Depth first, so that what a block needs is made just before it; parts cut off a chunk are next after it.
+        In the order in which they are wanted.
     """
-    graph = {}
-    names = list(arrays)
-    optimized = dict(zip(names, dask.optimize(*arrays.values()), strict=True))
-    for array in optimized.values():
-        graph.update(array.__dask_graph__())
-    outputs = {(optimized[name].name, *index): (name, index) for name, index in wanted}
-    needs = {}
-    stack = list(outputs)
-    while stack:
-        key = stack.pop()
-        if key not in needs:
-            needs[key] = get_dependencies(graph, key)
-            stack.extend(needs[key])
-    return {key: graph[key] for key in needs}, outputs, _depth_first(outputs, needs)
+    outputs = {(arrays[name].name, *index): (name, index) for name, index in wanted}
+    whole = HighLevelGraph.merge(*(array.dask for array in arrays.values()))
+    return dict(whole.cull(set(outputs))), outputs
 
 
-def run_on_threads(graph, outputs, order, deliver, threads):
+def run_on_threads(graph, outputs, deliver, threads):
     """
-    Run tasks on threads of this process, each as soon as it can in the order given.
+    Run tasks on threads of this process.
 
     Parameters
     ----------
-    graph, outputs, order
-        From `ordered_blocks`.
+    graph, outputs
+        From `tasks_of`.
     deliver : callable
-        ``deliver(name, index, block)`` takes each output, in this thread.
+        ``deliver(name, index, block)`` takes each output as it is wanted, one after the other.
     threads : int
 
     Raises
@@ -66,49 +51,21 @@ def run_on_threads(graph, outputs, order, deliver, threads):
     Exception
         Whatever a task or ``deliver`` raises; tasks that run are finished first.
     """
-    needs = {key: get_dependencies(graph, key) for key in graph}
-    users = _reversed(needs)
-    missing = {key: len(found) for key, found in needs.items()}
-    left = {key: len(users[key]) for key in graph}
-    ready = [(order[key], key) for key, count in missing.items() if not count]
-    heapq.heapify(ready)
-    results, running = {}, {}
     pool = ThreadPoolExecutor(threads)
     try:
-        while ready or running:
-            # One more than there are threads, so that none waits for this loop.
-            while ready and len(running) <= threads:
-                key = heapq.heappop(ready)[1]
-                small = {need: results[need] for need in needs[key]} | {key: graph[key]}
-                running[pool.submit(dask.get, small, key)] = key
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                key = running.pop(future)
-                result = future.result()
-                if key in outputs:
-                    deliver(*outputs[key], result)
-                for need in needs[key]:
-                    left[need] -= 1
-                    if not left[need]:
-                        del results[need]
-                if left[key]:
-                    results[key] = result
-                for user in users[key]:
-                    missing[user] -= 1
-                    if not missing[user]:
-                        heapq.heappush(ready, (order[user], user))
-                del result
+        dask.threaded.get(*_in_order(graph, outputs, deliver), pool=pool)
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def run_on_client(graph, outputs, order, deliver, client):
+def run_on_client(graph, outputs, deliver, client):
     """
     Run tasks on the workers of a cluster; a task that dies with its worker is run again.
 
     Parameters
     ----------
-    graph, outputs, order, deliver
-        As in `run_on_threads`; outputs are delivered in this process.
+    graph, outputs, deliver
+        As in `run_on_threads`; outputs are delivered in this process, as they come.
     client : distributed.Client
 
     Raises
@@ -118,7 +75,8 @@ def run_on_client(graph, outputs, order, deliver, client):
     Exception
         Whatever a task or ``deliver`` raises.
     """
-    layer = MaterializedLayer(graph, annotations={"priority": _Priority(order), "retries": _RETRIES})
+    ranks = order(_in_order(graph, outputs, deliver)[0])
+    layer = MaterializedLayer(graph, annotations={"priority": _Priority(ranks), "retries": _RETRIES})
     whole = HighLevelGraph({"blocks": layer}, {"blocks": set()})
     futures = dict(zip(client.get(whole, list(outputs), sync=False, optimize_graph=False), outputs, strict=True))
     try:
@@ -134,38 +92,26 @@ def run_on_client(graph, outputs, order, deliver, client):
 class _Priority:
     """Rank of a key in an order, the first the highest."""
 
-    def __init__(self, order):
-        self._order = order
+    def __init__(self, ranks):
+        self._ranks = ranks
 
     def __call__(self, key):
-        return -self._order[key]
+        return -self._ranks[key]
 
 
-def _depth_first(outputs, needs):
-    """Number of each task when what it needs is numbered before it, and its cuts right after it."""
-    cuts = defaultdict(list)
-    for key, found in needs.items():
-        if is_cut(key):
-            for need in found:
-                cuts[need].append(key)
-    order = {}
-    for output in outputs:
-        stack = [output]
-        while stack:
-            key = stack[-1]
-            missing = [need for need in needs[key] if need not in order]
-            if key in order or not missing:
-                stack.pop()
-                for each in (key, *sorted(cuts[key], key=str)):
-                    order.setdefault(each, len(order))
-            else:
-                stack.extend(sorted(missing, key=str, reverse=True))
-    return order
+def _in_order(graph, outputs, deliver):
+    """
+    The graph with the delivery of each output, and the last of these, which is all that there is to ask for.
+
+    dask goes into the depth of what is asked first. A delivery waits for the one before it, so that outputs are made
+    one after the other, and no chunk waits for an output that is far off.
+    """
+    tasks, before = dict(graph), []
+    for number, (key, place) in enumerate(outputs.items()):
+        tasks[("delivered", number)] = (partial(_deliver, deliver, *place), key, before)
+        before = [("delivered", number)]
+    return tasks, before
 
 
-def _reversed(needs):
-    users = defaultdict(list)
-    for key, found in needs.items():
-        for need in found:
-            users[need].append(key)
-    return users
+def _deliver(deliver, name, index, block, before):
+    deliver(name, index, block)

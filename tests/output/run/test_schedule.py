@@ -1,14 +1,15 @@
-"""Blocks in order: the numbers of dask's own scheduler, and little that waits."""
+"""Blocks in order: the numbers of dask without it, and little that waits."""
+
+import weakref
 
 import dask.array as da
 import numpy as np
 import pytest
 import xarray as xr
-from dask.core import get_dependencies
 
 from fifesim import fife_site
 from fifesim.base.footprints import Boxcar, axis_operator
-from fifesim.output.run.schedule import ordered_blocks, run_on_threads
+from fifesim.output.run.schedule import run_on_threads, tasks_of
 from fifesim.rasters import grid as grids
 from fifesim.rasters.chunks import neighbourhood, tiles
 from fifesim.rasters.regularization import resample
@@ -39,7 +40,7 @@ def wanted(array, name="means"):
 def test_blocks_are_those_of_dask(threads):
     array, found = means(96, 17), {}
     run_on_threads(
-        *ordered_blocks({"means": array}, wanted(array)),
+        *tasks_of({"means": array}, wanted(array)),
         lambda name, index, block: found.update({index: block}),
         threads,
     )
@@ -50,38 +51,71 @@ def test_blocks_are_those_of_dask(threads):
 
 def test_only_what_is_wanted_is_computed():
     array = means(96, 17)
-    all_of_it = ordered_blocks({"means": array}, wanted(array))[0]
-    one = ordered_blocks({"means": array}, [("means", (2, 3))])[0]
+    all_of_it = tasks_of({"means": array}, wanted(array))[0]
+    one = tasks_of({"means": array}, [("means", (2, 3))])[0]
     assert len(one) < len(all_of_it) / 6
 
 
-def test_what_waits_does_not_grow_with_the_rows():
-    """Chunks whole in memory at once, when tasks run one after the other in their order."""
+def chunks_at_once(rows, columns):
+    """Most chunks in memory together when pixels are made of so many of them, by one thread."""
+    alive, most = set(), 0
 
-    def most(rows):
-        source = da.ones((rows * 10, 200), chunks=10).map_blocks(lambda block: block + 1, name=f"source{rows}")
-        grid = fife_site(30 / 9, window=((0, rows * 10), (0, 200)))
-        raster = grids.place(xr.DataArray(source, dims=("y", "x")), grid)
-        axes = [
-            axis_operator(
-                Boxcar(3.5), cell_origin=0, cell_size=1, n_cells=size, pixel_origin=0, pixel_size=3, n_pixels=size // 3
-            )
-            for size in raster.shape
-        ]
-        array = resample(*axes, raster, grids.aligned(grid, 10.0)).data
-        graph, _, order = ordered_blocks({"a": array}, wanted(array, "a"))
-        last = {}
-        for key in graph:
-            for need in get_dependencies(graph, key):
-                last[need] = max(last.get(need, 0), order[key])
-        whole = [key for key in graph if isinstance(key, tuple) and len(key) == 3 and key in last]
-        whole = [key for key in whole if "windows" not in str(key[0]) and "cut" not in str(key[0])]
-        alive = np.zeros(len(graph) + 1, int)
-        for key in whole:
-            alive[order[key] : last[key] + 1] += 1
-        return alive.max()
+    def watched(block):
+        nonlocal most
+        made = block + 1
+        alive.add(id(made))
+        weakref.finalize(made, alive.discard, id(made))
+        most = max(most, len(alive))
+        return made
 
-    assert most(40) == most(10) <= 3
+    shape, options = (rows * 10, columns * 10), {"dtype": float, "meta": np.empty((0, 0))}
+    truth = da.ones(shape, chunks=10).map_blocks(watched, **options)
+    image = truth.map_blocks(np.sqrt).map_blocks(watched, **options)
+    grid = fife_site(30 / 9, window=((0, rows * 10), (0, columns * 10)))
+    pixels = grids.aligned(grid, 10.0)
+    axes = [
+        axis_operator(
+            Boxcar(3.5), cell_origin=0, cell_size=1, n_cells=size, pixel_origin=0, pixel_size=3, n_pixels=size // 3
+        )
+        for size in shape
+    ]
+    arrays = {
+        name: resample(*axes, grids.place(xr.DataArray(data, dims=("y", "x")), grid), pixels).data
+        for name, data in (("image", image), ("truth", truth))
+    }
+    places = [(name, index) for index in np.ndindex(arrays["image"].numblocks) for name in arrays]
+    run_on_threads(*tasks_of(arrays, places), lambda *block: None, 1)
+    return most
+
+
+def test_what_waits_grows_neither_with_rows_nor_with_columns():
+    """A few of the chunk that is being used and of its neighbours, never a row of them."""
+    assert chunks_at_once(40, 20) == chunks_at_once(10, 20) == chunks_at_once(10, 5) <= 3
+
+
+def test_blocks_are_delivered_as_they_are_wanted():
+    array, found = means(96, 17), []
+    backwards = wanted(array)[::-1]
+    run_on_threads(*tasks_of({"means": array}, backwards), lambda name, index, block: found.append((name, index)), 2)
+    assert found == backwards
+
+
+def test_what_two_arrays_need_is_made_once():
+    made = []
+
+    def source(block):
+        made.append(block.shape)
+        return block + 1
+
+    common = da.ones((20, 20), chunks=10).map_blocks(source, dtype=float, meta=np.empty((0, 0)))
+    arrays = {"more": common + 1, "less": common - 1}
+    places = [(name, index) for index in np.ndindex(common.numblocks) for name in arrays]
+    run_on_threads(*tasks_of(arrays, places), lambda *block: None, 2)
+    assert len(made) == common.npartitions
+
+
+def test_nothing_wanted_is_nothing_done():
+    run_on_threads(*tasks_of({"means": means(96, 17)}, []), lambda *block: pytest.fail("not wanted"), 2)
 
 
 def test_an_error_of_a_task_is_raised_as_it_is():
@@ -90,4 +124,4 @@ def test_an_error_of_a_task_is_raised_as_it_is():
 
     array = da.ones((4, 4), chunks=2).map_blocks(broken, dtype=float, meta=np.empty((0, 0)))
     with pytest.raises(OSError, match="no such cells"):
-        run_on_threads(*ordered_blocks({"a": array}, wanted(array, "a")), lambda *block: None, 2)
+        run_on_threads(*tasks_of({"a": array}, wanted(array, "a")), lambda *block: None, 2)
