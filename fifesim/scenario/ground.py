@@ -10,8 +10,8 @@ from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, spectrum_names
+from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
 from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.ground.landscape.field import LARGEST_STREAMING_ARP
 from fifesim.scenario.section import Section, number, text
 
 _BY_BAND = ("leaf_reflectance", "leaf_transmittance")

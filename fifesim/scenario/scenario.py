@@ -8,7 +8,7 @@ from pydantic import Field, field_validator, model_validator
 
 from fifesim.atmosphere.air import aerosols, models
 from fifesim.base import geometry
-from fifesim.ground.terrain.spline import metres_per_unit
+from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.rasters import grid as grids
 from fifesim.rasters import warp
 from fifesim.scenario.ground import Ground
