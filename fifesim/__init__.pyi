@@ -17,8 +17,8 @@ from .ground.landscape.raster import lai_scene as lai_scene
 from .ground.landscape.raster import open_lai as open_lai
 from .ground.landscape.distribution import lai_distribution as lai_distribution
 from .ground.landscape.distribution import treatments as treatments
-from .ground.landscape.field import correlation_length as correlation_length
-from .ground.landscape.field import arp_for_length as arp_for_length
+from .ground.landscape.autoregression import correlation_length as correlation_length
+from .ground.landscape.autoregression import arp_for_length as arp_for_length
 from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
 from .chain.steps import surface_reflectance as surface_reflectance  # method

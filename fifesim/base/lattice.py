@@ -1,8 +1,68 @@
-"""Fixed tiles of an unbounded lattice: what is made by the tile is the same in every window and chunk."""
+"""
+An unbounded lattice of cells, counted from the origin of a coordinate reference system, and fixed tiles of it.
+
+Coordinates counted from that origin are the same to the bit in a window and in the whole; summed from each grid's own
+they differ by 1e-10 m, and xarray aligns exactly. What is made by the tile is the same in every window and chunk.
+"""
 
 from functools import lru_cache
 
 import numpy as np
+
+# What is left over beside whole cells is rounded to this many decimals of a metre.
+_DECIMALS = 6
+
+
+def whole_cells(origin, cell):
+    """
+    Whole cells from the origin of the reference system to the edge of a grid.
+
+    Parameters
+    ----------
+    origin : float
+        Edge of the grid. [m]
+    cell : float
+        Negative along rows that count southward. [m]
+
+    Returns
+    -------
+    index : int
+    offset : float
+        What is left over. [m]
+
+    Examples
+    --------
+    >>> whole_cells(100.5, 10.0), whole_cells(100.5, -10.0)
+    ((10, 0.5), (-11, -9.5))
+    """
+    # The floor, not the nearest: halves rounded to even would move a window of a lattice at half cells by two cells.
+    index = int(np.floor(origin / cell + 1e-6))
+    return index, round(origin - index * cell, _DECIMALS)
+
+
+def centres(origin, cell, cells):
+    """
+    Coordinates of the centres of cells.
+
+    Parameters
+    ----------
+    origin, cell : float
+        As in `whole_cells`. [m]
+    cells : array of int
+        Counted from the edge of the grid; they may lie outside of it.
+
+    Returns
+    -------
+    centres : array, shape of cells
+        [m]
+
+    Examples
+    --------
+    >>> centres(100.5, 10.0, np.array([0, 3])).tolist()
+    [105.5, 135.5]
+    """
+    index, offset = whole_cells(origin, cell)
+    return (index + cells + 0.5) * cell + offset
 
 
 def assemble(make_tile, tile, row, column, shape):

@@ -87,11 +87,28 @@ def tiles(kernel, grid, chunks=None, *, tile):
     """
     if chunks is None:
         return grids.place(xr.DataArray(kernel(0, 0, tuple(grid.shape)), dims=("y", "x")), grid)
-    sizes = _tile_chunks(grid, tile) if chunks == "auto" else _chunk_tuple(chunks)
-    normal = da.core.normalize_chunks(sizes, shape=tuple(grid.shape), dtype=float)
+    normal = chunk_sizes(grid, chunks, tile=tile)
     lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal)), dims=("y", "x"))
     # xarray would take over dask's name.
     return grids.place(lazy.rename(None), grid)
+
+
+def chunk_sizes(grid, chunks, *, tile):
+    """
+    Sizes of the chunks of an array on a grid.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+    chunks, tile
+        As in `tiles`.
+
+    Returns
+    -------
+    rows, columns : tuple of int
+    """
+    sizes = _tile_chunks(grid, tile) if chunks == "auto" else _chunk_tuple(chunks)
+    return da.core.normalize_chunks(sizes, shape=tuple(grid.shape), dtype=float)
 
 
 def located(kernel, array):

@@ -9,10 +9,7 @@ from affine import Affine
 from odc.geo.geobox import GeoBox
 from odc.geo.xr import xr_coords
 
-# A grid's origin is a whole number of cells from the origin of its CRS, plus an offset rounded to this many decimals
-# of a metre. Coordinates counted from the CRS origin are the same to the bit in a window and in the whole; summed from
-# each grid's own origin they differ by 1e-10 m, and xarray aligns exactly.
-_DECIMALS = 6
+from fifesim.base.lattice import centres, whole_cells
 
 
 def grid_at(crs, west, north, width, height, cell):
@@ -136,9 +133,9 @@ def coordinates(grid):
         ``y``, ``x`` [m] and ``spatial_ref`` with a GeoTransform that fits.
     """
     a = grid.affine
-    centres = {"y": _centres(a.f, a.e, grid.shape.y), "x": _centres(a.c, a.a, grid.shape.x)}
+    places = {"y": centres(a.f, a.e, np.arange(grid.shape.y)), "x": centres(a.c, a.a, np.arange(grid.shape.x))}
     out = {}
-    for axis, values in centres.items():
+    for axis, values in places.items():
         attrs = {
             "standard_name": f"projection_{axis}_coordinate",
             "long_name": f"{axis} coordinate of projection",
@@ -230,7 +227,7 @@ def lattice_position(grid):
     row, column : int
     """
     a = grid.affine
-    return _lattice(a.f, a.e)[0], _lattice(a.c, a.a)[0]
+    return whole_cells(a.f, a.e)[0], whole_cells(a.c, a.a)[0]
 
 
 def lattice_offset(one, other):
@@ -352,22 +349,10 @@ def transform_points(affine, columns, rows):
     )
 
 
-def _lattice(origin, cell):
-    """Whole cells from the origin of the CRS, and what is left over [m]."""
-    # The floor, not the nearest: halves rounded to even would move a window of a lattice at half cells by two cells.
-    index = int(np.floor(origin / cell + 1e-6))
-    return index, round(origin - index * cell, _DECIMALS)
-
-
-def _centres(origin, cell, size):
-    index, offset = _lattice(origin, cell)
-    return (index + np.arange(size) + 0.5) * cell + offset
-
-
 def _snapped(grid):
     """The grid with its origin on the lattice, and its CRS by authority where that says the same."""
     a = grid.affine
-    (column, x_offset), (row, y_offset) = _lattice(a.c, a.a), _lattice(a.f, a.e)
+    (column, x_offset), (row, y_offset) = whole_cells(a.c, a.a), whole_cells(a.f, a.e)
     west, north = column * a.a + x_offset, row * a.e + y_offset
     crs = f"EPSG:{grid.crs.epsg}" if grid.crs and grid.crs.epsg else grid.crs
     return GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), crs)

@@ -9,9 +9,9 @@ from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, spectrum_names
+from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
 from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.ground.landscape.field import LARGEST_STREAMING_ARP
-from fifesim.ground.terrain.spline import metres_per_unit
+from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.scenario.keys import AirKeys, GroundKeys, SensorKeys, TerrainKeys
 from fifesim.scenario.section import nearest
 from fifesim.sensor.description.instruments import instrument

@@ -9,7 +9,8 @@ import fifesim
 from fifesim.analysis import variogram as kernels
 from fifesim.analysis.rasters import lags as variogram_raster
 from fifesim.base import footprints
-from fifesim.ground.landscape import field as random_field
+from fifesim.ground.landscape import autoregression
+from fifesim.ground.landscape.field import streaming_field
 
 CELL = 30 / 9
 RNG = np.random.default_rng(11)
@@ -58,7 +59,7 @@ def gaussian():
     """An autoregressive field of unit variance at arp 0.24, whose covariance is known: 1.4 km square."""
     grid = fifesim.fife_site(CELL, window=((0, 420), (0, 420)))
     lai = fifesim.lai_scene(grid, arp=0.24, seed=5)
-    return lai.copy(data=random_field.streaming_field(5, 0.24, 0, 0, (420, 420)))
+    return lai.copy(data=streaming_field(5, 0.24, 0, 0, (420, 420)))
 
 
 def test_variogram_of_the_autoregressive_field_is_the_analytic_one(gaussian):
@@ -69,17 +70,17 @@ def test_variogram_of_the_autoregressive_field_is_the_analytic_one(gaussian):
     cells over all lags here, so sqrt(2 x 60 / 176400) = 0.026; four of it.
     """
     found = fifesim.variogram(gaussian, 40.0)
-    expected = random_field.autocorrelation(0.24, np.arange(found.sizes["lag"]))
+    expected = autoregression.autocorrelation(0.24, np.arange(found.sizes["lag"]))
     np.testing.assert_allclose(found["correlation"], np.broadcast_to(expected, (2, expected.size)), atol=0.1)
     assert found.attrs["variance"] == pytest.approx(1, abs=0.1)
-    np.testing.assert_allclose(found["practical_range"], random_field.correlation_length(0.24, CELL), rtol=0.25)
+    np.testing.assert_allclose(found["practical_range"], autoregression.correlation_length(0.24, CELL), rtol=0.25)
     np.testing.assert_allclose(found["semivariance"], found.attrs["variance"] * (1 - found["correlation"]), atol=0.03)
 
 
 def exact_covariance(arp, reach):
     """Covariance map of the process, from its spectrum on a torus 40 decay lengths around."""
     u = 2 * np.pi * np.fft.fftfreq(1024)
-    spectrum = random_field.response(arp, u[:, None], u[None, :]) ** 2
+    spectrum = autoregression.response(arp, u[:, None], u[None, :]) ** 2
     covariance = np.fft.ifft2(spectrum).real
     covariance /= covariance[0, 0]
     lags = np.arange(-reach, reach + 1)
@@ -94,7 +95,7 @@ def test_means_of_blocks_keep_what_the_spectrum_says(arp):
     variance = kernels.footprint_variance(exact_covariance(arp, 8), products, products)
     u = 2 * np.pi * np.fft.fftfreq(1024)
     transfer = np.abs(np.exp(1j * np.outer(u, np.arange(9))).mean(axis=1)) ** 2
-    spectrum = random_field.response(arp, u[:, None], u[None, :]) ** 2
+    spectrum = autoregression.response(arp, u[:, None], u[None, :]) ** 2
     assert variance == pytest.approx(np.sum(spectrum * np.outer(transfer, transfer)) / spectrum.sum(), rel=1e-10)
 
 

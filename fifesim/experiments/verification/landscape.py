@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from fifesim.experiments.verification.deviations import Deviation, largest
-from fifesim.ground.landscape.field import autocorrelation, field_variance, periodic_field, streaming_field
+from fifesim.ground.landscape.autoregression import autocorrelation, field_variance
+from fifesim.ground.landscape.field import periodic_field, streaming_field
 
 _deviation = partial(Deviation, "random field")
 

@@ -48,10 +48,11 @@ def exponential_chain(lai, *rates):
     >>> float(exponential_chain(3.0, 0.0, 0.0, 0.0))
     4.5
     """
-    lai, *rates = np.broadcast_arrays(np.asarray(lai, float), *rates)
-    chains = np.empty(lai.size)
-    _chains(lai.ravel(), np.stack([rate.ravel() for rate in rates], dtype=float), chains)
-    return chains.reshape(lai.shape)[()]
+    given = np.broadcast_arrays(lai, *rates)
+    flat = np.stack([each.ravel() for each in given], dtype=float)
+    chains = np.empty(flat.shape[1])
+    _chains(flat[0], flat[1:], chains)
+    return chains.reshape(given[0].shape)[()]
 
 
 @numba.njit(nogil=True, cache=True)

@@ -7,8 +7,9 @@ import xarray as xr
 
 from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.optics import check_lai
-from fifesim.ground.landscape import field as random_field
+from fifesim.ground.landscape.autoregression import check_arp
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
+from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
 from fifesim.rasters import cf, warp
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -59,7 +60,7 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     fifesim.ground.landscape.field.streaming_field, fifesim.ground.landscape.distribution.lai_distribution
     """
     grids.check_grid(grid)
-    random_field.check_arp(arp)
+    check_arp(arp)
     seed = check_seed(seed)
     density = lai_distribution(distribution)
     if method not in FIELD_METHODS:
@@ -112,12 +113,12 @@ def _streaming_scene(grid, density, arp, seed, chunks):
     table = quantile_table(density)
 
     def cells(first_row, first_column, shape):
-        field = random_field.streaming_field(seed, arp, row + first_row, column + first_column, shape)
+        field = streaming_field(seed, arp, row + first_row, column + first_column, shape)
         return quantile_map(field, table)
 
     # A first window raises what streaming_field refuses before anything lazy is built.
     cells(0, 0, (0, 0))
-    return chunking.tiles(cells, grid, chunks, tile=random_field.TILE)
+    return chunking.tiles(cells, grid, chunks, tile=TILE)
 
 
 def _periodic_scene(grid, density, arp, seed, chunks):
@@ -128,7 +129,7 @@ def _periodic_scene(grid, density, arp, seed, chunks):
             f"a periodic field of {grid.shape.y} x {grid.shape.x} cells needs {needed / 1e9:.1f} GB of memory, "
             f'{free / 1e9:.1f} GB are free: use method="streaming", which needs no more for a larger scene'
         )
-    field = xr.DataArray(rank_map(random_field.periodic_field(seed, arp, tuple(grid.shape)), density), dims=("y", "x"))
+    field = xr.DataArray(rank_map(periodic_field(seed, arp, tuple(grid.shape)), density), dims=("y", "x"))
     return grids.place(field if chunks is None else field.chunk(chunks), grid)
 
 

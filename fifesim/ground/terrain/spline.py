@@ -8,59 +8,17 @@ a margin of `MARGIN` cells makes it a local operation.
 
 import numba
 import numpy as np
-from scipy import ndimage, sparse
-from scipy.sparse import linalg
+from scipy import ndimage
+
+from fifesim.base.lattice import assemble
 
 # Quintic: a wave of five cells is recovered within 5e-4 of its amplitude, by degree 3 within 3e-3. The larger pole of
 # the prefilter is -0.4306.
 DEGREE = 5
 MARGIN = 32
 
-# Metres in one unit of elevation, by the names that files use. NIST SP 811, App. B.8: the two feet differ by 2e-6.
-METRES = {"m": 1.0, "ft": 0.3048, "us-ft": 1200.0 / 3937.0, "km": 1000.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
-_NAMES = {
-    "m": ("metre", "metres", "meter", "meters"),
-    "ft": ("foot", "feet", "international foot", "foot (international)"),
-    "us-ft": ("us survey foot", "us survey feet", "survey foot", "ftus", "us_survey_foot", "foot_us", "us foot"),
-    "km": ("kilometre", "kilometer"),
-    "dm": ("decimetre", "decimeter"),
-    "cm": ("centimetre", "centimeter"),
-    "mm": ("millimetre", "millimeter"),
-}
-
-# Above this share of neighbours that are equal, whole numbers are terraces: their risers show in slope and aspect.
-TERRACES = 0.25
-
-
-def metres_per_unit(name):
-    """
-    Metres in a unit of elevation.
-
-    Parameters
-    ----------
-    name : str
-        As files and coordinate reference systems spell it, such as ``"ft"`` or ``"US survey foot"``.
-
-    Returns
-    -------
-    metres : float
-        [m]
-
-    Raises
-    ------
-    ValueError
-        If the unit is not known.
-
-    Examples
-    --------
-    >>> metres_per_unit("Foot")
-    0.3048
-    """
-    plain = str(name).strip().lower()
-    for unit, metres in METRES.items():
-        if plain == unit or plain in _NAMES.get(unit, ()):
-            return metres
-    raise ValueError(f"vertical units must be one of {', '.join(METRES)}, got {name!r}")
+# Lattice cells around positions that hold all that a spline there is made of, and more.
+REACH = 8
 
 
 def spline_coefficients(values):
@@ -161,164 +119,22 @@ def spline_points(coefficients, rows, columns):
     return out
 
 
-def extend(values, rings, rest=True):
+def spline_of_tiles(make_tile, tile, rows, columns):
     """
-    Carry a surface past its edge, ring by ring of cells, along the lines and diagonals that lead out of it.
-
-    A plane goes on as a plane.
+    Values on a grid of a spline without end, whose coefficients are made in fixed tiles of its lattice.
 
     Parameters
     ----------
-    values : array, shape (rows, columns)
-        NaN where unknown.
-    rings : int
-    rest : bool, optional
-        What lies farther out takes the mean of all values: past `MARGIN` rings nothing depends on it.
+    make_tile, tile
+        As `fifesim.base.lattice.assemble` takes them.
+    rows, columns : array, shape (rows,), (columns,)
+        Rising positions on the lattice. [lattice cell]
 
     Returns
     -------
     values : array, shape (rows, columns)
-        Without NaN, unless all is or the rest is left.
+        The same in every window.
     """
-    known = np.isfinite(values)
-    if known.all() or not known.any():
-        return values
-    rows, columns = values.shape
-    padded = np.pad(values, 2, constant_values=np.nan)
-    steps = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
-
-    def shifted(down, across):
-        return padded[2 + down : 2 + down + rows, 2 + across : 2 + across + columns]
-
-    for _ in range(rings):
-        total, count = np.zeros(values.shape), np.zeros(values.shape)
-        for down, across in steps:
-            line = 2 * shifted(down, across) - shifted(2 * down, 2 * across)
-            found = np.isfinite(line)
-            total += np.where(found, line, 0.0)
-            count += found
-        inside = padded[2:-2, 2:-2]
-        new = ~np.isfinite(inside) & (count > 0)
-        if not new.any():
-            break
-        inside[new] = total[new] / count[new]
-    filled = padded[2:-2, 2:-2]
-    return np.where(np.isfinite(filled), filled, values[known].mean()) if rest else filled
-
-
-def fill_gaps(values, distance):
-    """
-    Fill holes by the surface of least bending, and carry the surface on past its edge. A plane stays a plane.
-
-    Parameters
-    ----------
-    values : array, shape (rows, columns)
-        NaN where unknown. What touches the border is no hole but past the edge.
-    distance : (float, float)
-        From known values, down and across. Holes up to twice as tall and wide are filled. [cell]
-
-    Returns
-    -------
-    values : array, shape (rows, columns)
-        NaN farther from known values, and in larger holes but for their edge.
-    """
-    unknown = np.isnan(values)
-    if unknown.all() or not unknown.any():
-        return values
-    tall, wide = (2 * size + 1 for size in distance)
-    labels, _ = ndimage.label(unknown, structure=np.ones((3, 3)))
-    out = values.copy()
-    for number, (down, across) in enumerate(ndimage.find_objects(labels), start=1):
-        inside = min(down.start, across.start) > 0 and down.stop < values.shape[0] and across.stop < values.shape[1]
-        if inside and down.stop - down.start <= tall and across.stop - across.start <= wide:
-            around = tuple(slice(max(part.start - 4, 0), part.stop + 4) for part in (down, across))
-            hole = labels[around] == number
-            out[around][hole] = _least_bending(values[around], hole)
-    near = ndimage.distance_transform_edt(unknown, sampling=[1 / size for size in distance]) <= 1
-    carried = extend(values, int(np.ceil(max(distance))), rest=False)
-    return np.where(np.isnan(out) & near, carried, out)
-
-
-def _least_bending(values, hole):
-    """Values in a hole that make the sum of squared second differences least; other unknown cells take no part."""
-    rows, columns = values.shape
-    index = np.arange(values.size).reshape(values.shape)
-    triples = [
-        (index[:, :-2], index[:, 1:-1], index[:, 2:], 1.0),
-        (index[:-2], index[1:-1], index[2:], 1.0),
-    ]
-    lines = [np.stack([a.ravel(), b.ravel(), c.ravel()]) for a, b, c, _ in triples]
-    first, middle, last = np.concatenate(lines, axis=1)
-    usable = np.isfinite(values).ravel() | hole.ravel()
-    keep = usable[first] & usable[middle] & usable[last]
-    first, middle, last = first[keep], middle[keep], last[keep]
-    number = np.arange(first.size)
-    second = sparse.csr_array(
-        (
-            np.repeat([1.0, -2.0, 1.0], first.size),
-            (np.tile(number, 3), np.concatenate([first, middle, last])),
-        ),
-        shape=(first.size, rows * columns),
-    )
-    corners = (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:])
-    flat = [corner.ravel() for corner in corners]
-    keep = np.logical_and.reduce([usable[corner] for corner in flat])
-    flat = [corner[keep] for corner in flat]
-    number = np.arange(keep.sum())
-    # The mixed derivative counts twice in the bending energy.
-    mixed = sparse.csr_array(
-        (
-            np.repeat(np.sqrt(2.0) * np.array([1.0, -1.0, -1.0, 1.0]), number.size),
-            (np.tile(number, 4), np.concatenate(flat)),
-        ),
-        shape=(number.size, rows * columns),
-    )
-    bending = sparse.vstack([second, mixed]).tocsc()
-    unknown = np.flatnonzero(hole)
-    fixed = np.where(hole, 0.0, np.where(np.isfinite(values), values, 0.0)).ravel()
-    inner = bending[:, unknown]
-    return linalg.spsolve((inner.T @ inner).tocsc(), -(inner.T @ (bending @ fixed)))
-
-
-def block_means(values, down, across):
-    """
-    Means of blocks of cells.
-
-    Parameters
-    ----------
-    values : array, shape (rows, columns)
-        Of whole blocks.
-    down, across : int
-        Size of a block. [cell]
-
-    Returns
-    -------
-    means : array, shape (rows / down, columns / across)
-        NaN where a cell of the block is.
-    """
-    rows, columns = values.shape
-    return values.reshape(rows // down, down, columns // across, across).mean(axis=(1, 3))
-
-
-def terrace_step(values):
-    """
-    Vertical resolution of elevations that are whole numbers and lie in terraces.
-
-    Parameters
-    ----------
-    values : array, shape (rows, columns)
-        NaN where unknown.
-
-    Returns
-    -------
-    step : int or None
-        Greatest common divisor of the differences, where more than a quarter of the neighbours are equal and some are
-        not; None for elevations without terraces. [unit of the values]
-    """
-    differences = np.concatenate([np.diff(values, axis=axis).ravel() for axis in (0, 1)])
-    differences = differences[np.isfinite(differences)]
-    known = values[np.isfinite(values)]
-    if not known.size or not differences.any() or np.any(known != np.rint(known)):
-        return None
-    equal = np.mean(differences == 0)
-    return int(np.gcd.reduce(np.abs(differences).astype(np.int64))) if equal > TERRACES else None
+    row, column = int(np.floor(rows[0])) - REACH, int(np.floor(columns[0])) - REACH
+    shape = int(np.floor(rows[-1])) + REACH - row, int(np.floor(columns[-1])) + REACH - column
+    return spline_grid(assemble(make_tile, tile, row, column, shape), rows - row, columns - column)

@@ -7,6 +7,7 @@ from scipy import integrate, stats
 
 import fifesim
 from fifesim.base import datasets
+from fifesim.ground.landscape.autoregression import field_variance, response
 from fifesim.ground.landscape.distribution import (
     kernel_density,
     lai_distribution,
@@ -15,7 +16,6 @@ from fifesim.ground.landscape.distribution import (
     rank_map,
     truncated_normal,
 )
-from fifesim.ground.landscape.field import field_variance, response
 
 SAMPLES = np.random.default_rng(4).gamma(2.0, 0.5, 60)
 ROWS = [pytest.param(row, id=row.treatment) for row in datasets.table("lai_distributions.csv").itertuples()]

@@ -2,21 +2,16 @@
 
 import numpy as np
 import pytest
-from scipy import sparse, special, stats
+from oracles_field import covariances
+from scipy import sparse, stats
 from scipy.sparse.linalg import spsolve
 
 import fifesim
-from fifesim.ground.landscape import field as random_field
-from fifesim.ground.landscape.field import autocorrelation, field_variance, periodic_field, response, streaming_field
+from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, autocorrelation, field_variance, response
+from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
 
 ARPS = [0.05, 0.1, 0.15, 0.2, 0.24]
-SIZE = 4 * random_field.TILE
-
-
-def covariances(arp, size=512):
-    """Covariances by lag on a torus, from the two-dimensional spectrum; the torus is many correlation lengths wide."""
-    u = 2 * np.pi * np.fft.fftfreq(size)
-    return np.fft.ifft2(response(arp, u[:, None], u) ** 2).real
+SIZE = 4 * TILE
 
 
 def standard_error(arp, cells):
@@ -33,17 +28,6 @@ def standard_error(arp, cells):
 @pytest.fixture(scope="module", params=ARPS)
 def arp_and_field(request):
     return request.param, streaming_field(20, request.param, -SIZE // 2, 17, (SIZE, SIZE))
-
-
-@pytest.mark.parametrize("arp", ARPS)
-def test_variance_is_the_integral_of_the_squared_response(arp):
-    assert field_variance(arp) == pytest.approx(covariances(arp)[0, 0], rel=1e-12)
-
-
-@pytest.mark.parametrize("arp", ARPS)
-def test_autocorrelation_is_the_transform_of_the_squared_response(arp):
-    expected = covariances(arp)
-    np.testing.assert_allclose(autocorrelation(arp, np.arange(60)), expected[0, :60] / expected[0, 0], atol=1e-12)
 
 
 def test_field_agrees_with_the_analytic_moments(arp_and_field):
@@ -103,7 +87,7 @@ def test_seams_of_tiles_solve_the_equation(arp):
     cells at arp 0.24. Single precision leaves 3e-7 of the standard deviation rms, 2e-6 at most.
     """
     half, reach = 110, 70
-    first, size = random_field.TILE - half, 2 * half
+    first, size = TILE - half, 2 * half
     noise = streaming_field(11, 0.0, first, -half, (size, size))
     path = sparse.diags_array([np.ones(size - 1)] * 2, offsets=[-1, 1])
     neighbours = sparse.kronsum(path, path)
@@ -114,11 +98,10 @@ def test_seams_of_tiles_solve_the_equation(arp):
     np.testing.assert_allclose(field[inside, inside], solved[inside, inside], rtol=0, atol=2e-6)
 
 
-@pytest.mark.parametrize("arp", [0.15, random_field.LARGEST_STREAMING_ARP])
+@pytest.mark.parametrize("arp", [0.15, LARGEST_STREAMING_ARP])
 def test_window_is_a_slice_of_the_whole(arp):
     """Across tile seams, on both sides of the lattice's origin."""
-    tile = random_field.TILE
-    whole = streaming_field(7, arp, -40, tile - 60, (100, 130))
+    whole = streaming_field(7, arp, -40, TILE - 60, (100, 130))
     for row, column, height, width in [
         (0, 0, 100, 130),
         (39, 59, 3, 3),
@@ -126,7 +109,7 @@ def test_window_is_a_slice_of_the_whole(arp):
         (99, 0, 1, 130),
         (7, 11, 60, 90),
     ]:
-        part = streaming_field(7, arp, row - 40, column + tile - 60, (height, width))
+        part = streaming_field(7, arp, row - 40, column + TILE - 60, (height, width))
         np.testing.assert_array_equal(part, whole[row : row + height, column : column + width])
 
 
@@ -157,30 +140,6 @@ def test_periodic_field_solves_the_equation_on_a_torus(arp):
     np.testing.assert_allclose(field - arp * neighbours, noise, rtol=0, atol=1e-12)
 
 
-def test_correlation_has_fallen_to_5_percent_at_the_correlation_length():
-    """Where the length is a whole number of cells, nothing is interpolated."""
-    for cells in (1, 2, 5, 9, 20):
-        arp = fifesim.arp_for_length(cells)
-        assert autocorrelation(arp, cells) == pytest.approx(0.05, abs=1e-9)
-
-
-@pytest.mark.parametrize("cell", [1.0, 10 / 3])
-def test_length_and_arp_are_inverse(cell):
-    arps = np.array([0.001, 0.05, 0.15, 0.24, 0.249, random_field.LARGEST_STREAMING_ARP])
-    lengths = [fifesim.correlation_length(arp, cell) for arp in arps]
-    assert np.all(np.diff(lengths) > 0)
-    np.testing.assert_allclose([fifesim.arp_for_length(length, cell) for length in lengths], arps, rtol=1e-9)
-    assert fifesim.correlation_length(0.0) == fifesim.arp_for_length(0.0) == 0.0
-
-
-def test_margin_holds_the_response():
-    """What a unit impulse leaves at the margin, by quadrature of the response along a row at the lowest frequency."""
-    for arp in ARPS:
-        cells = random_field.margin(arp)
-        impulse = np.fft.ifft(1 / (1 - 2 * arp * (1 + np.cos(2 * np.pi * np.fft.fftfreq(4096))))).real
-        assert impulse[cells] < 2e-8 * impulse[0]
-
-
 @pytest.mark.parametrize("arp", [-0.01, 0.25, 0.3, np.nan])
 def test_process_that_is_not_stationary_is_refused(arp):
     for call in (
@@ -196,16 +155,3 @@ def test_streaming_stops_before_its_margin_grows_without_bound():
     with pytest.raises(ValueError, match=r"at most 0\.2498.*method=\"periodic\""):
         streaming_field(1, 0.2499, 0, 0, (2, 2))
     assert np.isfinite(periodic_field(1, 0.2499, (50, 50))).all()
-
-
-def test_length_beyond_streaming_is_refused():
-    with pytest.raises(ValueError, match="use larger cells for a longer range"):
-        fifesim.arp_for_length(1e6)
-
-
-def test_variance_of_the_paper_smoothest_field():
-    """k = 0.96: the elliptic integral by its series, to the digits that 400 terms give."""
-    k2, n = 0.96**2, np.arange(400)
-    ratio = np.exp(2 * (special.gammaln(2 * n + 1) - 2 * special.gammaln(n + 1) - 2 * n * np.log(2)))
-    integral = np.pi / 2 * np.sum(ratio * k2**n / (1 - 2 * n))
-    assert field_variance(0.24) == pytest.approx(2 / np.pi * integral / (1 - k2), rel=1e-12)

@@ -6,15 +6,15 @@ import xarray as xr
 from lazy import ODD_CHUNKS, check_place, no_compute
 
 import fifesim
-from fifesim.ground.landscape import field as random_field
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.field import streaming_field
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 
 
 def test_scene_is_the_field_mapped_to_the_distribution(site):
     row, column = grids.lattice_position(site)
-    field = random_field.streaming_field(7, 0.15, row, column, tuple(site.shape))
+    field = streaming_field(7, 0.15, row, column, tuple(site.shape))
     lai = fifesim.lai_scene(site, "unburned-ungrazed", arp=0.15, seed=7)
     table = quantile_table(lai_distribution("unburned-ungrazed"))
     np.testing.assert_array_equal(lai, quantile_map(field, table))

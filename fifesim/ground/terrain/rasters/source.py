@@ -14,7 +14,8 @@ import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
 
-from fifesim.ground.terrain.spline import metres_per_unit
+from fifesim.base.lattice import centres
+from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.rasters import grid as grids
 from fifesim.rasters import warp
 
@@ -200,7 +201,8 @@ class Placement:
         rows, columns : array, shape (m, 1), (1, n) where the two are parallel, else (m, n)
             [source cell]
         """
-        y, x = _centres(self.grid, 0, rows), _centres(self.grid, 1, columns)
+        a = self.grid.affine
+        y, x = centres(a.f, a.e, rows), centres(a.c, a.a, columns)
         if self.parallel:
             inverse = ~self.source.affine
             return (inverse.e * y + inverse.f - 0.5)[:, None], (inverse.a * x + inverse.c - 0.5)[None, :]
@@ -247,14 +249,6 @@ def placement(source, grid):
         If a change of datum has no known accuracy.
     """
     return Placement(source, grid, warp.operation(grid.crs.to_wkt(), source.crs, warp.degrees(grid))[0])
-
-
-def _centres(grid, axis, cells):
-    """Coordinates of cell centres, counted from the origin of the CRS: the same bits in a window and in the whole."""
-    cell = (grid.affine.e, grid.affine.a)[axis]
-    index = grids.lattice_position(grid)[axis]
-    offset = round((grid.affine.f, grid.affine.c)[axis] - index * cell, 6)
-    return (index + np.asarray(cells) + 0.5) * cell + offset
 
 
 def _chebyshev(values):

@@ -1,0 +1,168 @@
+"""Streams that cut into rising ground: drainage down the steepest ways, stream power and hillslope creep."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+
+class StreamPower(NamedTuple):
+    """
+    Law of erosion over one unit of time.
+
+    dz/dt = uplift - erodibility area**area_exponent slope + creep laplacian(z), in m and m2.
+    """
+
+    steps: int
+    area_exponent: float
+    uplift: float
+    creep: float
+    node: float  # distance of nodes [m]
+
+
+@njit(nogil=True, cache=True)
+def erode(start, erodibility, preference, law):
+    """
+    Ground after one unit of time of uplift, stream power and creep; its border stays.
+
+    Parameters
+    ----------
+    start : array, shape (n, n)
+        Ground before. [m]
+    erodibility : array, shape (n, n)
+        For drained areas in m2.
+    preference : array, shape (8, n * n)
+        Factors on the slopes to the neighbours, by which ways down are chosen. [1]
+    law : StreamPower
+
+    Returns
+    -------
+    ground : array, shape (n, n)
+        Stream power is implicit, creep explicit in parts of a step. [m]
+
+    References
+    ----------
+    [Braun2013]_
+    """
+    size, step = start.shape[0], 1.0 / law.steps
+    ground, new, area = start.copy().ravel(), np.empty(size * size), np.empty(size * size)
+    rock, distance = erodibility.ravel(), np.ones(size * size)
+    receiver, order = np.empty(size * size, np.int32), np.empty(size * size, np.int32)
+    # The explicit scheme is stable below a quarter.
+    parts = int(law.creep * step / law.node**2 / 0.2) + 1
+    share = law.creep * step / law.node**2 / parts
+    for _ in range(law.steps):
+        _receivers(ground, preference, size, law.node, receiver, distance)
+        _downstream_first(receiver, order)
+        _drain(receiver, order, law.node**2, area)
+        for k in range(size * size):
+            i = order[k]
+            if receiver[i] != i:
+                factor = step * rock[i] * area[i] ** law.area_exponent / distance[i]
+                ground[i] = (ground[i] + factor * ground[receiver[i]]) / (1.0 + factor)
+        for _ in range(parts):
+            _creep(ground, size, share, law.uplift * step / parts, new)
+            ground, new = new, ground
+    return ground.reshape(size, size)
+
+
+@njit(nogil=True, cache=True)
+def least_ways(cost):
+    """
+    Least cost of a way from each node to the border, over eight neighbours.
+
+    Parameters
+    ----------
+    cost : array, shape (n, n)
+        Of a way of one node. [1]
+
+    Returns
+    -------
+    way : array, shape (n, n)
+        By sweeps until nothing changes. [node]
+    """
+    size = cost.shape[0]
+    way = np.full((size, size), np.inf)
+    way[0] = way[-1] = way[:, 0] = way[:, -1] = 0.0
+    diagonal = np.sqrt(2.0)
+    changed = True
+    while changed:
+        changed = False
+        for sweep in range(4):
+            for i in range(1, size - 1):
+                y = i if sweep < 2 else size - 1 - i
+                for j in range(1, size - 1):
+                    x = j if sweep % 2 == 0 else size - 1 - j
+                    for a in range(-1, 2):
+                        for b in range(-1, 2):
+                            length = diagonal if a * b != 0 else 1.0
+                            through = way[y + a, x + b] + length * 0.5 * (cost[y, x] + cost[y + a, x + b])
+                            if through < way[y, x]:
+                                way[y, x] = through
+                                changed = True
+    return way
+
+
+@njit(nogil=True, cache=True)
+def _receivers(ground, preference, size, node, receiver, distance):
+    """Where each node drains to: the neighbour down the steepest way, some being preferred; itself on the border."""
+    for i in range(size * size):
+        receiver[i] = i
+    for y in range(1, size - 1):
+        for x in range(1, size - 1):
+            i = y * size + x
+            steepest, k = 0.0, 0
+            for a in range(-1, 2):
+                for b in range(-1, 2):
+                    if a == 0 and b == 0:
+                        continue
+                    j = i + a * size + b
+                    length = node * (np.sqrt(2.0) if a * b != 0 else 1.0)
+                    slope = (ground[i] - ground[j]) / length * preference[k, i]
+                    k += 1
+                    if slope > steepest:
+                        steepest = slope
+                        receiver[i], distance[i] = j, length
+
+
+@njit(nogil=True, cache=True)
+def _downstream_first(receiver, order):
+    """Order of nodes in which each comes after the one that it drains to."""
+    child, sibling = np.full(receiver.size, -1), np.empty(receiver.size, np.int64)
+    for i in range(receiver.size):
+        if receiver[i] != i:
+            sibling[i] = child[receiver[i]]
+            child[receiver[i]] = i
+    filled = 0
+    for i in range(receiver.size):
+        if receiver[i] == i:
+            done = filled
+            order[filled] = i
+            filled += 1
+            while done < filled:
+                other = child[order[done]]
+                while other >= 0:
+                    order[filled] = other
+                    filled += 1
+                    other = sibling[other]
+                done += 1
+
+
+@njit(nogil=True, cache=True)
+def _drain(receiver, order, own, area):
+    """Area that drains through each node, its own with it."""
+    area[:] = own
+    for k in range(order.size - 1, -1, -1):
+        i = order[k]
+        if receiver[i] != i:
+            area[receiver[i]] += area[i]
+
+
+@njit(nogil=True, cache=True)
+def _creep(ground, size, share, uplift, new):
+    new[:] = ground
+    for y in range(1, size - 1):
+        for x in range(1, size - 1):
+            i = y * size + x
+            around = ground[i - 1] + ground[i + 1] + ground[i - size] + ground[i + size]
+            new[i] = ground[i] + share * (around - 4.0 * ground[i]) + uplift

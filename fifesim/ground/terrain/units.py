@@ -1,0 +1,73 @@
+"""Units of elevation, and the vertical resolution that whole numbers of them leave."""
+
+import numpy as np
+
+# Metres in one unit of elevation, by the names that files use. NIST SP 811, App. B.8: the two feet differ by 2e-6.
+METRES = {"m": 1.0, "ft": 0.3048, "us-ft": 1200.0 / 3937.0, "km": 1000.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
+_NAMES = {
+    "m": ("metre", "metres", "meter", "meters"),
+    "ft": ("foot", "feet", "international foot", "foot (international)"),
+    "us-ft": ("us survey foot", "us survey feet", "survey foot", "ftus", "us_survey_foot", "foot_us", "us foot"),
+    "km": ("kilometre", "kilometer"),
+    "dm": ("decimetre", "decimeter"),
+    "cm": ("centimetre", "centimeter"),
+    "mm": ("millimetre", "millimeter"),
+}
+
+# Above this share of neighbours that are equal, whole numbers are terraces: their risers show in slope and aspect.
+TERRACES = 0.25
+
+
+def metres_per_unit(name):
+    """
+    Metres in a unit of elevation.
+
+    Parameters
+    ----------
+    name : str
+        As files and coordinate reference systems spell it, such as ``"ft"`` or ``"US survey foot"``.
+
+    Returns
+    -------
+    metres : float
+        [m]
+
+    Raises
+    ------
+    ValueError
+        If the unit is not known.
+
+    Examples
+    --------
+    >>> metres_per_unit("Foot")
+    0.3048
+    """
+    plain = str(name).strip().lower()
+    for unit, metres in METRES.items():
+        if plain == unit or plain in _NAMES.get(unit, ()):
+            return metres
+    raise ValueError(f"vertical units must be one of {', '.join(METRES)}, got {name!r}")
+
+
+def terrace_step(values):
+    """
+    Vertical resolution of elevations that are whole numbers and lie in terraces.
+
+    Parameters
+    ----------
+    values : array, shape (rows, columns)
+        NaN where unknown.
+
+    Returns
+    -------
+    step : int or None
+        Greatest common divisor of the differences, where more than a quarter of the neighbours are equal and some are
+        not; None for elevations without terraces. [unit of the values]
+    """
+    differences = np.concatenate([np.diff(values, axis=axis).ravel() for axis in (0, 1)])
+    differences = differences[np.isfinite(differences)]
+    known = values[np.isfinite(values)]
+    if not known.size or not differences.any() or np.any(known != np.rint(known)):
+        return None
+    equal = np.mean(differences == 0)
+    return int(np.gcd.reduce(np.abs(differences).astype(np.int64))) if equal > TERRACES else None
