@@ -6,7 +6,7 @@ import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 
 BANDS = ["TM3", "TM4"]
 
@@ -44,7 +44,7 @@ def test_reflectance_keeps_its_word(lai_with_hole, swath):
         lai_with_hole,
         quantity="surface_reflectance",
     )
-    assert cf.varying(cf.geometry_of(result)) == ("sza", "vza", "vaa")
+    assert directions.varying(directions.geometry_of(result)) == ("sza", "vza", "vaa")
     np.testing.assert_array_equal(np.isnan(result[0]), np.isnan(lai_with_hole))
 
 
@@ -58,8 +58,8 @@ def test_background_may_be_a_raster_too(lai, swath):
 def test_image_of_a_swath_knows_its_directions(lai, swath):
     toa = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath).fifesim.to_toa()
     image = check_raster_function(lambda array: array.fifesim.sense("TM"), toa, quantity="dn")
-    there = cf.geometry_of(image)
-    assert cf.varying(there) == ("sza", "vza", "vaa")
+    there = directions.geometry_of(image)
+    assert directions.varying(there) == ("sza", "vza", "vaa")
     middle = toa["sza"].values.reshape(5, 9, 6, 9).mean((1, 3))
     np.testing.assert_allclose(there.sza, middle, rtol=1e-12)
     # North lies between 350 and 10 degrees, and a mean of numbers would be in the south.

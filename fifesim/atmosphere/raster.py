@@ -5,7 +5,7 @@ import xarray as xr
 from fifesim.atmosphere.adjacency import raster as adjacency_raster
 from fifesim.atmosphere.schemes import coupling, engines, lookup
 from fifesim.base.geometry import ANGLES
-from fifesim.rasters import cf, chunks
+from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
 
 _REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
@@ -100,7 +100,7 @@ def diffuse_fraction(atmosphere, bands, geometry):
     --------
     fifesim.atmosphere.schemes.lookup.varying_diffuse_fraction
     """
-    if "sza" not in cf.varying(geometry):
+    if "sza" not in directions.varying(geometry):
         return engines.band_terms(atmosphere, tuple(bands), geometry.sza, 0.0, 0.0).diffuse_fraction
 
     def kernel(sza):
@@ -120,13 +120,13 @@ def _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency,
     plain = reflectance.drop_vars(["band", *ANGLES], errors="ignore")
     if adjacency:
         out = _with_adjacency(verb, plain, atmosphere, bands, geometry, elevation, surroundings)
-    elif elevation is None and not cf.varying(geometry):
+    elif elevation is None and not directions.varying(geometry):
         out = _uniform(verb, plain, atmosphere, bands, geometry)
     else:
         out = _varying(verb, plain, atmosphere, bands, geometry, elevation)
     if "band" in reflectance.coords:
         out = out.assign_coords(band=reflectance["band"])
-    out = cf.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)
+    out = directions.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)
     text = f"{verb}: {atmosphere.engine}{' with adjacency' if adjacency else ''}, {atmosphere.text}"
     return cf.label(out, name, source=reflectance, history=text, atmosphere=atmosphere.text, references=_REFERENCE)
 
@@ -155,12 +155,12 @@ def _varying(verb, reflectance, atmosphere, bands, geometry, elevation):
             rho, *places, atmosphere=atmosphere, bands=tuple(bands), to_surface=verb == "to_surface"
         )
 
-    return chunks.pointwise(kernel, reflectance, altitude, *cf.angles(geometry), bands=len(bands))
+    return chunks.pointwise(kernel, reflectance, altitude, *directions.angles(geometry), bands=len(bands))
 
 
 def _with_adjacency(verb, reflectance, atmosphere, bands, geometry, elevation, surroundings):
-    if elevation is not None or cf.varying(geometry):
-        what = "elevation" if elevation is not None else "rasters of " + ", ".join(cf.varying(geometry))
+    if elevation is not None or directions.varying(geometry):
+        what = "elevation" if elevation is not None else "rasters of " + ", ".join(directions.varying(geometry))
         raise ValueError(f"adjacency takes one geometry and one altitude, got {what}: leave one of the two out")
     terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
     if verb == "to_toa":

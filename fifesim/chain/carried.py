@@ -4,7 +4,7 @@ import numpy as np
 
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.base.bands import Band
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.instruments import instrument_names
@@ -66,7 +66,8 @@ def air_bands_and_geometry(array, atmosphere, geometry, instrument):
                 f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
                 f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
             )
-    return atmosphere or carried or Atmosphere(), _responses(array, instrument), cf.given_geometry(geometry, array)
+    geometry = directions.given_geometry(geometry, array)
+    return atmosphere or carried or Atmosphere(), _responses(array, instrument), geometry
 
 
 def _responses(array, instrument):

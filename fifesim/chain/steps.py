@@ -11,7 +11,7 @@ from fifesim.ground.canopy import optics
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.canopy.spectra import Spectrum
 from fifesim.ground.terrain.rasters import light as terrain
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 
@@ -90,7 +90,7 @@ def surface_reflectance(
     if dem is None and horizon is not None:
         raise ValueError("a horizon stands around a dem: give dem= too")
     atmosphere = given_air(atmosphere) or Atmosphere()
-    geometry = cf.given_geometry(geometry, lai)
+    geometry = directions.given_geometry(geometry, lai)
     description = find_instrument(instrument)
     selected = description.select(bands)
     names = [band.name for band in selected]
@@ -113,7 +113,7 @@ def surface_reflectance(
     )
     if dem is None:
         return level
-    geometry = cf.uniform_geometry(geometry, "surface_reflectance on slopes")
+    geometry = directions.uniform_geometry(geometry, "surface_reflectance on slopes")
     terms = engines.band_terms(atmosphere, responses, geometry.sza, geometry.vza, geometry.raa)
     light = _sunlight(terms) | {"geometry": geometry, "horizon": horizon}
     return terrain.terrain_reflectance(level, dem, upwelling=upwelling, **light)
@@ -153,7 +153,7 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
     fifesim.ground.terrain.light.topographic_factor
     """
     atmosphere, bands, geometry = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)
-    geometry = cf.uniform_geometry(geometry, "kt")
+    geometry = directions.uniform_geometry(geometry, "kt")
     terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
     return terrain.kt_on_slopes(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
 

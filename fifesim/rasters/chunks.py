@@ -9,7 +9,7 @@ import xarray as xr
 from dask.base import tokenize
 
 from fifesim.rasters import grid as grids
-from fifesim.rasters.windows import array_by_place, array_from_windows, gather, slices
+from fifesim.rasters.windows import array_from_windows, gather, slices
 
 
 def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
@@ -59,81 +59,6 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     )
     dims = [name for name in ("band", "y", "x") if name in out.dims]
     return out.transpose(*dims, ...)
-
-
-# Edge of an automatic chunk, and tiles along it at most: 8 MB in double precision. [cell]
-_CHUNK = 1008
-_TILES_PER_CHUNK = 2
-
-
-def tiles(kernel, grid, chunks=None, *, tile):
-    """
-    Array of a kernel that makes its cells from their place alone.
-
-    Parameters
-    ----------
-    kernel : callable
-        ``kernel(row, column, (rows, columns))`` gives the cells from a row and column of the grid on.
-    grid : odc.geo.geobox.GeoBox
-    chunks : mapping or int or "auto", optional
-        As xarray takes it, over y and x; "auto" ends chunks where tiles end, so that none is made twice. Without it
-        the whole array is made at once.
-    tile : int
-        Size of the fixed tiles that the kernel works by, counted from the origin of the CRS. [cell]
-
-    Returns
-    -------
-    array : xarray.DataArray, dims (y, x)
-    """
-    if chunks is None:
-        return grids.place(xr.DataArray(kernel(0, 0, tuple(grid.shape)), dims=("y", "x")), grid)
-    normal = chunk_sizes(grid, chunks, tile=tile)
-    lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal)), dims=("y", "x"))
-    # xarray would take over dask's name.
-    return grids.place(lazy.rename(None), grid)
-
-
-def chunk_sizes(grid, chunks, *, tile):
-    """
-    Sizes of the chunks of an array on a grid.
-
-    Parameters
-    ----------
-    grid : odc.geo.geobox.GeoBox
-    chunks, tile
-        As in `tiles`.
-
-    Returns
-    -------
-    rows, columns : tuple of int
-    """
-    sizes = _tile_chunks(grid, tile) if chunks == "auto" else _chunk_tuple(chunks)
-    return da.core.normalize_chunks(sizes, shape=tuple(grid.shape), dtype=float)
-
-
-def located(kernel, array):
-    """
-    Apply a kernel that must know where its block lies.
-
-    Parameters
-    ----------
-    kernel : callable
-        ``kernel(block, starts)`` gives an array like the block, whose first element lies at these indices of the whole.
-    array : xarray.DataArray
-
-    Returns
-    -------
-    array : xarray.DataArray
-        Float, lazy where the input is.
-    """
-
-    def call(block, block_info=None):
-        return kernel(block, tuple(start for start, _ in block_info[0]["array-location"]))
-
-    data = array.data
-    if isinstance(data, da.Array):
-        return array.copy(data=data.map_blocks(call, dtype=float, meta=np.empty((0,) * data.ndim)))
-    return array.copy(data=kernel(data, (0,) * data.ndim))
 
 
 class Reads(NamedTuple):
@@ -316,25 +241,6 @@ def runs(cells, chunks):
     chunk = np.minimum(np.searchsorted(np.cumsum(chunks), cells, side="right"), len(chunks) - 1)
     starts = np.flatnonzero(np.diff(chunk, prepend=-1))
     return tuple(np.diff([*starts, len(chunk)]).tolist())
-
-
-def _tile_chunks(grid, tile):
-    """Chunks of whole tiles, but for the borders of the grid."""
-    step = min(_TILES_PER_CHUNK, max(_CHUNK // tile, 1)) * tile
-    sizes = []
-    for first, size in zip(grids.lattice_position(grid), grid.shape, strict=True):
-        ends = np.arange((first // step + 1) * step, first + size, step) - first
-        sizes.append(tuple(np.diff([0, *ends, size]).tolist()))
-    return tuple(sizes)
-
-
-def _chunk_tuple(chunks):
-    if isinstance(chunks, dict):
-        unknown = set(chunks) - {"y", "x"}
-        if unknown:
-            raise ValueError(f"chunks name the dimensions y and x, got {', '.join(map(str, sorted(unknown)))}")
-        return tuple(-1 if chunks.get(axis) is None else chunks[axis] for axis in ("y", "x"))
-    return (chunks, chunks)
 
 
 def _aligned(arrays):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
-import pyproj
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
@@ -10,6 +9,7 @@ from odc.geo.geobox import GeoBox
 from odc.geo.xr import xr_coords
 
 from fifesim.base.lattice import centres, whole_cells
+from fifesim.rasters import projection
 
 
 def grid_at(crs, west, north, width, height, cell):
@@ -181,7 +181,10 @@ def same_grid(one, other):
     """
     if one.shape != other.shape or one.crs != other.crs:
         return False
-    corners = ([transform_points(grid.affine, *corner) for corner in ((0, 0), grid.shape.xy)] for grid in (one, other))
+    corners = [
+        [projection.transform_points(grid.affine, *corner) for corner in ((0, 0), grid.shape.xy)]
+        for grid in (one, other)
+    ]
     return bool(np.allclose(*corners, rtol=0, atol=1e-3 * min(abs(one.affine.a), abs(one.affine.e))))
 
 
@@ -274,25 +277,6 @@ def cell_size(grid):
     return -grid.affine.e, grid.affine.a
 
 
-def convergence(grid):
-    """
-    Angle from true north to the north of a grid, at its middle; positive where grid north lies east of true north.
-
-    Parameters
-    ----------
-    grid : odc.geo.geobox.GeoBox
-
-    Returns
-    -------
-    angle : float
-        [degree]
-    """
-    crs = pyproj.CRS.from_wkt(grid.crs.to_wkt())
-    x, y = transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)
-    to_degrees = pyproj.Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
-    return float(pyproj.Proj(crs).get_factors(*to_degrees.transform(x, y)).meridian_convergence)
-
-
 def extent(grid):
     """
     Where a grid lies, in words.
@@ -325,27 +309,6 @@ def describe(grid):
     return (
         f"{grid.shape.y} x {grid.shape.x} cells of {-a.e:g} x {a.a:g} m from {a.c:.3f} E {a.f:.3f} N "
         f"in {_crs_name(grid.crs)}"
-    )
-
-
-def transform_points(affine, columns, rows):
-    """
-    Apply an affine transform to many points.
-
-    Parameters
-    ----------
-    affine : affine.Affine
-    columns, rows : array
-        Positions across and down.
-
-    Returns
-    -------
-    x, y : array
-    """
-    columns, rows = np.asarray(columns, float), np.asarray(rows, float)
-    return (
-        affine.a * columns + affine.b * rows + affine.c,
-        affine.d * columns + affine.e * rows + affine.f,
     )
 
 

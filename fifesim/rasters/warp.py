@@ -1,6 +1,5 @@
 """Bring a raster file onto a grid, by an operation between the two CRSs whose accuracy is known."""
 
-import warnings
 from functools import lru_cache, partial
 from pathlib import Path
 from threading import Lock
@@ -14,13 +13,12 @@ from affine import Affine
 from odc.geo.geobox import GeoBox
 from pyproj.aoi import AreaOfInterest
 from pyproj.database import query_utm_crs_info
-from pyproj.transformer import TransformerGroup
 from rasterio.enums import Resampling
 from rasterio.warp import reproject
 
 from fifesim.base.lattice import assemble
-from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters import places, projection
 
 # Cells are made in fixed tiles of this size, so that the warper's rounding is the same under any chunking.
 _TILE = 512
@@ -34,77 +32,6 @@ _ONE_AT_A_TIME = Lock()
 
 # Bilinear interpolation reads one source cell around; an average as many as fit into a target cell.
 _SOURCE_MARGIN = 4
-
-
-def operation(source, target, area=None):
-    """
-    Coordinate operation of known accuracy from one CRS to another.
-
-    Where no direct one is known, the route through WGS 84 is taken if both of its steps are. A change of datum by
-    identity of latitude and longitude (PROJ's "ballpark") never is: between NAD27 and NAD83 it is 30 m off in Kansas.
-
-    Parameters
-    ----------
-    source, target : CRS or str
-        Anything that pyproj takes.
-    area : (float, float, float, float), optional
-        West, south, east, north of the data; picks among regional operations. [degree]
-
-    Returns
-    -------
-    pipeline : str or None
-        PROJ pipeline in the axis order of the two CRSs; None where they are the same.
-    accuracy : float
-        [m]
-
-    Raises
-    ------
-    ValueError
-        If no operation of known accuracy exists.
-
-    Examples
-    --------
-    >>> operation("EPSG:26714", "EPSG:26914", (-96.6, 39.0, -96.5, 39.1))[1]
-    11.0
-    """
-    source, target = pyproj.CRS.from_user_input(source), pyproj.CRS.from_user_input(target)
-    if source.equals(target, ignore_axis_order=True):
-        return None, 0.0
-    direct = _best(source, target, area)
-    if direct:
-        return _pipeline(direct), float(direct.accuracy)
-    wgs84 = pyproj.CRS.from_epsg(4326)
-    steps = _best(source, wgs84, area), _best(wgs84, target, area)
-    if all(steps):
-        return _pipeline(*steps), float(sum(step.accuracy for step in steps))
-    raise ValueError(
-        f"no operation of known accuracy leads from {_name(source)} to {_name(target)}: PROJ would only assume that "
-        "both datums agree ('ballpark'), which can be off by 100 m. Name the datum of the data in its CRS, or install "
-        "PROJ's grid files (projsync), or reproject the data yourself"
-    )
-
-
-def carry(pipeline, source, target, x, y):
-    """
-    Apply a coordinate operation to points.
-
-    Parameters
-    ----------
-    pipeline : str or None
-        From `operation`.
-    source, target : CRS or str
-        The same as there.
-    x, y : array
-        Easting or longitude, northing or latitude.
-
-    Returns
-    -------
-    x, y : array
-    """
-    if pipeline is None:
-        return x, y
-    first, second = pyproj.Transformer.from_pipeline(pipeline).transform(*((y, x) if _north_first(source) else (x, y)))
-    return (second, first) if _north_first(target) else (first, second)
 
 
 def file_onto_grid(path, grid, chunks=None):
@@ -133,9 +60,9 @@ def file_onto_grid(path, grid, chunks=None):
     """
     grids.check_grid(grid)
     with _opened(path) as source:
-        area = degrees(grid)
-        pipeline, _ = operation(source.crs, grid.crs.to_wkt(), area)
-        back, _ = operation(grid.crs.to_wkt(), source.crs, area)
+        area = projection.degrees(grid)
+        pipeline, _ = projection.operation(source.crs, grid.crs.to_wkt(), area)
+        back, _ = projection.operation(grid.crs.to_wkt(), source.crs, area)
         if not _meets(source, grid, back):
             raise ValueError(f"{path} does not overlap the grid, which spans {grids.extent(grid)}")
     # A file that has changed is another file to the cache.
@@ -146,7 +73,7 @@ def file_onto_grid(path, grid, chunks=None):
     def kernel(first_row, first_column, shape):
         return assemble(make_tile, _TILE, row + first_row, column + first_column, shape)
 
-    return chunking.tiles(kernel, grid, chunks, tile=_TILE)
+    return places.tiles(kernel, grid, chunks, tile=_TILE)
 
 
 def covering_grid(path, cell, pixel):
@@ -175,11 +102,11 @@ def covering_grid(path, cell, pixel):
         crs = pyproj.CRS.from_user_input(source.crs)
         outline = [np.linspace(0, size, 17) for size in (source.width, source.height)]
         columns, rows = (values.ravel() for values in np.meshgrid(*outline))
-        x, y = grids.transform_points(source.transform, columns, rows)
+        x, y = projection.transform_points(source.transform, columns, rows)
     if crs.is_geographic:
         target = _utm(crs, x, y)
-        pipeline, _ = operation(crs, target, (x.min(), y.min(), x.max(), y.max()))
-        x, y = carry(pipeline, crs, target, x, y)
+        pipeline, _ = projection.operation(crs, target, (x.min(), y.min(), x.max(), y.max()))
+        x, y = projection.carry(pipeline, crs, target, x, y)
         crs = target
     west, north = np.floor(np.min(x) / pixel) * pixel, np.ceil(np.max(y) / pixel) * pixel
     width, height = np.ceil((np.max(x) - west) / pixel) * pixel, np.ceil((north - np.min(y)) / pixel) * pixel
@@ -207,64 +134,18 @@ def _opened(path):
     return source
 
 
-def _best(source, target, area):
-    with warnings.catch_warnings():
-        # PROJ names a better operation whose grid file is not installed; the accuracy of the one taken is known.
-        warnings.filterwarnings("ignore", "Best transformation is not available")
-        group = TransformerGroup(
-            source, target, area_of_interest=AreaOfInterest(*area) if area else None, allow_ballpark=False
-        )
-    known = [found for found in group.transformers if found.accuracy >= 0]
-    return min(known, key=lambda found: found.accuracy, default=None)
-
-
-def _pipeline(*steps):
-    """One PROJ pipeline of one or two, whose steps meet in WGS 84."""
-    parts = []
-    for step in steps:
-        words = step.definition.split()
-        parts += words[1:] if words[0] == "proj=pipeline" else ["step", *words]
-    return " ".join("+" + word for word in ["proj=pipeline", *parts])
-
-
-def _north_first(crs):
-    """Whether a CRS gives northing or latitude before easting or longitude."""
-    return pyproj.CRS.from_user_input(crs).axis_info[0].direction == "north"
-
-
-def _name(crs):
-    return f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else crs.name
-
-
-def degrees(grid):
-    """
-    Bounds of a grid in degrees, which pick the regional operation; a datum does not matter to that.
-
-    Parameters
-    ----------
-    grid : odc.geo.geobox.GeoBox
-
-    Returns
-    -------
-    area : (float, float, float, float)
-        West, south, east, north. [degree]
-    """
-    to_degrees = pyproj.Transformer.from_crs(grid.crs.to_wkt(), 4326, always_xy=True)
-    return to_degrees.transform_bounds(*grid.boundingbox.bbox)
-
-
 def _source_points(grid, crs, back, source_crs):
     """The outline of a grid, and its middle, in the source's CRS."""
     share = np.linspace(0, 1, 17)
     columns, rows = (values.ravel() for values in np.meshgrid(share * grid.shape.x, share * grid.shape.y))
-    x, y = grids.transform_points(grid.affine, columns, rows)
-    return carry(back, crs, source_crs, x, y)
+    x, y = projection.transform_points(grid.affine, columns, rows)
+    return projection.carry(back, crs, source_crs, x, y)
 
 
 def _source_window(source, grid, back):
     """Window of the file that a grid reads; empty where they do not meet."""
     x, y = _source_points(grid, grid.crs.to_wkt(), back, source.crs)
-    columns, rows = grids.transform_points(~source.transform, x, y)
+    columns, rows = projection.transform_points(~source.transform, x, y)
     around = _SOURCE_MARGIN
     top, bottom = max(int(np.min(rows)) - around, 0), min(int(np.max(rows)) + around + 1, source.height)
     left, right = max(int(np.min(columns)) - around, 0), min(int(np.max(columns)) + around + 1, source.width)
@@ -280,7 +161,7 @@ def _warp_tile(path, state, grid, pipeline, back, tile_row, tile_column):
     """One lattice tile of the file's first band, in its physical unit."""
     row, column = grids.lattice_position(grid)
     a = grid.affine
-    west, north = grids.transform_points(a, tile_column * _TILE - column, tile_row * _TILE - row)
+    west, north = projection.transform_points(a, tile_column * _TILE - column, tile_row * _TILE - row)
     tile = GeoBox((_TILE, _TILE), Affine(a.a, 0.0, west, 0.0, a.e, north), grid.crs)
     out = np.full((_TILE, _TILE), np.nan)
     with rasterio.open(path) as source:
@@ -316,5 +197,5 @@ def _warp_tile(path, state, grid, pipeline, back, tile_row, tile_column):
 def _cells_per_cell(source, grid, back):
     """Source cells in one cell of the grid, down and across."""
     x, y = _source_points(grid, grid.crs.to_wkt(), back, source.crs)
-    columns, rows = grids.transform_points(~source.transform, x, y)
+    columns, rows = projection.transform_points(~source.transform, x, y)
     return np.ptp(rows) / grid.shape.y, np.ptp(columns) / grid.shape.x

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import ANGLES
-from fifesim.rasters import cf, chunks
+from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response import calibration
@@ -80,7 +80,7 @@ def sense(
     fifesim.sensor.response.calibration.radiance_to_dn
     """
     toa, description, bands = by_bands(toa, instrument)
-    geometry = cf.given_geometry(geometry, toa)
+    geometry = directions.given_geometry(geometry, toa)
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
     geometry = directions_on(pixels, geometry)
     scene = toa.drop_vars(ANGLES, errors="ignore")
@@ -88,7 +88,7 @@ def sense(
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
-    image = cf.with_geometry(grids.place(recorded(radiance, description, bands, quantise), pixels), geometry)
+    image = directions.with_geometry(grids.place(recorded(radiance, description, bands, quantise), pixels), geometry)
     return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise))
 
 
@@ -248,14 +248,14 @@ def to_reflectance(image):
     radiance = to_radiance(image) if "gain" in image.coords else image
     cf.check_quantity(radiance, "toa_radiance")
     # The sun alone counts, and a scan's view is an array.
-    geometry = cf.geometry_of(image.drop_vars(["vza", "vaa"], errors="ignore"))
+    geometry = directions.geometry_of(image.drop_vars(["vza", "vaa"], errors="ignore"))
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
     out = chunks.pointwise(
         calibration.radiance_to_reflectance,
         radiance,
         _along_band(image, "solar_irradiance"),
-        cf.mu_s(geometry),
+        directions.mu_s(geometry),
         earth_sun_distance=float(geometry.earth_sun_distance),
     )
     out = _placed_as(out, image)
@@ -292,7 +292,7 @@ def as_radiance(array, bands, geometry):
         calibration.reflectance_to_radiance,
         plain,
         irradiance,
-        cf.mu_s(geometry),
+        directions.mu_s(geometry),
         earth_sun_distance=float(geometry.earth_sun_distance),
     )
 

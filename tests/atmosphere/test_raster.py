@@ -8,7 +8,7 @@ import fifesim
 from fifesim.atmosphere.raster import to_surface, to_toa
 from fifesim.atmosphere.schemes import coupling, engines
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.sensor.description.instruments import instrument
 
 AIR = fifesim.Atmosphere(visibility=23.0)
@@ -40,7 +40,7 @@ def test_to_toa_keeps_its_word_and_equals_the_kernel(ground):
     np.testing.assert_array_equal(np.isnan(result), np.isnan(ground))
     assert result["band"].values.tolist() == ["TM3", "TM4"]
     assert "wavelength" in result.coords
-    assert cf.geometry_of(result) == SUN
+    assert directions.geometry_of(result) == SUN
     assert fifesim.Atmosphere.parse(result.attrs["atmosphere"]) == AIR
 
 

@@ -11,7 +11,7 @@ import fifesim
 from fifesim.atmosphere.raster import to_surface, to_toa
 from fifesim.atmosphere.schemes import lookup
 from fifesim.base.geometry import ANGLES, Geometry
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.sensor.description.instruments import instrument
 
 AIR = fifesim.Atmosphere(visibility=23.0)
@@ -32,7 +32,7 @@ def ramp(ground, low, high):
 
 def by_cell(sza, saa, vza, vaa):
     """Directions of which some are rasters."""
-    return cf.checked_geometry(xr.Dataset({"sza": sza, "saa": saa, "vza": vza, "vaa": vaa}))
+    return directions.checked_geometry(xr.Dataset({"sza": sza, "saa": saa, "vza": vza, "vaa": vaa}))
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def test_swath_keeps_its_word_and_equals_the_table(ground, swath):
     )
     np.testing.assert_array_equal(result, table)
     np.testing.assert_array_equal(result["vza"], swath.vza)
-    assert cf.varying(cf.geometry_of(result)) == ("sza", "vza")
+    assert directions.varying(directions.geometry_of(result)) == ("sza", "vza")
 
 
 def test_angles_may_be_lazy(ground, swath):

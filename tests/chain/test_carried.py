@@ -10,7 +10,7 @@ from lazy import check_raster_function
 import fifesim
 from fifesim.atmosphere.schemes import coupling, engines
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
 
@@ -71,8 +71,8 @@ def test_raster_without_bands_is_refused(site):
 def test_geometry_travels_with_the_raster(lai):
     sun = Geometry(50.0, 140.0, 8.0, 20.0, 1.01)
     image = lai.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun).fifesim.to_toa().fifesim.sense("TM")
-    assert cf.geometry_of(image) == sun
-    assert cf.geometry_of(image.fifesim.ndvi()) == sun
+    assert directions.geometry_of(image) == sun
+    assert directions.geometry_of(image.fifesim.ndvi()) == sun
 
 
 def own_instrument(name, tm3):

@@ -10,7 +10,7 @@ from fifesim.atmosphere.schemes import engines
 from fifesim.base.geometry import Geometry
 from fifesim.chain import steps as chain
 from fifesim.ground.canopy import optics
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
 
@@ -62,7 +62,7 @@ def test_defaults_are_the_paper_case(lai):
     rho = fifesim.surface_reflectance(lai, bands=TM34)
     assert fifesim.Atmosphere.parse(rho.attrs["atmosphere"]) == fifesim.Atmosphere()
     assert fifesim.Atmosphere().visibility == 45.0
-    assert cf.geometry_of(rho) == fifesim.fife_geometry()
+    assert directions.geometry_of(rho) == fifesim.fife_geometry()
     assert rho.attrs["instrument"] == "TM"
     assert fifesim.surface_reflectance(lai).sizes["band"] == 6
 

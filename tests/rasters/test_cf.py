@@ -5,13 +5,9 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from lazy import in_chunks, no_compute
 
 import fifesim
-from fifesim.base.geometry import Geometry
 from fifesim.rasters import cf
-
-SUN = Geometry(sza=28.5, saa=117.0, vza=3.0, vaa=-80.0, earth_sun_distance=1.0147)
 
 
 def raster(**attrs):
@@ -61,18 +57,6 @@ def test_wrong_units_are_named_with_the_right_ones():
         cf.check_units(raster(units="percent"), "toa_reflectance", "toa_radiance")
     with pytest.raises(ValueError, match="'1'"):
         cf.check_units(raster(units="1"), "toa_radiance")
-
-
-def test_directions_travel_as_scalar_coordinates():
-    with no_compute():
-        carried = cf.with_geometry(in_chunks(raster(), {"y": 1}), SUN)
-    assert cf.geometry_of(carried) == SUN
-    assert carried["sza"].attrs == cf.attributes("sza")
-    assert cf.geometry_of(raster()) is None
-
-
-def test_sun_alone_is_a_nadir_view():
-    assert cf.geometry_of(raster().assign_coords(sza=30.0)) == Geometry(30.0, 0.0)
 
 
 def test_numbers_along_band_have_units():

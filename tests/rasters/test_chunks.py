@@ -81,32 +81,6 @@ def test_rasters_seen_under_other_suns_are_refused():
         chunks.pointwise(lambda a, b, c: a, suns[0].drop_vars("sza"), *suns[1:])
 
 
-def places(row, column, shape):
-    """Kernel whose cells tell their place."""
-    return 1000.0 * (row + np.arange(shape[0]))[:, None] + column + np.arange(shape[1])
-
-
-@pytest.mark.parametrize("pieces", [None, "auto", 17, {"y": 5, "x": 8}, {"y": 5}, {"x": -1}, {"y": (30, 6), "x": 45}])
-def test_tiles_are_made_by_their_place(pieces):
-    with no_compute():
-        out = chunks.tiles(places, GRID, pieces, tile=8)
-    assert (out.chunks is None) == (pieces is None)
-    np.testing.assert_array_equal(out, places(0, 0, tuple(GRID.shape)))
-
-
-def test_automatic_chunks_end_where_tiles_end():
-    """Two tiles of 8 cells a chunk; the lattice counts from the origin of the CRS."""
-    out = chunks.tiles(places, GRID, "auto", tile=8)
-    for first, sizes in zip(grids.lattice_position(GRID), out.chunks, strict=True):
-        ends = first + np.cumsum(sizes)[:-1]
-        assert (ends % 16 == 0).all() and len(ends) > 1
-
-
-def test_unknown_dimension_of_chunks_is_named():
-    with pytest.raises(ValueError, match="chunks name the dimensions y and x, got band"):
-        chunks.tiles(places, GRID, {"band": 1}, tile=8)
-
-
 class Seen(NamedTuple):
     """Cells that lie one further down the diagonal for each row of the result."""
 

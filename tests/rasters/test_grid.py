@@ -172,8 +172,3 @@ def test_position_moves_by_as_many_cells_as_the_window(cell):
     for shift in range(1, 6):
         moved = grids.lattice_position(whole[shift:, shift:])
         assert moved == (first[0] + shift, first[1] + shift)
-
-
-def test_convergence_of_a_utm_zone_is_positive_east_of_its_meridian():
-    """Sine of the latitude times the distance from the central meridian."""
-    assert grids.convergence(sites.fife_site(30)) == pytest.approx(np.sin(np.radians(39.06)) * (99 - 96.54), rel=0.01)

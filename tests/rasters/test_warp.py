@@ -11,7 +11,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 import fifesim
 from fifesim.rasters import grid as grids
-from fifesim.rasters import warp
+from fifesim.rasters import projection, warp
 
 FIFE = (-96.63, 38.98, -96.45, 39.13)
 GRID = fifesim.fife_site(10.0, window=((300, 400), (500, 620)))
@@ -51,47 +51,12 @@ def interpolated(path, values, grid, transform):
     return RegularGridInterpolator((rows, columns), values, bounds_error=False)((row, column))
 
 
-def test_nad27_goes_to_nad83_by_a_route_of_known_accuracy():
-    """
-    FIFE's corner by the NADCON grids is 704968 E 4334211 N.
-
-    Two Helmert operations to WGS 84 (EPSG:1173, of metres) stand in for them and are 2 m off at most there.
-    """
-    pipeline, accuracy = warp.operation("EPSG:26714", "EPSG:26914", FIFE)
-    east, north = pyproj.Transformer.from_pipeline(pipeline).transform(705000.0, 4334000.0)
-    assert np.hypot(east - 704968, north - 4334211) < 2.0
-    assert 0 < accuracy <= 15
-
-
-def test_direct_operation_would_be_a_ballpark_a_pixel_off():
-    """Without grid files PROJ's own choice passes latitude and longitude unchanged, and says so nowhere but here."""
-    direct = pyproj.transformer.TransformerGroup(26714, 26914).transformers[0]
-    if "Ballpark" not in direct.description:
-        pytest.skip("PROJ has its grid files here")
-    east, north = direct.transform(705000.0, 4334000.0)
-    assert 25 < np.hypot(east - 704968, north - 4334211) < 35
-    pipeline, _ = warp.operation("EPSG:26714", "EPSG:26914", FIFE)
-    assert "helmert" in pipeline
-
-
-def test_operation_runs_in_both_directions():
-    forth, _ = warp.operation("EPSG:26714", "EPSG:26914", FIFE)
-    back, _ = warp.operation("EPSG:26914", "EPSG:26714", FIFE)
-    there = pyproj.Transformer.from_pipeline(forth).transform(705000.0, 4334000.0)
-    again = pyproj.Transformer.from_pipeline(back).transform(*there)
-    np.testing.assert_allclose(again, (705000.0, 4334000.0), rtol=0, atol=1e-3)
-
-
-def test_same_crs_needs_no_operation():
-    assert warp.operation("EPSG:26914", pyproj.CRS("EPSG:26914").to_wkt()) == (None, 0.0)
-
-
 UNKNOWN = "+proj=utm +zone=14 +ellps=clrk66 +units=m +no_defs"
 
 
 def test_unknown_datum_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"no operation of known accuracy.*EPSG:26914.*ballpark.*projsync"):
-        warp.operation(UNKNOWN, "EPSG:26914", FIFE)
+        projection.operation(UNKNOWN, "EPSG:26914", FIFE)
     path = write(tmp_path / "lai.tif", hills(400, 400), Affine(10, 0, 709000, 0, -10, 4332000), UNKNOWN)
     with pytest.raises(ValueError, match="no operation of known accuracy"):
         fifesim.open_lai(path, GRID)
@@ -106,7 +71,7 @@ def test_degrees_onto_metres_is_bilinear_interpolation(tmp_path, crs):
     """
     path, values = geographic(tmp_path / "lai.tif", crs=crs)
     found = warp.file_onto_grid(path, GRID)
-    pipeline, _ = warp.operation("EPSG:26914", crs, FIFE)
+    pipeline, _ = projection.operation("EPSG:26914", crs, FIFE)
 
     def to_degrees(x, y):
         latitude, longitude = pyproj.Transformer.from_pipeline(pipeline).transform(x, y)
@@ -185,7 +150,7 @@ def test_nad27_file_lands_where_it_belongs(tmp_path):
     values = np.zeros((400, 400))
     values[200:210, 200:210] = 1.0
     path = write(tmp_path / "lai.tif", values, Affine(10, 0, 709000, 0, -10, 4332000), "EPSG:26714")
-    pipeline, _ = warp.operation("EPSG:26714", "EPSG:26914", FIFE)
+    pipeline, _ = projection.operation("EPSG:26714", "EPSG:26914", FIFE)
     east, north = pyproj.Transformer.from_pipeline(pipeline).transform(711050.0, 4329950.0)
     grid = fifesim.grid_at("EPSG:26914", 710700.0, 4330600.0, 800.0, 800.0, 2.0)
     found = warp.file_onto_grid(path, grid)

@@ -9,7 +9,7 @@ from lazy import no_compute
 import fifesim
 from fifesim.base import fife
 from fifesim.base.geometry import Geometry, earth_sun_distance
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import elevation
@@ -201,7 +201,7 @@ def test_scenario_options_reach_their_stages():
     assert "ndvi" not in tree["image"]
     assert image["band"].values.tolist() == ["TM5"]
     assert grids.cell_size(grids.geobox(image)) == (50.0, 50.0)
-    assert cf.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
+    assert directions.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
     assert fifesim.Atmosphere.parse(image.attrs["atmosphere"]).visibility == 23
 
 

@@ -8,7 +8,7 @@ from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_c
 import fifesim
 from fifesim.base.footprints import axis_operator, regularize
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import cf
+from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response import calibration
@@ -22,7 +22,7 @@ def scene(grid, bands=("TM3", "TM4"), **coords):
     """Reflectance at the top of the atmosphere, different in each cell."""
     values = np.random.default_rng(2).uniform(0.02, 0.5, (len(bands), *grid.shape))
     array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": list(bands)} | coords, name="toa_reflectance")
-    return cf.with_geometry(grids.place(array, grid), SUN)
+    return directions.with_geometry(grids.place(array, grid), SUN)
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def test_image_carries_its_calibration(toa):
     assert image["solar_irradiance"].values.tolist() == [band.solar_irradiance for band in RED_NIR]
     assert image.attrs["instrument"] == "TM"
     assert image.attrs["_FillValue"] == 0 and image.attrs["_FillValue"].dtype == image.dtype
-    assert cf.geometry_of(image) == SUN
+    assert directions.geometry_of(image) == SUN
 
 
 def test_pixels_over_a_hole_are_no_data(toa):
@@ -184,7 +184,7 @@ def test_image_without_calibration_is_refused(toa):
 def test_geometry_given_wins(toa):
     low = Geometry(60.0, 120.0)
     image = fifesim.sense(toa, "TM", geometry=low)
-    assert cf.geometry_of(image) == low
+    assert directions.geometry_of(image) == low
     assert image.astype(int).sum() < fifesim.sense(toa, "TM").astype(int).sum()
 
 

@@ -8,7 +8,7 @@ from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import engines
 from fifesim.atmosphere.schemes.terms import on_wavelengths, spectral_nodes
 from fifesim.base.geometry import fife_geometry
-from fifesim.rasters import cf
+from fifesim.rasters import cf, directions
 
 _LONG_NAMES = {
     "path_reflectance": "reflectance of molecules and aerosol over a black ground, without gases",
@@ -51,7 +51,7 @@ def spectrum(atmosphere=None, geometry=None):
     fifesim.atmosphere.schemes.engines.band_terms
     """
     atmosphere = Atmosphere() if atmosphere is None else atmosphere
-    geometry = cf.uniform_geometry(fife_geometry() if geometry is None else geometry, "spectrum")
+    geometry = directions.uniform_geometry(fife_geometry() if geometry is None else geometry, "spectrum")
     for name in ("sza", "vza"):
         engines.check_zenith(name, getattr(geometry, name))
     wavelength = gases.table_wavelengths()
@@ -73,4 +73,4 @@ def spectrum(atmosphere=None, geometry=None):
     each = ("gas", "wavelength"), np.stack(by_gas).reshape(len(gases.GASES), -1)
     found["transmittance_of_gas"] = (*each, {"long_name": "transmittance of each gas, two ways", "units": "1"})
     coords = {"wavelength": ("wavelength", wavelength, cf.attributes("wavelength")), "gas": list(gases.GASES)}
-    return cf.with_geometry(xr.Dataset(found, coords, {"atmosphere": atmosphere.text}), geometry)
+    return directions.with_geometry(xr.Dataset(found, coords, {"atmosphere": atmosphere.text}), geometry)

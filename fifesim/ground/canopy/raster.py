@@ -8,7 +8,7 @@ from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_lai
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
-from fifesim.rasters import cf
+from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 
@@ -87,7 +87,7 @@ def level_reflectance(
     else:
         background = tuple(map(float, background))
         described = ",".join(f"{value:g}" for value in background)
-    if cf.varying(geometry):
+    if directions.varying(geometry):
         out = _in_directions(lai, background, diffuse_fraction, geometry, parameters)
     else:
         parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
@@ -96,7 +96,7 @@ def level_reflectance(
         parameters |= {} if described == "raster" else {"background": background}
         out = chunking.pointwise(_reflectance, *rasters, bands=len(bands), **parameters)
     out = out.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
-    out = cf.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
+    out = directions.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
     return cf.label(
         out,
         "surface_reflectance",
@@ -143,9 +143,9 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     """
     if not 0 < fpar_inf <= 1:
         raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
-    geometry = cf.given_geometry(geometry, lai)
-    if "sza" in cf.varying(geometry):
-        cf.uniform_geometry(geometry, "fpar")
+    geometry = directions.given_geometry(geometry, lai)
+    if "sza" in directions.varying(geometry):
+        directions.uniform_geometry(geometry, "fpar")
     extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))
     _check_scene(lai)
     out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
@@ -179,13 +179,14 @@ def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
         return directional_reflectance(cells, background=ground, diffuse_fraction=sky, **directions, **parameters)
 
     plain = lai.drop_vars(ANGLES, errors="ignore")
-    return chunking.pointwise(kernel, plain, *per_band, *cf.angles(geometry), bands=len(parameters["leaf_reflectance"]))
+    angles, bands = directions.angles(geometry), len(parameters["leaf_reflectance"])
+    return chunking.pointwise(kernel, plain, *per_band, *angles, bands=bands)
 
 
 def _directions(geometry):
     """The zenith angles in words."""
     return ", ".join(
-        f"{name} varying" if name in cf.varying(geometry) else f"{name} {getattr(geometry, name):.2f}"
+        f"{name} varying" if name in directions.varying(geometry) else f"{name} {getattr(geometry, name):.2f}"
         for name in ("sza", "vza")
     )
 

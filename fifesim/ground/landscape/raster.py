@@ -10,7 +10,7 @@ from fifesim.ground.canopy.optics import check_lai
 from fifesim.ground.landscape.autoregression import check_arp
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
 from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
-from fifesim.rasters import cf, warp
+from fifesim.rasters import cf, places, warp
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 
@@ -118,7 +118,7 @@ def _streaming_scene(grid, density, arp, seed, chunks):
 
     # A first window raises what streaming_field refuses before anything lazy is built.
     cells(0, 0, (0, 0))
-    return chunking.tiles(cells, grid, chunks, tile=TILE)
+    return places.tiles(cells, grid, chunks, tile=TILE)
 
 
 def _periodic_scene(grid, density, arp, seed, chunks):

@@ -10,7 +10,7 @@ from fifesim.base.geometry import Geometry
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.raster import level_reflectance
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 
 SUN = Geometry(35.0, 120.0, 10.0, 200.0)
@@ -37,7 +37,7 @@ def test_reflectance_keeps_its_word_and_equals_the_kernel(lai_with_hole):
     assert result.dims == ("band", "y", "x")
     assert result["band"].values.tolist() == BANDS["bands"]
     assert result["wavelength"].values.tolist() == BANDS["wavelengths"]
-    assert cf.geometry_of(result) == SUN
+    assert directions.geometry_of(result) == SUN
     assert result.attrs["arp"] == 0.15
     for band in result:
         np.testing.assert_array_equal(np.isnan(band), np.isnan(lai_with_hole))
@@ -93,7 +93,7 @@ def test_fpar_keeps_its_word_and_equals_the_kernel(lai_with_hole):
 
 
 def test_fpar_takes_the_sun_that_the_raster_carries(lai):
-    carried = fifesim.fpar(cf.with_geometry(lai, SUN))
+    carried = fifesim.fpar(directions.with_geometry(lai, SUN))
     np.testing.assert_array_equal(carried, fifesim.fpar(lai, geometry=SUN))
     np.testing.assert_array_equal(fifesim.fpar(lai), fifesim.fpar(lai, geometry=fifesim.fife_geometry()))
     assert not np.array_equal(carried, fifesim.fpar(lai))

@@ -11,7 +11,8 @@ from fifesim import fife_site
 from fifesim.base.footprints import Boxcar, axis_operator
 from fifesim.output.run.schedule import run_on_threads, tasks_of
 from fifesim.rasters import grid as grids
-from fifesim.rasters.chunks import neighbourhood, tiles
+from fifesim.rasters.chunks import neighbourhood
+from fifesim.rasters.places import tiles
 from fifesim.rasters.regularization import resample
 
 

@@ -9,6 +9,7 @@ from fifesim.ground.terrain.rasters.model import looked_up
 from fifesim.ground.terrain.rasters.source import check_heights
 from fifesim.ground.terrain.units import terrace_step
 from fifesim.rasters import grid as grids
+from fifesim.rasters import projection
 
 # What a model covers is looked at on so many rows and columns of the grid at most, so many rows at a time.
 _LOOKS = 2000
@@ -112,7 +113,7 @@ def _raise_for_gaps(model, grid, unknown, rows, columns):
     if holes:
         tall, wide, part = max(holes, key=lambda hole: max(hole[:2]))
         middle = [int(cells[(axis.start + axis.stop) // 2]) for cells, axis in zip((rows, columns), part, strict=True)]
-        east, north = grids.transform_points(grid.affine, middle[1] + 0.5, middle[0] + 0.5)
+        east, north = projection.transform_points(grid.affine, middle[1] + 0.5, middle[0] + 0.5)
         middle_distance = int(np.ceil(max(tall, wide) / 20 + 1)) * 10
         number = "a hole" if len(holes) == 1 else f"{len(holes)} holes, the largest"
         words.append(

@@ -13,8 +13,7 @@ from odc.geo.geobox import GeoBox
 from fifesim.ground.terrain.rasters.cover import check_cover, known_elevation, warn_of_terraces
 from fifesim.ground.terrain.rasters.model import TILE, model_under
 from fifesim.ground.terrain.rasters.source import placement
-from fifesim.rasters import cf
-from fifesim.rasters import chunks as chunking
+from fifesim.rasters import cf, places
 from fifesim.rasters import grid as grids
 from fifesim.rasters.windows import array_from_windows
 
@@ -64,7 +63,7 @@ def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=Non
     else:
         check_cover(model, grid)
         warn_of_terraces(model, grid)
-        out = chunking.tiles(partial(known_elevation, model, model.tiles()), grid, chunks, tile=TILE)
+        out = places.tiles(partial(known_elevation, model, model.tiles()), grid, chunks, tile=TILE)
     return cf.label(
         out,
         "dem",
@@ -115,7 +114,7 @@ def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None):
 
 def _from_lazy(model, grid, chunks):
     """The elevation of a lazy source: each chunk gets the window of it that its tiles read."""
-    data, sizes = model.source.cells, chunking.chunk_sizes(grid, chunks, tile=TILE)
+    data, sizes = model.source.cells, places.chunk_sizes(grid, chunks, tile=TILE)
     without = model.reading(None)
 
     def ask(rows, columns):

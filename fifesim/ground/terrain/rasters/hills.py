@@ -2,8 +2,7 @@
 
 from fifesim.base.seeds import check_seed
 from fifesim.ground.terrain.flint_hills import elevation
-from fifesim.rasters import cf
-from fifesim.rasters import chunks as chunking
+from fifesim.rasters import cf, places
 from fifesim.rasters import grid as grids
 
 # Chunks of "auto" are of some of these. [cell]
@@ -57,7 +56,7 @@ def flint_hills(grid, seed=0, *, chunks=None):
     def cells(row, column, shape):
         return elevation(seed, northing[row : row + shape[0]], easting[column : column + shape[1]])
 
-    dem = chunking.tiles(cells, grid, chunks, tile=_TILE)
+    dem = places.tiles(cells, grid, chunks, tile=_TILE)
     return cf.label(
         dem,
         "dem",

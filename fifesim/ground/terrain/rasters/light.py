@@ -10,7 +10,7 @@ from fifesim.ground.terrain import sky as skies
 from fifesim.ground.terrain.light import slope_light, slope_reflectance, topographic_factor
 from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid, source_resolution
 from fifesim.ground.terrain.rasters.sky import sky_above
-from fifesim.rasters import cf
+from fifesim.rasters import cf, directions, projection
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.windows import lazy_together
@@ -236,7 +236,7 @@ def _shadow(light):
 
 
 def _sun(dem, geometry):
-    return cf.uniform_geometry(cf.given_geometry(geometry, dem), "a slope's light")
+    return directions.uniform_geometry(directions.given_geometry(geometry, dem), "a slope's light")
 
 
 def _light(dem, horizon, geometry, name, of_light):
@@ -248,7 +248,7 @@ def _light(dem, horizon, geometry, name, of_light):
 
     data = _on_slopes(kernel, dem, horizon, geometry or fife_geometry(), check=geometry is not None)
     out = grids.place(xr.DataArray(data, dims=("y", "x")), grid)
-    out = out if geometry is None else cf.with_geometry(out, geometry)
+    out = out if geometry is None else directions.with_geometry(out, geometry)
     said = name if geometry is None else f"{name}: sza {geometry.sza:.2f}, saa {geometry.saa:.2f}"
     return cf.label(out, name, source=dem, history=said, references=REFERENCE)
 
@@ -257,7 +257,7 @@ def _of_level(kernel, reflectance, dem, geometry, horizon, name, said):
     """A band raster made from level ground's reflectance and the light on its slopes."""
     reflectance = reflectance.transpose("band", "y", "x")
     out = reflectance.copy(data=_on_slopes(kernel, dem, horizon, geometry, reflectance))
-    out = cf.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)
+    out = directions.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)
     return cf.label(out, name, source=reflectance, history=said, references=REFERENCE)
 
 
@@ -286,7 +286,7 @@ def _on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True):
 
 def _from_grid_north(geometry, grid):
     """Directions whose azimuths count from the north of the grid, as aspects and horizons do."""
-    turn = grids.convergence(grid)
+    turn = projection.convergence(grid)
     return replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
 
 

@@ -7,7 +7,7 @@ from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.ground.terrain.light import Sky
-from fifesim.rasters import cf
+from fifesim.rasters import cf, projection
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 
@@ -30,7 +30,7 @@ class Places(NamedTuple):
     def coarse(self):
         """Grid whose cells have the places as centres."""
         down, across = self.cell
-        x, y = grids.transform_points(self.grid.affine, self.columns[0] + 0.5, self.rows[0] + 0.5)
+        x, y = projection.transform_points(self.grid.affine, self.columns[0] + 0.5, self.rows[0] + 0.5)
         affine = Affine(across, 0.0, float(x) - across / 2, 0.0, -down, float(y) + down / 2)
         return GeoBox((self.rows.size, self.columns.size), affine, self.grid.crs)
 

@@ -16,8 +16,7 @@ from affine import Affine
 
 from fifesim.base.lattice import centres
 from fifesim.ground.terrain.units import metres_per_unit
-from fifesim.rasters import grid as grids
-from fifesim.rasters import warp
+from fifesim.rasters import projection
 
 # Positions in another CRS are a polynomial through those at so many Chebyshev nodes along each axis of a tile.
 _NODES = 12
@@ -219,15 +218,15 @@ class Placement:
         down, across : float
             Distance of its rows and of its columns. [m]
         """
-        x, y = grids.transform_points(self.grid.affine, self.grid.shape.x / 2, self.grid.shape.y / 2)
+        x, y = projection.transform_points(self.grid.affine, self.grid.shape.x / 2, self.grid.shape.y / 2)
         step = 10.0
         columns, rows = self._source_cells(np.array([x, x + step, x]), np.array([y, y, y + step]))
         return tuple(float(step / np.hypot(*(axis[1:] - axis[0]))) for axis in (rows, columns))
 
     def _source_cells(self, x, y):
         if self.pipeline is not None:
-            x, y = warp.carry(self.pipeline, self.grid.crs.to_wkt(), self.source.crs, x, y)
-        return grids.transform_points(~self.source.affine, x, y)
+            x, y = projection.carry(self.pipeline, self.grid.crs.to_wkt(), self.source.crs, x, y)
+        return projection.transform_points(~self.source.affine, x, y)
 
 
 def placement(source, grid):
@@ -248,7 +247,7 @@ def placement(source, grid):
     ValueError
         If a change of datum has no known accuracy.
     """
-    return Placement(source, grid, warp.operation(grid.crs.to_wkt(), source.crs, warp.degrees(grid))[0])
+    return Placement(source, grid, projection.operation(grid.crs.to_wkt(), source.crs, projection.degrees(grid))[0])
 
 
 def _chebyshev(values):

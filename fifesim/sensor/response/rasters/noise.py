@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from fifesim.base.seeds import check_seed
-from fifesim.rasters import chunks
+from fifesim.rasters import places
 from fifesim.sensor.response.noise import NoiseModel, add_noise, check_kinds
 
 
@@ -67,7 +67,7 @@ def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
             )
         return out
 
-    return chunks.located(kernel, radiance)
+    return places.located(kernel, radiance)
 
 
 def _model(instrument, band, kinds, given):

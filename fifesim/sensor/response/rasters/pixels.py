@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
 
@@ -228,7 +228,7 @@ def directions_on(pixels, geometry):
         return np.degrees(np.arctan2(mean(np.sin(radians)), mean(np.cos(radians)))) % 360
 
     averaged = {"sza": mean, "vza": mean, "saa": azimuth, "vaa": azimuth}
-    names = cf.varying(geometry)
+    names = directions.varying(geometry)
     if not names:
         return geometry
     kept = {name: geometry[name].variable for name in geometry.data_vars if name not in names}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from fifesim.rasters import cf, chunks
+from fifesim.rasters import cf, chunks, directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled, recorded
 from fifesim.sensor.response.rasters.noise import noisy
@@ -73,8 +73,8 @@ def sense_swath(
     fifesim.sensor.scan.swath.footprint_operator, fifesim.sensor.scan.track
     """
     toa, description, bands = by_bands(toa, instrument)
-    geometry = cf.given_geometry(geometry, toa.drop_vars(["vza", "vaa"], errors="ignore"))
-    geometry = cf.uniform_geometry(geometry, "sense_swath")
+    geometry = directions.given_geometry(geometry, toa.drop_vars(["vza", "vaa"], errors="ignore"))
+    geometry = directions.uniform_geometry(geometry, "sense_swath")
     scene = grids.geobox(toa)
     track = find_track(scene, track, nadir_offset, heading)
     pixels = _pixels(scene, description, bands, track)
@@ -176,7 +176,7 @@ def _block_means(footprints, shape, min_valid, lines, samples, cells):
 
 def _coordinates(scene, pixels, description):
     """Where the pixels lie and whence they are seen, after CF."""
-    x, y = grids.transform_points(scene.affine, pixels.column, pixels.row)
+    x, y = projection.transform_points(scene.affine, pixels.column, pixels.row)
     east, north = scan.view_components(pixels.track, pixels.latitude, pixels.longitude, description.altitude)
     values = {
         "latitude": (pixels.latitude, {"standard_name": "latitude", "units": "degrees_north"}),

@@ -7,8 +7,7 @@ import pyproj
 import xarray as xr
 from scipy.interpolate import RectBivariateSpline
 
-from fifesim.rasters import cf
-from fifesim.rasters import chunks as chunking
+from fifesim.rasters import cf, places, projection
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.scan import track as scan
@@ -67,7 +66,7 @@ def scan_geometry(instrument, grid, track=None, *, nadir_offset=0.0, heading=180
     out = {}
     for name in ("vza", "vaa"):
         kernel = partial(_view, name, grid, track, description.altitude, description.max_angle)
-        array = chunking.tiles(kernel, grid, chunks, tile=_TILE)
+        array = places.tiles(kernel, grid, chunks, tile=_TILE)
         out[name] = cf.label(array, name, history=f"scan_geometry: {description.name}", instrument=description.name)
     return xr.Dataset(out, attrs=attrs)
 
@@ -126,7 +125,7 @@ def degrees(grid, rows, columns):
     latitude, longitude : array
         [degree]
     """
-    x, y = grids.transform_points(grid.affine, columns, rows)
+    x, y = projection.transform_points(grid.affine, columns, rows)
     longitude, latitude = transformer(grid.crs.to_wkt()).transform(x, y)
     return latitude, longitude
 

@@ -13,7 +13,7 @@ from affine import Affine
 from lazy import check_place, no_compute
 
 import fifesim
-from fifesim.rasters import cf, warp
+from fifesim.rasters import cf, projection
 
 # The corner of the largest square of the Kings Creek model, where real terrain would be.
 WEST, NORTH = 708120.0, 4331070.0
@@ -131,8 +131,8 @@ def test_change_of_datum_has_a_known_accuracy(path):
     """
     old = fifesim.grid_at("EPSG:26714", WEST + 30, NORTH - 210, 500, 500, 10.0)
     dem = fifesim.fine_dem(path, old)
-    pipeline, _ = warp.operation("EPSG:26714", CRS, warp.degrees(old))
-    x, y = warp.carry(pipeline, "EPSG:26714", CRS, *np.meshgrid(dem["x"], dem["y"]))
+    pipeline, _ = projection.operation("EPSG:26714", CRS, projection.degrees(old))
+    x, y = projection.carry(pipeline, "EPSG:26714", CRS, *np.meshgrid(dem["x"], dem["y"]))
     np.testing.assert_allclose(dem, surface(x, y), rtol=0, atol=1e-3 * AMPLITUDE)
 
 

@@ -12,6 +12,7 @@ from fifesim.ground.terrain.rasters import light as terrain_raster
 from fifesim.ground.terrain.rasters import sky as sky_raster
 from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
+from fifesim.rasters import projection
 
 SUN = Geometry(70.0, 117.0, 20.0, 40.0)
 LIGHT = {"direct_transmittance": [0.7, 0.8], "transmittance_down": [0.9, 0.95], "geometry": SUN}
@@ -142,7 +143,7 @@ def test_chain_takes_its_light_from_the_atmosphere(lai, dem, level):
     np.testing.assert_allclose(without, level * kt, rtol=1e-12)
     slope, aspect = np.radians(dem.fifesim.slope()), np.radians(dem.fifesim.aspect())
     # Aspect counts from the north of the grid, the view from true north.
-    vza, vaa = np.radians(20.0), np.radians(40.0 - grids.convergence(grids.geobox(lai)))
+    vza, vaa = np.radians(20.0), np.radians(40.0 - projection.convergence(grids.geobox(lai)))
     factor = np.cos(slope) + np.sin(slope) * np.tan(vza) * np.cos(vaa - aspect)
     tilted = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], dem=dem, geometry=SUN)
     np.testing.assert_allclose(tilted, without * factor, rtol=1e-10)
@@ -217,7 +218,7 @@ def test_small_and_coarse_rasters_have_horizons_too():
 def test_the_sun_counts_from_true_north_and_the_slope_from_grid_north():
     """In EPSG:3035 over Portugal grid north lies 12.8 degrees west of true north."""
     grid = fifesim.grid_at("EPSG:3035", 2700000, 1900000, 600, 600, 10)
-    turn = grids.convergence(grid)
+    turn = projection.convergence(grid)
     assert turn == pytest.approx(-12.8, abs=0.6)
     hill = elevation(grid, plane(tuple(grid.shape), 10.0, 10.0, 20.0, 0.0))
     # Straight up the slope, by the grid, stands the sun at the azimuth of the slope and the convergence.

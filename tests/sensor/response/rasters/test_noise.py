@@ -9,7 +9,7 @@ from lazy import check_raster_function
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.performance import Noise
@@ -37,7 +37,7 @@ def uniform(shape=(900, 990), cell=30 / 9, row=0, column=0):
     values = np.broadcast_to(np.array(list(RADIANCE.values()))[:, None, None], (2, *shape))
     array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": list(RADIANCE)})
     array.attrs["units"] = "W m-2 sr-1 um-1"
-    return cf.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
+    return directions.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
 
 
 def test_uniform_scene_shows_the_published_ratio():

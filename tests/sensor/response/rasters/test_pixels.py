@@ -9,7 +9,7 @@ from lazy import check_raster_function
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import cf
+from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.spatial_response import (
@@ -30,7 +30,7 @@ def scene(shape=(180, 198), values=None):
         values = np.random.default_rng(2).uniform(10.0, 90.0, (2, *shape))
     array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": ["TM3", "TM4"]}, name="toa_radiance")
     array.attrs["units"] = "W m-2 sr-1 um-1"
-    return cf.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
+    return directions.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
 
 
 def sensed(array, tm=TM, **options):

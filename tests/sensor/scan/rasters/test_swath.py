@@ -9,7 +9,7 @@ from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import cf
+from fifesim.rasters import cf, directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.performance import Noise, Scan
@@ -25,7 +25,7 @@ def scene(shape=(180, 198), plane=None):
     values = np.random.default_rng(2).uniform(10, 90, shape) if plane is None else plane(x, y)
     array = xr.DataArray(np.stack([values, values + 1]), dims=("band", "y", "x"), coords={"band": ["TM3", "TM4"]})
     array.attrs["units"] = "W m-2 sr-1 um-1"
-    return cf.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
+    return directions.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
 
 
 def test_pixels_lie_where_they_say():
@@ -34,7 +34,7 @@ def test_pixels_lie_where_they_say():
     image = fifesim.sense_swath(plane, TM, quantise=False, **VIEW)
     expected = 0.02 * (image["x"] - 705600) - 0.03 * (image["y"] - 4333900)
     difference = (image.sel(band="TM3") - expected).values
-    x, y = grids.transform_points(~grids.geobox(plane).affine, image["x"], image["y"])
+    x, y = projection.transform_points(~grids.geobox(plane).affine, image["x"], image["y"])
     inside = (x > 9) & (x < 189) & (y > 9) & (y < 171)
     assert inside.mean() > 0.5
     assert np.abs(difference[inside]).max() < np.hypot(0.02, 0.03) * 0.01 * 10 / 3
@@ -50,7 +50,7 @@ def test_pixels_stand_at_the_instruments_interval_and_turn_with_the_track():
     np.testing.assert_allclose(along, 30.315, rtol=4e-3)
     np.testing.assert_allclose(across, 30.315 * float(wider[1]), rtol=5e-3)
     heading = np.degrees(np.arctan2(image["x"].diff("line"), image["y"].diff("line"))) % 360
-    convergence = grids.convergence(grids.geobox(scene()))
+    convergence = projection.convergence(grids.geobox(scene()))
     np.testing.assert_allclose(heading, 193.6 - convergence, rtol=0, atol=0.4)
     # Flying south, the right is the west.
     assert (image["x"].diff("sample") < 0).all()

@@ -1,0 +1,82 @@
+"""Directions travel as coordinates: numbers, or rasters on the cells."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import in_chunks, no_compute
+
+from fifesim.base.geometry import Geometry, fife_geometry
+from fifesim.rasters import cf, directions
+
+SUN = Geometry(sza=28.5, saa=117.0, vza=3.0, vaa=-80.0, earth_sun_distance=1.0147)
+
+
+def raster(**attrs):
+    return xr.DataArray(np.ones((2, 3)), dims=("y", "x"), name="mine", attrs=attrs)
+
+
+def test_directions_travel_as_scalar_coordinates():
+    with no_compute():
+        carried = directions.with_geometry(in_chunks(raster(), {"y": 1}), SUN)
+    assert directions.geometry_of(carried) == SUN
+    assert carried["sza"].attrs == cf.attributes("sza")
+    assert directions.geometry_of(raster()) is None
+
+
+def test_sun_alone_is_a_nadir_view():
+    assert directions.geometry_of(raster().assign_coords(sza=30.0)) == Geometry(30.0, 0.0)
+
+
+def ramp(low, high):
+    """A raster on the cells that grows to the east."""
+    return raster().copy(data=np.broadcast_to(np.linspace(low, high, 3), (2, 3)))
+
+
+@pytest.fixture
+def scan():
+    return xr.Dataset({"sza": 40.0, "saa": 120.0, "vza": ramp(0.0, 30.0), "vaa": 280.0})
+
+
+def test_angles_by_cell_are_a_dataset_and_travel(scan):
+    found = directions.checked_geometry(scan)
+    assert directions.varying(found) == ("vza",) and float(found["earth_sun_distance"]) == 1.0
+    again = directions.geometry_of(directions.with_geometry(raster(), found))
+    xr.testing.assert_equal(again, found)
+    assert again["vza"].attrs["standard_name"] == "sensor_zenith_angle"
+
+
+def test_a_dataset_of_numbers_is_a_geometry():
+    assert directions.checked_geometry(xr.Dataset({"sza": 40.0, "vza": 5.0})) == Geometry(40.0, 0.0, 5.0)
+
+
+def test_given_wins_over_carried_and_that_over_the_papers(scan):
+    carried = directions.with_geometry(raster(), Geometry(30.0, 100.0))
+    assert directions.given_geometry(Geometry(50.0, 90.0), carried) == Geometry(50.0, 90.0)
+    assert directions.given_geometry(None, carried) == Geometry(30.0, 100.0)
+    assert directions.given_geometry(None, raster()) == fife_geometry()
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "said"),
+    [
+        (30.0, TypeError, "must be a fifesim.Geometry, or an xarray.Dataset with sza"),
+        (xr.Dataset({"vza": 5.0}), TypeError, "xarray.Dataset with sza"),
+        (xr.Dataset({"sza": 95.0}), ValueError, "the sun is below the horizon"),
+        (xr.Dataset({"sza": ramp(0.5, 0.6).assign_attrs(units="radian")}), ValueError, "'radian'"),
+    ],
+)
+def test_what_is_no_direction_is_refused(given, kind, said):
+    with pytest.raises(kind, match=said):
+        directions.checked_geometry(given)
+
+
+def test_one_direction_is_asked_for_where_it_is_needed(scan):
+    with pytest.raises(ValueError, match="the test needs one direction of sun and sensor, got rasters of vza"):
+        directions.uniform_geometry(directions.checked_geometry(scan), "the test")
+    assert directions.uniform_geometry(Geometry(30.0, 0.0), "the test") == Geometry(30.0, 0.0)
+
+
+def test_cosine_of_the_sun_is_a_number_or_by_cell():
+    assert directions.mu_s(Geometry(60.0, 0.0)).item() == pytest.approx(0.5, abs=1e-15)
+    by_cell = directions.checked_geometry(xr.Dataset({"sza": ramp(0.0, 60.0)}))
+    np.testing.assert_allclose(directions.mu_s(by_cell)[0, [0, -1]], [1.0, 0.5], atol=1e-15)
