@@ -11,7 +11,8 @@ import argparse
 import numpy as np
 from chain import seconds
 
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.line_spread import Boxcar
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
 
 CELL = 30 / 9

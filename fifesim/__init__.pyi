@@ -58,7 +58,7 @@ from .sensor.raster import to_reflectance as to_reflectance  # method
 from .sensor.description.instruments import instrument as instrument
 from .sensor.description.instruments import instrument_names as instrument_names
 from .sensor.description.instruments import read_instrument as read_instrument
-from .sensor.description.instruments import Instrument as Instrument
+from .sensor.description.instrument_file import Instrument as Instrument
 from .base.bands import Band as Band
 
 # Analysis

@@ -52,6 +52,8 @@ def simulate(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only estimate time, memory and disk.")] = False,
 ):
     """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
+    _check_spelling(scenario)
+
     from fifesim.output.folders import check_folder
     from fifesim.output.run.estimates import describe, estimate
     from fifesim.output.run.folder import scenario_to_resume, simulate_to_folder
@@ -107,6 +109,8 @@ def budget(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
 ):
     """Find where the scatter comes from, stage by stage: budget.csv, budget.png, report.html, scenario.toml."""
+    _check_spelling(scenario)
+
     from fifesim.experiments.scatter.folder import budget_to_folder
     from fifesim.scenario.scenario import read_scenario
 
@@ -170,6 +174,17 @@ def verify():
     typer.echo(summary(found))
     if not all(deviation.within for deviation in found):
         raise typer.Exit(Exit.FAILURE)
+
+
+def _check_spelling(scenario):
+    """A typing error is told before anything slow is imported."""
+    from fifesim.scenario.toml import check_spelling
+
+    try:
+        if scenario is not None:
+            check_spelling(scenario)
+    except ValueError as error:
+        _stop(error, Exit.MISTAKE)
 
 
 @contextmanager

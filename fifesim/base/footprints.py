@@ -1,10 +1,8 @@
 """
 Means of ground cells over the footprints of pixels, for any ratio of sizes and any offset.
 
-A line spread function (lsf) is any object with ``half_width`` [m], outside of which it is zero, and
-``cumulative(x)``, its integral from there up to the distance x [m] from the pixel centre, 0 to 1, as `LineSpread` says.
-The weight of a cell from a to b is then exactly ``cumulative(b) - cumulative(a)``, whatever the shape. The footprint is
-the product of one lsf per axis.
+A footprint is the product of one line spread function per axis. The weight of a cell from a to b is exactly
+``cumulative(b) - cumulative(a)``, whatever the shape.
 """
 
 from dataclasses import dataclass
@@ -16,131 +14,6 @@ from numba import njit
 # Rounding of positions leaves weights of about 1e-16 in cells that only touch the footprint: dropped, because
 # they would pass on NaN and widen the window.
 _DUST = 1e-12
-
-
-class Transfer:
-    """
-    What a part of an instrument leaves of waves on the ground.
-
-    Each kind of part gives the formula, ``_mtf(frequency)``.
-    """
-
-    def mtf(self, frequency):
-        """
-        Modulation transfer function, the Fourier transform of the line spread function.
-
-        Parameters
-        ----------
-        frequency : array
-            Spatial frequency. [cycles m-1]
-
-        Returns
-        -------
-        mtf : array, shape of frequency
-            Factor by which a sinusoid's amplitude is reduced, negative where bright and dark change places. [1]
-        """
-        return self._mtf(np.asarray(frequency, float))
-
-
-class LineSpread(Transfer):
-    """
-    Response of a sensor to a line, by the line's distance from the pixel centre.
-
-    Each shape gives ``half_width``, the distance from the pixel centre beyond which it is zero [m], and two formulas:
-    ``_cumulative(x)``, and its transform ``_mtf(frequency)``.
-    """
-
-    def cumulative(self, x):
-        """
-        Share of the response that lies before a distance from the pixel centre.
-
-        Parameters
-        ----------
-        x : array
-            Distance from the pixel centre. [m]
-
-        Returns
-        -------
-        share : array, shape of x
-            0 before the support, 1 behind it. [1]
-        """
-        return self._cumulative(np.asarray(x, float))
-
-
-@dataclass(frozen=True)
-class FiniteSpread(LineSpread):
-    """
-    Line spread function that ends at half of its width to either side.
-
-    Parameters
-    ----------
-    width : float
-        Width W of the support. [m]
-
-    Raises
-    ------
-    ValueError
-        If the width is not positive.
-    """
-
-    width: float
-
-    def __post_init__(self):
-        check_width(self.width)
-
-    @property
-    def half_width(self):
-        """Half of the width [m]."""
-        return self.width / 2
-
-
-@dataclass(frozen=True)
-class Boxcar(FiniteSpread):
-    r"""
-    Uniform line spread function: with it a footprint is an area and its mean the true one.
-
-    .. math:: C(x) = \frac{1}{2} + \frac{x}{W}, \quad |x| \le \frac{W}{2}; \qquad
-        M(f) = \mathrm{sinc}(f W), \quad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
-
-    Parameters
-    ----------
-    width : float
-        Width W of the support. [m]
-
-    Raises
-    ------
-    ValueError
-        If the width is not positive.
-
-    Examples
-    --------
-    >>> float(Boxcar(30.0).cumulative(-7.5))
-    0.25
-    """
-
-    def _cumulative(self, x):
-        return np.clip(0.5 + x / self.width, 0.0, 1.0)
-
-    def _mtf(self, frequency):
-        return np.sinc(frequency * self.width)
-
-
-def check_width(width):
-    """
-    Refuse a support without a positive width.
-
-    Parameters
-    ----------
-    width : float
-        [m]
-
-    Raises
-    ------
-    ValueError
-        If it is not positive and finite.
-    """
-    if not 0 < width < np.inf:
-        raise ValueError(f"the width of a line spread function must be positive metres, got {width}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +71,7 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
     Parameters
     ----------
     lsf : line spread function
-        As the module describes it, such as `Boxcar`.
+        As `fifesim.base.line_spread` says.
     cell_origin, pixel_origin : float
         Outer edge of the first cell and of the first pixel. [m]
     cell_size, pixel_size : float
@@ -225,6 +98,7 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
     --------
     A pixel of two and a half cells:
 
+    >>> from fifesim.base.line_spread import Boxcar
     >>> operator = axis_operator(Boxcar(5.0), cell_origin=0, cell_size=2, n_cells=5,
     ...                          pixel_origin=0, pixel_size=5, n_pixels=2)
     >>> operator.weights[0].round(3).tolist(), operator.start[0].item()
@@ -301,6 +175,7 @@ def regularize(values, rows, columns, *, min_valid=0.98):
     --------
     A constant scene stays constant, and a pixel that mostly lies outside is missing:
 
+    >>> from fifesim.base.line_spread import Boxcar
     >>> axis = axis_operator(Boxcar(9.0), cell_origin=0, cell_size=3, n_cells=6,
     ...                      pixel_origin=0, pixel_size=9, n_pixels=3)
     >>> regularize(np.full((6, 6), 0.25), axis, axis).round(12)[0].tolist()

@@ -249,8 +249,8 @@ def _aligned(arrays):
     for one, other in combinations(rasters, 2):
         if not grids.same_grid(grids.geobox(one), grids.geobox(other)):
             raise ValueError(
-                f"{one.name!r} and {other.name!r} lie on different grids, {grids.describe(grids.geobox(one))} and "
-                f"{grids.describe(grids.geobox(other))}: bring one onto the other's first"
+                f"{one.name!r} and {other.name!r} lie on different grids, {grids.in_words(grids.geobox(one))} and "
+                f"{grids.in_words(grids.geobox(other))}: bring one onto the other's first"
             )
         for name in set(one.coords) & set(other.coords) - {"spatial_ref"}:
             a, b = one.coords[name], other.coords[name]

@@ -255,8 +255,8 @@ def lattice_offset(one, other):
     rows, columns = (b.f - a.f) / a.e, (b.c - a.c) / a.a
     if one.crs != other.crs or not same_cell or max(abs(rows - round(rows)), abs(columns - round(columns))) > 1e-3:
         raise ValueError(
-            f"the rasters lie on different lattices, {describe(one)} and {describe(other)}: "
-            'bring one onto the other, or use pair="index"'
+            f"the rasters lie on different lattices, {in_words(one)} and {in_words(other)}: "
+            "bring one onto the other first"
         )
     return round(rows), round(columns)
 
@@ -293,7 +293,7 @@ def extent(grid):
     return f"{box.left:.0f} to {box.right:.0f} E and {box.bottom:.0f} to {box.top:.0f} N"
 
 
-def describe(grid):
+def in_words(grid):
     """
     A grid in words, for messages.
 

@@ -4,7 +4,8 @@ import numpy as np
 import xarray as xr
 from dask.base import tokenize
 
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.line_spread import Boxcar
 from fifesim.rasters import chunks
 from fifesim.rasters import grid as grids
 from fifesim.rasters.windows import array_from_windows, slices
@@ -20,7 +21,7 @@ def areas(pixels):
 
     Returns
     -------
-    down, across : fifesim.base.footprints.Boxcar
+    down, across : fifesim.base.line_spread.Boxcar
     """
     down, across = grids.cell_size(pixels)
     return Boxcar(down), Boxcar(across)

@@ -66,7 +66,7 @@ class Scenario(Keys):
         bands = [band.response for band in own.description.select(own.bands)]
         if min(grids.aligned(box, own.size).shape) < 2:
             raise ValueError(
-                f"grid: the image must have 2 x 2 pixels of {own.size:g} m or more, got {grids.describe(box)}"
+                f"grid: the image must have 2 x 2 pixels of {own.size:g} m or more, got {grids.in_words(box)}"
             )
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})

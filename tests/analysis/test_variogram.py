@@ -9,6 +9,7 @@ import fifesim
 from fifesim.analysis import variogram as kernels
 from fifesim.analysis.rasters import lags as variogram_raster
 from fifesim.base import footprints
+from fifesim.base import line_spread as spreads
 from fifesim.ground.landscape import autoregression
 from fifesim.ground.landscape.field import streaming_field
 
@@ -90,7 +91,7 @@ def exact_covariance(arp, reach):
 @pytest.mark.parametrize("arp", [0.05, 0.15, 0.24])
 def test_means_of_blocks_keep_what_the_spectrum_says(arp):
     """The same share by integrating the spectrum times the transfer function of 9 x 9 cells."""
-    axis = operator(footprints.Boxcar(9.0))
+    axis = operator(spreads.Boxcar(9.0))
     products = kernels.weight_correlation(axis, 8)
     variance = kernels.footprint_variance(exact_covariance(arp, 8), products, products)
     u = 2 * np.pi * np.fft.fftfreq(1024)
@@ -107,7 +108,7 @@ def operator(lsf, pixel=9.0):
 
 def test_products_of_weights_are_even_and_sum_to_one():
     """Also of pixels that cut cells, where each has other weights."""
-    products = kernels.weight_correlation(operator(footprints.Boxcar(7.3), 7.3), 12)
+    products = kernels.weight_correlation(operator(spreads.Boxcar(7.3), 7.3), 12)
     np.testing.assert_allclose(products, products[::-1], atol=1e-15)
     assert products.sum() == pytest.approx(1, rel=1e-12)
 

@@ -7,7 +7,8 @@ from lazy import ODD_CHUNKS, in_chunks, no_compute
 from odc.geo.geobox import GeoBox
 
 import fifesim
-from fifesim.base.footprints import Boxcar, regularize
+from fifesim.base.footprints import regularize
+from fifesim.base.line_spread import Boxcar
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, operators, regularized, resample
 

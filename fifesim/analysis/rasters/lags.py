@@ -8,7 +8,7 @@ import xarray as xr
 from fifesim.analysis import variogram as kernels
 from fifesim.analysis.rasters.pairs import check_no_counts, origins
 from fifesim.analysis.rasters.regression import aggregate
-from fifesim.base.footprints import Boxcar
+from fifesim.base.line_spread import Boxcar
 from fifesim.rasters import grid as grids
 from fifesim.rasters.reductions import block_sums, limits
 from fifesim.rasters.regularization import operators

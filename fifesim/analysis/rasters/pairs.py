@@ -81,7 +81,10 @@ def _common_index(y, x):
 def _common_place(y, x):
     """Both cut to the ground that they share."""
     one, two = grids.geobox(y), grids.geobox(x)
-    rows, columns = grids.lattice_offset(one, two)
+    try:
+        rows, columns = grids.lattice_offset(one, two)
+    except ValueError as error:
+        raise ValueError(f'{error}, or use pair="index"') from None
     cut_y, cut_x = {}, {}
     for axis, shift in (("y", rows), ("x", columns)):
         start, stop = max(0, shift), min(y.sizes[axis], shift + x.sizes[axis])

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.line_spread import Boxcar
 
 BLOCK = 60.0  # size of the blocks, as far as whole cells go [m]
 

@@ -9,7 +9,8 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.analysis import indices
 from fifesim.analysis.rasters import regression as analysis
-from fifesim.base.footprints import Boxcar, regularize
+from fifesim.base.footprints import regularize
+from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.ground.canopy import raster as ground

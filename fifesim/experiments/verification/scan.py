@@ -5,8 +5,9 @@ from functools import partial
 import numpy as np
 import pyproj
 
-from fifesim.base.footprints import Boxcar, axis_operator
+from fifesim.base.footprints import axis_operator
 from fifesim.base.geometry import fife_geometry
+from fifesim.base.line_spread import Boxcar
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.performance import EARTH_RADIUS, swath_width

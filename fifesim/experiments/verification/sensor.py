@@ -10,7 +10,8 @@ from scipy.signal import butter, freqs
 from scipy.stats import norm
 
 from fifesim.base.bands import Band, solar_irradiance_steps, solar_spectrum
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.line_spread import Boxcar
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import regularized

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
-from fifesim.base.footprints import Boxcar
+from fifesim.base.line_spread import Boxcar
 from fifesim.sensor.description.axes import TwoAxes
 from fifesim.sensor.description.fields import CONFIG, Count, Number, Positive, Share
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread, TableSpread

@@ -1,7 +1,7 @@
 """
 Line spread functions of sensors (Eq. 3), as `fifesim.base.footprints` takes them.
 
-Here stand the cosine of the paper, the Gaussian and a measured table; `fifesim.base.footprints.Boxcar` is another, and
+Here stand the cosine of the paper, the Gaussian and a measured table; `fifesim.base.line_spread.Boxcar` is another, and
 `fifesim.sensor.response.transfer` makes one of the parts of an instrument. A footprint takes one for its rows, along
 the track, and one for its columns, across the track. Each shape holds its integral C and the transform M of its
 density w.
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import ndtr, spherical_jn
 
-from fifesim.base.footprints import FiniteSpread, LineSpread, check_width
+from fifesim.base.line_spread import FiniteSpread, LineSpread, check_width
 
 # Standard deviations at which a Gaussian is cut: 2e-9 of it lie beyond.
 _GAUSSIAN_REACH = 6.0

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import irfft
 
-from fifesim.base.footprints import LineSpread, Transfer
+from fifesim.base.line_spread import LineSpread, Transfer
 from fifesim.sensor.response.spatial import TableSpread
 
 # Samples of the tabulated response over its equivalent width, and the periods of the transform that are tried, in the
@@ -118,7 +118,7 @@ class SystemSpread(LineSpread):
     ----------
     parts : sequence
         Objects with ``mtf(frequency)``: `Diffraction` or `GaussianSpread` for the optics, `LowPass` for the
-        electronics, `fifesim.base.footprints.Boxcar` for the detector and for the smear of its motion.
+        electronics, `fifesim.base.line_spread.Boxcar` for the detector and for the smear of its motion.
     truncation : float, optional
         Largest share of the response that may be cut off. [1]
 
@@ -233,7 +233,7 @@ def _density(parts, step, samples):
     product = _product(parts, frequency)
     if abs(product[-1]) > _JUMP:
         raise ValueError(
-            f"the response of {parts} has jumps, which no table holds: use fifesim.base.footprints.Boxcar, or add the "
+            f"the response of {parts} has jumps, which no table holds: use fifesim.base.line_spread.Boxcar, or add the "
             "optics, the smear or the electronics"
         )
     # Lines between the samples multiply the transform by sinc squared.

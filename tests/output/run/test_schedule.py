@@ -8,7 +8,8 @@ import pytest
 import xarray as xr
 
 from fifesim import fife_site
-from fifesim.base.footprints import Boxcar, axis_operator
+from fifesim.base.footprints import axis_operator
+from fifesim.base.line_spread import Boxcar
 from fifesim.output.run.schedule import run_on_threads, tasks_of
 from fifesim.rasters import grid as grids
 from fifesim.rasters.chunks import neighbourhood

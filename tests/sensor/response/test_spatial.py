@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import k0
 
-from fifesim.base.footprints import Boxcar, axis_operator, regularize
+from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.line_spread import Boxcar
 from fifesim.ground.landscape.field import streaming_field
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread, TableSpread
 from fifesim.sensor.response.transfer import Diffraction, LowPass, SystemSpread

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fifesim.base.footprints import Boxcar, axis_operator
+from fifesim.base.footprints import axis_operator
+from fifesim.base.line_spread import Boxcar
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
 from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_operator
 

@@ -112,7 +112,9 @@ def shadow(dem, geometry=None, horizon=None):
 
     Parameters
     ----------
-    dem, geometry, horizon
+    dem : xarray.DataArray, dims (y, x)
+        Elevation on a UTM grid. [m]
+    geometry, horizon
         As in `illumination`.
 
     Returns
