@@ -12,9 +12,7 @@ class Named(NamedTuple):
     name: str
 
 
-KNOWN = {
-    key.lower(): Named(name) for key, name in {"TM": "TM", "Landsat-5 TM": "TM", "OLI": "OLI", "HRV": "HRV"}.items()
-}
+KNOWN = {"tm": Named("TM"), "landsat-5 tm": Named("TM"), "oli": Named("OLI"), "hrv": Named("HRV")}
 
 
 @pytest.mark.parametrize("name", ["TM", "tm", "landsat-5 tm", "LANDSAT-5 TM"])

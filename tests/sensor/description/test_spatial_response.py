@@ -69,8 +69,8 @@ def test_mistakes_in_a_response_name_key_and_remedy(changed, replacements, messa
         changed(*replacements)
 
 
-def test_aperture_and_blur_are_parts_of_the_system(changed):
-    """Optics of 12 m at half of the maximum pass exp(-(pi W f)^2 / (4 ln 2)), as an aperture its overlap of circles."""
+def test_blur_and_smear_are_parts_of_the_system(changed):
+    """Optics W wide at half of their maximum pass exp(-(pi W f)^2 / (4 ln 2)), boxcars sinc(W f)."""
     parts = 'kind = "system"\nblur = 0.4\nsmear = 0.5\ndetector = 0.9\n'
     mine = changed(LSF, parts, *IFOV)
     expected = np.exp(-((np.pi * 0.4 * 0.5) ** 2) / (4 * np.log(2))) * np.sinc(0.45) * np.sinc(0.25)
