@@ -103,13 +103,6 @@ def test_raster_without_the_bands_is_refused(lai, change, message):
         ndvi(change(reflectance(lai)))
 
 
-@pytest.fixture
-def pair(lai):
-    x = lai.rename("ndvi")
-    noise = np.random.default_rng(5).normal(0, 0.1, lai.shape)
-    return (2 * lai + 1 + noise).rename("lai"), x
-
-
 def test_regression_agrees_with_scipy(pair):
     fitted, theirs = fifesim.regress(*pair), stats.linregress(pair[1].values.ravel(), pair[0].values.ravel())
     assert fitted.slope == pytest.approx(theirs.slope, rel=1e-10)
@@ -129,33 +122,6 @@ def test_regression_works_where_the_first_row_is_empty(pair):
     y, x = pair
     y[0], x[0] = np.nan, np.nan
     assert fifesim.regress(y, x).n == 44 * 54
-
-
-def test_pairs_lie_in_the_same_place(pair):
-    """Rasters that cover other ground are cut to what they share."""
-    y, x = pair
-    cut = fifesim.regress(y[3:40, :50], x[:, 7:])
-    assert cut == fifesim.regress(y[3:40, 7:50], x[3:40, 7:50])
-
-
-def test_pairs_may_be_matched_by_row_and_column(pair):
-    y, x = pair
-    moved = grids.place(x, fifesim.fife_site(CELL, window=((91, 136), (180, 234))))
-    assert fifesim.regress(y, moved, pair="index") == fifesim.regress(y, x)
-    assert fifesim.regress(y, moved).r2 < 0.5
-    assert fifesim.regress(y, moved).n == 44 * 54
-
-
-def test_unmatched_rasters_are_refused(pair):
-    y, x = pair
-    with pytest.raises(ValueError, match=r"different lattices.*pair=\"index\""):
-        fifesim.regress(y, fifesim.aggregate(x, 30.0))
-    with pytest.raises(ValueError, match="do not overlap"):
-        fifesim.regress(y[:10], x[20:])
-    with pytest.raises(ValueError, match="pair must be 'coordinates' or 'index', got 'place'"):
-        fifesim.regress(y, x, pair="place")
-    with pytest.raises(ValueError, match="select one band first"):
-        fifesim.regress(y.expand_dims(band=["a"]), x)
 
 
 def test_aggregates_of_bands_keep_them(lai):

@@ -13,7 +13,8 @@ from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.performance import Noise
-from fifesim.sensor.response.noise import NoiseModel
+from fifesim.sensor.response.noise import NoiseModel, add_noise
+from fifesim.sensor.response.rasters.noise import noisy
 
 TM = instrument("TM")
 # Figures of a test, of no real instrument.
@@ -125,3 +126,21 @@ def test_noise_may_be_given():
     np.testing.assert_array_equal(lower, mixed)
     with pytest.raises(ValueError, match="unknown band of TM 'TM33': did you mean TM3"):
         fifesim.sense(uniform((90, 99)), NOISY, noise_models={"TM33": model}, **options)
+
+
+@pytest.mark.parametrize("chunk", [1, 2, 3])
+def test_bands_in_chunks_of_their_own_have_the_noise_of_the_whole(chunk):
+    """Each band by its number in the instrument and with its own model, wherever its chunk begins."""
+    names = ["TM5", "TM1", "TM4", "TM3", "TM2"]
+    models = {name: NoiseModel(0.2 + 0.1 * k, 0.01) for k, name in enumerate(names)}
+    radiance = xr.DataArray(np.full((5, 9, 11), 50.0), dims=("band", "y", "x"))
+    bands, kinds = TM.select(names), ("shot", "thermal")
+    whole = noisy(radiance, TM, bands, kinds, 5, (3, 4), models)
+    parts = noisy(radiance.chunk(band=chunk, y=4), TM, bands, kinds, 5, (3, 4), models)
+    np.testing.assert_array_equal(parts, whole)
+    for layer, name in enumerate(names):
+        number = [band.name for band in TM.bands].index(name)
+        alone = add_noise(
+            radiance.values[layer], models[name], ("shot", "thermal"), seed=5, band=number, row=3, column=4
+        )
+        np.testing.assert_array_equal(whole[layer], alone)

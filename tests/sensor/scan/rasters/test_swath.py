@@ -13,7 +13,9 @@ from fifesim.rasters import cf, directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.performance import Noise, Scan
-from fifesim.sensor.scan.track import growth
+from fifesim.sensor.description.spatial_response import BoxcarResponse
+from fifesim.sensor.scan.rasters.view import degrees
+from fifesim.sensor.scan.track import growth, place_beside, view_from_ground
 
 TM = instrument("TM")
 VIEW = {"nadir_offset": -36e3, "heading": 193.6}
@@ -124,3 +126,28 @@ def test_a_scene_that_is_not_scanned_is_named():
         fifesim.sense_swath(scene(), narrow, nadir_offset=4e5)
     with pytest.raises(ValueError, match="simulate a larger one"):
         fifesim.sense_swath(scene((6, 6)), TM)
+
+
+def test_lines_and_samples_are_all_those_whose_centres_lie_in_the_scene():
+    """Neither more nor less, from the first to the last; corners of the scene are the farthest along and across."""
+    track = fifesim.Track(39.1, -96.9, 193.6)
+    plane = scene()
+    image = fifesim.sense_swath(plane, TM, track, quantise=False)
+    rows, columns = np.meshgrid([0, plane.sizes["y"]], [0, plane.sizes["x"]])
+    distance, aside = place_beside(track, *degrees(grids.geobox(plane), rows, columns))
+    theta = np.radians(view_from_ground(aside, 705e3)[1])
+    for name, place, step in (("line", distance, 30.315), ("sample", theta, 43e-6)):
+        centres = (np.arange(-10_000, 10_000) + 0.5) * step
+        within = np.flatnonzero((centres >= place.min()) & (centres <= place.max())) - 10_000
+        np.testing.assert_array_equal(image[name], within)
+
+
+def test_bands_with_other_line_spreads_are_seen_each_by_its_own():
+    wide = replace(TM.bands[3], lsf=BoxcarResponse("boxcar", width=120 / 705e3))
+    mixed, alone = replace(TM, bands=(*TM.bands[:3], wide, *TM.bands[4:])), replace(TM, lsf=wide.lsf)
+    options = {"quantise": False, "min_valid": 0.5} | VIEW
+    image = fifesim.sense_swath(scene().isel(band=[1, 0]), mixed, **options)
+    assert image["band"].values.tolist() == ["TM4", "TM3"]
+    both = fifesim.sense_swath(scene(), alone, **options)
+    np.testing.assert_array_equal(image.sel(band="TM4"), both.sel(band="TM4"))
+    np.testing.assert_array_equal(image.sel(band="TM3"), fifesim.sense_swath(scene(), TM, **options).sel(band="TM3"))

@@ -1,0 +1,51 @@
+"""Kernel densities beside those of scipy."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from fifesim.analysis import density
+
+
+def test_density_agrees_with_scipy():
+    samples = np.random.default_rng(4).gamma(3.0, 0.3, 300)
+    at = np.linspace(0, 3, 50)
+    theirs = stats.gaussian_kde(samples, bw_method=0.1 / samples.std(ddof=1))
+    np.testing.assert_allclose(density.gaussian_density(samples, at, 0.1), theirs(at), rtol=1e-10)
+    weights = np.random.default_rng(5).integers(1, 9, 300)
+    theirs = stats.gaussian_kde(np.repeat(samples, weights), bw_method=0.1 / np.repeat(samples, weights).std(ddof=1))
+    np.testing.assert_allclose(density.gaussian_density(samples, at, 0.1, weights), theirs(at), rtol=1e-10)
+
+
+def test_density_of_samples_takes_the_rule_of_thumb():
+    samples = np.random.default_rng(6).normal(0, 1, 500)
+    spread = min(samples.std(ddof=1), stats.iqr(samples) / 1.34)
+    theirs = stats.gaussian_kde(samples, bw_method=0.9 * spread * 500**-0.2 / samples.std(ddof=1))
+    at = np.linspace(-3, 3, 40)
+    np.testing.assert_allclose(density.sample_density(samples, at), theirs(at), rtol=1e-10)
+
+
+def test_weights_stand_for_values_that_come_again():
+    at = np.linspace(-1, 3, 9)
+    weighted = density.gaussian_density(np.array([0.0, 2.0]), at, 0.7, weights=np.array([1.0, 3.0]))
+    np.testing.assert_allclose(weighted, density.gaussian_density(np.array([0.0, 2, 2, 2]), at, 0.7), rtol=1e-14)
+
+
+def test_parts_of_many_samples_add_up(monkeypatch):
+    samples, at = np.random.default_rng(2).normal(size=50), np.linspace(-3, 3, 7)
+    whole = density.gaussian_density(samples, at, 0.3)
+    monkeypatch.setattr(density, "_PART", 7)
+    np.testing.assert_allclose(density.gaussian_density(samples, at, 0.3), whole, rtol=1e-13)
+
+
+def test_bandwidth_falls_with_the_fifth_root_of_the_number():
+    """The narrower of the two spreads counts, and a deviation stands for an empty interquartile range."""
+    assert density.silverman_bandwidth(1.0, 1.34 * 0.5, 32.0) == pytest.approx(0.9 * 0.5 / 2, rel=1e-12)
+    assert density.silverman_bandwidth(1.0, 0.0, 1.0) == pytest.approx(0.9, rel=1e-12)
+
+
+def test_samples_without_a_density_are_refused():
+    with pytest.raises(ValueError, match="at least 2 values"):
+        density.sample_density(np.array([1.0, np.nan]), np.array([0.0]))
+    with pytest.raises(ValueError, match="bandwidth must be positive, got 0: do the samples vary"):
+        density.sample_density(np.array([1.0, 1.0]), np.array([0.0]))

@@ -1,0 +1,24 @@
+"""Instrument files with one thing changed."""
+
+import pytest
+
+from fifesim.base import datasets
+from fifesim.sensor.description.instruments import read_instrument
+
+TM_FILE = datasets.path("instruments/tm.toml")
+
+
+@pytest.fixture
+def changed(tmp_path):
+    """Reads the TM file after replacements in its text, each old and new."""
+
+    def read(*replacements):
+        text = TM_FILE.read_text(encoding="utf-8")
+        for old, new in zip(replacements[::2], replacements[1::2], strict=True):
+            assert old in text
+            text = text.replace(old, new, 1)
+        path = tmp_path / "mine.toml"
+        path.write_text(text, encoding="utf-8")
+        return read_instrument(path)
+
+    return read

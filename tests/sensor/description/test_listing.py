@@ -1,0 +1,40 @@
+"""Instruments in words: the numbers that a reader needs, by hand."""
+
+import dataclasses
+
+from fifesim.sensor.description.axes import Angles
+from fifesim.sensor.description.instruments import instrument, instrument_names
+from fifesim.sensor.description.listing import instrument_in_words, list_instruments
+
+
+def test_thematic_mapper_in_words():
+    """Table 1: 43 urad from 705 km; the cosine keeps 0.69 at half a cycle per interval; 205.5 / 255 a count."""
+    text = instrument_in_words(instrument("TM"))
+    lines = text.splitlines()
+    assert lines[0] == "TM  Landsat-5 Thematic Mapper"
+    assert "  altitude 705 km, 8 bits" in lines and "  whiskbroom, 7.47 degrees to either side, swath 185 km" in text
+    assert "  all bands: pixels of 30 m in the gridded product" in lines
+    assert "    own interval 30.315 m at nadir" in lines
+    assert "    line spread cosine, modulation transfer at the Nyquist frequency of the own interval 0.69" in lines
+    (red,) = [line.split() for line in lines if line.startswith("  TM3")]
+    assert red[5:8] == ["-1.20", "204.30", "0.8059"]
+
+
+def test_transfer_at_the_nyquist_frequency_is_that_of_each_axis():
+    """A detector as wide as half, and as a fourth, of its interval: sinc(1/4) = 0.90 and sinc(1/8) = 0.97."""
+    oli = instrument("OLI")
+    wide = dataclasses.replace(oli, interval=Angles(along=4 * 42.5e-6, across=8 * 42.5e-6), ifov=2 * 42.5e-6)
+    text = instrument_in_words(wide)
+    assert "own interval 119.850 along x 239.700 across m" in text
+    assert "of the own interval 0.90 along x 0.97 across" in text
+
+
+def test_bands_that_share_their_pixels_share_a_line():
+    text = instrument_in_words(instrument("MODIS"))
+    assert "  MODIS1, MODIS2: pixels of 250 m" in text
+    assert "  MODIS3, MODIS4, MODIS5, MODIS6, MODIS7: pixels of 500 m" in text
+
+
+def test_list_has_a_line_for_each():
+    lines = list_instruments([instrument(name) for name in instrument_names()]).splitlines()
+    assert [line.split()[0] for line in lines] == ["name", *instrument_names()]

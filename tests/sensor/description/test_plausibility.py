@@ -1,0 +1,94 @@
+"""Numbers in another unit than that of their key are found out."""
+
+import pytest
+
+from fifesim.base import datasets
+from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
+from fifesim.sensor.description.plausibility import check_units
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("altitude = 705000.0", "altitude = 705.0", "altitude = 705: it is in metres.*multiply by 1000"),
+        ("interval = 43.0e-6", "interval = 43.0", "interval = 43: angles are in radians"),
+        ("interval = 43.0e-6", "interval = 0.0024637", "interval = 0.0024637: it is in radians.*degrees, so multiply"),
+        ("interval = 43.0e-6", "interval = 43.0e-3", "interval = 0.043: angles are in radians"),
+        ("= 1536.0", "= 153.6", "bands.3.solar_irradiance = 153.6: it is in W m-2 um-1.*1550.7.*times 10"),
+        ("= 1536.0", "= 1.536", "bands.3.solar_irradiance = 1.536: .*W m-2 nm-1 times 1000"),
+        ("= 206.2 ", "= 2000.0 ", "bands.4.full_scale_radiance = 2000: it is in W m-2 sr-1 um-1"),
+        ("max_angle = 7.47", "max_angle = 0.13", "scan: max_angle = 0.13 degrees gives a swath of 3 km.*in degrees"),
+        ("swath = 185000.0", "swath = 185.0", "scan: .*swath = 185 m; .*swath in metres"),
+        ("gsd = 30.0", "gsd = 0.03", "interval = 4.3e-05: .*unless gsd is in kilometres"),
+        ("step = 4.778e-6", "step = 2.7376e-4", "bands.1.lsf: its angles are in radians.*degrees times pi / 180"),
+        ("step = 4.778e-6", "step = 4.778e-3", "bands.1.lsf: .*milliradians times 1e-3"),
+        ("step = 4.778e-6", "step = 4.778e-8", "bands.1.lsf: its angles are in radians"),
+        (
+            'sensor = "TM", band = "7"',
+            'sensor = "TM", band = "9"',
+            "bands.6.srf: pyrsr has no response of Landsat-5 TM 9",
+        ),
+    ],
+)
+def test_a_number_in_another_unit_is_found_out(changed, old, new, message):
+    with pytest.raises(ValueError, match=f"mine.toml: {message}"):
+        changed(old, new)
+
+
+@pytest.mark.parametrize(
+    ("ifov", "message"),
+    [
+        ("2.4351e-3", "0.0024351: it is in radians, and 56.6 times the interval; degrees times pi / 180"),
+        ("42.5", "42.5: it is in radians.*microradians times 1e-6"),
+    ],
+)
+def test_a_field_of_view_in_another_unit_is_found_out(changed, ifov, message):
+    source = ('bits = "Friedl1995"', 'bits = "Friedl1995"\nifov = "Friedl1995"')
+    with pytest.raises(ValueError, match=f"mine.toml: bands.1.ifov = {message}"):
+        changed("bits = 8 ", f"ifov = {ifov}\nbits = 8 ", *source)
+
+
+def test_every_radiance_in_milliwatts_is_found_out(changed):
+    """The tables of Markham and Barker (1986) are in mW cm-2 sr-1 um-1: a tenth of the numbers here."""
+    tenths = []
+    for text in ("152.10", "296.81", "204.3", "206.2", "27.19", "14.38"):
+        tenths += [f"full_scale_radiance = {text}", f"full_scale_radiance = {float(text) / 10}"]
+    with pytest.raises(ValueError, match=r"mine.toml: bands.full_scale_radiance: .*no band records more than 6%"):
+        changed(*tenths)
+
+
+@pytest.mark.parametrize(
+    ("angle", "message"),
+    [("0.9669", "0.9669: it is in degrees.*55.7 degrees to either side"), ("70.0", "70: .*misses the earth")],
+)
+def test_a_scan_without_a_swath_is_compared_with_its_samples_and_the_horizon(tmp_path, angle, message):
+    """2048 samples of 0.95 mrad are 55.7 degrees to either side; the horizon from 833 km is at 62.2."""
+    text = datasets.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace("max_angle = 55.4", f"max_angle = {angle}"), encoding="utf-8")
+    with pytest.raises(ValueError, match=f"mine.toml: scan.max_angle = {message}"):
+        read_instrument(path)
+
+
+@pytest.mark.parametrize(
+    ("replacements", "message"),
+    [
+        (
+            (
+                'bits = "Friedl1995"',
+                'bits = "Friedl1995"\nnoise = "Friedl1995"',
+                'name = "TM1"',
+                'name = "TM1"\nnoise = { radiance = 500.0, snr = 100.0 }',
+            ),
+            "noise.radiance = 500: it is in W m-2 sr-1 um-1 and must lie between",
+        ),
+    ],
+)
+def test_noise_of_another_radiance_is_found_out(changed, replacements, message):
+    with pytest.raises(ValueError, match=f"mine.toml: .*{message}"):
+        changed(*replacements)
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_instruments_that_are_shipped_are_plausible(name):
+    check_units(instrument(name))

@@ -1,0 +1,77 @@
+"""Spatial responses of instrument files: the transfer that each says it has."""
+
+import numpy as np
+import pytest
+
+from fifesim.base import datasets
+
+TM_TEXT = datasets.path("instruments/tm.toml").read_text(encoding="utf-8")
+LSF = TM_TEXT[TM_TEXT.index('kind = "cosine"') : TM_TEXT.index("[scan]")]
+IFOV = ("bits = 8 ", "ifov = 43.0e-6\nbits = 8 ", 'bits = "Friedl1995"', 'bits = "Friedl1995"\nifov = "Friedl1995"')
+
+
+def nyquist(item):
+    band = item.bands[0]
+    spreads, steps = item.line_spreads(band), item.ground_intervals(band)
+    return [float(lsf.mtf(0.5 / step)) for lsf, step in zip(spreads, steps, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("lsf", "expected"),
+    [
+        # Boxcar as wide as the interval; Gaussians: the transfer itself, exp(-(pi W / d)^2 / (16 ln 2)), 2^-(E / d)^2.
+        ('kind = "boxcar"\nwidth = 43.0e-6', 2 / np.pi),
+        ('kind = "gaussian"\nmtf_at_nyquist = 0.3', 0.3),
+        ('kind = "gaussian"\nfwhm = 43.0e-6', np.exp(-(np.pi**2) / (16 * np.log(2)))),
+        ('kind = "gaussian"\neifov = 43.0e-6', 0.5),
+        # A triangle twice as wide as the interval.
+        ('kind = "table"\nangles = [-43.0e-6, 0.0, 43.0e-6]\nvalues = [0.0, 2.0, 0.0]', (2 / np.pi) ** 2),
+    ],
+)
+def test_each_kind_of_response_has_the_transfer_it_says(changed, lsf, expected):
+    np.testing.assert_allclose(nyquist(changed(LSF, lsf + "\n")), expected, rtol=1e-6)
+
+
+def test_system_response_is_the_product_of_its_parts(changed):
+    """
+    At half a cycle per interval: detector and smear sinc(1/2) each, the electronics 1/sqrt(2) at their cutoff, the
+    aperture's diffraction at nu = wavelength / (2 interval aperture), that of a circle.
+    """
+    parts = 'kind = "system"\nsmear = 1.0\nelectronics = 0.5\naperture = 0.4\n'
+    mine = changed(LSF, parts, *IFOV)
+    nu = 1e-6 * mine.bands[0].wavelength / (2 * 43e-6 * 0.4)
+    circle = 2 / np.pi * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
+    # What is cut off, 1e-3 of the response, is missing.
+    np.testing.assert_allclose(nyquist(mine), (2 / np.pi) ** 2 / np.sqrt(2) * circle, atol=2e-3)
+
+
+def test_responses_may_differ_by_axis_and_by_band(changed):
+    axes = '[lsf.along]\nkind = "boxcar"\n[lsf.across]\nkind = "gaussian"\nmtf_at_nyquist = 0.4\n'
+    mine = changed("[lsf] ", "#", LSF, axes, *IFOV)
+    np.testing.assert_allclose(nyquist(mine), [2 / np.pi, 0.4], rtol=1e-9)
+    wider = changed('name = "TM1"', 'name = "TM1"\nlsf = { kind = "boxcar", width = 86.0e-6 }')
+    np.testing.assert_allclose(nyquist(wider), np.sinc(1.0), atol=1e-12)
+    np.testing.assert_allclose(wider.line_spreads(wider.bands[1]).along.width, 30.31641, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("replacements", "message"),
+    [
+        ((LSF, 'kind = "boxcar"\n'), "bands.1.lsf: kind 'boxcar' needs the instantaneous field of view: add ifov"),
+        ((LSF, 'kind = "gaussian"\n'), "lsf: give one of fwhm, mtf_at_nyquist and eifov, got none"),
+        ((LSF, 'kind = "gaussian"\nmtf_at_nyquist = 30.0\n'), "lsf.mtf_at_nyquist = 30.0: .*less than 1"),
+        ((LSF, 'kind = "table"\nangles = [0.0, 1e-5]\nvalues = [1.0]\n'), "lsf.values = .*at least 2"),
+        (("[lsf] ", "#", LSF, '[lsf.along]\nkind = "boxcar"\n'), "the key lsf.across is missing"),
+    ],
+)
+def test_mistakes_in_a_response_name_key_and_remedy(changed, replacements, message):
+    with pytest.raises(ValueError, match=f"mine.toml: .*{message}"):
+        changed(*replacements)
+
+
+def test_blur_and_smear_are_parts_of_the_system(changed):
+    """Optics W wide at half of their maximum pass exp(-(pi W f)^2 / (4 ln 2)), boxcars sinc(W f)."""
+    parts = 'kind = "system"\nblur = 0.4\nsmear = 0.5\ndetector = 0.9\n'
+    mine = changed(LSF, parts, *IFOV)
+    expected = np.exp(-((np.pi * 0.4 * 0.5) ** 2) / (4 * np.log(2))) * np.sinc(0.45) * np.sinc(0.25)
+    np.testing.assert_allclose(nyquist(mine), expected, atol=2e-3)
