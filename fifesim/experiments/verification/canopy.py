@@ -4,12 +4,15 @@ from functools import partial
 
 import numpy as np
 from scipy.integrate import quad
+from scipy.linalg import expm
 
 from fifesim.base import datasets
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.canopy import absorption
-from fifesim.ground.canopy.background import with_background
+from fifesim.ground.canopy.background import over_background, with_background
+from fifesim.ground.canopy.divided_differences import exponential_chain
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes, leaf_projection
+from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
 from fifesim.ground.canopy.sail_model import sail, volume_scattering
 
 _deviation = partial(Deviation, "canopy")
@@ -139,6 +142,50 @@ def _absorption():
     yield _deviation("light that leaves take, layer by layer", fpar, 1e-12, "1", "quadrature of Beer's law")
 
 
+def _chains():
+    """The corner of the exponential of a bidiagonal matrix is a divided difference; rates alike and far apart."""
+    worst = 0.0
+    for gap in (0.0, 1e-9, 0.01, 0.6, 0.7, 3.0, 100.0):
+        for rates in ((0.3, gap), (0.3, 0.3 + gap, 0.1, 0.3, 0.2 + 2 * gap)):
+            corner = expm(3.0 * (np.diag(-np.array(rates)) + np.diag(np.ones(len(rates) - 1), 1)))[0, -1]
+            worst = np.maximum(worst, largest(exponential_chain(3.0, *rates), corner, relative=True))
+    yield _deviation("light attenuated in stages", worst, 1e-11, "1", "matrix exponential, Opitz (1964)")
+
+
+def _tables():
+    """Over one background, over one for each cell, and exactly; and with directions of each cell's own."""
+    rng, sky, leaf = np.random.default_rng(6), np.array([0.2, 0.1]), (np.array([0.07, 0.45]), np.array([0.04, 0.42]))
+    lai = np.concatenate([[0.0, 1e-6, 99.0], rng.gamma(1.5, 1.5, 197)])
+    ground, one = rng.uniform(0, 1, (2, 200)), np.array([0.15, 0.6])
+    worst = np.zeros(3)
+    for sza, vza, raa, hotspot, shape in ((28.5, 0, 0, 0.0, "spherical"), (60, 45, 170, 0.1, "planophile")):
+        given = {"sza": sza, "vza": vza, "raa": raa, "leaf_angles": shape, "hotspot": hotspot}
+        canopy = sail(lai, leaf[0][:, None], leaf[1][:, None], **given)
+        over = [with_background(canopy, each) for each in (one[:, None], ground)]
+        expected = [(1 - sky[:, None]) * each.rso + sky[:, None] * each.rdo for each in over]
+        tables = [canopy_reflectance(lai, *leaf, each, diffuse_fraction=sky, **given) for each in (one, ground)]
+        exact = [
+            canopy_reflectance(lai, *leaf, each, diffuse_fraction=sky, exact=True, **given) for each in (one, ground)
+        ]
+        given |= {name: np.full(200, float(given[name])) for name in ("sza", "vza", "raa")}
+        cells = directional_reflectance(lai, *leaf, ground.T, diffuse_fraction=sky, **given)
+        worst = np.maximum(worst, [largest(tables, expected), largest(exact, expected), largest(cells, expected[1])])
+    table, exact, cells = worst
+    yield _deviation("table of canopies over leaf area", table, 1e-6, "1", "SAIL at every cell")
+    yield _deviation("canopies cell by cell", np.maximum(exact, cells), 1e-12, "1", "SAIL, and a mixture of light")
+
+
+def _orders():
+    """What goes back and forth between leaves and ground, order by order, in both ways of writing it."""
+    canopy = sail(_LAI, 0.9 * _RHO, 0.9 - 0.9 * _RHO, sza=_SZA, vza=_VZA, raa=50, hotspot=0.05)
+    through = (canopy.tss + canopy.tsd) * (canopy.too + canopy.tdo)
+    hot = canopy.tsstoo - canopy.tss * canopy.too
+    orders = sum(through * 0.5 * (0.5 * canopy.rdd) ** order for order in range(60))
+    found = over_background(canopy.rso, hot, through, canopy.rdd, 0.5), with_background(canopy, 0.5).rso
+    worst = largest(found, canopy.rso + hot * 0.5 + orders)
+    yield _deviation("light between leaves and ground", worst, 1e-12, "1", "order by order")
+
+
 CHECKS = (
     _limits,
     _reciprocity,
@@ -148,4 +195,7 @@ CHECKS = (
     _other_sail,
     _exact_transfer,
     _absorption,
+    _chains,
+    _orders,
+    _tables,
 )

@@ -1,12 +1,15 @@
-"""Checks of the random field against its equation and its analytic spectrum."""
+"""Checks of the random field against its equation and its analytic spectrum, and of the noise that it is made of."""
 
 from functools import partial
 
 import numpy as np
+from scipy.stats import norm
 
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.landscape.autoregression import autocorrelation, field_variance
-from fifesim.ground.landscape.field import periodic_field, streaming_field
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map, treatments
+from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
+from fifesim.ground.landscape.noise import philox, white_noise
 
 _deviation = partial(Deviation, "random field")
 
@@ -54,4 +57,64 @@ def _equation():
     yield _deviation("a field is its neighbours and noise", worst, 1e-12, "1", "its own equation, cell by cell")
 
 
-CHECKS = (_moments, _samples, _equation)
+def _generator():
+    """Counters and keys of Random123's kat_vectors."""
+    known = {
+        ("00000000 00000000 00000000 00000000", "00000000 00000000"): "6627e8d5 e169c58d bc57ac4c 9b00dbd8",
+        ("ffffffff ffffffff ffffffff ffffffff", "ffffffff ffffffff"): "408f276d 41c83b0e a20bc7c6 6d5451fd",
+        ("243f6a88 85a308d3 13198a2e 03707344", "a4093822 299f31d0"): "d16cfe09 94fdcceb 5001e420 24126ea1",
+    }
+    wrong = sum(np.sum(philox(_words(counter), _words(key)) != _words(said)) for (counter, key), said in known.items())
+    yield _deviation("words of Philox-4x32-10", float(wrong), 0.0, "word", "Salmon et al. (2011), known answers")
+
+
+def _words(text):
+    return np.array([int(word, 16) for word in text.split()], np.uint64)
+
+
+def _halves(*numbers):
+    """Low and high words of numbers of 64 bits."""
+    return np.array([number >> shift & 2**32 - 1 for number in numbers for shift in (0, 32)], np.uint64)
+
+
+def _white_noise():
+    """In single precision; four cells of a row are made of the words of one place."""
+    seed, row, group = 2**40 + 7, -2, -3
+    found = white_noise(seed, row, 4 * group, (40, 500)).ravel()
+    words = [philox(_halves(k, i), _halves(seed)) for i in range(row, row + 40) for k in range(group, group + 125)]
+    one, other = np.reshape(words, (-1, 2)).T
+    radius = np.sqrt(-2 * np.log((one + 0.5) / 2**32))
+    # Within an eighth of a turn by 30 bits, and quarters of it by two.
+    angle = np.pi / 2 * ((other // 4 - 2.0**29) / 2**30 - other % 4)
+    expected = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1).ravel()
+    # A radius below 0.01 is the root of what rounding leaves of u.
+    clear = np.repeat(radius > 0.01, 2)
+    yield _deviation("normals, cell by cell", largest(found[clear], expected[clear]), 1e-5, "1", "Box, Muller (1958)")
+
+
+def _quantiles():
+    """Linear interpolation of a table leaves an eighth of its squared step times the curvature of the quantiles."""
+    deviates = np.append(np.random.default_rng(4).normal(0, 1.5, 20_000), [-9.0, 9.0])[None]
+    worst = 0.0
+    for name in treatments():
+        density = lai_distribution(name)
+        found, exact = quantile_map(deviates, quantile_table(density)), density.ppf(norm.cdf(deviates))
+        worst = np.maximum(worst, largest(found, exact))
+    yield _deviation("leaf area at quantiles", worst, 3e-7, "m2 m-2", "quantile functions of scipy")
+    ranked = rank_map(deviates[0], density)[np.argsort(deviates[0])]
+    exact = density.ppf((np.arange(ranked.size) + 0.5) / ranked.size)
+    yield _deviation("leaf area by ranks", largest(ranked, exact), 0.0, "m2 m-2", "quantile functions of scipy")
+
+
+def _tiles():
+    """Across the seams of four tiles, in the single precision of their filter."""
+    worst = 0.0
+    for arp in _ARPS:
+        noise = white_noise(5, -20, TILE - 30, (40, 60)).astype(float)
+        field = streaming_field(5, arp, -21, TILE - 31, (42, 62)) * np.sqrt(field_variance(arp))
+        neighbours = field[:-2, 1:-1] + field[2:, 1:-1] + field[1:-1, :-2] + field[1:-1, 2:]
+        worst = np.maximum(worst, largest(field[1:-1, 1:-1] - arp * neighbours, noise))
+    yield _deviation("tiles are their neighbours and noise", worst, 1e-5, "1", "its own equation, cell by cell")
+
+
+CHECKS = (_moments, _samples, _equation, _generator, _white_noise, _tiles, _quantiles)

@@ -258,7 +258,7 @@ def _slope_light(dem, sky, setting, light):
     for i in range(light.cosine.shape[0]):
         _between_rows(sky, i, above)
         line = SlopeLight(light.cosine[i], light.sky_view[i], light.mu_s_local[i], light.upwelling[i])
-        _light_of_row(dem[i : i + 3], above, sky, setting, line)
+        _light_of_row(dem, i, above, sky, setting, line)
 
 
 @njit(nogil=True, cache=True)
@@ -267,7 +267,7 @@ def _slope_reflectance(rho, dem, sky, setting, direct, total, upwelling, out):
     line = SlopeLight(np.empty(columns), np.empty(columns), np.empty(columns), np.empty(columns))
     for i in range(out.shape[1]):
         _between_rows(sky, i, above)
-        _light_of_row(dem[i : i + 3], above, sky, setting, line)
+        _light_of_row(dem, i, above, sky, setting, line)
         for band in range(out.shape[0]):
             for j in range(columns):
                 sky_view = line.sky_view[j]
@@ -294,15 +294,15 @@ def _between_rows(sky, i, out):
 
 
 @njit(nogil=True, cache=True)
-def _light_of_row(dem, above, sky, setting, light):
+def _light_of_row(dem, i, above, sky, setting, light):
     last = above.shape[1] - 1
     for j in range(light.cosine.size):
-        here = dem[1, j + 1]
+        here = dem[i + 1, j + 1]
         if np.isnan(here):
             light.cosine[j] = light.sky_view[j] = light.mu_s_local[j] = light.upwelling[j] = np.nan
             continue
-        east = rise(dem[1, j], here, dem[1, j + 2]) * setting.per_x
-        north = rise(dem[2, j + 1], here, dem[0, j + 1]) * setting.per_y
+        east = rise(dem[i + 1, j], here, dem[i + 1, j + 2]) * setting.per_x
+        north = rise(dem[i + 2, j + 1], here, dem[i, j + 1]) * setting.per_y
         before, share = sky.column[j], sky.column_share[j]
         after = min(before + 1, last)
         seen = Vector(

@@ -133,7 +133,7 @@ def spline_of_tiles(make_tile, tile, rows, columns):
     Returns
     -------
     values : array, shape (rows, columns)
-        The same in every window.
+        The same in every window, if whole cells come off the positions without rounding.
     """
     row, column = int(np.floor(rows[0])) - REACH, int(np.floor(columns[0])) - REACH
     shape = int(np.floor(rows[-1])) + REACH - row, int(np.floor(columns[-1])) + REACH - column

@@ -134,7 +134,7 @@ class SystemSpread(LineSpread):
 
     Examples
     --------
-    >>> from fifesim.base.footprints import Boxcar
+    >>> from fifesim.base.line_spread import Boxcar
     >>> spread = SystemSpread((Diffraction(0.86), Boxcar(30.0), Boxcar(9.0), LowPass(0.05)))
     >>> bool(spread.truncated_share < 1e-3), round(float(spread.cumulative(0.0)), 12)
     (True, 0.5)

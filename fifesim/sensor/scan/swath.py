@@ -98,7 +98,7 @@ def footprint_operator(footprints, rows, columns):
     --------
     A footprint of 30 m turned by 45 degrees over cells of 5 m is whole:
 
-    >>> from fifesim.base.footprints import Boxcar
+    >>> from fifesim.base.line_spread import Boxcar
     >>> turn = 5 * np.array([[[1, 1], [-1, 1]]]) / np.sqrt(2)
     >>> pixel = Footprints(np.array([10.0]), np.array([10.0]), turn, Boxcar(30.0), Boxcar(30.0))
     >>> round(float(footprint_operator(pixel, slice(0, 20), slice(0, 20)).sum()), 12)

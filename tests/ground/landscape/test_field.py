@@ -3,12 +3,21 @@
 import numpy as np
 import pytest
 from oracles_field import covariances
-from scipy import sparse, stats
+from scipy import fft, sparse, stats
 from scipy.sparse.linalg import spsolve
 
 import fifesim
-from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, autocorrelation, field_variance, response
+from fifesim.ground.canopy.reflectance_table import canopy_reflectance
+from fifesim.ground.landscape.autoregression import (
+    LARGEST_STREAMING_ARP,
+    autocorrelation,
+    field_variance,
+    margin,
+    response,
+)
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
 from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
+from fifesim.ground.landscape.noise import white_noise
 
 ARPS = [0.05, 0.1, 0.15, 0.2, 0.24]
 SIZE = 4 * TILE
@@ -96,6 +105,25 @@ def test_seams_of_tiles_solve_the_equation(arp):
     inside = slice(reach, -reach)
     field = streaming_field(11, arp, first, -half, (size, size))
     np.testing.assert_allclose(field[inside, inside], solved[inside, inside], rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize("arp", [0.05, 0.24])
+def test_single_precision_moves_cells_and_reflectances_by_as_little_as_is_said(arp):
+    """The same noise on the same torus, filtered in double precision."""
+    around = margin(arp)
+    size = fft.next_fast_len(TILE + 2 * around, real=True)
+    noise = white_noise(3, -around, -around, (size, size)).astype(float)
+    u = 2 * np.pi * np.fft.fftfreq(size)
+    double = np.fft.ifft2(np.fft.fft2(noise) * response(arp, u[:, None], u)).real / np.sqrt(field_variance(arp))
+    double, single = double[around : around + TILE, around : around + TILE], streaming_field(3, arp, 0, 0, (TILE, TILE))
+    assert np.sqrt(np.mean((single - double) ** 2)) < 3e-7
+    np.testing.assert_allclose(single, double, rtol=0, atol=2e-6)
+    table = quantile_table(lai_distribution("burned-grazed"))
+    seen = [
+        canopy_reflectance(quantile_map(field, table), [0.07, 0.45], [0.04, 0.42], [0.15, 0.2], sza=28.5)
+        for field in (single, double)
+    ]
+    np.testing.assert_allclose(*seen, rtol=0, atol=6e-8)
 
 
 @pytest.mark.parametrize("arp", [0.15, LARGEST_STREAMING_ARP])

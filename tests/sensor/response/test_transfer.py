@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.signal import butter, freqs
 from scipy.special import k0
 
-from fifesim.base.footprints import Boxcar
+from fifesim.base.line_spread import Boxcar
 from fifesim.sensor.response.spatial import GaussianSpread
 from fifesim.sensor.response.transfer import Diffraction, LowPass, SystemSpread
 

@@ -1,0 +1,25 @@
+"""Production kernels that are a little wrong, to see that checks look at them."""
+
+import numpy as np
+
+
+def broken(kernel):
+    """The kernel with a thousandth more in what it returns or fills."""
+
+    def wrong(*arguments, **options):
+        found = kernel(*arguments, **options)
+        if found is not None:
+            return found + (found.dtype.type(1) if found.dtype.kind == "u" else 1e-3 * np.abs(found).max())
+        *_, filled = arguments
+        for array in filled if isinstance(filled, tuple) else (filled,):
+            array += 1e-3 * np.nanmax(np.abs(array))
+        return None
+
+    return wrong
+
+
+def notices(check, monkeypatch, owner, kernel):
+    """Whether all is well, and a check exceeds a bound once a kernel of a module is broken."""
+    before = all(each.within for each in check())
+    monkeypatch.setattr(owner, kernel, broken(getattr(owner, kernel)))
+    return before and not all(each.within for each in check())

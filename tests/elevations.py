@@ -1,0 +1,67 @@
+"""Elevation models of known surfaces, as files and as labelled rasters."""
+
+import numpy as np
+import rasterio
+import xarray as xr
+from affine import Affine
+from oracles_terrain import hills
+
+import fifesim
+from fifesim.rasters import grid as grids
+
+# The corner of the largest square of the Kings Creek model, where real terrain would be.
+WEST, NORTH = 708120.0, 4331070.0
+CRS = "EPSG:26914"
+
+# Of `surface`. [m]
+AMPLITUDE = 38.0
+
+
+def surface(x, y):
+    """Band-limited hills: waves of 160 to 900 m, six cells of 30 m and more along each axis. [m]"""
+    u, v = x - WEST, y - NORTH
+    waves = [(160, 30, 2.0), (240, 110, 4.0), (500, 200, 12.0), (900, 75, 20.0)]
+    angles = [(2 * np.pi / length, np.radians(angle), size) for length, angle, size in waves]
+    return 400 + sum(size * np.sin(k * (u * np.cos(a) + v * np.sin(a)) + size) for k, a, size in angles)
+
+
+def tilted(x, y):
+    """A plane. [m]"""
+    return 400 + 0.1 * (x - WEST) - 0.05 * (y - NORTH)
+
+
+def model(function=surface, cell=30.0, margin=600.0, size=900.0, affine=None, shape=None):
+    """A lattice of point values of a function that reaches past the grid, and its transform."""
+    affine = affine or Affine(cell, 0, WEST - margin, 0, -cell, NORTH + margin)
+    shape = shape or (int((size + 2 * margin) / cell),) * 2
+    columns, rows = np.meshgrid(np.arange(shape[1]) + 0.5, np.arange(shape[0]) + 0.5)
+    return function(*(affine * (columns, rows))), affine
+
+
+def write(path, values, affine, crs=CRS, unit=None, nodata=-9999.0, **tags):
+    values = np.where(np.isnan(values), nodata, values)
+    profile = {"driver": "GTiff", "width": values.shape[1], "height": values.shape[0], "count": 1, "dtype": "float64"}
+    with rasterio.open(path, "w", crs=crs, transform=affine, nodata=nodata, **profile) as file:
+        file.write(values, 1)
+        if unit:
+            file.units = (unit,)
+    return path
+
+
+def grid(cell=30 / 9, size=900.0, crs=CRS, west=WEST, north=NORTH):
+    return fifesim.grid_at(crs, west, north, size, size, cell)
+
+
+def truth(dem, function=surface):
+    return function(dem["x"].values[None, :], dem["y"].values[:, None])
+
+
+def with_hole(tmp_path, tall=3, wide=4):
+    values, affine = model()
+    values[30 : 30 + tall, 28 : 28 + wide] = np.nan
+    return write(tmp_path / "hole.tif", values, affine)
+
+
+def labelled(grid, values=None, **attrs):
+    values = hills(tuple(grid.shape), seed=1, relief=40.0) if values is None else values
+    return grids.place(xr.DataArray(values, dims=("y", "x"), name="dem", attrs={"units": "m"} | attrs), grid)

@@ -1,0 +1,18 @@
+"""Deviations in words."""
+
+from fifesim.experiments.verification.deviations import Deviation
+from fifesim.experiments.verification.listing import HEADING, line, summary
+
+WITHIN = Deviation("terrain", "slope of planes", 1e-12, 1e-9, "degree", "plane")
+BEYOND = Deviation("canopy", "reciprocity", 0.2, 0.1, "1", "theory")
+
+
+def test_numbers_stand_below_their_headings():
+    for word, text in (("compared", "slope of planes"), ("with", "plane")):
+        assert line(WITHIN).rindex(text) == HEADING.index(word)
+    assert "EXCEEDED" in line(BEYOND) and "EXCEEDED" not in line(WITHIN)
+
+
+def test_summary_names_what_is_beyond():
+    assert summary([WITHIN, WITHIN]) == "2 checks, all within their bounds"
+    assert summary([WITHIN, BEYOND]) == "2 checks, 1 beyond their bounds: canopy: reciprocity"

@@ -1,0 +1,21 @@
+"""Checks of the terrain see the kernels that light real slopes."""
+
+import pytest
+from broken import notices
+
+from fifesim.experiments.verification import terrain
+from fifesim.ground.terrain import horizon, light, sky, slope
+
+
+@pytest.mark.parametrize(
+    "owner, kernel, check",
+    [
+        (slope, "_gradient", terrain._slopes),
+        (sky, "_sky_vector", terrain._any_sky),
+        (horizon, "horizon_tangent", terrain._horizons),
+        (light, "_slope_light", terrain._light),
+        (light, "_slope_reflectance", terrain._light),
+    ],
+)
+def test_production_kernels_are_checked(monkeypatch, owner, kernel, check):
+    assert notices(check, monkeypatch, owner, kernel)
