@@ -17,12 +17,12 @@ import rasterio.shutil
 import rioxarray
 import xarray as xr
 from dask.utils import SerializableLock
-from distributed import Lock, get_client
 from rasterio.windows import Window
 
 from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
+from fifesim.rasters.clients import found_client
 
 # GDAL's own block size for cloud-optimised files.
 _BLOCK = 512
@@ -244,10 +244,10 @@ class _Sink:
 
 def _lock(name):
     """One writer at a time: among the workers of a cluster where there is one, else among threads."""
-    try:
-        get_client()
-    except ValueError:
+    if found_client() is None:
         return SerializableLock()
+    from distributed import Lock
+
     return Lock(name)
 
 

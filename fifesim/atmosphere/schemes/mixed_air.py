@@ -11,7 +11,7 @@ from fifesim.atmosphere.schemes.terms import Scattering
 from fifesim.base.geometry import scattering_angle_cosine
 
 _MOMENTS = 48  # of the aerosol's scattering matrix: the solver uses the first 33
-_COSINES, _WEIGHTS = np.polynomial.legendre.leggauss(500)  # fine enough for the forward peak of coarse particles
+_COSINES = 500  # of a quadrature fine enough for the forward peak of coarse particles
 
 
 def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
@@ -98,6 +98,7 @@ def _aerosol(atmosphere, wavelength, cosine, polarized):
 def _moments(aerosol, wavelength, polarized):
     if not polarized:
         return aerosols.phase_moments(aerosol, np.array([wavelength]), _MOMENTS)[0]
-    phase = aerosols.aerosol_phase(aerosol, _COSINES, wavelength)
-    polarization = aerosols.aerosol_polarization(aerosol, _COSINES, wavelength)
-    return matrix_moments(phase, polarization, _COSINES, _WEIGHTS, _MOMENTS)
+    cosines, weights = np.polynomial.legendre.leggauss(_COSINES)
+    phase = aerosols.aerosol_phase(aerosol, cosines, wavelength)
+    polarization = aerosols.aerosol_polarization(aerosol, cosines, wavelength)
+    return matrix_moments(phase, polarization, cosines, weights, _MOMENTS)

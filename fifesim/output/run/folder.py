@@ -23,8 +23,9 @@ from fifesim.output.run.engine import run_engine
 from fifesim.output.run.products import make_scene_store, products_of, wanted_blocks
 from fifesim.output.run.saved import save_block, saved_array, saved_blocks
 from fifesim.output.run.schedule import run_on_client, run_on_threads, tasks_of
-from fifesim.output.run.workers import found_client, usable_cores
+from fifesim.output.run.workers import usable_cores
 from fifesim.rasters import grid as grids
+from fifesim.rasters.clients import found_client
 from fifesim.rasters.files import to_geotiff
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate

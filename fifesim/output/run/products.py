@@ -5,7 +5,6 @@ from typing import NamedTuple
 import dask.array as da
 import numpy as np
 import xarray as xr
-import zarr
 from dask.base import tokenize
 
 from fifesim.rasters import grid as grids
@@ -154,6 +153,8 @@ def _written(array, path, name):
     counts = tuple((1,) * len(each) for each in sizes)
 
     def write(rows, columns, block):
+        import zarr  # slow, and few runs write cells
+
         sink = zarr.open_array(str(path), path=name, mode="r+")
         top, left = (part.start * _SHARD for part in (rows, columns))
         height, width = (min(_SHARD, size - start) for size, start in zip(sink.shape[-2:], (top, left), strict=True))

@@ -6,7 +6,6 @@ from functools import partial
 import dask.threaded
 from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
 from dask.order import order
-from distributed import KilledWorker, as_completed
 
 # A worker that dies takes a task with it; one that kills its workers this often is at fault itself.
 _RETRIES = 3
@@ -75,6 +74,8 @@ def run_on_client(graph, outputs, deliver, client):
     Exception
         Whatever a task or ``deliver`` raises.
     """
+    from distributed import KilledWorker, as_completed  # there already, where a client is
+
     ranks = order(_in_order(graph, outputs, deliver)[0])
     layer = MaterializedLayer(graph, annotations={"priority": _Priority(ranks), "retries": _RETRIES})
     whole = HighLevelGraph({"blocks": layer}, {"blocks": set()})

@@ -4,7 +4,6 @@ import os
 from contextlib import contextmanager
 
 import dask
-from distributed import Client, LocalCluster, get_client
 
 # Without an answer for so long, there is no scheduler. [s]
 _TIMEOUT = 20
@@ -19,20 +18,6 @@ def usable_cores():
     cores : int
     """
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def found_client():
-    """
-    The current client of a cluster.
-
-    Returns
-    -------
-    client : distributed.Client or None
-    """
-    try:
-        return get_client()
-    except ValueError:
-        return None
 
 
 @contextmanager
@@ -64,8 +49,12 @@ def cluster(workers=None, scheduler=None):
     if workers is not None and workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     if workers is None and scheduler is None:
-        yield None
+        # dask would look for a client, and import all that one needs.
+        with dask.config.set(scheduler=dask.config.get("scheduler", "threads")):
+            yield None
         return
+    from distributed import Client, LocalCluster
+
     if scheduler is not None:
         try:
             client = Client(scheduler, timeout=_TIMEOUT, set_as_default=False)

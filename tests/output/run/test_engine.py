@@ -6,8 +6,8 @@ from typer.testing import CliRunner
 from fifesim.atmosphere.schemes import engines, six_s
 from fifesim.cli import app
 from fifesim.output.run.engine import run_engine
+from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
-from fifesim.scenario.toml import parse_scenario
 
 SMALL = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}
 
