@@ -55,7 +55,7 @@ def simulate(
     _check_spelling(scenario)
 
     from fifesim.output.folders import check_folder
-    from fifesim.output.run.estimates import describe, estimate
+    from fifesim.output.run.estimates import estimate, estimate_in_words
     from fifesim.output.run.folder import scenario_to_resume, simulate_to_folder
     from fifesim.output.run.workers import cluster
     from fifesim.scenario.scenario import Scenario, read_scenario
@@ -65,7 +65,7 @@ def simulate(
         found = scenario_to_resume(output) if resume and scenario is None else None
         found = found or (Scenario() if scenario is None else read_scenario(scenario))
         if dry_run:
-            typer.echo(describe(estimate(found, threads=workers or threads, scene=scene), as_json))
+            typer.echo(estimate_in_words(estimate(found, threads=workers or threads, scene=scene), as_json))
             return
         found.complete()
         with cluster(workers, scheduler) as client:

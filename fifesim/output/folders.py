@@ -39,30 +39,52 @@ def check_folder(folder, overwrite, resume=False):
 
 
 @contextmanager
-def whole_files(folder):
+def results(folder, names, *, resume=False, worth_keeping=None):
     """
-    A hidden folder whose files move into place when all of them are written; a context manager.
+    A hidden folder to write results into, which come into place when all of them are whole; a context manager.
 
     Parameters
     ----------
     folder : pathlib.Path
         Made where it does not exist, and removed again where nothing comes of it.
+    names : iterable of str
+        Files and folders that come into place, and replace what has their names.
+    resume : bool, optional
+        Go on with what was kept.
+    worth_keeping : callable, optional
+        ``worth_keeping(hidden, error)`` says whether the hidden folder outlives an error, for another run to go on
+        with. It is always removed without.
 
     Yields
     ------
-    partial : pathlib.Path
-        To write into.
+    hidden : pathlib.Path
+        `UNFINISHED` where it may be kept, else a folder of this run alone.
     """
     existed = folder.is_dir()
     folder.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(prefix=".partial-", dir=folder))
+    hidden = _kept(folder, resume) if worth_keeping else Path(tempfile.mkdtemp(prefix=".partial-", dir=folder))
     try:
-        yield partial
-        for path in sorted(partial.iterdir()):
-            os.replace(path, folder / path.name)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        if not existed:
-            shutil.rmtree(folder, ignore_errors=True)
+        yield hidden
+        for name in names:
+            _replace(hidden / name, folder / name)
+    except BaseException as error:
+        if not (worth_keeping and worth_keeping(hidden, error)):
+            shutil.rmtree(hidden, ignore_errors=True)
+            if not existed:
+                shutil.rmtree(folder, ignore_errors=True)
         raise
-    partial.rmdir()
+    shutil.rmtree(hidden)
+
+
+def _kept(folder, resume):
+    hidden = folder / UNFINISHED
+    if not resume:
+        shutil.rmtree(hidden, ignore_errors=True)
+    hidden.mkdir(exist_ok=True)
+    return hidden
+
+
+def _replace(source, target):
+    if target.is_dir() and not target.is_symlink():
+        shutil.rmtree(target)
+    os.replace(source, target)

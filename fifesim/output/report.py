@@ -1,64 +1,44 @@
 """Pictures and the HTML page of a run."""
 
-import base64
-import io
 from pathlib import Path
 
-import jinja2
-
+from fifesim.output import pages
 from fifesim.output.figures import NAMES, detail_figure, fit_figure, histogram_figure, map_figure, terrain_figure
 from fifesim.rasters import grid as grids
 from fifesim.scenario.keys import Keys
 
-_TEMPLATE = "report.html.j2"
+_TEMPLATE = Path(__file__).with_name("report.html.j2")
 _DPI = 130
 # Figures show every so many pixels of an image that has more rows or columns. [pixel]
 _MOST = 600
 
 
-def quicklook(path, image, truth, detail):
+def run_page(scenario, image, truth, detail, terrain, level, fits):
     """
-    Picture of the scene and of its image.
+    One self-contained HTML page on a run, and its first picture.
 
     Parameters
     ----------
-    path : pathlib.Path
-        PNG file.
+    scenario : fifesim.scenario.scenario.Scenario
     image : xarray.Dataset
         ``dn`` and perhaps ``ndvi``, lazy or in memory.
     truth : xarray.Dataset
         ``lai`` and ``fpar`` over the ground of the pixels.
     detail : xarray.DataArray, dims (y, x)
         LAI of the cells in the middle.
-    """
-    figure = detail_figure(_thinned(image, _step(image)), _below(image, detail), detail)
-    figure.savefig(path, dpi=_DPI, metadata={"Software": None})
-
-
-def page(scenario, image, truth, detail, terrain, level, fits, versions):
-    """
-    One self-contained HTML page on a run.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    image, truth : xarray.Dataset
-        As `quicklook` takes them.
-    detail : xarray.DataArray
     terrain : xarray.Dataset or None
         ``dem``, ``slope`` and ``kt`` over pixels, and how far the elevation is known; None if flat.
     level : xarray.DataArray or None
         Digital numbers on level ground, over as many pixels; None if flat.
     fits : mapping of str to fifesim.analysis.regression.Regression
         Of the true means on NDVI.
-    versions : mapping of str to str
 
     Returns
     -------
+    quicklook : bytes
+        The scene and its image, a PNG.
     html : str
     """
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string((Path(__file__).parent / _TEMPLATE).read_text(encoding="utf-8"))
     # Pixels and their truth are paired by row and column.
     step = max(_step(image), _step(truth))
     shown, means = _thinned(image, step), _thinned(truth, step)
@@ -71,15 +51,34 @@ def page(scenario, image, truth, detail, terrain, level, fits, versions):
         figures["terrain"] = terrain_figure(image, terrain, level)
     if fits:
         figures["fits"] = fit_figure(shown, means, fits)
-    return template.render(
-        title=_title(scenario),
+    pictures = {name: pages.png(figure, _DPI) for name, figure in figures.items()}
+    html = pages.html(
+        _TEMPLATE,
+        title=title(scenario),
         summary=_summary(scenario, image, truth, fits) + _ground(terrain),
-        figures={name: _png(figure) for name, figure in figures.items()},
+        figures=pictures,
         fits=[(NAMES[name], fit) for name, fit in fits.items()],
         parameters=_parameters(scenario),
         history=image["dn"].attrs.get("history", "").splitlines(),
-        versions=versions,
     )
+    return pictures["detail"], html
+
+
+def title(scenario):
+    """
+    What a run or a budget is of, in words.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Returns
+    -------
+    title : str
+    """
+    ground = scenario.ground
+    scene = Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
+    return f"{scene}, seen by {Path(scenario.sensor.instrument).name}"
 
 
 def _step(rasters):
@@ -89,12 +88,6 @@ def _step(rasters):
 def _thinned(rasters, step):
     """Every so many pixels, in memory: a picture shows no more, and numbers in text are of all of them."""
     return rasters.isel({axis: slice(step // 2, None, step) for axis in ("y", "x")}).compute()
-
-
-def _title(scenario):
-    ground = scenario.ground
-    scene = Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
-    return f"{scene}, seen by {scenario.sensor.instrument}"
 
 
 def _summary(scenario, image, truth, fits):
@@ -153,9 +146,3 @@ def _below(image, detail):
     """The pixels of some cells, in memory."""
     box = grids.geobox(detail).boundingbox
     return image["dn"].sel(x=slice(box.left, box.right), y=slice(box.top, box.bottom)).compute()
-
-
-def _png(figure):
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
-    return base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -1,7 +1,5 @@
 """The repeated experiment as a folder of files."""
 
-import importlib.metadata
-import platform
 from pathlib import Path
 
 from fifesim.base.seeds import check_seed
@@ -9,7 +7,8 @@ from fifesim.experiments.friedl1995 import effects, figures
 from fifesim.experiments.friedl1995 import report as friedl1995_report
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import Case
-from fifesim.output.folders import check_folder, whole_files
+from fifesim.output import pages
+from fifesim.output.folders import check_folder, results
 from fifesim.output.progress import steps
 
 NUMBERS = range(3, 10)
@@ -18,7 +17,6 @@ FILES = ("table2.csv", *(f"figure{number}.png" for number in NUMBERS), "report.h
 # Differences between cases share their random numbers, and need few realisations.
 _EFFECT_REALISATIONS = 2
 _DPI = 200
-_VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "numba", "matplotlib")
 
 
 def reproduce_to_folder(folder, *, realisations=20, cells=333, seed=1995, overwrite=False):
@@ -69,27 +67,22 @@ def reproduce_to_folder(folder, *, realisations=20, cells=333, seed=1995, overwr
         "sensitivity": effects.sensitivity(case, few, each=_shown("numbers chosen")),
     }
     run = {"realisations": realisations, "effect_realisations": _EFFECT_REALISATIONS, "cells": cells, "seed": seed}
-    with whole_files(folder) as partial:
+    with results(folder, FILES) as partial:
         table.to_csv(partial / "table2.csv", index=False, float_format="%.6g")
-        drawn = _draw(case, seed, partial)
-        page = friedl1995_report.page(case, table, text, tables, drawn, run, _versions())
+        drawn = _draw(case, seed)
+        for number, picture in drawn.items():
+            (partial / f"figure{number}.png").write_bytes(picture)
+        page = friedl1995_report.reproduction_page(case, table, text, tables, drawn, run)
         (partial / "report.html").write_text(page, encoding="utf-8")
     return [folder / name for name in FILES]
 
 
-def _draw(case, seed, folder):
-    """The figures as files, by number."""
+def _draw(case, seed):
+    """The figures as PNG, by number."""
     scenes = figures.pixels(case, figures.BURNED_GRAZED, seed)
     drawn = {3: figures.figure3(case)} | {number: getattr(figures, f"figure{number}")(scenes) for number in NUMBERS[1:]}
-    paths = {number: folder / f"figure{number}.png" for number in NUMBERS}
-    for number, path in paths.items():
-        drawn[number].savefig(path, dpi=_DPI, metadata={"Software": None})
-    return paths
+    return {number: pages.png(figure, _DPI) for number, figure in drawn.items()}
 
 
 def _shown(label):
     return lambda sequence: steps(sequence, label)
-
-
-def _versions():
-    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _VERSIONS}

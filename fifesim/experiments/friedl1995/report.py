@@ -1,16 +1,13 @@
 """The HTML page of the repeated experiment."""
 
-import base64
 from pathlib import Path
-
-import jinja2
-import numpy as np
 
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import ARPS
+from fifesim.output import pages
 
-_TEMPLATE = "report.html.j2"
+_TEMPLATE = Path(__file__).with_name("report.html.j2")
 
 CAPTIONS = {
     3: "Densities of LAI of the three treatments, inferred from Table 2 (the measurements are not public).",
@@ -27,7 +24,7 @@ CAPTIONS = {
 }
 
 
-def page(case, table, text, effects, figures, run, versions):
+def reproduction_page(case, table, text, effects, figures, run):
     """
     One self-contained HTML page.
 
@@ -40,28 +37,21 @@ def page(case, table, text, effects, figures, run, versions):
         From `friedl1995_table.text_table`.
     effects : mapping of str to pandas.DataFrame
         ``readings``, ``sizes`` and ``sensitivity`` of `friedl1995_effects`.
-    figures : mapping of int to pathlib.Path
-        PNG files by number.
+    figures : mapping of int to bytes
+        PNG by number.
     run : mapping of str to int
         ``realisations``, ``effect_realisations``, ``cells`` and ``seed``.
-    versions : mapping of str to str
 
     Returns
     -------
     html : str
     """
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters["fixed"] = _fixed
-    template = environment.from_string((Path(__file__).parent / _TEMPLATE).read_text(encoding="utf-8"))
-    encoded = {number: base64.b64encode(path.read_bytes()).decode("ascii") for number, path in figures.items()}
     found = friedl1995_table.agreement(table)
-    return template.render(
-        rows=table.to_dict("records"), text=text.to_dict("records"), criteria=criteria(table, text), agreement=found,
-        arps=ARPS, sample=friedl1995_table.SAMPLE,
+    return pages.html(
+        _TEMPLATE, rows=table.to_dict("records"), text=text.to_dict("records"), criteria=criteria(table, text),
+        agreement=found, arps=ARPS, sample=friedl1995_table.SAMPLE,
         effects={name: each.to_dict("records") for name, each in effects.items()},
-        figures=encoded, captions=CAPTIONS, run=run, versions=versions, readings=friedl1995.READINGS,
+        figures=figures, captions=CAPTIONS, run=run, readings=friedl1995.READINGS,
         used=friedl1995.USED, interval=case.setup.instrument.ground_interval,
         cell=friedl1995.CELL, pixel=friedl1995.PIXEL,
         standard_cells=friedl1995.CELLS, optics=case.setup.leaf_optics, drift=_drift(case),
@@ -77,7 +67,7 @@ def criteria(table, text):
     Parameters
     ----------
     table, text : pandas.DataFrame
-        As `page` takes them.
+        As `reproduction_page` takes them.
 
     Returns
     -------
@@ -119,10 +109,3 @@ def _drift(case):
     """How far the last pixel lies from its block. [m]"""
     size = case.setup.instrument.ground_interval
     return int(case.cells * friedl1995.CELL / size - 1) * (size - friedl1995.PIXEL)
-
-
-def _fixed(value, digits=2, sign=False):
-    if value is None or not np.isfinite(value):
-        return "–"
-    text = f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"
-    return text.replace("-", "−")

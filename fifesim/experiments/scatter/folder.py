@@ -1,19 +1,17 @@
 """A budget as a folder of files."""
 
-import importlib.metadata
-import platform
 from pathlib import Path
 
 from fifesim.experiments.scatter import report as scatter_report
 from fifesim.experiments.scatter import shares as scatter
-from fifesim.output.folders import check_folder, whole_files
+from fifesim.output import pages
+from fifesim.output.folders import check_folder, results
 from fifesim.output.progress import steps
 from fifesim.scenario.toml import write_scenario
 
 FILES = ("budget.csv", "budget.png", "report.html", "scenario.toml")
 
 _DPI = 200
-_VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "numba", "matplotlib")
 
 
 def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None, overwrite=False):
@@ -56,14 +54,11 @@ def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None,
         "columns": min(cells, shape.x),
         "seed": complete.ground.seed if seed is None else seed,
     }
-    with whole_files(folder) as partial:
+    with results(folder, FILES) as partial:
         table.to_csv(partial / "budget.csv", index=False, float_format="%.6g")
-        scatter_report.chart(table).savefig(partial / "budget.png", dpi=_DPI, metadata={"Software": None})
-        page = scatter_report.page(complete, found, table, partial / "budget.png", run, _versions())
+        chart = pages.png(scatter_report.chart(table), _DPI)
+        (partial / "budget.png").write_bytes(chart)
+        page = scatter_report.budget_page(complete, found, table, chart, run)
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
     return [folder / name for name in FILES]
-
-
-def _versions():
-    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _VERSIONS}

@@ -1,18 +1,19 @@
 """The bar chart and the HTML page of a budget."""
 
-import base64
 from pathlib import Path
 
-import jinja2
 import numpy as np
 from matplotlib.figure import Figure
 
 from fifesim.experiments.scatter.shares import CURVATURE, TOTAL, VARIATION, standard_error
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES
+from fifesim.output import pages
+from fifesim.output.pages import fixed, plus_minus
+from fifesim.output.report import title
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
 
-_TEMPLATE = "report.html.j2"
+_TEMPLATE = Path(__file__).with_name("report.html.j2")
 
 # Okabe and Ito's colours, which the colour-blind tell apart; hatches tell them apart in grey.
 _STYLES = {"lai": ("#0072B2", ""), "fpar": ("#E69F00", "////")}
@@ -47,14 +48,14 @@ def chart(table):
         rows = table[table["variable"] == variable].set_index("stage")
         total = 100 * rows.loc[TOTAL]
         color, hatch = _STYLES[variable]
-        label = f"{variable.upper()}: {_fixed(total['share'], 1)}{_error(total['share_error'], 1)} % in all"
+        label = f"{variable.upper()}: {fixed(total['share'], 1)}{plus_minus(total['share_error'], 1)} % in all"
         at = np.arange(len(names)) + 0.2 * (2 * k - 1)
         share, error = (100 * rows.loc[list(names), name].to_numpy(float) for name in ("share", "share_error"))
         axis.barh(at, share, 0.38, color=color, hatch=hatch, edgecolor="white", linewidth=0, label=label)
         axis.errorbar(share, at, xerr=np.nan_to_num(error), fmt="none", ecolor="#222222", elinewidth=1, capsize=2.5)
         for y, value, spread in zip(at, share, np.nan_to_num(error), strict=True):
             # Exactly nothing is a stage that is ideal already.
-            text = "0" if value == 0 else _fixed(value, 1)
+            text = "0" if value == 0 else fixed(value, 1)
             axis.annotate(
                 text, (max(value, 0) + spread, y), (5, 0), textcoords="offset points", va="center", fontsize=7
             )
@@ -97,7 +98,7 @@ def mechanisms(budget):
     return rows
 
 
-def page(scenario, budget, table, figure, run, versions):
+def budget_page(scenario, budget, table, picture, run):
     """
     One self-contained HTML page.
 
@@ -109,35 +110,22 @@ def page(scenario, budget, table, figure, run, versions):
         From `scatter.budget`.
     table : pandas.DataFrame
         From `scatter.table`.
-    figure : pathlib.Path
-        PNG file of the chart.
+    picture : bytes
+        The chart as PNG.
     run : mapping of str to int
         ``realisations``, ``rows`` and ``columns`` of cells, and ``seed``.
-    versions : mapping of str to str
 
     Returns
     -------
     html : str
     """
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters |= {"fixed": _fixed, "error": _error}
-    template = environment.from_string((Path(__file__).parent / _TEMPLATE).read_text(encoding="utf-8"))
     by_variable = {name: table[table["variable"] == name].set_index("stage").to_dict("index") for name in VARIABLES}
     found = mechanisms(budget)
-    return template.render(
-        title=_title(scenario), setting=_setting(scenario, run), stages=STAGES, variables=VARIABLES,
+    return pages.html(
+        _TEMPLATE, title=title(scenario), setting=_setting(scenario, run), stages=STAGES, variables=VARIABLES,
         rows=by_variable, mechanisms=found, largest=max(found, key=lambda row: row["lai"]["share"]),
-        curvature=CURVATURE, total=TOTAL, variation=VARIATION, run=run, versions=versions,
-        chart=base64.b64encode(figure.read_bytes()).decode("ascii"),
+        curvature=CURVATURE, total=TOTAL, variation=VARIATION, run=run, chart=picture,
     )  # fmt: skip
-
-
-def _title(scenario):
-    ground = scenario.ground
-    scene = Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
-    return f"{scene}, seen by {scenario.sensor.instrument}"
 
 
 def _setting(scenario, run):
@@ -169,14 +157,3 @@ def _drift(scenario, run):
     interval = instrument(own.instrument).ground_interval if own.interval == "native" else own.interval
     length = run["columns"] * grids.cell_size(scenario.geobox())[1]
     return (min(int(length / interval), int(length / size)) - 0.5) * abs(interval - size)
-
-
-def _fixed(value, digits=1):
-    if not np.isfinite(value):
-        return "–"
-    text = f"{value:.{digits}f}"
-    return ("0" + text[2:] if float(text) == 0 and text.startswith("-") else text).replace("-", "−")
-
-
-def _error(value, digits=1):
-    return f" ± {value:.{digits}f}" if np.isfinite(value) else ""

@@ -69,7 +69,7 @@ def estimate(scenario, *, threads=None, scene=False):
     }
 
 
-def describe(found, as_json=False):
+def estimate_in_words(found, as_json=False):
     """
     An estimate in words.
 

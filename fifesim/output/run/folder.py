@@ -1,10 +1,7 @@
 """A run: a scenario simulated into a folder of files, block by block, which can be stopped and gone on with."""
 
-import importlib.metadata
 import json
 import os
-import platform
-import shutil
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,8 +14,9 @@ from fifesim.analysis.rasters.pairs import matched
 from fifesim.analysis.rasters.regression import regress
 from fifesim.chain.images import ndvi
 from fifesim.output import report
-from fifesim.output.folders import UNFINISHED, check_folder
+from fifesim.output.folders import UNFINISHED, check_folder, results
 from fifesim.output.progress import CellProgress
+from fifesim.output.provenance import versions
 from fifesim.output.run.engine import run_engine
 from fifesim.output.run.products import make_scene_store, products_of, wanted_blocks
 from fifesim.output.run.saved import save_block, saved_array, saved_blocks
@@ -39,8 +37,6 @@ _GDAL_CACHE = 32 * 2**20
 
 # Of pixels that are read back for statistics; dask's own choice is a whole image.
 _CHUNK_SIZE = "4MiB"
-
-_VERSIONS = ("fifesim", "numpy", "scipy", "xarray", "dask", "numba", "rasterio", "odc-geo", "pvlib", "pyrsr")
 
 
 def simulate_to_folder(
@@ -86,7 +82,13 @@ def simulate_to_folder(
     folder = Path(folder)
     check_folder(folder, overwrite, resume)
     complete = scenario.complete()
-    with _unfinished(folder, complete, scene, resume) as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
+    identity, names = _identity(complete, scene), FILES + (SCENE,) * scene
+    begun = resume and _is_begun(folder / UNFINISHED, identity)
+    kept = results(folder, names, resume=begun, worth_keeping=_has_blocks)
+    with _errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
+        if not begun:
+            for name, text in identity.items():
+                (unfinished / name).write_text(text, encoding="utf-8")
         run_engine(complete)
         tree = simulate(complete)
         found = products_of(tree, unfinished / SCENE if scene else None)
@@ -96,9 +98,6 @@ def simulate_to_folder(
         options = {"scheduler": "threads", "num_workers": threads or usable_cores(), "array.chunk-size": _CHUNK_SIZE}
         with dask.config.set(options):
             _write_files(complete, tree, found, unfinished)
-        names = FILES + (SCENE,) * scene
-        for name in names:
-            _replace(unfinished / name, folder / name)
     return [folder / name for name in names]
 
 
@@ -120,57 +119,53 @@ def scenario_to_resume(folder):
     return read_scenario(path) if path.is_file() else None
 
 
-@contextmanager
-def _unfinished(folder, scenario, scene, resume):
-    """Folder of what is not finished: kept when the run is stopped, and away when it ends or can never end well."""
-    existed, path = folder.is_dir(), folder / UNFINISHED
-    text, state = write_scenario(scenario), _state(scenario, scene)
-    if path.is_dir() and resume and (path / "run.toml").is_file():
-        _check_same_run(path, text, state)
-    else:
-        shutil.rmtree(path, ignore_errors=True)
-        path.mkdir(parents=True)
-        (path / "run.json").write_text(json.dumps(state), encoding="utf-8")
-        (path / "run.toml").write_text(text, encoding="utf-8")
-    try:
-        yield path
-    except (ValueError, TypeError):
-        _remove(folder, path, existed)
-        raise
-    except OSError as error:
-        _remove_if_empty(folder, path, existed)
-        hint = f"; what is finished is kept, go on with --resume -o {folder}" if path.exists() else ""
-        raise OSError(f"{_said(error)}{hint}") from error
-    except BaseException:
-        _remove_if_empty(folder, path, existed)
-        raise
-    shutil.rmtree(path)
-
-
-def _state(scenario, scene):
-    """What must be the same for blocks of two runs to fit together, besides the scenario."""
+def _identity(scenario, scene):
+    """What must be the same for blocks of two runs to fit together, as files."""
     inputs = {}
     for name in scenario.files.values():
         if Path(name).is_file():
             status = os.stat(name)
             inputs[name] = [status.st_size, status.st_mtime_ns]
-    return {"versions": _versions(), "inputs": inputs, "scene": bool(scene)}
+    state = {"versions": versions(), "inputs": inputs, "scene": bool(scene)}
+    return {"run.json": json.dumps(state), "run.toml": write_scenario(scenario)}
 
 
-def _check_same_run(path, text, state):
-    before, kept = (path / "run.toml").read_text(encoding="utf-8"), json.loads((path / "run.json").read_text())
-    if before != text:
-        old, new = ({line.strip() for line in each.splitlines()} for each in (before, text))
+def _is_begun(path, identity):
+    """Whether a run has been begun that this one goes on with; another run than this is a mistake."""
+    if not (path / "run.toml").is_file():
+        return False
+    before = {name: (path / name).read_text(encoding="utf-8") for name in identity}
+    if before["run.toml"] != identity["run.toml"]:
+        old, new = ({line.strip() for line in each["run.toml"].splitlines()} for each in (before, identity))
         changed = sorted(line.partition("#")[0].strip() for line in old - new) or ["keys"]
         raise ValueError(
             f"the run to resume is of another scenario, with {', '.join(changed[:3])}: "
             "leave out SCENARIO to go on with that one, or begin again with --overwrite"
         )
+    kept, state = (json.loads(each["run.json"]) for each in (before, identity))
     for key, what in (("versions", "other versions of its packages"), ("inputs", "an input file that has changed")):
         if kept[key] != state[key]:
             raise ValueError(f"the run to resume was begun with {what}: begin again with --overwrite")
     if kept["scene"] != state["scene"]:
         raise ValueError("the run to resume was begun with --scene or without it: give it as it was")
+    return True
+
+
+def _has_blocks(unfinished, error):
+    """Whether a stopped run can go on: not with what can never end well, nor from nothing."""
+    return not isinstance(error, ValueError | TypeError) and any((unfinished / "blocks").glob("*/*.npy"))
+
+
+@contextmanager
+def _errors_with_their_file(folder):
+    """Errors of the system say which file they met, and what can be done."""
+    try:
+        yield
+    except OSError as error:
+        name = f" ({error.filename})" if error.filename and str(error.filename) not in str(error.strerror) else ""
+        said = f"{error.strerror}{name}" if error.strerror else str(error)
+        hint = f"; what is finished is kept, go on with --resume -o {folder}"
+        raise OSError(f"{said}{hint if (folder / UNFINISHED).exists() else ''}") from error
 
 
 def _compute(found, lai, folder, client, threads, as_json):
@@ -218,8 +213,8 @@ def _write_files(scenario, tree, found, folder):
         terrain = xr.Dataset({name: saved[f"terrain-{name}"].compute() for name in tree["terrain"].data_vars})
         terrain.attrs = dict(tree["terrain"].attrs)
     detail = saved["detail"].compute()
-    report.quicklook(folder / "quicklook.png", image, truth, detail)
-    page = report.page(scenario, image, truth, detail, terrain, level, _fits(image, truth), _versions())
+    quicklook, page = report.run_page(scenario, image, truth, detail, terrain, level, _fits(image, truth))
+    (folder / "quicklook.png").write_bytes(quicklook)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "scenario.toml").write_text(write_scenario(scenario), encoding="utf-8")
 
@@ -237,31 +232,3 @@ def _fits(image, truth):
         if valid > 2 and spread > 0:
             fits[name] = regress(known, found, pair="index")
     return fits
-
-
-def _versions():
-    versions = {name: importlib.metadata.version(name) for name in _VERSIONS}
-    return {"python": platform.python_version()} | versions
-
-
-def _said(error):
-    """What an error of the system says, with the file."""
-    name = f" ({error.filename})" if error.filename and str(error.filename) not in str(error.strerror) else ""
-    return f"{error.strerror}{name}" if error.strerror else str(error)
-
-
-def _replace(source, target):
-    if target.is_dir() and not target.is_symlink():
-        shutil.rmtree(target)
-    os.replace(source, target)
-
-
-def _remove(folder, path, existed):
-    shutil.rmtree(path, ignore_errors=True)
-    if not existed:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _remove_if_empty(folder, path, existed):
-    if not any((path / "blocks").glob("*/*.npy")):
-        _remove(folder, path, existed)

@@ -1,0 +1,14 @@
+"""Versions are those that are installed."""
+
+import platform
+
+import numpy as np
+
+import fifesim
+from fifesim.output.provenance import versions
+
+
+def test_versions_are_those_of_the_packages_that_run():
+    found = versions()
+    assert (found["python"], found["numpy"]) == (platform.python_version(), np.__version__)
+    assert found["fifesim"] == fifesim.__version__
