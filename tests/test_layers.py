@@ -108,6 +108,8 @@ def test_a_folder_is_read_at_a_glance():
     shown = [path for path in PACKAGE.iterdir() if not path.name.startswith(("__pycache__", "."))]
     assert len([path for path in shown if path.name != "data"]) <= 14
     assert {path.name for path in shown if path.is_dir()} - {"data"} == {*ORDER, *STAGES} - {"stages", "cli"}
+
+
 def test_only_the_package_imports_the_accessor():
     assert [name for name in FILES if "accessor" in own_imports(name)] == ["__init__"]
 
