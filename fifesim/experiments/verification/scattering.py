@@ -108,10 +108,11 @@ def _numbered(values):
 
 
 def _once():
-    """Light that the aerosol scatters once; the phase function is read at quarters of a degree."""
+    """Also straight back. The phase function is read at quarters of a degree."""
     band, worst = instrument("TM").select(["TM3"])[0].response, 0.0
     at = np.array([band.center])
-    for engine, angles in (("5S", (40.0, 25.0, 130.0)), ("successive-orders", (55.0, 40.0, 20.0))):
+    cases = ("5S", (40.0, 25.0, 130.0)), ("successive-orders", (55.0, 40.0, 20.0)), ("5S", (35.0, 35.0, 0.0))
+    for engine, angles in cases:
         air = Atmosphere(visibility=10.0, altitude=0.0, engine=engine)
         found = once_on_nodes(*(np.array([angle]) for angle in angles), scattered_once(air, (band,)))
         mu_s, mu_v = np.cos(np.radians(angles[:2]))

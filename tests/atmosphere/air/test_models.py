@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.air.molecules import rayleigh_cross_section, rayleigh_phase
 
 
 def test_columns_are_the_published_ones():
@@ -40,17 +39,6 @@ def test_aerosol_does_not_depend_on_altitude():
 def test_rayleigh_optical_depth_agrees_with_6s(altitude, wavelength, tau):
     """0.3 % less: 6S closes its profile by a layer from 100 to 99999 km that holds 0.26 % of the molecules."""
     assert Atmosphere(altitude=altitude).rayleigh_optical_depth(wavelength) == pytest.approx(tau, rel=3.2e-3)
-
-
-def test_rayleigh_optical_depth_of_hydrostatic_air_is_the_published_one():
-    """.0973 at .55 um and 1013.25 hPa (Bucholtz 1995, Teillet 1990), which differ by 0.5 % among authors."""
-    molecules_above = 101325 / 9.80665 / 0.028964 * 6.02214e23
-    assert rayleigh_cross_section(0.55) * molecules_above == pytest.approx(0.0973, rel=6e-3)
-
-
-def test_rayleigh_phase_has_mean_one():
-    nodes, weights = np.polynomial.legendre.leggauss(4)
-    assert rayleigh_phase(nodes) @ weights / 2 == pytest.approx(1, rel=1e-14)
 
 
 def test_aerosol_optical_depth_falls_from_blue_to_infrared():

@@ -1,6 +1,5 @@
 import subprocess
 import sys
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +8,9 @@ import pytest
 from pyrsr.rsr import RSR_reader
 
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.coupling import apparent_reflectance, corrected_reflectance
+from fifesim.atmosphere.schemes.coupling import apparent_reflectance
 from fifesim.atmosphere.schemes.engines import band_terms
-from fifesim.base.bands import Band, solar_irradiance
+from fifesim.base.bands import Band
 
 NAMES = ("TM1", "TM2", "TM3", "TM4", "TM5", "TM7")
 RESPONSES = RSR_reader("Landsat-5", "TM")
@@ -66,35 +65,6 @@ def test_factors_of_the_fife_case_agree_with_6s():
         assert terms.diffuse_fraction == pytest.approx(diffuse, abs=2e-3)
 
 
-@pytest.mark.parametrize("visibility", [8.0, 45.0])
-def test_band_factors_stand_for_the_spectral_sum(visibility):
-    """One wide band against the mean of 34 slices of it: 5e-4 at a reflectance of 0.5."""
-    atmosphere = Atmosphere(visibility=visibility)
-    edges = np.linspace(0.75, 0.92, 35)
-    slices = [Band("slice", (low, high), (1, 1)) for low, high in pairwise(edges)]
-    whole = Band("whole", (edges[0], edges[-1]), (1, 1))
-    weight = np.array([solar_irradiance(part) for part in slices])
-    parts = apparent_reflectance(0.5, **band_terms(atmosphere, slices, 40.0, 20.0, 60.0).uniform)
-    once = apparent_reflectance(0.5, **band_terms(atmosphere, [whole], 40.0, 20.0, 60.0).uniform)
-    assert once[0] == pytest.approx(np.average(parts, weights=weight), abs=5e-4)
-
-
-def test_inverse_is_exact():
-    terms = band_terms(Atmosphere(visibility=10), BANDS, 60.0, 30.0, 45.0).uniform
-    rho = np.broadcast_to(np.linspace(0, 1, 11)[:, None], (11, len(BANDS)))
-    np.testing.assert_allclose(corrected_reflectance(apparent_reflectance(rho, **terms), **terms), rho, atol=1e-12)
-
-
-def test_missing_cell_stays_missing():
-    toa = apparent_reflectance(np.array([np.nan, 0.2]), 0.1, 0.8, 0.9, 0.1)
-    assert np.isnan(toa).tolist() == [True, False]
-
-
-def test_percent_is_refused():
-    with pytest.raises(ValueError, match="must be below 1, got 3: reflectance is a fraction"):
-        apparent_reflectance(30.0, 0.1, 0.8, 0.9, 0.1)
-
-
 def test_terms_are_fractions_and_the_blue_sky_is_the_most_diffuse():
     terms = band_terms(Atmosphere(), BANDS, 30.0, 0.0, 0.0)
     for values in terms._replace(optical_depth=terms.spherical_albedo):
@@ -123,11 +93,6 @@ def test_azimuth_does_not_matter_at_nadir():
 def test_low_sun_and_view_are_refused(angles, name):
     with pytest.raises(ValueError, match=f"{name} must be from 0 to 75 degrees"):
         band_terms(Atmosphere(), BANDS, *angles, 0.0)
-
-
-def test_thermal_band_is_refused():
-    with pytest.raises(ValueError, match=r"band TM6 spans 10.4 to 12.5 um, the gas tables only 0.4 to 2.5 um"):
-        band_terms(Atmosphere(), [Band("TM6", (10.4, 12.5), (1, 1))], 30.0, 0.0, 0.0)
 
 
 def test_terms_cannot_be_changed():

@@ -38,10 +38,3 @@ def test_everything_has_a_name_and_a_unit():
 def test_bands_only_engine_is_named():
     with pytest.raises(ValueError, match="engine must be one of 5S, successive-orders"):
         fifesim.atmosphere.spectrum(fifesim.Atmosphere(engine="6S"))
-
-
-def test_atmosphere_prints_columns_depths_and_transmittances():
-    text = str(fifesim.Atmosphere())
-    assert "water vapour 2.4" in text
-    assert "optical depth, molecules" in text
-    assert "transmittance, ozone" in text

@@ -7,7 +7,7 @@ from numpy.polynomial.legendre import leggauss, legval
 
 from fifesim.atmosphere.air.aerosols import aerosol_phase, aerosol_polarization
 from fifesim.atmosphere.air.molecules import rayleigh_phase
-from fifesim.atmosphere.schemes.phase_expansion import matrix_moments, rayleigh_expansion, truncated_expansion, wigner
+from fifesim.atmosphere.schemes.phase_expansion import matrix_moments, rayleigh_expansion
 from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
 from fifesim.base.geometry import scattering_angle_cosine
 
@@ -258,43 +258,3 @@ def test_light_that_is_not_polarized_is_another():
     )
     assert abs(expected[1] / expected[0] - 1) > 0.01
     assert vector / scalar == pytest.approx(expected[1] / expected[0], abs=5e-4)
-
-
-@pytest.mark.parametrize("order, spin", [(0, 0), (1, 0), (0, 2), (2, 2), (2, -2), (3, 2), (5, -2)])
-def test_wigner_functions_are_orthogonal(order, spin):
-    nodes, weights = leggauss(40)
-    lowest = max(order, abs(spin))
-    functions = wigner(order, spin, nodes, 30)
-    assert not functions[:lowest].any()
-    norms = (functions * weights) @ functions.T
-    expected = np.diag(np.where(np.arange(30) < lowest, 0, 2 / ORDERS[:30]))
-    np.testing.assert_allclose(norms, expected, atol=1e-12)
-
-
-def test_wigner_functions_are_the_closed_forms():
-    x = np.linspace(-1, 1, 9)
-    np.testing.assert_allclose(wigner(2, 2, x, 3)[2], ((1 + x) / 2) ** 2, atol=1e-14)
-    np.testing.assert_allclose(wigner(2, -2, x, 3)[2], ((1 - x) / 2) ** 2, atol=1e-14)
-    np.testing.assert_allclose(wigner(0, 2, x, 3)[2], np.sqrt(6) / 4 * (1 - x**2), atol=1e-14)
-
-
-def test_molecules_are_expanded_as_they_scatter():
-    expansion = rayleigh_expansion(3)
-    np.testing.assert_allclose(legval(NODES, expansion[:, 0]), rayleigh_phase(NODES), rtol=1e-12)
-    polarization = expansion[2, 3] * wigner(0, 2, NODES, 3)[2]
-    # At right angles, light of molecules with depolarization d is polarized by (1 - d) / (1 + d).
-    assert np.interp(0, NODES, polarization / rayleigh_phase(NODES)) == pytest.approx((1 - 0.0279) / (1 + 0.0279), 1e-4)
-
-
-def test_moments_give_the_phase_function_back():
-    degree = (1 - NODES**2) / (1 + NODES**2)
-    found = matrix_moments(0.75 * (1 + NODES**2), degree, NODES, WEIGHTS, 6)
-    np.testing.assert_allclose(found[:3, [0, 3]], PURE_RAYLEIGH[:, [0, 3]], atol=1e-12)
-    np.testing.assert_allclose(found[3:, [0, 3]], 0, atol=1e-12)
-
-
-def test_truncation_keeps_the_light_that_is_not_in_the_peak():
-    moments = 0.9 ** np.arange(100)
-    expansion, peak = truncated_expansion(moments, 32)
-    assert peak == pytest.approx(0.9**32)
-    np.testing.assert_allclose(expansion[:, 0] / ORDERS[:32] * (1 - peak) + peak, moments[:32], rtol=1e-12)

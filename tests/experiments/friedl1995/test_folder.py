@@ -76,11 +76,10 @@ def test_failure_in_the_middle_leaves_nothing(quick, tmp_path, monkeypatch):
     for name in ("readings", "sizes", "sensitivity"):
         monkeypatch.setattr(friedl1995_effects, name, lambda *arguments, **options: None)
 
-    def full(case, seed, folder):
-        (folder / "figure3.png").write_bytes(b"half")
+    def full(*arguments):
         raise OSError("disk full")
 
-    monkeypatch.setattr(reproduction, "_draw", full)
+    monkeypatch.setattr(reproduction.friedl1995_report, "reproduction_page", full)
     result = quick("-o", "out")
     assert result.exit_code == 1 and "disk full" in result.stderr
     assert not (tmp_path / "out").exists()

@@ -1,0 +1,86 @@
+"""The equation of surface and atmosphere, forth and back."""
+
+import numpy as np
+import pytest
+
+from fifesim.atmosphere.schemes.coupling import (
+    apparent_reflectance,
+    apparent_reflectance_of_cell,
+    corrected_reflectance,
+    corrected_reflectance_of_cell,
+    inhomogeneous_reflectance,
+    target_reflectance,
+)
+
+UNIFORM = (0.09, 0.8, 0.83, 0.19, 0.98)
+TERMS = (0.09, 0.8, 0.52, 0.31, 0.19, 0.98)
+
+
+def test_inverse_is_exact():
+    rho = np.linspace(0, 1, 11)
+    np.testing.assert_allclose(corrected_reflectance(apparent_reflectance(rho, *UNIFORM), *UNIFORM), rho, atol=1e-12)
+
+
+def test_missing_cell_stays_missing():
+    toa = apparent_reflectance(np.array([np.nan, 0.2]), 0.1, 0.8, 0.9, 0.1)
+    assert np.isnan(toa).tolist() == [True, False]
+
+
+def test_percent_is_refused():
+    with pytest.raises(ValueError, match="must be below 1, got 3: reflectance is a fraction"):
+        apparent_reflectance(30.0, 0.1, 0.8, 0.9, 0.1)
+
+
+def test_reflections_between_ground_and_air_are_a_geometric_series():
+    """Light that goes up once, comes back a share S, and so on: 60 times are enough."""
+    path, down, up, albedo, gas = UNIFORM
+    rho = np.array([0.0, 0.3, 1.0])
+    series = gas * (path + down * up * sum(rho * (rho * albedo) ** order for order in range(60)))
+    np.testing.assert_allclose(apparent_reflectance(rho, *UNIFORM), series, rtol=1e-14)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 1, 1), (3, 4, 1), (3, 4, 5), (5,), (4, 5), (2, 1, 4, 5)])
+@pytest.mark.parametrize("function", [apparent_reflectance, corrected_reflectance])
+def test_arrays_broadcast_and_are_the_scalars(function, shape):
+    random = np.random.default_rng(1)
+    values, terms = random.random((3, 4, 5)), [term * random.uniform(0.9, 1.0, shape) for term in UNIFORM]
+    found, all_terms = function(values, *terms), np.broadcast_arrays(values, *terms)
+    assert found.shape == all_terms[0].shape
+    for place in np.ndindex(found.shape):
+        value, *here = (float(each[place]) for each in all_terms)
+        if function is apparent_reflectance:
+            assert found[place] == apparent_reflectance_of_cell(value, value, *here)
+        else:
+            assert found[place] == corrected_reflectance_of_cell(value, *here)
+
+
+@pytest.mark.parametrize("function", [apparent_reflectance, corrected_reflectance])
+def test_single_precision_is_widened_and_numbers_stay_numbers(function):
+    values = np.linspace(0, 1, 6, dtype=np.float32)
+    found = function(values, *UNIFORM)
+    assert found.dtype == np.float64
+    np.testing.assert_array_equal(found, function(values.astype(float), *UNIFORM))
+    assert isinstance(function(0.3, *UNIFORM), np.float64)
+    assert function(np.zeros((2, 0)), *UNIFORM).shape == (2, 0)
+
+
+def test_where_no_light_comes_through_nothing_is_known_of_the_ground():
+    """Opaque gas, as in the middle of a band of water vapour: no error, but no number either."""
+    assert not np.isfinite(corrected_reflectance(np.array([0.0]), 0.1, 0.8, 0.9, 0.0, 0.0)).any()
+
+
+def test_uniform_ground_has_the_total_transmittance():
+    path, down, direct, diffuse, albedo, gas = TERMS
+    uniform = gas * (path + down * (direct + diffuse) * 0.3 / (1 - 0.3 * albedo))
+    assert inhomogeneous_reflectance(0.3, 0.3, *TERMS) == pytest.approx(uniform, rel=1e-14)
+
+
+def test_target_comes_back():
+    target, around = np.meshgrid(np.linspace(0, 1, 11), np.linspace(0, 1, 11))
+    toa = inhomogeneous_reflectance(target, around, *TERMS)
+    np.testing.assert_allclose(target_reflectance(toa, around, *TERMS), target, atol=1e-13)
+
+
+def test_percent_around_a_target_is_refused():
+    with pytest.raises(ValueError, match=r"must be below 1, got 5\.7: reflectance is a fraction"):
+        inhomogeneous_reflectance(30.0, 30.0, *TERMS)

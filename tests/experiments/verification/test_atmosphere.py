@@ -1,0 +1,62 @@
+"""Checks of the atmosphere notice what is wrong, and say where."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from fifesim.atmosphere.schemes import lookup
+from fifesim.cli import app
+from fifesim.experiments.verification import areas, atmosphere
+
+
+def exceeded(check):
+    return [deviation.what for deviation in check() if not deviation.within]
+
+
+@pytest.mark.parametrize("check", [atmosphere._sunbeam, atmosphere._there_and_back, atmosphere._varying])
+def test_all_is_well(check):
+    assert exceeded(check) == []
+
+
+def test_a_tighter_bound_is_exceeded(monkeypatch):
+    """The closed forms of 5S do not reach a hundredth of a percent."""
+    monkeypatch.setattr(areas, "AREAS", {"atmosphere": (atmosphere._five_s_at_fife,)})
+    monkeypatch.setattr(atmosphere, "_FIFE_BOUNDS", (0.007, 0.004, 1e-5, 0.002, 0.001, 0.001))
+    result = CliRunner().invoke(app, ["verify"])
+    assert result.exit_code == 1
+    assert result.stdout.splitlines()[-1] == "6 checks, 1 beyond their bounds: atmosphere: 5S, FIFE case, TM3"
+
+
+@pytest.mark.parametrize(
+    "name, what",
+    [("corrected_reflectance", "reflectance there and back"), ("target_reflectance", "target there and back")],
+)
+def test_a_way_back_that_leads_elsewhere_is_noticed(monkeypatch, name, what):
+    right = getattr(atmosphere, name)
+    monkeypatch.setattr(atmosphere, name, lambda *given, **terms: right(*given, **terms) + 1e-9)
+    assert exceeded(atmosphere._there_and_back) == [what]
+
+
+def test_a_sunbeam_of_another_depth_is_noticed(monkeypatch):
+    """In the mixed atmosphere the beam falls off with the depths of molecules and aerosol together."""
+    right = atmosphere.scattering
+
+    def wrong(air, wavelength, *angles):
+        light = right(air, wavelength, *angles)
+        aerosol = air.aerosol_optical_depth(wavelength) / np.cos(np.radians(50.0))
+        return light._replace(direct_transmittance_down=light.direct_transmittance_down * np.exp(2 * aerosol))
+
+    monkeypatch.setattr(atmosphere, "scattering", wrong)
+    assert exceeded(atmosphere._sunbeam) == ["5S, sunbeam", "successive-orders, sunbeam"]
+
+
+@pytest.mark.parametrize("wrong", [-1.0, 1.001, np.nan])
+def test_a_wrong_kernel_of_the_tables_is_noticed(monkeypatch, wrong):
+    right = lookup._through
+
+    def through(*given):
+        right(*given)
+        given[-1][...] *= wrong
+
+    monkeypatch.setattr(lookup, "_through", through)
+    assert "geometry by cell" in exceeded(atmosphere._varying)
