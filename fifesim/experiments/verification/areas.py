@@ -1,12 +1,12 @@
 """Every check of the package, area by area."""
 
-from fifesim.experiments.verification import analysis, atmosphere, canopy, landscape, scan, sensor, terrain
+from fifesim.experiments.verification import analysis, atmosphere, canopy, landscape, line_spread, scan, sensor, terrain
 
 AREAS = {
     "random field": landscape.CHECKS,
     "canopy": canopy.CHECKS,
     "terrain": terrain.CHECKS,
-    "sensor": (*sensor.CHECKS, *scan.CHECKS),
+    "sensor": (*sensor.CHECKS, *line_spread.CHECKS, *scan.CHECKS),
     "atmosphere": atmosphere.CHECKS,
     "analysis": analysis.CHECKS,
 }
