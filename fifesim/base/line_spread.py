@@ -58,6 +58,11 @@ class LineSpread(Transfer):
         """
         return self._cumulative(np.asarray(x, float))
 
+    @staticmethod
+    def _check_width(width):
+        if not 0 < width < np.inf:
+            raise ValueError(f"the width of a line spread function must be positive metres, got {width}")
+
 
 @dataclass(frozen=True)
 class FiniteSpread(LineSpread):
@@ -78,7 +83,7 @@ class FiniteSpread(LineSpread):
     width: float
 
     def __post_init__(self):
-        check_width(self.width)
+        self._check_width(self.width)
 
     @property
     def half_width(self):
@@ -89,20 +94,10 @@ class FiniteSpread(LineSpread):
 @dataclass(frozen=True)
 class Boxcar(FiniteSpread):
     r"""
-    Uniform line spread function: with it a footprint is an area and its mean the true one.
+    Uniform line spread function of a width W: with it a footprint is an area and its mean the true one.
 
     .. math:: C(x) = \frac{1}{2} + \frac{x}{W}, \quad |x| \le \frac{W}{2}; \qquad
         M(f) = \mathrm{sinc}(f W), \quad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
-
-    Parameters
-    ----------
-    width : float
-        Width W of the support. [m]
-
-    Raises
-    ------
-    ValueError
-        If the width is not positive.
 
     Examples
     --------
@@ -115,21 +110,3 @@ class Boxcar(FiniteSpread):
 
     def _mtf(self, frequency):
         return np.sinc(frequency * self.width)
-
-
-def check_width(width):
-    """
-    Refuse a support without a positive width.
-
-    Parameters
-    ----------
-    width : float
-        [m]
-
-    Raises
-    ------
-    ValueError
-        If it is not positive and finite.
-    """
-    if not 0 < width < np.inf:
-        raise ValueError(f"the width of a line spread function must be positive metres, got {width}")

@@ -6,6 +6,7 @@ from fifesim.experiments.verification import (
     atmosphere,
     canopy,
     landscape,
+    line_spread,
     scan,
     scattering,
     sensor,
@@ -16,7 +17,7 @@ AREAS = {
     "random field": landscape.CHECKS,
     "canopy": canopy.CHECKS,
     "terrain": terrain.CHECKS,
-    "sensor": (*sensor.CHECKS, *scan.CHECKS),
+    "sensor": (*sensor.CHECKS, *line_spread.CHECKS, *scan.CHECKS),
     "atmosphere": (*scattering.CHECKS, *adjacency.CHECKS, *atmosphere.CHECKS),
     "analysis": analysis.CHECKS,
 }

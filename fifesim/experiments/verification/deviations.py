@@ -1,8 +1,10 @@
 """How far a result lies from an independent one."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import quad
 
 
 class Deviation(NamedTuple):
@@ -64,3 +66,25 @@ def rms_percent(found, expected):
     1.0
     """
     return float(100 * np.sqrt(np.mean((np.divide(found, expected) - 1) ** 2)))
+
+
+def integral(function, kinks):
+    """
+    Integral of a function with kinks.
+
+    Parameters
+    ----------
+    function : callable
+    kinks : sequence of float
+        Increasing, from the lower end of the integral to the upper.
+
+    Returns
+    -------
+    integral : float
+
+    Examples
+    --------
+    >>> round(integral(abs, (-1.0, 0.0, 2.0)), 12)
+    2.5
+    """
+    return sum(quad(function, low, high, epsabs=1e-10)[0] for low, high in pairwise(kinks))

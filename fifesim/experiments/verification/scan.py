@@ -118,6 +118,19 @@ def _turned():
     yield _deviation("second moments of a turned footprint", shape, 2e-3, "1", "those of the response, turned")
 
 
+def _rectangle():
+    """A detector of 30 by 40 m, turned over cells of 10 m; 64 by 64 points in each of these."""
+    frame = 10 * np.array([[np.cos(0.5), np.sin(0.5)], [-np.sin(0.5), np.cos(0.5)]])
+    footprint = _footprint(frame, Boxcar(30.0), Boxcar(40.0), 6.3, 5.7)
+    found = footprint_operator(footprint, slice(0, 12), slice(0, 12)).toarray().reshape(12, 12)
+    place = (np.arange(12 * 64) + 0.5) / 64
+    down, right = place[:, None] - 6.3, place - 5.7
+    along, across = (abs(a * down + b * right) < half for (a, b), half in zip(frame, (15, 20), strict=True))
+    points = (along & across).reshape(12, 64, 12, 64).sum(axis=(1, 3))
+    worst = np.abs(found - points / points.sum()).sum()
+    yield _deviation("turned detector, all cells", worst, 0.003, "1", "points inside of a rectangle")
+
+
 def _straight():
     """A quarter turn changes rows for columns; tables of the responses have steps of 1/4096."""
     along, across = CosineSpread(30.32), Boxcar(24.0)
@@ -164,4 +177,4 @@ def _plane():
     yield _deviation("view of its samples", worst, 1e-9, "degree", "Friedl et al. (1995), Table 1")
 
 
-CHECKS = (_lines_of_sight, _places, _grid, _orbits, _turned, _straight, _plane)
+CHECKS = (_lines_of_sight, _places, _grid, _orbits, _turned, _rectangle, _straight, _plane)

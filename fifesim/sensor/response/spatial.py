@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import ndtr, spherical_jn
 
-from fifesim.base.line_spread import FiniteSpread, LineSpread, check_width
+from fifesim.base.line_spread import FiniteSpread, LineSpread
 
 # Standard deviations at which a Gaussian is cut: 2e-9 of it lie beyond.
 _GAUSSIAN_REACH = 6.0
@@ -21,7 +21,7 @@ _GAUSSIAN_REACH = 6.0
 @dataclass(frozen=True)
 class CosineSpread(FiniteSpread):
     r"""
-    Cosine line spread function truncated at half its amplitude.
+    Cosine line spread function of a width W, truncated at half its amplitude.
 
     .. math::
 
@@ -30,16 +30,6 @@ class CosineSpread(FiniteSpread):
         M(f) &= \frac{\pi}{3 \sqrt{3}} \left[ \mathrm{sinc}\left(\frac{1}{3} - f W\right)
             + \mathrm{sinc}\left(\frac{1}{3} + f W\right) \right],
         \qquad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
-
-    Parameters
-    ----------
-    width : float
-        Width W of the support. [m]
-
-    Raises
-    ------
-    ValueError
-        If the width is not positive.
 
     References
     ----------
@@ -92,7 +82,7 @@ class GaussianSpread(LineSpread):
     fwhm: float
 
     def __post_init__(self):
-        check_width(self.fwhm)
+        self._check_width(self.fwhm)
 
     @classmethod
     def from_mtf(cls, mtf_at_nyquist, interval):
@@ -124,7 +114,7 @@ class GaussianSpread(LineSpread):
         """
         if not 0 < mtf_at_nyquist < 1:
             raise ValueError(f"mtf_at_nyquist must be in (0, 1), got {mtf_at_nyquist}: it is a share, not percent")
-        check_width(interval)
+        cls._check_width(interval)
         return cls(float(np.sqrt(-16 * np.log(2) * np.log(mtf_at_nyquist)) * interval / np.pi))
 
     @property

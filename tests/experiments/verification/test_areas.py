@@ -5,11 +5,13 @@ import pytest
 from typer.testing import CliRunner
 
 import fifesim
+from fifesim.analysis import scaling
 from fifesim.cli import app
 from fifesim.experiments.verification import areas, canopy
 from fifesim.ground.canopy import absorption
 from fifesim.ground.terrain import sky, spline
 from fifesim.sensor.response import calibration
+from fifesim.sensor.scan import track
 
 
 def run():
@@ -39,6 +41,8 @@ def test_installation_is_within_all_bounds():
         ("terrain", sky, "sky_view", np.nan, "terrain: sky under a rugged horizon"),
         ("terrain", spline, "spline_grid", np.nan, "terrain: wave of six cells"),
         ("sensor", calibration, "gain_offset", 1.01, "sensor: counts of TM's radiances"),
+        ("sensor", track, "growth", 1.01, "sensor: growth of a footprint"),
+        ("analysis", scaling, "ndvi_hessian", 1.01, "analysis: second derivatives of NDVI"),
     ],
 )
 def test_broken_physics_is_named_with_exit_code_1(monkeypatch, only, area, owner, name, wrong, said):
