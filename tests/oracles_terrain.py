@@ -28,6 +28,12 @@ def dozier(slope, aspect, tangent_of, count=200_000):
     return float(np.mean(np.cos(s) * np.sin(h) ** 2 + np.sin(s) * np.cos(phi - a) * (h - np.sin(h) * np.cos(h))))
 
 
+def plane_gradient(slope, aspect):
+    """Rise eastward and northward of a plane that falls by a slope toward an aspect [degree]."""
+    steep, azimuth = np.tan(np.radians(slope)), np.radians(aspect)
+    return -steep * np.sin(azimuth), -steep * np.cos(azimuth)
+
+
 def plane(shape, cell_y, cell_x, slope, aspect):
     """Elevation of a plane that falls by a slope toward an aspect [degree]."""
     i, j = np.mgrid[: shape[0], : shape[1]].astype(float)

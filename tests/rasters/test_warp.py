@@ -173,19 +173,6 @@ def test_files_that_cannot_be_used_are_named(tmp_path):
         fifesim.open_lai(away, GRID)
 
 
-def test_map_of_leaf_area_is_labelled_and_checked(tmp_path):
-    path = write(tmp_path / "lai.tif", hills(100, 120), GRID.affine, "EPSG:26914")
-    lai = fifesim.open_lai(path, GRID)
-    assert (lai.name, lai.attrs["lai_distribution"]) == ("lai", "lai.tif")
-    negative = write(tmp_path / "negative.tif", hills(100, 120) - 2.5, GRID.affine, "EPSG:26914")
-    with pytest.raises(ValueError, match="negative"):
-        fifesim.open_lai(negative, GRID)
-    with no_compute():
-        lazy = fifesim.open_lai(negative, GRID, chunks=50)
-    with pytest.raises(ValueError, match="negative"):
-        lazy.compute()
-
-
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:26914"])
 def test_covering_grid_covers_the_file_in_whole_pixels(tmp_path, crs):
     if crs == "EPSG:4326":

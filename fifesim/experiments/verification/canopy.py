@@ -155,7 +155,7 @@ def _chains():
 def _tables():
     """Over one background, over one for each cell, and exactly; and with directions of each cell's own."""
     rng, sky, leaf = np.random.default_rng(6), np.array([0.2, 0.1]), (np.array([0.07, 0.45]), np.array([0.04, 0.42]))
-    lai = np.concatenate([[0.0, 1e-6, 99.0], rng.gamma(1.5, 1.5, 197)])
+    lai = np.concatenate([[0.0, 1e-6, 100.0], rng.gamma(1.5, 1.5, 197)])
     ground, one = rng.uniform(0, 1, (2, 200)), np.array([0.15, 0.6])
     worst = np.zeros(3)
     for sza, vza, raa, hotspot, shape in ((28.5, 0, 0, 0.0, "spherical"), (60, 45, 170, 0.1, "planophile")):

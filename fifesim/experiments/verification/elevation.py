@@ -32,17 +32,18 @@ def _upsampling():
 
 
 def _unknown_cells():
+    """Holes as large as are filled, and all sides."""
     rows, columns = np.mgrid[:60, :70]
     plane = 400.0 + 3.0 * columns - 2.0 * rows
     holed = plane.copy()
-    holed[20:27, 30:33], holed[40, 50], holed[43:47, 47:53] = np.nan, np.nan, np.nan
+    holed[20:29, 30:39], holed[40, 50], holed[43:47, 47:53] = np.nan, np.nan, np.nan
     filled = largest(gaps.fill_gaps(holed, (4, 4)), plane)
-    edged = plane.copy()
-    edged[:9], edged[:, 50:] = np.nan, np.nan
-    carried = gaps.extend(edged, 12, rest=False)
+    cut = np.full(plane.shape, np.nan)
+    cut[15:45, 20:50] = plane[15:45, 20:50]
+    carried = gaps.extend(cut, 12, rest=False)
     reached = np.isfinite(carried)
-    filled = np.maximum(filled, largest(carried[reached], plane[reached]) if reached[:, :62].all() else np.nan)
-    yield _deviation("plane in its holes and past its edge", filled, 1e-8, "m", "plane")
+    carried = largest(carried[reached], plane[reached]) if reached[3:57, 8:62].all() else np.nan
+    yield _deviation("plane in its holes and past its edge", np.maximum(filled, carried), 1e-8, "m", "plane")
 
 
 def _drainage(ground, preference, node):

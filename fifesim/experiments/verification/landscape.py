@@ -64,8 +64,10 @@ def _generator():
         ("ffffffff ffffffff ffffffff ffffffff", "ffffffff ffffffff"): "408f276d 41c83b0e a20bc7c6 6d5451fd",
         ("243f6a88 85a308d3 13198a2e 03707344", "a4093822 299f31d0"): "d16cfe09 94fdcceb 5001e420 24126ea1",
     }
-    wrong = sum(np.sum(philox(_words(counter), _words(key)) != _words(said)) for (counter, key), said in known.items())
-    yield _deviation("words of Philox-4x32-10", float(wrong), 0.0, "word", "Salmon et al. (2011), known answers")
+    wrong = [philox(*_words(counter), *_words(key)) != _words(answer) for (counter, key), answer in known.items()]
+    yield _deviation(
+        "words of Philox-4x32-10", float(np.sum(wrong)), 0.0, "word", "Salmon et al. (2011), known answers"
+    )
 
 
 def _words(text):
@@ -81,7 +83,7 @@ def _white_noise():
     """In single precision; four cells of a row are made of the words of one place."""
     seed, row, group = 2**40 + 7, -2, -3
     found = white_noise(seed, row, 4 * group, (40, 500)).ravel()
-    words = [philox(_halves(k, i), _halves(seed)) for i in range(row, row + 40) for k in range(group, group + 125)]
+    words = [philox(*_halves(k, i, seed)) for i in range(row, row + 40) for k in range(group, group + 125)]
     one, other = np.reshape(words, (-1, 2)).T
     radius = np.sqrt(-2 * np.log((one + 0.5) / 2**32))
     # Within an eighth of a turn by 30 bits, and quarters of it by two.

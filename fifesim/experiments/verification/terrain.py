@@ -25,6 +25,13 @@ def _plane(slope, aspect, shape=(7, 9)):
     return 1000 - np.tan(np.radians(slope)) * (30.0 * j * np.sin(a) - 20.0 * i * np.cos(a))
 
 
+def _sky_view(slope, aspect, zenith):
+    """Of a slope under a horizon that is known from north on."""
+    steep, azimuth = np.tan(np.radians(slope)), np.radians(aspect)
+    tangents, directions = horizon.tangent(zenith), horizon.azimuths(len(zenith))
+    return skies.sky_view(tangents, directions, -steep * np.sin(azimuth), -steep * np.cos(azimuth))
+
+
 def _vector(zenith, azimuth):
     zenith, azimuth = np.radians(zenith), np.radians(azimuth)
     return np.array([np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith)])
@@ -49,17 +56,17 @@ def _slopes():
 
 def _skies():
     """A horizon is known in 32 directions, and is a great circle between them: half a percent in a valley."""
-    slopes, open_sky = np.array([0.0, 5.0, 30.0, 60.0]), np.full((32, 1), 90.0)
-    wide = [skies.sky_view(slope, 100.0, open_sky[:, 0]) for slope in slopes]
+    slopes = np.array([0.0, 5.0, 30.0, 60.0])
+    wide = [_sky_view(slope, 100.0, np.full(32, 90.0)) for slope in slopes]
     analytic = (1 + np.cos(np.radians(slopes))) / 2
     yield _deviation("sky seen from a wide plane", largest(wide, analytic), 1e-12, "1", "(1 + cos slope) / 2")
     walls = np.array([5.0, 20.0, 45.0])
     across = np.abs(np.sin(np.radians(horizon.azimuths(32))))
     valleys = [horizon.zenith(np.tan(np.radians(wall)) * across) for wall in walls]
-    floor = [skies.sky_view(0.0, 0.0, valley) for valley in valleys]
+    floor = [_sky_view(0.0, 0.0, valley) for valley in valleys]
     worst = 100 * largest(floor, np.cos(np.radians(walls)), relative=True)
     yield _deviation("sky seen from the floor of a V valley", worst, 0.5, "%", "cos(wall)")
-    foot = [skies.sky_view(wall, 90.0, valley) for wall, valley in zip(walls, valleys, strict=True)]
+    foot = [_sky_view(wall, 90.0, valley) for wall, valley in zip(walls, valleys, strict=True)]
     worst = 100 * largest(foot, (1 + np.cos(np.radians(2 * walls))) / 2, relative=True)
     yield _deviation("sky seen from the foot of its wall", worst, 0.5, "%", "(1 + cos 2 wall) / 2")
 
@@ -74,7 +81,7 @@ def _valley_of_cells():
     directions = horizon.azimuths(32)
     slope, aspect = terrain.slope_aspect(np.pad(ground, 1, mode="edge"), cell, cell)
     zenith = horizon.horizon_zenith(padded, cell, cell, directions, reach)
-    sky = skies.sky_view(slope, aspect, zenith, directions)[2]
+    sky = _sky_view(slope, aspect, zenith)[2]
     rim = np.arctan(np.tan(wall) / 3)  # the far one, half a depth up and three quarters of a width away
     found, analytic = sky[[3 * half, 3 * half + half // 2]], [np.cos(wall), (1 + np.cos(rim + wall)) / 2]
     worst = 100 * largest(found, analytic, relative=True)
@@ -93,7 +100,7 @@ def _any_sky():
         tilt, toward = np.radians(slope), phi - np.radians(aspect)
         h = np.arctan2(1.0, np.maximum(np.maximum(land, -np.tan(tilt) * np.cos(toward)), 0.0))
         integrand = np.cos(tilt) * np.sin(h) ** 2 + np.sin(tilt) * np.cos(toward) * (h - np.sin(h) * np.cos(h))
-        found = skies.sky_view(slope, aspect, horizon.zenith(tangents))
+        found = _sky_view(slope, aspect, horizon.zenith(tangents))
         worst = np.maximum(worst, largest(found, np.mean(integrand)))
     yield _deviation("sky under a rugged horizon", worst, 1e-7, "1", "Dozier and Frew (1990), Eq. 7b, quadrature")
 

@@ -1,9 +1,9 @@
 """Tables over leaf area index: exact functions on nodes, cubic splines between them."""
 
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
-import numba
 import numpy as np
+from numba import njit
 from numba.extending import register_jitable
 from scipy.interpolate import CubicSpline
 
@@ -17,26 +17,14 @@ _COARSEST = 32
 _FINEST = 2**16
 
 
-@dataclass(frozen=True, eq=False)
-class LaiTable:
-    """
-    Cubic splines of functions of leaf area index, on nodes that are equidistant in rate LAI / (1 + rate LAI).
-
-    Parameters
-    ----------
-    rate : float
-        Of the nodes. [1]
-    coefficients : array, shape (interval, column, 4)
-        Polynomial coefficients over the unit interval, constant term first.
-    """
+class LaiTable(NamedTuple):
+    """Cubic splines of functions of leaf area index, on nodes that are equidistant in rate LAI / (1 + rate LAI)."""
 
     rate: float
-    coefficients: np.ndarray = field(repr=False)
-
-    @property
-    def step(self):
-        """Intervals per unit of rate LAI / (1 + rate LAI)."""
-        return len(self.coefficients) / _length(self.rate)
+    step: float
+    """Intervals per unit of rate LAI / (1 + rate LAI)."""
+    coefficients: np.ndarray
+    """Of polynomials over the unit interval, constant term first, shape (interval, column, 4)."""
 
 
 def tabulate(function, rate, combine=None, tolerance=1e-6):
@@ -84,7 +72,8 @@ def tabulate(function, rate, combine=None, tolerance=1e-6):
         values = np.insert(values, np.arange(1, values.shape[1]), exact, axis=1)
         if np.abs(combine(coarse) - combine(exact)).max() < tolerance:
             spline = CubicSpline(np.arange(values.shape[1]), values, axis=1)
-            return LaiTable(rate, np.ascontiguousarray(spline.c[::-1].transpose(1, 2, 0)))
+            coefficients = np.ascontiguousarray(spline.c[::-1].transpose(1, 2, 0))
+            return LaiTable(rate, len(coefficients) / length, coefficients)
     raise ValueError(f"no table of {_FINEST} nodes reaches {tolerance:g}: use exact=True")
 
 
@@ -113,7 +102,7 @@ def interpolate(table, lai):
     """
     lai = np.asarray(lai, float)
     values = np.empty((table.coefficients.shape[1], lai.size))
-    _interpolate(np.ascontiguousarray(lai).ravel(), table.coefficients, table.rate, table.step, values)
+    _interpolate(np.ascontiguousarray(lai).ravel(), table, values)
     return values.reshape(-1, *lai.shape)
 
 
@@ -139,43 +128,39 @@ def interpolate_over(table, lai, background):
     bands = table.coefficients.shape[1] // 4
     background = np.broadcast_to(np.asarray(background, float), (bands, *lai.shape)).reshape(bands, -1)
     values = np.empty((bands, lai.size))
-    _interpolate_over(np.ascontiguousarray(lai).ravel(), background, table.coefficients, table.rate, table.step, values)
+    _interpolate_over(np.ascontiguousarray(lai).ravel(), background, table, values)
     return values.reshape(-1, *lai.shape)
 
 
 @register_jitable
-def _place(lai, rate, step, last):
+def _place(lai, table):
     """Interval of a leaf area index in a table, and its place in that, which is NaN where there is none."""
     if not 0 <= lai <= LIMIT:
         return 0, np.nan
-    position = rate * lai / (1 + rate * lai) * step
-    interval = min(int(position), last)
+    position = table.rate * lai / (1 + table.rate * lai) * table.step
+    interval = min(int(position), table.coefficients.shape[0] - 1)
     return interval, position - interval
 
 
 @register_jitable
-def _cubic(coefficients, interval, column, share):
-    c = coefficients[interval, column]
+def _cubic(table, interval, column, share):
+    c = table.coefficients[interval, column]
     return c[0] + share * (c[1] + share * (c[2] + share * c[3]))
 
 
-@numba.njit(nogil=True, cache=True)
-def _interpolate(lai, coefficients, rate, step, values):
-    last = coefficients.shape[0] - 1
+@njit(nogil=True, cache=True)
+def _interpolate(lai, table, values):
     for i in range(lai.size):
-        interval, share = _place(lai[i], rate, step, last)
+        interval, share = _place(lai[i], table)
         for column in range(values.shape[0]):
-            values[column, i] = _cubic(coefficients, interval, column, share)
+            values[column, i] = _cubic(table, interval, column, share)
 
 
-@numba.njit(nogil=True, cache=True)
-def _interpolate_over(lai, background, coefficients, rate, step, values):
-    last = coefficients.shape[0] - 1
+@njit(nogil=True, cache=True)
+def _interpolate_over(lai, background, table, values):
     for i in range(lai.size):
-        interval, share = _place(lai[i], rate, step, last)
+        interval, share = _place(lai[i], table)
         for band in range(values.shape[0]):
-            alone = _cubic(coefficients, interval, 4 * band, share)
-            hot = _cubic(coefficients, interval, 4 * band + 1, share)
-            through = _cubic(coefficients, interval, 4 * band + 2, share)
-            rdd = _cubic(coefficients, interval, 4 * band + 3, share)
+            alone, hot = _cubic(table, interval, 4 * band, share), _cubic(table, interval, 4 * band + 1, share)
+            through, rdd = _cubic(table, interval, 4 * band + 2, share), _cubic(table, interval, 4 * band + 3, share)
             values[band, i] = over_background(alone, hot, through, rdd, background[band, i])

@@ -1,17 +1,38 @@
 """Canopy reflectance of many cells: SAIL once per scene, then a table over leaf area index."""
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from fifesim.ground.canopy.absorption import extinction_coefficient
 from fifesim.ground.canopy.background import over_background, reflectance_factor, with_background
 from fifesim.ground.canopy.lai_table import interpolate, interpolate_over, tabulate
-from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
 from fifesim.ground.canopy.optics import check_background, check_lai, check_leaf_optics
 from fifesim.ground.canopy.sail_model import sail
 
 _BLOCK = 2**15  # cells evaluated exactly at a time, to bound memory
+
+
+class _Scene(NamedTuple):
+    """What a canopy's reflectance depends on besides its leaf area and its background."""
+
+    leaf_reflectance: tuple
+    leaf_transmittance: tuple
+    sky: tuple
+    sza: float
+    vza: float
+    raa: float
+    leaf_angles: LeafAngles
+    hotspot: float
+
+    def part(self, cells):
+        """The same for some of the cells, where directions vary."""
+        if not np.ndim(self.sza):
+            return self
+        angles = {"sza": self.sza[cells], "vza": self.vza[cells], "raa": self.raa[cells]}
+        return self._replace(sky=self.sky[:, cells], **angles)
 
 
 def canopy_reflectance(
@@ -87,9 +108,11 @@ def canopy_reflectance(
     if uniform:
         bands = np.broadcast_shapes(bands, background.shape)
     optics = tuple(_per_band(v, bands) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction))
-    scene = (*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
+    scene = _Scene(*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
     if exact:
-        return _exact(lai, background, scene, bands)
+        ground = np.reshape(background, (-1,) + (1,) * lai.ndim) if uniform else background
+        ground = np.broadcast_to(ground, bands + lai.shape).reshape(*bands, -1)
+        return _cell_by_cell(lai.reshape(-1), ground, scene).reshape(bands + lai.shape)
     if uniform:
         return interpolate(_surface_table(_per_band(background, bands), scene), lai)
     return interpolate_over(_layer_table(scene), lai, background)
@@ -144,14 +167,9 @@ def directional_reflectance(
     )
     missing = np.isnan(sza + vza + raa)
     sza, vza, raa = (np.where(missing, 0.0, angle) for angle in (sza, vza, raa))
-    rho, tau = (np.asarray(v, float)[:, None] for v in (leaf_reflectance, leaf_transmittance))
-    out = np.empty((bands, lai.size))
-    for start in range(0, lai.size, _BLOCK):
-        block = slice(start, start + _BLOCK)
-        angles = {"sza": sza[block], "vza": vza[block], "raa": raa[block]}
-        canopy = sail(lai[block], rho, tau, **angles, leaf_angles=leaf_angle_classes(leaf_angles), hotspot=hotspot)
-        surface = with_background(canopy, ground[:, block])
-        out[:, block] = reflectance_factor(surface.rso, surface.rdo, sky[:, block])
+    leaves = leaf_angle_classes(leaf_angles)
+    scene = _Scene(leaf_reflectance, leaf_transmittance, sky, sza, vza, raa, leaves, hotspot)
+    out = _cell_by_cell(lai, ground, scene)
     out[:, missing] = np.nan
     return out.reshape(bands, *cells)
 
@@ -162,10 +180,10 @@ def _per_band(values, bands):
 
 
 def _sail(lai, scene):
-    """SAIL of cells, shape (band, n) from (n,), and the sky's share, shape (band, 1)."""
-    rho, tau, sky, sza, vza, raa, leaf_angles, hotspot = scene
-    rho, tau, sky = (np.array(v)[:, None] for v in (rho, tau, sky))
-    return sail(lai, rho, tau, sza=sza, vza=vza, raa=raa, leaf_angles=leaf_angles, hotspot=hotspot), sky
+    """SAIL of cells, shape (band, n) from (n,), and the sky's share, shape (band, 1) or (band, n)."""
+    rho, tau = np.array(scene.leaf_reflectance)[:, None], np.array(scene.leaf_transmittance)[:, None]
+    angles = {"sza": scene.sza, "vza": scene.vza, "raa": scene.raa, "leaf_angles": scene.leaf_angles}
+    return sail(lai, rho, tau, **angles, hotspot=scene.hotspot), np.reshape(scene.sky, (len(rho), -1))
 
 
 def _surface(lai, background, scene):
@@ -175,24 +193,19 @@ def _surface(lai, background, scene):
     return reflectance_factor(surface.rso, surface.rdo, sky)
 
 
-def _exact(lai, background, scene, bands):
-    """Reflectance of every cell computed exactly, shape (band,) + lai.shape."""
-    shape = bands + lai.shape
-    if background.ndim < 2:
-        background = np.reshape(background, (-1,) + (1,) * lai.ndim)
-    background = np.broadcast_to(background, shape).reshape(*bands, -1)
-    cells = lai.reshape(-1)
-    result = np.empty(background.shape)
-    for start in range(0, cells.size, _BLOCK):
+def _cell_by_cell(lai, background, scene):
+    """The same, a block of cells at a time."""
+    out = np.empty(background.shape)
+    for start in range(0, lai.size, _BLOCK):
         block = slice(start, start + _BLOCK)
-        result[:, block] = _surface(cells[block], background[:, block], scene)
-    return result.reshape(shape)
+        out[:, block] = _surface(lai[block], background[:, block], scene.part(block))
+    return out
 
 
 def _rate(scene):
     """Fastest decay with leaf area: sunbeam and view together, or diffuse light."""
-    sza, vza, leaf_angles = scene[3], scene[4], scene[6]
-    return max(1.0, extinction_coefficient(sza, leaf_angles) + extinction_coefficient(vza, leaf_angles))
+    down, up = (extinction_coefficient(angle, scene.leaf_angles) for angle in (scene.sza, scene.vza))
+    return max(1.0, down + up)
 
 
 @lru_cache(maxsize=32)

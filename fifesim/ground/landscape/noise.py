@@ -64,34 +64,27 @@ def white_noise(seed, row, column, shape):
     return out[:, skip : skip + shape[1]]
 
 
-@njit(nogil=True, cache=True)
-def philox(counter, key):
+@njit(nogil=True, cache=True, inline="always")
+def philox(c0, c1, c2, c3, k0, k1):
     """
     Philox-4x32-10 of one counter.
 
     Parameters
     ----------
-    counter : array of uint64, shape (4,)
-        Words of 32 bits.
-    key : array of uint64, shape (2,)
-        Words of 32 bits.
+    c0, c1, c2, c3 : uint64
+        Counter, words of 32 bits.
+    k0, k1 : uint64
+        Key, words of 32 bits.
 
     Returns
     -------
-    words : array of uint64, shape (4,)
+    words : tuple of uint64, length 4
         Of 32 bits.
 
     References
     ----------
     [Salmon2011]_
     """
-    out = np.empty(4, np.uint64)
-    out[0], out[1], out[2], out[3] = _philox(counter[0], counter[1], counter[2], counter[3], key[0], key[1])
-    return out
-
-
-@njit(nogil=True, inline="always")
-def _philox(c0, c1, c2, c3, k0, k1):
     for _ in range(_ROUNDS):
         p0, p1 = _M0 * c0, _M1 * c2
         c0, c1, c2, c3 = (p1 >> _HALF) ^ c1 ^ k0, p1 & _WORD, (p0 >> _HALF) ^ c3 ^ k1, p0 & _WORD
@@ -109,12 +102,8 @@ def _fill(seed, row, first, out):
         place = np.uint64(row + i)
         for g in range(groups):
             group = np.uint64(first + g)
-            w0, w1, w2, w3 = _philox(group & _WORD, group >> _HALF, place & _WORD, place >> _HALF, k0, k1)
-            words[0, g], words[1, g], words[2, g], words[3, g] = (
-                np.uint32(w0),
-                np.uint32(w1),
-                np.uint32(w2),
-                np.uint32(w3),
+            words[0, g], words[1, g], words[2, g], words[3, g] = philox(
+                group & _WORD, group >> _HALF, place & _WORD, place >> _HALF, k0, k1
             )
         _box_muller(words[0], words[1], normals[0], normals[1])
         _box_muller(words[2], words[3], normals[2], normals[3])

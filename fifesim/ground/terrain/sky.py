@@ -4,8 +4,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from fifesim.ground.terrain.horizon import tangent
-from fifesim.ground.terrain.slope import Vector, along_normal, plane_gradient, slope_cosine
+from fifesim.ground.terrain.slope import Vector, along_normal, slope_cosine
 
 
 def sky_vector(tangents, directions, east, north):
@@ -79,9 +78,9 @@ def sky_factor(vector, east, north):
     return np.maximum(np.minimum(along_normal(vector, east, north), (1 + slope_cosine(east, north)) / 2), 0.0)
 
 
-def sky_view(slope, aspect, horizon, directions=None):
+def sky_view(tangents, directions, east, north):
     r"""
-    Sky view factor of a slope under a known horizon.
+    Sky view factor of slopes under a known horizon.
 
     .. math::
 
@@ -92,16 +91,12 @@ def sky_view(slope, aspect, horizon, directions=None):
 
     Parameters
     ----------
-    slope, aspect : array
-        [degree]
-    horizon : array, shape (direction, ...)
-        Zenith angle H of the horizon of the land around. [degree]
-    directions : array, shape (direction,), optional
-        Its azimuths, clockwise from north and evenly spaced; by default from north on. [degree]
+    tangents, directions, east, north
+        As in `sky_vector`.
 
     Returns
     -------
-    sky_view : array
+    sky_view : array, shape (...)
         1 on an open plain. [1]
 
     Notes
@@ -116,18 +111,10 @@ def sky_view(slope, aspect, horizon, directions=None):
     --------
     A wide plane of 60 degrees sees (1 + cos 60) / 2:
 
-    >>> round(float(sky_view(60.0, 10.0, np.full(16, 90.0))), 12)
+    >>> round(float(sky_view(np.zeros(16), np.arange(16) * 22.5, np.sqrt(3.0), 0.0)), 12)
     0.75
     """
-    horizon = np.asarray(horizon, float)
-    count = horizon.shape[0]
-    directions = np.arange(count) * (360 / count) if directions is None else directions
-    shape = np.broadcast_shapes(np.shape(slope), np.shape(aspect), horizon.shape[1:])
-    east, north = plane_gradient(np.broadcast_to(slope, shape), np.broadcast_to(aspect, shape))
-    missing = len(shape) + 1 - horizon.ndim
-    tangents = tangent(horizon).reshape(count, *(1,) * missing, *horizon.shape[1:])
-    vector = Vector(*sky_vector(np.broadcast_to(tangents, (count, *shape)), directions, east, north))
-    return sky_factor(vector, east, north)
+    return sky_factor(Vector(*sky_vector(tangents, directions, east, north)), east, north)
 
 
 @register_jitable

@@ -197,29 +197,6 @@ def angles(east, north):
     return slope, np.where(aspect == 360, 0.0, aspect)
 
 
-def plane_gradient(slope, aspect):
-    """
-    Gradient of a plane; the inverse of `angles`.
-
-    Parameters
-    ----------
-    slope, aspect : array
-        As of `slope_aspect`. [degree]
-
-    Returns
-    -------
-    east, north : array
-        Rise eastward and northward. [m m-1]
-
-    Examples
-    --------
-    >>> angles(*plane_gradient(30.0, 120.0))[1].round(9).item()
-    120.0
-    """
-    steep, azimuth = np.tan(np.radians(slope)), np.radians(aspect)
-    return -steep * np.sin(azimuth), -steep * np.cos(azimuth)
-
-
 @njit(nogil=True, cache=True)
 def _gradient(dem, rows, columns, over_y, over_x, out):
     for i in range(rows.size):

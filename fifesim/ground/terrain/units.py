@@ -2,16 +2,24 @@
 
 import numpy as np
 
-# Metres in one unit of elevation, by the names that files use. NIST SP 811, App. B.8: the two feet differ by 2e-6.
-METRES = {"m": 1.0, "ft": 0.3048, "us-ft": 1200.0 / 3937.0, "km": 1000.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
-_NAMES = {
-    "m": ("metre", "metres", "meter", "meters"),
-    "ft": ("foot", "feet", "international foot", "foot (international)"),
-    "us-ft": ("us survey foot", "us survey feet", "survey foot", "ftus", "us_survey_foot", "foot_us", "us foot"),
-    "km": ("kilometre", "kilometer"),
-    "dm": ("decimetre", "decimeter"),
-    "cm": ("centimetre", "centimeter"),
-    "mm": ("millimetre", "millimeter"),
+# Metres in one unit of elevation, and names that files use for it. NIST SP 811, App. B.8: the two feet differ by 2e-6.
+_UNITS = {
+    "m": (1.0, "metre", "metres", "meter", "meters"),
+    "ft": (0.3048, "foot", "feet", "international foot", "foot (international)"),
+    "us-ft": (
+        1200.0 / 3937.0,
+        "us survey foot",
+        "us survey feet",
+        "survey foot",
+        "ftus",
+        "us_survey_foot",
+        "foot_us",
+        "us foot",
+    ),
+    "km": (1000.0, "kilometre", "kilometer"),
+    "dm": (0.1, "decimetre", "decimeter"),
+    "cm": (0.01, "centimetre", "centimeter"),
+    "mm": (0.001, "millimetre", "millimeter"),
 }
 
 # Above this share of neighbours that are equal, whole numbers are terraces: their risers show in slope and aspect.
@@ -43,10 +51,10 @@ def metres_per_unit(name):
     0.3048
     """
     plain = str(name).strip().lower()
-    for unit, metres in METRES.items():
-        if plain == unit or plain in _NAMES.get(unit, ()):
+    for unit, (metres, *names) in _UNITS.items():
+        if plain in (unit, *names):
             return metres
-    raise ValueError(f"vertical units must be one of {', '.join(METRES)}, got {name!r}")
+    raise ValueError(f"vertical units must be one of {', '.join(_UNITS)}, got {name!r}")
 
 
 def terrace_step(values):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from elevations import write
 from lazy import ODD_CHUNKS, check_place, no_compute
 
 import fifesim
@@ -66,3 +67,19 @@ def test_scene_too_large_for_memory_names_the_streaming_method():
     grid = fifesim.grid_at("EPSG:26914", 0, 5e6, 4e6, 4e6, 1.0)
     with pytest.raises(ValueError, match=r"needs .* GB of memory.*method=\"streaming\""):
         fifesim.lai_scene(grid, method="periodic")
+
+
+def test_map_of_leaf_area_is_labelled_and_checked(tmp_path, site):
+    values = np.random.default_rng(1).uniform(0, 4, site.shape)
+    values[3, 4] = np.nan
+    lai = fifesim.open_lai(write(tmp_path / "lai.tif", values, site.affine), site)
+    check_place(lai, site.crs)
+    assert (lai.name, lai.attrs["lai_distribution"]) == ("lai", "lai.tif")
+    np.testing.assert_array_equal(lai, values)
+    negative = write(tmp_path / "negative.tif", values - 2.5, site.affine)
+    with pytest.raises(ValueError, match="negative"):
+        fifesim.open_lai(negative, site)
+    with no_compute():
+        lazy = fifesim.open_lai(negative, site, chunks=50)
+    with pytest.raises(ValueError, match="negative"):
+        lazy.compute()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from oracles_terrain import hills, plane
+from oracles_terrain import hills, plane, plane_gradient
 
 from fifesim.base.geometry import Geometry
 from fifesim.ground.terrain import horizon as horizons
@@ -53,7 +53,7 @@ def test_kernel_on_planes_is_the_formulas():
     for slope, aspect in ((0, 0), (15, 80), (40, 250), (60, 300)):
         light = light_of(plane((12, 14), 10.0, 10.0, slope, aspect), 10.0, geometry)
         mu_s, mu_v = (max(cosine(slope, aspect, *toward), 0.0) for toward in ((50.0, 110.0), (20.0, 300.0)))
-        sky = sky_view(slope, aspect, np.full(32, 90.0))
+        sky = sky_view(np.zeros(32), AZIMUTHS, *plane_gradient(slope, aspect))
         wanted = [np.cos(np.radians(slope)), sky, mu_s, mu_v / np.cos(np.radians(20.0))]
         for found, value, tolerance in zip(light, wanted, (1e-12, 2e-4, 1e-12, 1e-12), strict=True):
             np.testing.assert_allclose(found, value, rtol=0, atol=tolerance)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from oracles_terrain import hills, plane
+from oracles_terrain import hills, plane, plane_gradient
 
 from fifesim.ground.terrain import slope as terrain
 
@@ -49,7 +49,7 @@ def test_component_along_the_normal_is_that_of_vectors():
     slope, aspect, *vector = rng.uniform([[0], [0], [-1], [-1], [-1]], [[89], [360], [1], [1], [1]], (5, 50))
     tilt, azimuth = np.radians((slope, aspect))
     normal = np.stack([np.sin(tilt) * np.sin(azimuth), np.sin(tilt) * np.cos(azimuth), np.cos(tilt)])
-    east, north = terrain.plane_gradient(slope, aspect)
+    east, north = plane_gradient(slope, aspect)
     found = terrain.along_normal(terrain.Vector(*vector), east, north)
     np.testing.assert_allclose(found, (normal * vector).sum(0), rtol=0, atol=1e-13)
     np.testing.assert_allclose(terrain.slope_cosine(east, north), normal[2], rtol=0, atol=1e-14)
@@ -57,4 +57,4 @@ def test_component_along_the_normal_is_that_of_vectors():
 
 def test_angles_and_gradient_are_inverse():
     slope, aspect = np.array([0.5, 45.0, 80.0]), np.array([359.0, 180.0, 37.0])
-    np.testing.assert_allclose(terrain.angles(*terrain.plane_gradient(slope, aspect)), [slope, aspect], rtol=1e-12)
+    np.testing.assert_allclose(terrain.angles(*plane_gradient(slope, aspect)), [slope, aspect], rtol=1e-12)

@@ -85,47 +85,27 @@ def _raise_for_gaps(model, grid, unknown, rows, columns):
             f"{name} holds no elevation on the grid, which spans {grids.extent(grid)}: is it the right place?"
         )
     down, across = grids.cell_size(grid)
-    height, width = (np.gradient(cells.astype(float)) * size for cells, size in ((rows, down), (columns, across)))
-    leads = {
-        "north": unknown,
-        "south": unknown[::-1],
-        "west": unknown.T,
-        "east": unknown.T[::-1],
-    }
-    sizes = {"north": height, "south": height[::-1], "west": width, "east": width[::-1]}
-    short = {side: _lead(leads[side], sizes[side]) for side in leads}
-    short = {side: metres for side, metres in short.items() if metres > 0}
-    labels, _ = ndimage.label(unknown, structure=np.ones((3, 3)))
-    holes = [
-        (height[part[0]].sum(), width[part[1]].sum(), part)
-        for part in ndimage.find_objects(labels)
-        if part[0].start > 0 and part[1].start > 0 and part[0].stop < rows.size and part[1].stop < columns.size
-    ]
-    words = []
-    if short:
-        sides = ", ".join(f"{metres:.0f} m in the {side}" for side, metres in short.items())
-        # Filling counts from the centre of the last known cell.
-        near = int(np.ceil((max(short.values()) + model.resolution + max(_filled(model))) / 10 + 1)) * 10
-        words.append(
-            f"it lacks up to {sides}: take a smaller grid or a model that reaches farther"
-            + (f", or fill={near} carries it on" if near <= _NEAR else "")
-        )
-    if holes:
-        tall, wide, part = max(holes, key=lambda hole: max(hole[:2]))
-        middle = [int(cells[(axis.start + axis.stop) // 2]) for cells, axis in zip((rows, columns), part, strict=True)]
-        east, north = projection.transform_points(grid.affine, middle[1] + 0.5, middle[0] + 0.5)
-        middle_distance = int(np.ceil(max(tall, wide) / 20 + 1)) * 10
-        number = "a hole" if len(holes) == 1 else f"{len(holes)} holes, the largest"
-        words.append(
-            f"it has {number} of {tall:.0f} x {wide:.0f} m at {east:.0f} E {north:.0f} N: fill={middle_distance} "
-            "interpolates it"
-        )
+    height, width = np.gradient(rows.astype(float)) * down, np.gradient(columns.astype(float)) * across
+    words = [*_short_sides(model, unknown, height, width), *_holes(grid, unknown, rows, columns, height, width)]
     raise ValueError(f"{name} does not cover the grid, which spans {grids.extent(grid)}; " + "; ".join(words))
 
 
-def _filled(model):
-    """Distances that gaps are already filled over, down and across [m]."""
-    return [cells * size for cells, size in zip(model.fill, model.place.cell_size(), strict=True)]
+def _short_sides(model, unknown, height, width):
+    """By how much a model ends inside a grid, in words."""
+    leads = {
+        "north": _lead(unknown, height),
+        "south": _lead(unknown[::-1], height[::-1]),
+        "west": _lead(unknown.T, width),
+        "east": _lead(unknown.T[::-1], width[::-1]),
+    }
+    if not any(leads.values()):
+        return
+    sides = ", ".join(f"{metres:.0f} m in the {side}" for side, metres in leads.items() if metres > 0)
+    filled = max(cells * size for cells, size in zip(model.fill, model.place.cell_size(), strict=True))
+    # Filling counts from the centre of the last known cell.
+    near = int(np.ceil((max(leads.values()) + model.resolution + filled) / 10 + 1)) * 10
+    carried = f", or fill={near} carries it on" if near <= _NEAR else ""
+    yield f"it lacks up to {sides}: take a smaller grid or a model that reaches farther{carried}"
 
 
 def _lead(unknown, sizes):
@@ -133,6 +113,24 @@ def _lead(unknown, sizes):
     partly = unknown[:, ~unknown.all(axis=0)]
     runs = np.cumsum(np.logical_and.accumulate(partly, axis=0) * sizes[:, None], axis=0)[-1]
     return float(runs.max())
+
+
+def _holes(grid, unknown, rows, columns, height, width):
+    """Where the largest of the holes lies that are seen, in words."""
+    labels, _ = ndimage.label(unknown, structure=np.ones((3, 3)))
+    holes = [
+        (height[down].sum(), width[across].sum(), down, across)
+        for down, across in ndimage.find_objects(labels)
+        if down.start > 0 and across.start > 0 and down.stop < rows.size and across.stop < columns.size
+    ]
+    if not holes:
+        return
+    tall, wide, down, across = max(holes, key=lambda hole: max(hole[:2]))
+    row, column = rows[(down.start + down.stop) // 2], columns[(across.start + across.stop) // 2]
+    east, north = projection.transform_points(grid.affine, column + 0.5, row + 0.5)
+    fill = int(np.ceil(max(tall, wide) / 20 + 1)) * 10
+    number = "a hole" if len(holes) == 1 else f"{len(holes)} holes, the largest"
+    yield f"it has {number} of {tall:.0f} x {wide:.0f} m at {east:.0f} E {north:.0f} N: fill={fill} interpolates it"
 
 
 def warn_of_terraces(model, grid):

@@ -2,20 +2,20 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import dask.array as da
 import numpy as np
 import xarray as xr
 from affine import Affine
-from dask.base import tokenize
 from odc.geo.geobox import GeoBox
 
 from fifesim.ground.terrain.rasters.cover import check_cover, known_elevation, warn_of_terraces
-from fifesim.ground.terrain.rasters.model import TILE, model_under
+from fifesim.ground.terrain.rasters.model import TILE, Model, model_under
 from fifesim.ground.terrain.rasters.source import placement
 from fifesim.rasters import cf, places
+from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-from fifesim.rasters.windows import array_from_windows
 
 
 def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=None):
@@ -112,21 +112,27 @@ def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None):
     return cf.label(dem, "dem", history=history, source_resolution=model.resolution), reach
 
 
+class _TileReads(NamedTuple):
+    """What each chunk reads of a lazy source: the window of it that the chunk's tiles read."""
+
+    array: da.Array
+    model: Model
+
+    def window(self, rows, columns):
+        return self.model.tile_window(rows, columns)
+
+
 def _from_lazy(model, grid, chunks):
-    """The elevation of a lazy source: each chunk gets the window of it that its tiles read."""
-    data, sizes = model.source.cells, places.chunk_sizes(grid, chunks, tile=TILE)
     without = model.reading(None)
 
-    def ask(rows, columns):
-        window = model.tile_window(rows, columns)
-        return (rows, columns, tuple(part.start for part in window)), [window]
-
-    def block(rows, columns, origin, cells):
-        known = without.reading(cells, origin)
+    def kernel(rows, columns, cells):
+        down, across = without.tile_window(rows, columns)
+        known = without.reading(cells, (down.start, across.start))
         shape = rows.stop - rows.start, columns.stop - columns.start
         return known_elevation(known, known.tiles(), rows.start, columns.start, shape)
 
-    out = array_from_windows(block, [data], sizes, ask, token=tokenize("fine_dem", without, data.name, sizes))
+    sizes = places.chunk_sizes(grid, chunks, tile=TILE)
+    out = chunking.windows(kernel, [_TileReads(model.source.cells, without)], tuple(grid.shape), sizes)
     return grids.place(xr.DataArray(out, dims=("y", "x")), grid)
 
 

@@ -1,6 +1,7 @@
 """Terrain on labelled rasters: sky, horizon and the light on a slope, from an elevation model."""
 
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 import xarray as xr
@@ -47,7 +48,7 @@ def sky_view(dem, horizon=None):
     --------
     fifesim.ground.terrain.sky.sky_factor, fifesim.ground.terrain.sky.sky_vector
     """
-    return _light(dem, horizon, None, "sky_view", _sky_view)
+    return _light(dem, horizon, None, "sky_view", attrgetter("sky_view"))
 
 
 def terrain_view(dem, horizon=None):
@@ -103,7 +104,7 @@ def illumination(dem, geometry=None, horizon=None):
     --------
     fifesim.ground.terrain.slope.along_normal, fifesim.ground.terrain.light.horizon_toward
     """
-    return _light(dem, horizon, _sun(dem, geometry), "illumination", _illumination)
+    return _light(dem, horizon, _sun(dem, geometry), "illumination", attrgetter("mu_s_local"))
 
 
 def shadow(dem, geometry=None, horizon=None):
@@ -221,16 +222,8 @@ def terrain_reflectance(
     return _of_level(kernel, reflectance, dem, geometry, horizon, "surface_reflectance", said)
 
 
-def _sky_view(light):
-    return light.sky_view
-
-
 def _terrain_view(light):
     return skies.terrain_view(light.sky_view, light.cosine)
-
-
-def _illumination(light):
-    return light.mu_s_local
 
 
 def _shadow(light):
