@@ -1,0 +1,20 @@
+"""Checks of line spread functions see the kernels that production calls."""
+
+import pytest
+from broken import notices
+
+from fifesim.base.line_spread import Boxcar
+from fifesim.experiments.verification import line_spread
+from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
+
+
+@pytest.mark.parametrize(
+    ("owner", "kernel", "check"),
+    [
+        (Boxcar, "_cumulative", line_spread._shapes),
+        (CosineSpread, "_mtf", line_spread._shapes),
+        (GaussianSpread, "_cumulative", line_spread._shapes),
+    ],
+)
+def test_production_kernels_are_checked(monkeypatch, owner, kernel, check):
+    assert notices(check, monkeypatch, owner, kernel)

@@ -1,0 +1,20 @@
+"""Checks of scans see the kernels that production calls."""
+
+import pytest
+from broken import notices
+
+from fifesim.experiments.verification import scan
+from fifesim.sensor.scan import track
+
+
+@pytest.mark.parametrize(
+    ("owner", "kernel", "check"),
+    [
+        (track, "view_from_ground", scan._lines_of_sight),
+        (track, "growth", scan._lines_of_sight),
+        (track, "place_of", scan._places),
+        (scan, "apply_operator", scan._straight),
+    ],
+)
+def test_production_kernels_are_checked(monkeypatch, owner, kernel, check):
+    assert notices(check, monkeypatch, owner, kernel)

@@ -1,0 +1,25 @@
+"""Estimates count what a run has, in words and as JSON."""
+
+import json
+
+from fifesim.output.run.estimates import estimate, estimate_in_words
+from fifesim.scenario.scenario import parse_scenario
+
+FOUND = {"cells": 72900, "pixels": 900, "tasks": 12, "threads": 2, "memory": 2**30, "disk": 2**20, "seconds": 90.0}
+
+
+def test_cells_and_pixels_are_those_of_the_scenario():
+    scenario = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
+    found, with_scene = estimate(scenario, threads=1), estimate(scenario, threads=1, scene=True)
+    assert found["cells"] == 90 * 90 and found["pixels"] == 100
+    assert with_scene["disk"] - found["disk"] >= found["cells"] * 8
+    assert found["threads"] == 1 and found["seconds"] > 0 and found["memory"] > 0
+
+
+def test_words_have_units():
+    text = estimate_in_words(FOUND)
+    assert "0.1 million" in text and "1.00 GiB with 2 threads" in text and "1.00 MiB" in text
+
+
+def test_json_is_the_estimate():
+    assert json.loads(estimate_in_words(FOUND, as_json=True)) == {"event": "estimate", **FOUND}

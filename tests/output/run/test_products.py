@@ -1,0 +1,44 @@
+"""What a run computes, and in which order."""
+
+import pytest
+import xarray as xr
+
+from fifesim.output.run.products import make_scene_store, products_of, wanted_blocks
+from fifesim.rasters import grid as grids
+from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.simulation import simulate
+
+
+@pytest.fixture(scope="module")
+def tree():
+    scenario = parse_scenario({"grid": {"width": 900, "height": 600}, "terrain": {"dem": "flat"}})
+    return simulate(scenario.complete(), chunks={"y": 90, "x": 135})
+
+
+def test_every_block_is_wanted_once(tree):
+    found, lai = products_of(tree), tree["scene"]["lai"]
+    wanted = wanted_blocks(found, lai.chunks, grids.geobox(lai))
+    assert len(wanted) == len(set(wanted)) == sum(array.npartitions for array in found.arrays.values())
+    assert {name for name, _ in wanted} == set(found.rasters) == {"image", "lai", "fpar", "detail"}
+
+
+def test_blocks_are_wanted_by_the_chunk_of_the_scene_below_them(tree):
+    found, lai = products_of(tree), tree["scene"]["lai"]
+    image = [index[-2:] for name, index in wanted_blocks(found, lai.chunks, grids.geobox(lai)) if name == "image"]
+    assert image == sorted(image) and len(image) > 1
+
+
+def test_cells_of_the_detail_are_those_below_pixels_in_the_middle(tree):
+    detail, scene = products_of(tree).rasters["detail"], tree["scene"]["lai"]
+    assert detail.shape == (144, 144)
+    assert abs(float(detail["x"].mean() - scene["x"].mean())) <= 15
+
+
+def test_scene_products_are_written_as_their_blocks_are_made(tree, tmp_path):
+    path = tmp_path / "scene.zarr"
+    found = products_of(tree, path)
+    assert set(found.scene) == set(tree["scene"].data_vars)
+    make_scene_store(path, found.scene)
+    assert found.arrays["scene-lai"].compute().all()
+    written = xr.open_zarr(path, decode_coords="all", consolidated=False)
+    assert written["lai"].values.tobytes() == tree["scene"]["lai"].values.tobytes()
