@@ -8,6 +8,7 @@ The ground itself is held fixed, so all that changes is the air.
 
 import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
 from odc.geo.xr import wrap_xr
 
 import fifesim
@@ -20,7 +21,7 @@ ground = ground.drop_attrs(deep=False)
 
 def ndvi(atmosphere, **angles):
     sun = {"sza": 30.0, "saa": 0.0, "vza": 0.0, "vaa": 0.0} | angles
-    return ground.fifesim.to_toa(atmosphere, geometry=fifesim.Geometry(**sun), instrument="TM").fifesim.ndvi().values[0]
+    return ground.fifesim.to_toa(atmosphere, geometry=xr.Dataset(sun), instrument="TM").fifesim.ndvi().values[0]
 
 
 def raster(values):
