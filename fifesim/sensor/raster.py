@@ -251,13 +251,7 @@ def to_reflectance(image):
     geometry = directions.geometry_of(image.drop_vars(["vza", "vaa"], errors="ignore"))
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
-    out = chunks.pointwise(
-        calibration.radiance_to_reflectance,
-        radiance,
-        _along_band(image, "solar_irradiance"),
-        directions.mu_s(geometry),
-        earth_sun_distance=float(geometry.earth_sun_distance),
-    )
+    out = _by_sun(calibration.radiance_to_reflectance, radiance, _along_band(image, "solar_irradiance"), geometry)
     out = _placed_as(out, image)
     return cf.label(out, "toa_reflectance", source=radiance, history="to_reflectance")
 
@@ -288,13 +282,13 @@ def as_radiance(array, bands, geometry):
         return array
     irradiance = xr.DataArray([band.solar_irradiance for band in bands], dims="band")
     plain = array.drop_vars("band", errors="ignore")
-    return chunks.pointwise(
-        calibration.reflectance_to_radiance,
-        plain,
-        irradiance,
-        directions.mu_s(geometry),
-        earth_sun_distance=float(geometry.earth_sun_distance),
-    )
+    return _by_sun(calibration.reflectance_to_radiance, plain, irradiance, geometry)
+
+
+def _by_sun(kernel, array, irradiance, geometry):
+    """Apply a kernel of calibration to light below a sun."""
+    mu_s, distance = xr.DataArray(geometry.mu_s), geometry.earth_sun_distance
+    return chunks.pointwise(kernel, array, irradiance, mu_s, earth_sun_distance=distance)
 
 
 def _along_band(image, name):

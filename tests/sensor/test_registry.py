@@ -10,9 +10,9 @@ import pytest
 from fifesim.base import datasets
 from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
 from fifesim.sensor.description.listing import instrument_in_words
-from fifesim.sensor.description.performance import swath_width
 from fifesim.sensor.description.plausibility import check_units
 from fifesim.sensor.response.calibration import gain_offset, radiance_to_reflectance, reflectance_to_radiance
+from fifesim.sensor.scan.track import swath_width
 
 FILES = sorted(datasets.path("instruments").glob("*.toml"))
 LANDSAT = ("TM", "L4TM", "ETM+", "OLI", "OLI2")

@@ -10,7 +10,6 @@ from fifesim.base.geometry import fife_geometry
 from fifesim.base.line_spread import Boxcar
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.rasters import grid as grids
-from fifesim.sensor.description.performance import EARTH_RADIUS, swath_width
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
 from fifesim.sensor.scan import track as scan
 from fifesim.sensor.scan.rasters.swath import sense_swath
@@ -19,17 +18,17 @@ from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_oper
 
 _deviation = partial(Deviation, "sensor")
 
-_SPHERE = pyproj.Geod(a=EARTH_RADIUS, b=EARTH_RADIUS)
+_SPHERE = pyproj.Geod(a=scan.EARTH_RADIUS, b=scan.EARTH_RADIUS)
 _ALTITUDE = 833e3
 _TRACK = scan.Track(39.0, -97.0, 193.0)
 
 
 def _triangle(aside, altitude=_ALTITUDE):
     """Slant range [m], scan angle and view zenith [degree] by the sides of the triangle with the earth's centre."""
-    orbit = EARTH_RADIUS + altitude
-    slant = np.sqrt(EARTH_RADIUS**2 + orbit**2 - 2 * EARTH_RADIUS * orbit * np.cos(np.radians(aside)))
-    scan_angle = np.degrees(np.arccos((slant**2 + orbit**2 - EARTH_RADIUS**2) / (2 * slant * orbit)))
-    vza = 180 - np.degrees(np.arccos((slant**2 + EARTH_RADIUS**2 - orbit**2) / (2 * slant * EARTH_RADIUS)))
+    orbit = scan.EARTH_RADIUS + altitude
+    slant = np.sqrt(scan.EARTH_RADIUS**2 + orbit**2 - 2 * scan.EARTH_RADIUS * orbit * np.cos(np.radians(aside)))
+    scan_angle = np.degrees(np.arccos((slant**2 + orbit**2 - scan.EARTH_RADIUS**2) / (2 * slant * orbit)))
+    vza = 180 - np.degrees(np.arccos((slant**2 + scan.EARTH_RADIUS**2 - orbit**2) / (2 * slant * scan.EARTH_RADIUS)))
     return slant, scan_angle, vza
 
 
@@ -43,8 +42,8 @@ def _lines_of_sight():
     cosine = np.cos(np.radians(vza))
     worst = largest([along, across], [slant / _ALTITUDE, slant / _ALTITUDE / cosine], relative=True)
     yield _deviation("growth of a footprint", worst, 1e-9, "1", "sides of a triangle")
-    widths = [swath_width(_ALTITUDE, each) for each in scan_angle]
-    worst = largest(widths, 2 * EARTH_RADIUS * np.radians(aside), relative=True)
+    widths = [scan.swath_width(_ALTITUDE, each) for each in scan_angle]
+    worst = largest(widths, 2 * scan.EARTH_RADIUS * np.radians(aside), relative=True)
     yield _deviation("width of a swath", worst, 1e-9, "1", "sides of a triangle")
 
 
@@ -53,7 +52,7 @@ def _places():
     distance, aside = np.array([-3e5, 4e5, 1e5, -2e5]), np.array([3.0, -8.0, 0.4, 12.0])
     lon, lat, back = _SPHERE.fwd([_TRACK.longitude] * 4, [_TRACK.latitude] * 4, [_TRACK.heading] * 4, distance)
     abeam = np.array(back) + 180 + 90 * np.sign(aside)
-    lon, lat, back = _SPHERE.fwd(lon, lat, abeam, EARTH_RADIUS * np.radians(np.abs(aside)))
+    lon, lat, back = _SPHERE.fwd(lon, lat, abeam, scan.EARTH_RADIUS * np.radians(np.abs(aside)))
     latitude, longitude = scan.place_of(_TRACK, distance, aside)
     yield _deviation("places beside a track", largest([latitude, longitude], [lat, lon]), 1e-9, "degree", "geodesics")
     there, angle = scan.place_beside(_TRACK, lat, lon)
@@ -71,7 +70,7 @@ def _grid():
     lon, lat = pyproj.Transformer.from_crs(26914, 4269, always_xy=True).transform(*np.meshgrid(view["x"], view["y"]))
     abeam = scan.place_of(track, scan.place_beside(track, lat, lon)[0], 0.0)
     azimuth, _, distance = _SPHERE.inv(lon, lat, abeam[1], abeam[0])
-    vza = _triangle(np.degrees(distance / EARTH_RADIUS), 705e3)[2]
+    vza = _triangle(np.degrees(distance / scan.EARTH_RADIUS), 705e3)[2]
     worst = largest([view["vza"], (view["vaa"] - azimuth + 180) % 360 - 180], [vza, 0 * vza])
     yield _deviation("view angles of a grid", worst, 1e-6, "degree", "geodesics and a triangle")
 
@@ -84,7 +83,7 @@ def _orbits():
         ahead = np.degrees(np.arcsin(np.sin(np.radians(latitude)) / np.sin(np.radians(inclination))))
         turn = np.radians(ahead if ascending else 180 - ahead)
         point = np.cos(turn) * np.array([1.0, 0, 0]) + np.sin(turn) * np.cross(normal, [1.0, 0, 0])
-        rate = np.sqrt(3.986004418e14 / (EARTH_RADIUS + 705e3) ** 3)
+        rate = np.sqrt(3.986004418e14 / (scan.EARTH_RADIUS + 705e3) ** 3)
         velocity = rate * np.cross(normal, point) - 7.292115e-5 * np.cross([0, 0, 1.0], point)
         east = np.cross([0, 0, 1.0], point) / np.hypot(point[0], point[1])
         heading = np.degrees(np.arctan2(velocity @ east, velocity @ np.cross(point, east))) % 360
@@ -172,7 +171,7 @@ def _plane():
     worst = np.abs(image - expected).max() / np.hypot(0.02, 0.03) / (10 / 3)
     yield _deviation("plane in a scan", float(worst), 0.01, "cell", "the plane at its pixels")
     theta = (image["sample"].values + 0.5) * 43e-6
-    vza = np.degrees(np.arcsin(np.sin(np.abs(theta)) * (1 + 705e3 / EARTH_RADIUS)))
+    vza = np.degrees(np.arcsin(np.sin(np.abs(theta)) * (1 + 705e3 / scan.EARTH_RADIUS)))
     worst = largest(image["vza"].values, vza)
     yield _deviation("view of its samples", worst, 1e-9, "degree", "Friedl et al. (1995), Table 1")
 

@@ -8,13 +8,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from fifesim.sensor.description.axes import AlongAcross, Angle, by_axes
-from fifesim.sensor.description.band import (
-    BAND_NUMBERS,
-    INSTRUMENT_NUMBERS,
-    OPTIONAL_NUMBERS,
-    InstrumentBand,
-    Sources,
-)
+from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
 from fifesim.sensor.description.fields import CONFIG, Count, Name, Positive
 from fifesim.sensor.description.names import lookup
 from fifesim.sensor.description.performance import Scan

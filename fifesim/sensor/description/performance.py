@@ -2,15 +2,11 @@
 
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from fifesim.sensor.description.fields import CONFIG, Count, Number, Positive
 from fifesim.sensor.response.noise import NoiseModel
-
-# Mean radius of the earth [m].
-EARTH_RADIUS = 6.371e6
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -133,33 +129,3 @@ class Scan:
     lines: Count | None = None
     period: Positive | None = None
     swath: Positive | None = None
-
-
-def swath_width(altitude, max_angle):
-    r"""
-    Width of the ground that a scan covers, along the sphere.
-
-    .. math:: s = 2 R \left[ \arcsin\left(\frac{R + h}{R} \sin \theta\right) - \theta \right]
-
-    Parameters
-    ----------
-    altitude : float
-        Altitude h of the instrument. [m]
-    max_angle : float
-        Largest scan angle :math:`\theta` from nadir. [degree]
-
-    Returns
-    -------
-    width : float
-        Infinite where the line of sight misses the earth. [m]
-
-    Examples
-    --------
-    A narrow swath is that of a plane:
-
-    >>> round(float(swath_width(705e3, 0.1) / (2 * 705e3 * np.tan(np.radians(0.1)))), 5)
-    1.0
-    """
-    angle = np.radians(max_angle)
-    sine = (EARTH_RADIUS + altitude) / EARTH_RADIUS * np.sin(angle)
-    return float(2 * EARTH_RADIUS * (np.arcsin(sine) - angle)) if sine < 1 else float("inf")

@@ -3,8 +3,8 @@
 import numpy as np
 
 from fifesim.sensor.description.axes import by_axes
-from fifesim.sensor.description.performance import swath_width
 from fifesim.sensor.description.spectral_response import half_peak
+from fifesim.sensor.scan.track import swath_width
 
 # Angles between samples above this one are degrees, or no imager's [rad].
 _WIDEST = 0.02

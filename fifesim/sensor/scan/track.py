@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fifesim.sensor.description.performance import EARTH_RADIUS
+# Mean radius of the earth [m].
+EARTH_RADIUS = 6.371e6
 
 # Gravitational parameter of the earth [m3 s-2] and its rotation [rad s-1], WGS 84.
 _GRAVITY = 3.986004418e14
@@ -195,6 +196,34 @@ def growth(scan_angle, altitude):
     # The difference of two legs, which stays defined at nadir.
     slant = orbit * np.cos(np.radians(scan_angle)) - EARTH_RADIUS * mu_v
     return slant / altitude, slant / altitude / mu_v
+
+
+def swath_width(altitude, max_angle):
+    r"""
+    Width of the ground that a scan covers, along the sphere.
+
+    .. math:: s = 2 R \gamma
+
+    Parameters
+    ----------
+    altitude : float
+        Altitude of the instrument. [m]
+    max_angle : float
+        Largest scan angle from nadir. [degree]
+
+    Returns
+    -------
+    width : float
+        NaN where the line of sight misses the earth. [m]
+
+    Examples
+    --------
+    A narrow swath is that of a plane:
+
+    >>> round(float(swath_width(705e3, 0.1) / (2 * 705e3 * np.tan(np.radians(0.1)))), 5)
+    1.0
+    """
+    return float(2 * EARTH_RADIUS * np.radians(view_from_scan(max_angle, altitude)[1]))
 
 
 def place_beside(track, latitude, longitude):

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from fifesim.sensor.description.performance import EARTH_RADIUS
 from fifesim.sensor.scan.track import (
+    EARTH_RADIUS,
     Track,
     growth,
     place_beside,
     place_of,
+    swath_width,
     view_components,
     view_from_ground,
     view_from_scan,
@@ -109,3 +110,17 @@ def test_tracks_that_cannot_be_are_refused():
         Track(0.0, np.nan, 0.0)
     with pytest.raises(ValueError, match="does not reach latitude 85"):
         Track.from_inclination(85.0, 0.0, 98.2, 705e3)
+
+
+@pytest.mark.parametrize("angle", [0.5, 7.5, 30.0, 55.4])
+def test_swath_is_an_arc_whose_chord_closes_the_triangle(angle):
+    """Law of sines in the triangle of satellite, ground and earth's centre."""
+    half = swath_width(833e3, angle) / 2 / EARTH_RADIUS
+    vza = np.radians(angle) + half
+    assert (EARTH_RADIUS + 833e3) * np.sin(np.radians(angle)) == pytest.approx(EARTH_RADIUS * np.sin(vza), rel=1e-12)
+    assert half > 0
+
+
+def test_scan_beyond_the_horizon_has_no_width():
+    horizon = np.degrees(np.arcsin(EARTH_RADIUS / (EARTH_RADIUS + 705e3)))
+    assert np.isnan(swath_width(705e3, horizon + 0.01)) and np.isfinite(swath_width(705e3, horizon - 0.01))
