@@ -148,13 +148,14 @@ def _straight():
     rows, columns = (np.zeros(60) for _ in operators)
     for line, each in zip((rows, columns), operators, strict=True):
         line[each.start[0] : each.start[0] + each.count[0]] = each.weights[0, : each.count[0]]
-    scene = np.random.default_rng(2).uniform(1, 2, (60, 60))
-    scene[31, 27] = np.nan
-    weights = np.outer(rows, columns) * np.isfinite(scene)
+    scenes = np.random.default_rng(2).uniform(1, 2, (2, 60, 60))
+    scenes[1, 31, 27] = np.nan
+    weights = np.outer(rows, columns) * np.isfinite(scenes)
     footprint = _footprint(10 / 3 * np.array([[0.0, 1.0], [-1.0, 0.0]]), along, across)
     operator = footprint_operator(footprint, slice(0, 60), slice(0, 60))
-    found = apply_operator(operator, scene.reshape(1, -1), 0.5)
-    worst = largest(found, np.sum(weights * np.nan_to_num(scene)) / weights.sum())
+    found, whole = (apply_operator(operator, scenes.reshape(2, -1), valid)[:, 0] for valid in (0.5, 1.0))
+    worst = largest(found, np.sum(weights * np.nan_to_num(scenes), axis=(1, 2)) / weights.sum(axis=(1, 2)))
+    worst = worst if np.array_equal(whole, [found[0], np.nan], equal_nan=True) else np.inf
     yield _deviation("pixel of a scan along the grid", worst, 1e-5, "1", "sums by rows and columns")
 
 
