@@ -114,7 +114,7 @@ def _turned():
         centre = np.maximum(centre, largest([np.sum(weights * down), np.sum(weights * right)], 0))
         shape = np.maximum(shape, largest(moments, expected) / expected.max())
     yield _deviation("centre of a turned footprint", centre, 1e-6, "cell", "symmetry")
-    yield _deviation("second moments of a turned footprint", shape, 2e-3, "1", "those of the response, turned")
+    yield _deviation("second moments of a turned footprint", shape, 1e-5, "1", "those of the response, turned")
 
 
 def _rectangle():
