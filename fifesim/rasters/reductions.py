@@ -26,7 +26,7 @@ def computed(*arrays):
     return dask.compute(*arrays)
 
 
-def limits(array):
+def extremes(array):
     """
     Smallest and largest value of a raster; computes.
 
@@ -43,7 +43,7 @@ def limits(array):
     return float(low), float(high)
 
 
-def row_sums(kernel, *arrays, count, **parameters):
+def sums_by_row(kernel, *arrays, count, **parameters):
     """
     Sums of whole rows; computes.
 
@@ -73,7 +73,7 @@ def row_sums(kernel, *arrays, count, **parameters):
     return found[..., 0].T
 
 
-def block_sums(kernel, array, shape, size, margin=(0, 0)):
+def sums_by_block(kernel, array, shape, size, margin=(0, 0)):
     """
     Sum of what a kernel makes of the blocks of an array, one after the other; computes.
 

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 from lazy import ODD_CHUNKS, in_chunks
 
-from fifesim.rasters.reductions import block_sums, computed, limits, row_sums
+from fifesim.rasters.reductions import computed, extremes, sums_by_block, sums_by_row
 
 VALUES = np.random.default_rng(9).integers(0, 100, (23, 31)).astype(float)
 RASTER = xr.DataArray(VALUES, dims=("y", "x"))
@@ -21,7 +21,7 @@ def count_and_total(one, other, power):
 def test_each_row_is_summed_whole(monkeypatch, cells, chunks):
     """Whatever blocks of rows are read together; whole numbers are exact."""
     monkeypatch.setattr("fifesim.rasters.reductions._CELLS", cells)
-    found = row_sums(count_and_total, in_chunks(RASTER, chunks), RASTER + 1, count=2, power=2)
+    found = sums_by_row(count_and_total, in_chunks(RASTER, chunks), RASTER + 1, count=2, power=2)
     np.testing.assert_array_equal(found, count_and_total(VALUES, VALUES + 1, 2))
 
 
@@ -37,22 +37,22 @@ def margins_and_pairs(cells, margin):
 def test_blocks_with_their_margins_add_up(chunks):
     """Two rows of blocks below the first have a margin of 1 above, and so on: 4 blocks of columns, 3 of rows."""
     data = in_chunks(RASTER, chunks).data
-    found = block_sums(margins_and_pairs, data, (5,), 8, margin=(1, 2))
+    found = sums_by_block(margins_and_pairs, data, (5,), 8, margin=(1, 2))
     pairs = np.sum(VALUES[:-1] * VALUES[1:])
     np.testing.assert_array_equal(found, [2 * 4, 2 * 4, 3 * 3 * 2, 3 * 3 * 2, pairs])
-    np.testing.assert_array_equal(block_sums(margins_and_pairs, data, (5,), 99, margin=(1, 2)), [0, 0, 0, 0, pairs])
+    np.testing.assert_array_equal(sums_by_block(margins_and_pairs, data, (5,), 99, margin=(1, 2)), [0, 0, 0, 0, pairs])
 
 
 def test_blocks_are_added_in_their_order():
     """1e16 swallows what is added to it one by one, and not what was added up before."""
     data = np.array([[1e16, *[1.0] * 62, -1e16]])
-    assert block_sums(lambda cells, margin: cells[0], data, (1,), 1).tolist() == [0.0]
+    assert sums_by_block(lambda cells, margin: cells[0], data, (1,), 1).tolist() == [0.0]
     assert data.sum() != 0
 
 
 def test_limits_leave_out_what_is_missing():
     gap = RASTER.where(RASTER > 3)
-    assert limits(in_chunks(gap, ODD_CHUNKS)) == limits(gap) == (VALUES[VALUES > 3].min(), VALUES.max())
+    assert extremes(in_chunks(gap, ODD_CHUNKS)) == extremes(gap) == (VALUES[VALUES > 3].min(), VALUES.max())
 
 
 def test_arrays_come_into_memory():

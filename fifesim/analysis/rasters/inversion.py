@@ -9,7 +9,7 @@ from fifesim.analysis.rasters.pairs import matched
 from fifesim.analysis.regression import totals
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
-from fifesim.rasters.reductions import row_sums
+from fifesim.rasters.reductions import sums_by_row
 
 _LIMITS = ("low", "high")
 
@@ -89,7 +89,7 @@ def inversion_error(estimate, truth, *, pair="coordinates"):
     value, true = matched(value, truth, pair)
     low, _ = matched(low, truth, pair)
     high, _ = matched(high, truth, pair)
-    n, total, squares, inside = totals(row_sums(uncertainty.error_sums, true, value, low, high, count=4))
+    n, total, squares, inside = totals(sums_by_row(uncertainty.error_sums, true, value, low, high, count=4))
     if n == 0:
         raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
     found = {"bias": total / n, "rmse": math.sqrt(squares / n), "n": int(n)}

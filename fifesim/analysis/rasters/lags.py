@@ -10,7 +10,7 @@ from fifesim.analysis.rasters.pairs import check_no_counts, origins
 from fifesim.analysis.rasters.regression import aggregate
 from fifesim.base.line_spread import Boxcar
 from fifesim.rasters import grid as grids
-from fifesim.rasters.reductions import block_sums, limits
+from fifesim.rasters.reductions import extremes, sums_by_block
 from fifesim.rasters.regularization import operators
 
 # Blocks of cells that are transformed together, counted from the first cell of the raster: fixed, so that the chunks
@@ -59,7 +59,7 @@ def autocovariance(array, reach):
     (origin,) = origins(array)
     shape = (kernels.SUMS, steps[0] + 1, 2 * steps[1] + 1)
     kernel = partial(kernels.lag_sums, reach=steps, origin=origin)
-    sums = block_sums(kernel, array.data, shape, _BLOCK, steps)
+    sums = sums_by_block(kernel, array.data, shape, _BLOCK, steps)
     if not sums[0].any():
         raise ValueError("the raster has no valid cells")
     found = {
@@ -99,7 +99,7 @@ def variogram(array, reach):
     if abs(down - across) > 1e-6 * across:
         raise ValueError(f"a variogram by distance needs square cells, got {down:g} x {across:g} m: use autocovariance")
     lags = autocovariance(array, reach)
-    low, high = limits(array)
+    low, high = extremes(array)
     if not high > low:
         raise ValueError(f"a correlation needs values that vary, got {low:g} to {high:g}: use autocovariance")
     along = xr.concat(

@@ -7,7 +7,7 @@ from fifesim.analysis.rasters.pairs import check_no_counts, matched, origins
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
-from fifesim.rasters.reductions import row_sums
+from fifesim.rasters.reductions import sums_by_row
 from fifesim.rasters.regularization import areas, regularized
 
 
@@ -109,7 +109,7 @@ def regress(y, x, *, pair="coordinates"):
     """
     y, x = matched(y, x, pair)
     y_origin, x_origin = origins(y, x)
-    sums = row_sums(regression.row_sums, y, x, count=6, y_origin=y_origin, x_origin=x_origin)
+    sums = sums_by_row(regression.row_sums, y, x, count=6, y_origin=y_origin, x_origin=x_origin)
     return regression.fit(sums, y_origin, x_origin)
 
 

@@ -12,7 +12,7 @@ from fifesim.analysis.rasters.pairs import check_no_counts
 from fifesim.analysis.rasters.regression import aggregate, red_and_nir, regress
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
-from fifesim.rasters.reductions import block_sums, limits
+from fifesim.rasters.reductions import extremes, sums_by_block
 
 # Bins of the histogram that stands for the values of a raster: 1/2000 of their range is far less than a bandwidth.
 _BINS = 2000
@@ -228,11 +228,11 @@ def density(array, points=256, bandwidth=None):
     fifesim.analysis.density.gaussian_density
     """
     check_no_counts(array)
-    low, high = limits(array)
+    low, high = extremes(array)
     if not high > low:
         raise ValueError(f"a density needs values that vary, got {low:g} to {high:g}")
     edges = np.linspace(low, high, _BINS + 1)
-    counts = block_sums(partial(_counts, edges=edges), np.atleast_2d(array.data), (_BINS,), _BLOCK)
+    counts = sums_by_block(partial(_counts, edges=edges), np.atleast_2d(array.data), (_BINS,), _BLOCK)
     middles = (edges[1:] + edges[:-1]) / 2
     if bandwidth is None:
         bandwidth = _rule_of_thumb(middles, counts)

@@ -7,7 +7,7 @@ from fifesim.analysis import uncertainty
 from fifesim.analysis.rasters.pairs import matched, origins
 from fifesim.analysis.rasters.regression import regress
 from fifesim.rasters import cf
-from fifesim.rasters.reductions import limits, row_sums
+from fifesim.rasters.reductions import extremes, sums_by_row
 
 # More increments than this are a width in other units than the variable.
 _MOST_INCREMENTS = 10_000
@@ -57,7 +57,7 @@ def relative_equivalent_noise(variable, ndvi, increment=0.1, *, slope=None, min_
     variable, ndvi = matched(variable, ndvi, pair)
     if slope is None:
         slope = regress(ndvi, variable, pair="index").slope
-    low, high = limits(variable)
+    low, high = extremes(variable)
     if not (np.isfinite(low) and np.isfinite(high)):
         raise ValueError(f"the variable goes from {low:g} to {high:g}: relative noise needs finite values")
     first, last = int(np.floor(low / increment)), int(np.floor(high / increment))
@@ -68,7 +68,7 @@ def relative_equivalent_noise(variable, ndvi, increment=0.1, *, slope=None, min_
         )
     increments = last - first + 1
     (origin,) = origins(ndvi)
-    sums = row_sums(
+    sums = sums_by_row(
         uncertainty.increment_sums, variable, ndvi, count=uncertainty.SUMS * increments, first=first, width=increment,
         increments=increments, ndvi_origin=origin,
     )  # fmt: skip
