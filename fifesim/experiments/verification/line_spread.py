@@ -23,7 +23,13 @@ _SHAPES = {
     "cosine": (CosineSpread(30.0), lambda x: np.cos(2 * np.pi * x / 90.0), (-15.0, 15.0), 1e-9),
     "boxcar": (Boxcar(30.0), lambda x: 1.0 + 0 * x, (-15.0, 15.0), 1e-9),
     "Gaussian": (GaussianSpread(33.0), lambda x: 2.0 ** -((2 * x / 33.0) ** 2), (-85.0, 0.0, 85.0), 1e-8),
-    "table": (TableSpread(*_TABLE), lambda x: np.interp(x, *_TABLE), _TABLE[0], 1e-9),
+    "uneven table": (TableSpread(*_TABLE), lambda x: np.interp(x, *_TABLE), _TABLE[0], 1e-9),
+    "even table": (
+        TableSpread((-21.0, -9.0, 9.0, 21.0), (0.0, 1.0, 1.0, 0.0)),
+        lambda x: np.minimum((21.0 - np.abs(x)) / 12.0, 1.0),
+        (-21.0, -9.0, 9.0, 21.0),
+        1e-9,
+    ),
     "two boxcars": (
         SystemSpread((Boxcar(30.0), Boxcar(12.0)), 1e-9),
         lambda x: np.minimum((21.0 - np.abs(x)) / 12.0, 1.0),
@@ -46,10 +52,10 @@ def _shapes():
     for name, (spread, density, kinks, bound) in _SHAPES.items():
         whole = integral(density, kinks)
         shares = [integral(density, [*(k for k in kinks if k < x), x]) / whole for x in (-14.0, 3.0, 14.5)]
-        transfers = np.array([_transform(density, kinks, f) for f in (1 / 200, 1 / 60, 1 / 31)]) / whole
+        transfers = np.array([_transform(density, kinks, f) for f in (1 / 200, 1 / 60, 1 / 23)]) / whole
         # The modulus, where the response is not even.
-        transfers = np.abs(transfers) if name == "table" else transfers.real
-        found = [*spread.cumulative([-14.0, 3.0, 14.5]), *spread.mtf([1 / 200, 1 / 60, 1 / 31])]
+        transfers = np.abs(transfers) if name == "uneven table" else transfers.real
+        found = [*spread.cumulative([-14.0, 3.0, 14.5]), *spread.mtf([1 / 200, 1 / 60, 1 / 23])]
         worst = largest(found, [*shares, *transfers])
         yield _deviation(f"line spread and transfer, {name}", worst, bound, "1", "its density, quadrature")
         reach = spread.half_width
