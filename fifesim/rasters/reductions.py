@@ -94,22 +94,22 @@ def sums_by_block(kernel, array, shape, size, margin=(0, 0)):
     -------
     sums : array
     """
-    lengths = array.shape[-2:]
-    places = [np.arange(0, length, size) for length in lengths]
+    (height, width), (down, across) = array.shape[-2:], margin
+
+    def around(first, length, reach):
+        return min(first, reach), max(min(length - first - size, reach), 0)
 
     def sums(row, column, cells):
-        first = row.start * size, column.start * size
-        margins = [
-            (min(at, reach), max(min(length - at - size, reach), 0))
-            for at, length, reach in zip(first, lengths, margin, strict=True)
-        ]
+        margins = around(row.start * size, height, down), around(column.start * size, width, across)
         return kernel(cells, margins)[..., None, None]
 
-    edges = [
-        (np.maximum(first - reach, 0), np.minimum(first + size + reach, length))
-        for first, length, reach in zip(places, lengths, margin, strict=True)
-    ]
+    def edges(length, reach):
+        first = np.arange(0, length, size)
+        return np.maximum(first - reach, 0), np.minimum(first + size + reach, length)
+
+    rows, columns = edges(height, down), edges(width, across)
     # A result whose every cell is a block.
-    (found,) = computed(in_blocks(sums, [Reads(array, *edges)], (*shape, *map(len, places)), 1))
+    shape = (*shape, len(rows[0]), len(columns[0]))
+    (found,) = computed(in_blocks(sums, [Reads(array, rows, columns)], shape, 1))
     # One after the other: numpy's own sum goes by the layout in memory.
-    return reduce(np.add, np.moveaxis(found.reshape(*shape, -1), -1, 0))
+    return reduce(np.add, np.moveaxis(found.reshape(*shape[:-2], -1), -1, 0))

@@ -102,14 +102,9 @@ def variogram(array, reach):
     low, high = extremes(array)
     if not high > low:
         raise ValueError(f"a correlation needs values that vary, got {low:g} to {high:g}: use autocovariance")
-    along = xr.concat(
-        [
-            lags.sel(lag_y=0.0, drop=True).sel(lag_x=slice(0, None)).rename(lag_x="lag"),
-            lags.sel(lag_x=0.0, drop=True).rename(lag_y="lag"),
-        ],
-        dim=xr.Variable("direction", ["x", "y"]),
-        join="override",
-    )
+    east = lags.sel(lag_y=0.0, drop=True).sel(lag_x=slice(0, None)).rename(lag_x="lag")
+    south = lags.sel(lag_x=0.0, drop=True).rename(lag_y="lag")
+    along = xr.concat([east, south], dim=xr.Variable("direction", ["x", "y"]), join="override")
     variance = float(lags["covariance"].sel(lag_y=0.0, lag_x=0.0))
     out = along[["semivariance", "count"]].assign(correlation=along["covariance"] / variance)
     ranges = [kernels.crossing(out["lag"].values, values) for values in out["correlation"].values]

@@ -56,13 +56,8 @@ def scan_geometry(instrument, grid, track=None, *, nadir_offset=0.0, heading=180
     grids.check_grid(grid)
     track = find_track(grid, track, nadir_offset, heading)
     _check_swath(description, grid, track)
-    attrs = {
-        "instrument": description.name,
-        "altitude": description.altitude,
-        "track_latitude": track.latitude,
-        "track_longitude": track.longitude,
-        "track_heading": track.heading,
-    }
+    attrs = {"instrument": description.name, "altitude": description.altitude}
+    attrs |= {f"track_{name}": value for name, value in vars(track).items()}
     out = {}
     for name in ("vza", "vaa"):
         kernel = partial(_view, name, grid, track, description.altitude, description.max_angle)
