@@ -171,16 +171,17 @@ def _light():
 
 
 def _shadow():
-    """The edge of a shadow is known to a cell."""
+    """The edge of a shadow is known to a cell; the cliff is seen from as far as the reach."""
     cliff = np.where(np.arange(120) < 60, 0.0, 20.0) * np.ones((3, 1))
-    m, n = horizon.horizon_margin(2.0, 2.0, 140.0)
+    m, n = horizon.horizon_margin(2.0, 2.0, 120.0)
     padded = np.pad(cliff, ((m, m), (n, n)), mode="edge")
-    tangents = horizon.horizon_tangent(padded, 2.0, 2.0, np.array([90.0]), 140.0)[0, 1]
-    worst = 0.0
-    for height in (12.0, 20.0, 45.0):
-        dark = tangents[:60] > np.tan(np.radians(height))
-        worst = np.maximum(worst, abs(2.0 * dark.sum() - 20.0 / np.tan(np.radians(height))))
-    yield _deviation("length of the shadow of a cliff of 20 m", worst, 2.0, "m", "20 m / tan(elevation)")
+    tangents = horizon.horizon_tangent(padded, 2.0, 2.0, np.array([90.0]), 120.0)[0, 1, :60]
+    worst = largest(tangents, 20.0 / (120.0 - 2.0 * np.arange(60)))
+    yield _deviation("horizon of a cliff of 20 m", worst, 1e-12, "1", "20 m / distance")
+    sun = np.radians([12.0, 20.0, 45.0])
+    lengths = 2.0 * np.sum(tangents > np.tan(sun)[:, None], axis=1)
+    worst = largest(lengths, 20.0 / np.tan(sun))
+    yield _deviation("length of its shadow", worst, 2.0, "m", "20 m / tan(elevation)")
 
 
 CHECKS = (_slopes, _skies, _any_sky, _valley_of_cells, _horizons, _light, _shadow, *elevation.CHECKS)

@@ -163,8 +163,8 @@ def kt_on_slopes(reflectance, dem, *, direct_transmittance, transmittance_down, 
     """
     direct, total = (np.reshape(each, (-1, 1, 1)) for each in (direct_transmittance, transmittance_down))
 
-    def kernel(rho, *ground):
-        light = slope_light(*ground)
+    def kernel(rho, elevation, sky, cell, seen):
+        light = slope_light(elevation, sky, cell, seen)
         ct = skies.terrain_view(light.sky_view, light.cosine)
         return topographic_factor(light.sky_view, ct, rho, light.mu_s_local, geometry.mu_s, direct, total)
 
@@ -215,8 +215,9 @@ def terrain_reflectance(
     """
     cf.check_units(reflectance, "surface_reflectance")
 
-    def kernel(rho, *ground):
-        return slope_reflectance(rho, *ground, direct_transmittance, transmittance_down, upwelling)
+    def kernel(rho, elevation, sky, cell, seen):
+        air = direct_transmittance, transmittance_down
+        return slope_reflectance(rho, elevation, sky, cell, seen, *air, upwelling)
 
     said = f"terrain: Kt (Eq. 4){' and view cosine (Eq. 5)' if upwelling else ''}"
     return _of_level(kernel, reflectance, dem, geometry, horizon, "surface_reflectance", said)
@@ -238,8 +239,8 @@ def _light(dem, horizon, geometry, name, of_light):
     """What a function makes of `slope_light`, at every cell."""
     grid = elevation_grid(dem)
 
-    def kernel(*ground):
-        return of_light(slope_light(*ground))
+    def kernel(elevation, sky, cell, seen):
+        return of_light(slope_light(elevation, sky, cell, seen))
 
     data = _on_slopes(kernel, dem, horizon, geometry or fife_geometry(), check=geometry is not None)
     out = grids.place(xr.DataArray(data, dims=("y", "x")), grid)
@@ -257,7 +258,7 @@ def _of_level(kernel, reflectance, dem, geometry, horizon, name, said):
 
 
 def _on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True):
-    """Array of a kernel that takes the reflectance, if there is one, and what `slope_light` takes."""
+    """Array of a kernel that takes the reflectance, if there is one, and what `slope_light` takes, from grid north."""
     dem_grid = elevation_grid(dem)
     grid = dem_grid if reflectance is None else grids.geobox(reflectance)
     offset, shape = _offset(dem_grid, grid), tuple(grid.shape)
