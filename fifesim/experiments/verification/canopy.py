@@ -158,7 +158,7 @@ def _tables():
     lai = np.concatenate([[0.0, 1e-6, 100.0], rng.gamma(1.5, 1.5, 197)])
     ground, one = rng.uniform(0, 1, (2, 200)), np.array([0.15, 0.6])
     worst = np.zeros(3)
-    for sza, vza, raa, hotspot, shape in ((28.5, 0, 0, 0.0, "spherical"), (60, 45, 170, 0.1, "planophile")):
+    for sza, vza, raa, hotspot, shape in ((28.5, 0, 0, 0.0, "spherical"), (50, 45, 170, 0.1, "planophile")):
         given = {"sza": sza, "vza": vza, "raa": raa, "leaf_angles": shape, "hotspot": hotspot}
         canopy = sail(lai, leaf[0][:, None], leaf[1][:, None], **given)
         over = [with_background(canopy, each) for each in (one[:, None], ground)]

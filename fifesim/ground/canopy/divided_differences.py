@@ -65,7 +65,7 @@ def _chains(lai, rates, chains):
         if math.isnan(x[0]):
             chains[cell] = math.nan
             continue
-        if x[count - 1] - x[0] < _SPREAD:
+        if x[-1] - x[0] < _SPREAD:
             difference[0] = _series(x, 0, count, homogeneous)
         else:
             _recursion(x, difference, homogeneous)
