@@ -62,10 +62,8 @@ def apparent_reflectance_of_scene(reflectance, terms, vza, surroundings=None):
     ----------
     reflectance : xarray.DataArray, dims ([band], y, x)
         Of the surface. [1]
-    terms : object
-        With ``path_reflectance``, ``transmittance_down``, ``transmittance_up``, ``direct_transmittance_up``,
-        ``diffuse_up_molecules``, ``diffuse_up_aerosol``, ``spherical_albedo`` and ``gas_transmittance``, each of shape
-        (band,). [1]
+    terms : schemes.terms.BandTerms
+        Each of shape (band,). [1]
     vza : float or array, shape (band,)
         [degree]
     surroundings : float or sequence or xarray.DataArray, optional
@@ -89,7 +87,7 @@ def apparent_reflectance_of_scene(reflectance, terms, vza, surroundings=None):
     reflectance = _banded(reflectance)
     weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
     coarse = _environment(reflectance, weights, vza, surroundings)
-    return _couple(coupling.inhomogeneous_reflectance, reflectance, coarse, _factors(terms, reflectance))
+    return _couple(coupling.inhomogeneous_reflectance, reflectance, coarse, _by_band(terms, reflectance))
 
 
 def corrected_reflectance_of_scene(toa_reflectance, terms, vza, surroundings=None):
@@ -101,7 +99,7 @@ def corrected_reflectance_of_scene(toa_reflectance, terms, vza, surroundings=Non
     ----------
     toa_reflectance : xarray.DataArray, dims ([band], y, x)
         [1]
-    terms : object
+    terms : schemes.terms.BandTerms
         As in `apparent_reflectance_of_scene`. [1]
     vza : float or array, shape (band,)
         [degree]
@@ -127,11 +125,11 @@ def corrected_reflectance_of_scene(toa_reflectance, terms, vza, surroundings=Non
     """
     toa_reflectance = _banded(toa_reflectance)
     weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
-    factors = _factors(terms, toa_reflectance)
-    by_band = [coupling.TargetTerms(*row) for row in np.stack(factors, axis=-1).tolist()]
-    solve = [partial(environment_grid.environment_of_target, terms=each) for each in by_band]
+    by_band = _by_band(terms, toa_reflectance)
+    each_band = (coupling.TargetTerms(*row) for row in np.stack(by_band, axis=-1).tolist())
+    solve = [partial(environment_grid.environment_of_target, terms=each) for each in each_band]
     coarse = _on_blocks(solve, toa_reflectance, weights, vza, surroundings, linear=True)
-    return _couple(coupling.target_reflectance, toa_reflectance, coarse, factors)
+    return _couple(coupling.target_reflectance, toa_reflectance, coarse, by_band)
 
 
 def _banded(array):
@@ -141,17 +139,9 @@ def _banded(array):
     return array.transpose("band", "y", "x")
 
 
-def _factors(terms, array):
+def _by_band(terms, array):
     """Terms of the equation of a target in its environment, shape (band,) each."""
-    found = coupling.TargetTerms(
-        path_reflectance=terms.path_reflectance,
-        transmittance_down=terms.transmittance_down,
-        direct_transmittance_up=terms.direct_transmittance_up,
-        diffuse_transmittance_up=np.asarray(terms.transmittance_up) - terms.direct_transmittance_up,
-        spherical_albedo=terms.spherical_albedo,
-        gas_transmittance=terms.gas_transmittance,
-    )
-    return coupling.TargetTerms(*(_per_band(values, array, "a term") for values in found))
+    return coupling.TargetTerms(*(_per_band(values, array, "a term") for values in terms.target))
 
 
 def _per_band(values, array, what):
@@ -228,11 +218,15 @@ def _on_cells(coarse, array):
     return grids.place(out, grids.geobox(array))
 
 
-def _couple(kernel, array, coarse, factors):
-    """Apply a kernel of `coupling` to the cells and their environment."""
+def _couple(equation, array, coarse, by_band):
+    """Apply an equation of `coupling` to the cells and their environment."""
+
+    def kernel(cells, environment, *terms):
+        return equation(cells, environment, coupling.TargetTerms(*terms))
+
     cells = passes.second_pass(array, coarse), _on_cells(coarse, array)
     plain = [each.drop_vars("band", errors="ignore") for each in cells]
-    out = chunks.pointwise(kernel, *plain, *(xr.DataArray(values, dims="band") for values in factors))
+    out = chunks.pointwise(kernel, *plain, *(xr.DataArray(values, dims="band") for values in by_band))
     if "band" in array.coords:
         out = out.assign_coords(band=array["band"])
     return grids.place(out, grids.geobox(array))

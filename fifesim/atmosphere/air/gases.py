@@ -1,7 +1,6 @@
 """Absorption by the gases of the air."""
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -178,35 +177,24 @@ def table_wavelengths():
     return np.round(np.linspace(0.4, 2.5, 841), 4)
 
 
-class _Lines(NamedTuple):
-    """Parameters of a gas at the wavelengths of the table where it absorbs."""
-
-    index: np.ndarray  # of these wavelengths
-    strength: np.ndarray
-    saturation: np.ndarray
-    strength_temperature: np.ndarray  # shape (2, n) [K-1, K-2]
-    width_temperature: np.ndarray
-
-
 @lru_cache
-def _lines(gas):
+def _parameters(gas):
+    """Places of the absorbing wavelengths in the table; strength, saturation, two pairs of temperature coefficients."""
     table = datasets.table("gas_absorption.csv").query("gas == @gas")
-    return _Lines(
-        index=np.searchsorted(table_wavelengths(), table["wavelength"].to_numpy() - 1e-6),
-        strength=table["strength"].to_numpy(),
-        saturation=table["saturation"].to_numpy(),
-        strength_temperature=table[["strength_temperature", "strength_temperature_2"]].to_numpy().T,
-        width_temperature=table[["width_temperature", "width_temperature_2"]].to_numpy().T,
+    index = np.searchsorted(table_wavelengths(), table["wavelength"].to_numpy() - 1e-6)
+    of_strength, of_width = (
+        table[[name, f"{name}_2"]].to_numpy().T for name in ("strength_temperature", "width_temperature")
     )
+    return index, table["strength"].to_numpy(), table["saturation"].to_numpy(), of_strength, of_width
 
 
 @lru_cache(maxsize=256)
 def _vertical(atmosphere, gas):
     """Where a gas absorbs in the table, and its weak-line optical depth and saturation there at air mass 1."""
-    lines = _lines(gas)
-    amount, broadening = effective_amounts(atmosphere.levels, gas, lines.strength_temperature, lines.width_temperature)
+    index, strength, saturation, of_strength, of_width = _parameters(gas)
+    amount, broadening = effective_amounts(atmosphere.levels, gas, of_strength, of_width)
     ratio = np.divide(amount, broadening, out=np.zeros_like(amount), where=broadening > 0)  # no gas: not saturated
-    return lines.index, lines.strength * amount, lines.saturation * amount * ratio
+    return index, strength * amount, saturation * amount * ratio
 
 
 def gas_transmittance(wavelength, atmosphere, air_mass, *, gases=GASES):

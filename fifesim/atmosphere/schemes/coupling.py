@@ -9,23 +9,18 @@ from numba.extending import register_jitable
 
 
 class TargetTerms(NamedTuple):
-    """Terms of the equation of a target in its environment, in the order of `inhomogeneous_reflectance`. [1]"""
+    """Terms of the equation of a target in its environment: arrays that broadcast. [1]"""
 
-    path_reflectance: object
-    transmittance_down: object
-    direct_transmittance_up: object
-    diffuse_transmittance_up: object
-    spherical_albedo: object
-    gas_transmittance: object
+    path_reflectance: object  # of the atmosphere alone
+    transmittance_down: object  # total, from the sun
+    direct_transmittance_up: object  # to the sensor without scattering
+    diffuse_transmittance_up: object  # and with
+    spherical_albedo: object  # of the atmosphere seen from below
+    gas_transmittance: object = 1.0  # of the absorbing gases, down and up
 
 
 def apparent_reflectance(
-    surface_reflectance,
-    path_reflectance,
-    transmittance_down,
-    transmittance_up,
-    spherical_albedo,
-    gas_transmittance=1.0,
+    surface_reflectance, path_reflectance, transmittance_down, transmittance_up, spherical_albedo, gas_transmittance=1.0
 ):
     r"""
     Apparent reflectance at the top of the atmosphere over a uniform surface.
@@ -79,12 +74,7 @@ def apparent_reflectance(
 
 
 def corrected_reflectance(
-    toa_reflectance,
-    path_reflectance,
-    transmittance_down,
-    transmittance_up,
-    spherical_albedo,
-    gas_transmittance=1.0,
+    toa_reflectance, path_reflectance, transmittance_down, transmittance_up, spherical_albedo, gas_transmittance=1.0
 ):
     r"""
     Reflectance of a uniform surface from its apparent reflectance.
@@ -122,16 +112,7 @@ def corrected_reflectance(
     return _by_cell(_corrected, (toa_reflectance,), factors)
 
 
-def inhomogeneous_reflectance(
-    target,
-    environment,
-    path_reflectance,
-    transmittance_down,
-    direct_transmittance_up,
-    diffuse_transmittance_up,
-    spherical_albedo,
-    gas_transmittance=1.0,
-):
+def inhomogeneous_reflectance(target, environment, terms):
     r"""
     Apparent reflectance at the top of the atmosphere of a target in its environment.
 
@@ -146,17 +127,8 @@ def inhomogeneous_reflectance(
         Reflectance factor of the target, :math:`\rho_c`. [1]
     environment : array, broadcastable
         Mean of the ground around it, :math:`\langle \rho \rangle`. [1]
-    path_reflectance : array, broadcastable
-        Reflectance of the atmosphere alone, :math:`\rho_a`. [1]
-    transmittance_down : array, broadcastable
-        Total transmittance from the sun, :math:`T(\theta_s)`. [1]
-    direct_transmittance_up, diffuse_transmittance_up : array, broadcastable
-        Transmittance to the sensor without scattering, :math:`e^{-\tau / \mu_v}`, and with,
-        :math:`t_d(\theta_v)`. [1]
-    spherical_albedo : array, broadcastable
-        Of the atmosphere seen from below, :math:`S`. [1]
-    gas_transmittance : array, broadcastable, optional
-        Of the absorbing gases, down and up, :math:`T_g`. [1]
+    terms : TargetTerms
+        :math:`\rho_a, T(\theta_s), e^{-\tau / \mu_v}, t_d(\theta_v), S, T_g`. [1]
 
     Returns
     -------
@@ -176,27 +148,19 @@ def inhomogeneous_reflectance(
     --------
     Bright surroundings brighten a dark target:
 
-    >>> round(float(inhomogeneous_reflectance(0.05, 0.4, 0.1, 0.8, 0.6, 0.25, 0.2) -
-    ...             inhomogeneous_reflectance(0.05, 0.05, 0.1, 0.8, 0.6, 0.25, 0.2)), 4)
+    >>> terms = TargetTerms(0.1, 0.8, 0.6, 0.25, 0.2)
+    >>> bright, dark = (inhomogeneous_reflectance(0.05, around, terms) for around in (0.4, 0.05))
+    >>> round(float(bright - dark), 4)
     0.0787
     """
-    leaving = np.multiply(target, direct_transmittance_up) + np.multiply(environment, diffuse_transmittance_up)
-    factors = path_reflectance, transmittance_down, 1.0, spherical_albedo, gas_transmittance
-    toa = _by_cell(_apparent, (leaving, environment), factors)
-    _check_converged(toa, environment, spherical_albedo, "the environment's reflectance")
+    path, down, direct, diffuse, albedo, gas = terms
+    leaving = np.multiply(target, direct) + np.multiply(environment, diffuse)
+    toa = _by_cell(_apparent, (leaving, environment), (path, down, 1.0, albedo, gas))
+    _check_converged(toa, environment, albedo, "the environment's reflectance")
     return toa
 
 
-def target_reflectance(
-    toa_reflectance,
-    environment,
-    path_reflectance,
-    transmittance_down,
-    direct_transmittance_up,
-    diffuse_transmittance_up,
-    spherical_albedo,
-    gas_transmittance=1.0,
-):
+def target_reflectance(toa_reflectance, environment, terms):
     r"""
     Reflectance of a target in a known environment, from its apparent reflectance.
 
@@ -209,9 +173,7 @@ def target_reflectance(
     ----------
     toa_reflectance : array, shape (..., band, y, x)
         Apparent reflectance, :math:`\rho^*`. [1]
-    environment, path_reflectance, transmittance_down, direct_transmittance_up, diffuse_transmittance_up : array
-        As in `inhomogeneous_reflectance`. [1]
-    spherical_albedo, gas_transmittance : array
+    environment, terms
         As in `inhomogeneous_reflectance`. [1]
 
     Returns
@@ -229,13 +191,13 @@ def target_reflectance(
 
     Examples
     --------
-    >>> terms = 0.1, 0.8, 0.6, 0.25, 0.2
-    >>> round(float(target_reflectance(inhomogeneous_reflectance(0.05, 0.4, *terms), 0.4, *terms)), 12)
+    >>> terms = TargetTerms(0.1, 0.8, 0.6, 0.25, 0.2)
+    >>> round(float(target_reflectance(inhomogeneous_reflectance(0.05, 0.4, terms), 0.4, terms)), 12)
     0.05
     """
-    ground = toa_reflectance / gas_transmittance - path_reflectance
-    upward = ground * (1 - environment * spherical_albedo) / transmittance_down
-    return (upward - environment * diffuse_transmittance_up) / direct_transmittance_up
+    path, down, direct, diffuse, albedo, gas = terms
+    upward = (toa_reflectance / gas - path) * (1 - environment * albedo) / down
+    return (upward - environment * diffuse) / direct
 
 
 @register_jitable

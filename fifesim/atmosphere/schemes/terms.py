@@ -7,6 +7,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from fifesim.atmosphere.air import gases
+from fifesim.atmosphere.schemes.coupling import TargetTerms
 from fifesim.base.bands import solar_irradiance_steps
 
 # Wavelengths at which scattering is computed: those of the aerosol's refractive indices. [um]
@@ -61,6 +62,13 @@ class BandTerms(NamedTuple):
         """Those of `coupling.apparent_reflectance`, the equation over a uniform surface, by name and in its order."""
         names = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
         return {name: getattr(self, name) for name in names}
+
+    @property
+    def target(self):
+        """Those of the equation of a target in its environment, as `coupling.TargetTerms`."""
+        diffuse = np.asarray(self.transmittance_up) - self.direct_transmittance_up
+        own = {name: getattr(self, name) for name in TargetTerms._fields if name in self._fields}
+        return TargetTerms(diffuse_transmittance_up=diffuse, **own)
 
 
 def nodes_of(bands):

@@ -172,7 +172,7 @@ def _there_and_back():
     back = corrected_reflectance(apparent_reflectance(reflectance, **terms), **terms)
     yield _deviation("reflectance there and back", largest(back, reflectance), 1e-12, "1", source="theory")
     around, terms = reflectance[:, None], TargetTerms(0.11, 0.8, 0.6, 0.27, 0.19, 0.93)
-    back = target_reflectance(inhomogeneous_reflectance(reflectance, around, *terms), around, *terms)
+    back = target_reflectance(inhomogeneous_reflectance(reflectance, around, terms), around, terms)
     worst = largest(back, np.broadcast_to(reflectance, back.shape))
     yield _deviation("target there and back", worst, 1e-12, "1", source="theory")
 

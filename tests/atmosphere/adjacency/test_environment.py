@@ -13,13 +13,13 @@ from fifesim.atmosphere.adjacency.environment import (
     mixed_environment_function,
     point_spread,
 )
-from fifesim.atmosphere.schemes.coupling import inhomogeneous_reflectance
+from fifesim.atmosphere.schemes.coupling import TargetTerms, inhomogeneous_reflectance
 
 SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_adjacency.csv", comment="#")
 
 
 def sixs_terms():
-    return (
+    return TargetTerms(
         SIXS["path_reflectance_with_gas"] / SIXS["gas_transmittance"],
         SIXS["transmittance_down"],
         SIXS["direct_transmittance_up"],
@@ -60,7 +60,7 @@ def test_apparent_reflectance_of_a_target_agrees_with_6s():
     """Means over the band for the sum over wavelengths: 2.1e-4 at most in 244 cases. The effect itself reaches 0.11."""
     share = sixs_mixed()
     around = share * SIXS["target_reflectance"] + (1 - share) * SIXS["environment_reflectance"]
-    toa = inhomogeneous_reflectance(SIXS["target_reflectance"], around, *sixs_terms())
+    toa = inhomogeneous_reflectance(SIXS["target_reflectance"], around, sixs_terms())
     np.testing.assert_allclose(toa, SIXS["toa_reflectance"], rtol=0, atol=3e-4)
 
 

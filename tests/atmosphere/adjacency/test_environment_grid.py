@@ -61,7 +61,7 @@ def test_bright_surroundings_are_seen_where_they_are():
 def test_environment_is_found_from_apparent_reflectance(ground, around):
     """Solved to 1e-12."""
     known = environment(sums_of(ground), around, spread())
-    toa = inhomogeneous_reflectance(ground, known[1:-1, 1:-1], *TERMS)
+    toa = inhomogeneous_reflectance(ground, known[1:-1, 1:-1], TERMS)
     found = environment_of_target(sums_of(toa, linear=True), around, spread(), TERMS)
     np.testing.assert_allclose(found, known, rtol=0, atol=1e-11)
 

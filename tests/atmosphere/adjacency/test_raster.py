@@ -1,7 +1,6 @@
 """The adjacency effect on labelled rasters."""
 
 from pathlib import Path
-from typing import NamedTuple
 
 import dask
 import dask.array as da
@@ -16,25 +15,29 @@ from scipy.interpolate import RegularGridInterpolator
 import fifesim
 from fifesim.atmosphere.adjacency import environment as adjacency
 from fifesim.atmosphere.adjacency import raster as adjacency_raster
+from fifesim.atmosphere.schemes.terms import BandTerms
 from fifesim.rasters import grid as grids
 
 SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_adjacency.csv", comment="#")
 CRS = "EPSG:26914"
 
 
-class Terms(NamedTuple):
-    path_reflectance: np.ndarray
-    transmittance_down: np.ndarray
-    transmittance_up: np.ndarray
-    direct_transmittance_up: np.ndarray
-    diffuse_up_molecules: np.ndarray
-    diffuse_up_aerosol: np.ndarray
-    spherical_albedo: np.ndarray
-    gas_transmittance: np.ndarray
+NAMES = (
+    "path_reflectance",
+    "transmittance_down",
+    "transmittance_up",
+    "direct_transmittance_up",
+    "diffuse_up_molecules",
+    "diffuse_up_aerosol",
+    "spherical_albedo",
+    "gas_transmittance",
+)
 
 
 def make_terms(*bands):
-    return Terms(*(np.array(values) for values in zip(*bands, strict=True)))
+    """Of these names; adjacency asks for no others."""
+    unknown = dict.fromkeys(BandTerms._fields, np.full(len(bands), np.nan))
+    return BandTerms(**unknown | dict(zip(NAMES, np.array(bands).T, strict=True)))
 
 
 # Like TM1 and TM3 through a visibility of 10 km.
@@ -112,10 +115,8 @@ def test_apparent_reflectance_in_the_middle_of_a_disc_agrees_with_6s(row):
     west, north = (60.0 * whole + 30.0 for whole in (11_666, 72_167))
     west, north = west - size * 10.0, north + size * 10.0
     disc = raster(np.where(inside, row.target_reflectance, row.environment_reflectance)[None], 20.0, west, north)
-    terms = Terms(
-        path_reflectance=np.array([row.path_reflectance_with_gas / row.gas_transmittance]),
-        **{name: np.array([getattr(row, name)]) for name in Terms._fields[1:]},
-    )
+    path = row.path_reflectance_with_gas / row.gas_transmittance
+    terms = make_terms((path, *(getattr(row, name) for name in NAMES[1:])))
     toa = adjacency_raster.apparent_reflectance_of_scene(disc, terms, row.vza, row.environment_reflectance)
     assert float(toa[0, size // 2, size // 2]) == pytest.approx(row.toa_reflectance, abs=1e-3)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fifesim.atmosphere.schemes.coupling import (
+    TargetTerms,
     apparent_reflectance,
     apparent_reflectance_of_cell,
     corrected_reflectance,
@@ -13,7 +14,7 @@ from fifesim.atmosphere.schemes.coupling import (
 )
 
 UNIFORM = (0.09, 0.8, 0.83, 0.19, 0.98)
-TERMS = (0.09, 0.8, 0.52, 0.31, 0.19, 0.98)
+TERMS = TargetTerms(0.09, 0.8, 0.52, 0.31, 0.19, 0.98)
 
 
 def test_inverse_is_exact():
@@ -72,15 +73,15 @@ def test_where_no_light_comes_through_nothing_is_known_of_the_ground():
 def test_uniform_ground_has_the_total_transmittance():
     path, down, direct, diffuse, albedo, gas = TERMS
     uniform = gas * (path + down * (direct + diffuse) * 0.3 / (1 - 0.3 * albedo))
-    assert inhomogeneous_reflectance(0.3, 0.3, *TERMS) == pytest.approx(uniform, rel=1e-14)
+    assert inhomogeneous_reflectance(0.3, 0.3, TERMS) == pytest.approx(uniform, rel=1e-14)
 
 
 def test_target_comes_back():
     target, around = np.meshgrid(np.linspace(0, 1, 11), np.linspace(0, 1, 11))
-    toa = inhomogeneous_reflectance(target, around, *TERMS)
-    np.testing.assert_allclose(target_reflectance(toa, around, *TERMS), target, atol=1e-13)
+    toa = inhomogeneous_reflectance(target, around, TERMS)
+    np.testing.assert_allclose(target_reflectance(toa, around, TERMS), target, atol=1e-13)
 
 
 def test_percent_around_a_target_is_refused():
     with pytest.raises(ValueError, match=r"must be below 1, got 5\.7: reflectance is a fraction"):
-        inhomogeneous_reflectance(30.0, 30.0, *TERMS)
+        inhomogeneous_reflectance(30.0, 30.0, TERMS)
