@@ -92,8 +92,7 @@ def apparent_reflectance_of_scene(reflectance, terms, vza, surroundings=None):
 
 def corrected_reflectance_of_scene(toa_reflectance, terms, vza, surroundings=None):
     """
-    Surface reflectance without the light that the surroundings of each cell add; the inverse of
-    `apparent_reflectance_of_scene`.
+    Surface reflectance without the light that the surroundings of each cell add.
 
     Parameters
     ----------
@@ -117,6 +116,10 @@ def corrected_reflectance_of_scene(toa_reflectance, terms, vza, surroundings=Non
         As `environment`.
     RuntimeError
         When it is computed, if too little light comes from a target unscattered to tell it from its surroundings.
+
+    Notes
+    -----
+    The inverse of `apparent_reflectance_of_scene`.
 
     See Also
     --------
@@ -166,7 +169,8 @@ def _on_blocks(solve, array, weights, vza, surroundings, *, linear):
     pieces, sums = _sums(array, along, linear)
     kernels = []
     for band, angle in enumerate(_per_band(vza, array, "vza").tolist()):
-        spread = (*along, grids.cell_size(grid), margin, angle, molecules[band], aerosol[band])
+        weights = molecules[band], aerosol[band]
+        spread = partial(environment_grid.spread_over, *along, grids.cell_size(grid), margin, angle, *weights)
         kernels.append(partial(_whole, solve[band], pieces, spread, fars[band]))
     shape = tuple(axis.count + 2 for axis in along)
     lazy = array.chunks is not None or (outer is not None and outer.chunks is not None)
@@ -186,7 +190,7 @@ def _one_chunk(shape):
 def _whole(solve, pieces, spread, far, rows, columns, sums, outer=None):
     """Environment at all blocks of one band."""
     around = far if outer is None else outer[0]
-    return solve(blocks.whole_blocks(sums[0], *pieces), around, environment_grid.spread_over(*spread))[None]
+    return solve(blocks.whole_blocks(sums[0], *pieces), around, spread())[None]
 
 
 def _sums(array, along, linear):
