@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import dask
+import dask.threaded
 import numpy as np
 import rasterio
 import xarray as xr
@@ -95,8 +96,9 @@ def simulate_to_folder(
         if scene and not (unfinished / SCENE).exists():
             make_scene_store(unfinished / SCENE, found.scene)
         _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads or usable_cores(), as_json)
-        options = {"scheduler": "threads", "num_workers": threads or usable_cores(), "array.chunk-size": _CHUNK_SIZE}
-        with dask.config.set(options):
+        # The scheduler by itself: by its name, dask would look for a client, and import all that one needs.
+        scheduler = {"scheduler": dask.threaded.get, "num_workers": threads or usable_cores()}
+        with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}):
             _write_files(complete, tree, found, unfinished)
     return [folder / name for name in names]
 

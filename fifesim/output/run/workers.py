@@ -4,6 +4,7 @@ import os
 from contextlib import contextmanager
 
 import dask
+import dask.threaded
 
 # Without an answer for so long, there is no scheduler. [s]
 _TIMEOUT = 20
@@ -49,8 +50,8 @@ def cluster(workers=None, scheduler=None):
     if workers is not None and workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     if workers is None and scheduler is None:
-        # dask would look for a client, and import all that one needs.
-        with dask.config.set(scheduler=dask.config.get("scheduler", "threads")):
+        # By its name, or without one, dask would look for a client, and import all that one needs.
+        with dask.config.set(scheduler=dask.config.get("scheduler", dask.threaded.get)):
             yield None
         return
     from distributed import Client, LocalCluster
