@@ -287,8 +287,8 @@ def as_radiance(array, bands, geometry):
 
 def _by_sun(kernel, array, irradiance, geometry):
     """Apply a kernel of calibration to light below a sun."""
-    mu_s, distance = xr.DataArray(geometry.mu_s), geometry.earth_sun_distance
-    return chunks.pointwise(kernel, array, irradiance, mu_s, earth_sun_distance=distance)
+    distance = float(geometry.earth_sun_distance)
+    return chunks.pointwise(kernel, array, irradiance, directions.mu_s(geometry), earth_sun_distance=distance)
 
 
 def _along_band(image, name):

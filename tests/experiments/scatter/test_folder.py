@@ -71,7 +71,7 @@ def test_failure_in_the_middle_leaves_nothing(command, tmp_path, monkeypatch):
     def full(*arguments):
         raise OSError("disk full")
 
-    monkeypatch.setattr(scatter_run.scatter_report, "page", full)
+    monkeypatch.setattr(scatter_run.scatter_report, "budget_page", full)
     result = command("mine.toml", "-o", "out", "--realisations", 1)
     assert result.exit_code == 1 and "disk full" in result.stderr
     assert not (tmp_path / "out").exists()

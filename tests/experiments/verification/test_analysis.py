@@ -1,23 +1,21 @@
-"""Checks of the analysis notice what is wrong."""
-
-import dataclasses
+"""Checks of the analysis see the kernels that production calls."""
 
 import pytest
+from broken import notices
 
+from fifesim.analysis import attribution, density, scaling, uncertainty, variogram
 from fifesim.experiments.verification import analysis
 
 
 @pytest.mark.parametrize(
-    ("name", "wrong", "said"),
+    ("owner", "kernel", "check"),
     [
-        ("row_sums", lambda sums: sums * [1, 1, 1, 1, -1, 1], "least-squares line and its errors"),
-        ("fit", lambda line: dataclasses.replace(line, x_mean=-line.x_mean), "intervals of a line"),
-        ("normalized_difference", lambda index: -index, "normalized difference"),
+        (uncertainty, "increment_sums", analysis._increments),
+        (variogram, "lag_sums", analysis._lags),
+        (scaling, "ndvi_hessian", analysis._scales),
+        (density, "sample_density", analysis._densities),
+        (attribution, "shapley", analysis._causes),
     ],
 )
-def test_what_is_wrong_is_named(exceeded, name, wrong, said):
-    assert said in exceeded(analysis, name, wrong)
-
-
-def test_all_is_well(exceeded):
-    assert exceeded(analysis) == []
+def test_production_kernels_are_checked(monkeypatch, owner, kernel, check):
+    assert notices(check, monkeypatch, owner, kernel)

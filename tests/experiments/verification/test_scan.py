@@ -1,22 +1,20 @@
-"""Checks of scans notice what is wrong."""
+"""Checks of scans see the kernels that production calls."""
 
 import pytest
+from broken import notices
 
 from fifesim.experiments.verification import scan
+from fifesim.sensor.scan import track
 
 
 @pytest.mark.parametrize(
-    ("name", "wrong", "said"),
+    ("owner", "kernel", "check"),
     [
-        ("footprint_operator", lambda weights: 1.001 * weights, "second moments of a turned footprint"),
-        ("apply_operator", lambda image: 1.001 * image, "pixel of a scan along the grid"),
-        ("scan_geometry", lambda view: view.assign(vaa=view["vaa"] + 0.01), "view angles of a grid"),
-        ("sense_swath", lambda image: image + 0.01, "plane in a scan"),
+        (track, "view_from_ground", scan._lines_of_sight),
+        (track, "growth", scan._lines_of_sight),
+        (track, "place_of", scan._places),
+        (scan, "apply_operator", scan._straight),
     ],
 )
-def test_what_is_wrong_is_named(exceeded, name, wrong, said):
-    assert said in exceeded(scan, name, wrong)
-
-
-def test_all_is_well(exceeded):
-    assert exceeded(scan) == []
+def test_production_kernels_are_checked(monkeypatch, owner, kernel, check):
+    assert notices(check, monkeypatch, owner, kernel)

@@ -1,24 +1,21 @@
-"""Checks of the sensor notice what is wrong."""
+"""Checks of the sensor see the kernels that production calls."""
 
 import pytest
+from broken import notices
 
 from fifesim.experiments.verification import sensor
+from fifesim.sensor.response import calibration
 
 
 @pytest.mark.parametrize(
-    ("name", "wrong", "said"),
+    ("owner", "kernel", "check"),
     [
-        ("regularize", lambda image: 1.001 * image, "image of one bright cell"),
-        ("regularized", lambda image: image[::-1], "image of a scene with holes, on another grid"),
-        ("nearest", lambda number: 0, "red and near infrared of four instruments"),
-        ("solar_irradiance_steps", lambda sun: 1.001 * sun, "and of its steps"),
-        ("add_noise", lambda image: 80 + 1.05 * (image - 80), "noise at a radiance between two"),
-        ("fixed_pattern", lambda pattern: (pattern[0], -pattern[1]), "detectors of rows"),
+        (sensor, "regularize", sensor._impulse),
+        (sensor, "regularize", sensor._wave),
+        (calibration, "gain_offset", sensor._counts),
+        (calibration, "radiance_to_dn", sensor._counts),
+        (sensor, "line_noise", sensor._detectors),
     ],
 )
-def test_what_is_wrong_is_named(exceeded, name, wrong, said):
-    assert said in exceeded(sensor, name, wrong)
-
-
-def test_all_is_well(exceeded):
-    assert exceeded(sensor) == []
+def test_production_kernels_are_checked(monkeypatch, owner, kernel, check):
+    assert notices(check, monkeypatch, owner, kernel)
