@@ -1,16 +1,20 @@
 """The command line. Everything slow to import is imported by the command that needs it, so that --help is instant."""
 
 import json
-from contextlib import contextmanager
+import os
+import sys
 from enum import IntEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.core import TyperGroup
 
-app = typer.Typer(
-    help="Simulate what a satellite would have seen.", no_args_is_help=True, add_completion=False, rich_markup_mode=None
-)
+# Of a message. [character]
+_LONGEST = 500
+
+# What click, or the one that typer brings, says of arguments.
+_UsageError = typer.BadParameter.__base__
 
 
 class Exit(IntEnum):
@@ -21,11 +25,39 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
+class _Door(TyperGroup):
+    """The one way out of all commands: a mistake is a line, and the exit code says whose it is."""
+
+    def main(self, *arguments, **options):
+        try:
+            sys.exit(super().main(*arguments, **options | {"standalone_mode": False}))
+        except _UsageError as error:
+            error.message = _shown(error.message)
+            error.show()
+            sys.exit(error.exit_code)
+        except typer.Abort:
+            _stop("interrupted; nothing is written", Exit.INTERRUPTED)
+        except ValueError as error:
+            _stop(error, Exit.MISTAKE)
+        except (OSError, MemoryError, RuntimeError, ImportError) as error:
+            _stop(error or "memory does not suffice", Exit.FAILURE)
+
+
+app = typer.Typer(
+    cls=_Door,
+    help="Simulate what a satellite would have seen.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
 def _version(asked: bool):
     if asked:
         from fifesim import __version__
 
-        typer.echo(f"fifesim {__version__}")
+        _say(f"fifesim {__version__}")
         raise typer.Exit
 
 
@@ -56,26 +88,29 @@ def simulate(
 
     from fifesim.output.folders import check_folder
     from fifesim.output.run.estimates import estimate, estimate_in_words
-    from fifesim.output.run.folder import scenario_to_resume, simulate_to_folder
+    from fifesim.output.run.folder import simulate_to_folder
+    from fifesim.output.run.identity import scenario_to_resume
     from fifesim.output.run.workers import cluster
     from fifesim.scenario.scenario import Scenario, read_scenario
 
-    with _errors_in_one_line(output):
-        check_folder(output, overwrite, resume)
-        found = scenario_to_resume(output) if resume and scenario is None else None
-        found = found or (Scenario() if scenario is None else read_scenario(scenario))
-        if dry_run:
-            typer.echo(estimate_in_words(estimate(found, threads=workers or threads, scene=scene), as_json))
-            return
-        found.complete()
+    check_folder(output, overwrite, resume)
+    found = scenario_to_resume(output) if resume and scenario is None else None
+    found = found or (Scenario() if scenario is None else read_scenario(scenario))
+    if dry_run:
+        _say(estimate_in_words(estimate(found, threads=workers or threads, scene=scene), as_json))
+        return
+    found.complete()
+    try:
         with cluster(workers, scheduler) as client:
             options = {"overwrite": overwrite, "resume": resume, "scene": scene, "as_json": as_json}
             files = simulate_to_folder(found, output, threads=threads, client=client, **options)
+    except KeyboardInterrupt:
+        kept = f"what is finished is kept, go on with --resume -o {output}" if output.exists() else "nothing is written"
+        _stop(f"interrupted; {kept}", Exit.INTERRUPTED)
     if as_json:
-        typer.echo(json.dumps({"event": "finished", "files": [str(path) for path in files]}))
+        _say(json.dumps({"event": "finished", "files": [str(path) for path in files]}))
         return
-    for path in files:
-        typer.echo(path)
+    _say(*files)
 
 
 @app.command()
@@ -89,14 +124,7 @@ def reproduce(
     """Repeat the paper: table2.csv, figure3.png to figure9.png, report.html."""
     from fifesim.experiments.friedl1995.folder import reproduce_to_folder
 
-    try:
-        files = reproduce_to_folder(output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite)
-    except ValueError as error:
-        _stop(error, Exit.MISTAKE)
-    except (OSError, MemoryError) as error:
-        _stop(error, Exit.FAILURE)
-    for path in files:
-        typer.echo(path)
+    _say(*reproduce_to_folder(output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite))
 
 
 @app.command()
@@ -114,16 +142,9 @@ def budget(
     from fifesim.experiments.scatter.folder import budget_to_folder
     from fifesim.scenario.scenario import read_scenario
 
-    try:
-        found = None if scenario is None else read_scenario(scenario)
-        options = {"realisations": realisations, "cells": cells, "seed": seed}
-        files = budget_to_folder(found, output, overwrite=overwrite, **options)
-    except ValueError as error:
-        _stop(error, Exit.MISTAKE)
-    except (OSError, MemoryError, RuntimeError, ImportError) as error:
-        _stop(error, Exit.FAILURE)
-    for path in files:
-        typer.echo(path)
+    found = None if scenario is None else read_scenario(scenario)
+    options = {"realisations": realisations, "cells": cells, "seed": seed}
+    _say(*budget_to_folder(found, output, overwrite=overwrite, **options))
 
 
 @app.command()
@@ -132,7 +153,7 @@ def scenario():
     from fifesim.scenario.scenario import Scenario
     from fifesim.scenario.toml import write_scenario
 
-    typer.echo(write_scenario(Scenario().complete()), nl=False)
+    _say(write_scenario(Scenario().complete()).rstrip())
 
 
 @app.command()
@@ -144,17 +165,13 @@ def sensors(
     from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
     from fifesim.sensor.description.listing import instrument_in_words, list_instruments
 
-    try:
-        if check is not None:
-            found = instrument_in_words(read_instrument(check))
-            text = f"{found}\n{check} is right: every number has a source, and none looks like another unit."
-        elif name is not None:
-            text = instrument_in_words(instrument(name))
-        else:
-            text = list_instruments([instrument(each) for each in instrument_names()])
-    except (ValueError, OSError) as error:
-        _stop(error, Exit.MISTAKE)
-    typer.echo(text)
+    if check is not None:
+        found = instrument_in_words(read_instrument(check))
+        _say(found, f"{check} is right: every number has a source, and none looks like another unit.")
+    elif name is not None:
+        _say(instrument_in_words(instrument(name)))
+    else:
+        _say(list_instruments([instrument(each) for each in instrument_names()]))
 
 
 @app.command()
@@ -164,14 +181,11 @@ def verify():
     from fifesim.experiments.verification.listing import HEADING, line, summary
 
     found = []
-    try:
-        typer.echo(HEADING)
-        for deviation in deviations():
-            typer.echo(line(deviation))
-            found.append(deviation)
-    except OSError as error:
-        _stop(error, Exit.FAILURE)
-    typer.echo(summary(found))
+    _say(HEADING)
+    for deviation in deviations():
+        _say(line(deviation))
+        found.append(deviation)
+    _say(summary(found))
     if not all(deviation.within for deviation in found):
         raise typer.Exit(Exit.FAILURE)
 
@@ -180,25 +194,28 @@ def _check_spelling(scenario):
     """A typing error is told before anything slow is imported."""
     from fifesim.scenario.toml import check_spelling
 
-    try:
-        if scenario is not None:
-            check_spelling(scenario)
-    except ValueError as error:
-        _stop(error, Exit.MISTAKE)
+    if scenario is not None:
+        check_spelling(scenario)
 
 
-@contextmanager
-def _errors_in_one_line(output):
-    try:
-        yield
-    except ValueError as error:
-        _stop(error, Exit.MISTAKE)
-    except (OSError, MemoryError, RuntimeError, ImportError) as error:
-        _stop(error, Exit.FAILURE)
-    except KeyboardInterrupt:
-        _stop(f"interrupted; what is finished is kept, go on with --resume -o {output}", Exit.INTERRUPTED)
+def _say(*lines, err=False):
+    for line in lines:
+        typer.echo(_shown(str(line)), err=err)
+
+
+def _shown(text):
+    """Text whose names and values from elsewhere cannot steer a terminal."""
+    return "".join(each if each.isprintable() or each == "\n" else ascii(each)[1:-1] for each in text)
 
 
 def _stop(error, code):
-    typer.echo(f"fifesim: {error}", err=True)
-    raise typer.Exit(code) from None
+    said = str(error)
+    if len(said) > _LONGEST:
+        said = f"{said[: _LONGEST - 200]} ... {said[-150:]}"
+    _say(f"fifesim: {said}", err=True)
+    try:
+        sys.stdout.flush()
+    except OSError:
+        # What standard output does not take would be said again, at length, when the interpreter ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(code)

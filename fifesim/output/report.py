@@ -13,7 +13,7 @@ _DPI = 130
 _MOST = 600
 
 
-def run_page(scenario, image, truth, detail, terrain, level, fits):
+def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     """
     One self-contained HTML page on a run, and its first picture.
 
@@ -32,6 +32,8 @@ def run_page(scenario, image, truth, detail, terrain, level, fits):
         Digital numbers on level ground, over as many pixels; None if flat.
     fits : mapping of str to fifesim.analysis.regression.Regression
         Of the true means on NDVI.
+    reasons : mapping of str to str
+        Why there is none of them, by name.
 
     Returns
     -------
@@ -55,7 +57,7 @@ def run_page(scenario, image, truth, detail, terrain, level, fits):
     html = pages.html(
         _TEMPLATE,
         title=title(scenario),
-        summary=_summary(scenario, image, truth, fits) + _ground(terrain),
+        summary=_summary(scenario, image, truth, fits, reasons) + _ground(terrain),
         figures=pictures,
         fits=[(NAMES[name], fit) for name, fit in fits.items()],
         parameters=_parameters(scenario),
@@ -90,7 +92,7 @@ def _thinned(rasters, step):
     return rasters.isel({axis: slice(step // 2, None, step) for axis in ("y", "x")}).compute()
 
 
-def _summary(scenario, image, truth, fits):
+def _summary(scenario, image, truth, fits, reasons):
     """Rows of a small table: what a reader wants to know first."""
     grid, pixels = scenario.grid, image["dn"]
     valid = float((pixels != 0).all("band").mean())
@@ -103,7 +105,8 @@ def _summary(scenario, image, truth, fits):
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
         label = f"{NAMES[name][0].upper()}{NAMES[name][1:]} of the pixels"
         rows.append((label, f"mean {float(values.mean()):.3f}, standard deviation {float(values.std()):.3f}"))
-    return rows + [(f"R² of {NAMES[name]} on NDVI", f"{fit.r2:.3f}") for name, fit in fits.items()]
+    found = {name: f"{fit.r2:.3f}" for name, fit in fits.items()} | {name: f"none, {reasons[name]}" for name in reasons}
+    return rows + [(f"R² of {NAMES[name]} on NDVI", text) for name, text in found.items()]
 
 
 def _ground(terrain):

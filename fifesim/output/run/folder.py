@@ -1,6 +1,5 @@
 """A run: a scenario simulated into a folder of files, block by block, which can be stopped and gone on with."""
 
-import json
 import os
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,16 +16,15 @@ from fifesim.chain.images import ndvi
 from fifesim.output import report
 from fifesim.output.folders import UNFINISHED, check_folder, results
 from fifesim.output.progress import CellProgress
-from fifesim.output.provenance import versions
 from fifesim.output.run.engine import run_engine
-from fifesim.output.run.products import make_scene_store, products_of, wanted_blocks
-from fifesim.output.run.saved import save_block, saved_array, saved_blocks
+from fifesim.output.run.identity import NotThisRun, begin, check_inputs, identity_of
+from fifesim.output.run.products import make_scene_store, products_of, shard_checksum, wanted_blocks
+from fifesim.output.run.saved import SUFFIX, save_block, saved_array, saved_block, saved_blocks
 from fifesim.output.run.schedule import run_on_client, run_on_threads, tasks_of
 from fifesim.output.run.workers import usable_cores
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
 from fifesim.rasters.files import to_geotiff
-from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
 from fifesim.scenario.toml import write_scenario
 
@@ -83,79 +81,29 @@ def simulate_to_folder(
     folder = Path(folder)
     check_folder(folder, overwrite, resume)
     complete = scenario.complete()
-    identity, names = _identity(complete, scene), FILES + (SCENE,) * scene
-    begun = resume and _is_begun(folder / UNFINISHED, identity)
-    kept = results(folder, names, resume=begun, worth_keeping=_has_blocks)
+    identity, names = identity_of(complete, scene), FILES + (SCENE,) * scene
+    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=_has_blocks)
     with _errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
-        if not begun:
-            for name, text in identity.items():
-                (unfinished / name).write_text(text, encoding="utf-8")
+        begin(unfinished, identity)
         run_engine(complete)
         tree = simulate(complete)
         found = products_of(tree, unfinished / SCENE if scene else None)
         if scene and not (unfinished / SCENE).exists():
-            make_scene_store(unfinished / SCENE, found.scene)
+            make_scene_store(unfinished / f"{SCENE}.partial", found.scene)
+            os.replace(unfinished / f"{SCENE}.partial", unfinished / SCENE)
         _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads or usable_cores(), as_json)
         # The scheduler by itself: by its name, dask would look for a client, and import all that one needs.
         scheduler = {"scheduler": dask.threaded.get, "num_workers": threads or usable_cores()}
         with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}):
             _write_files(complete, tree, found, unfinished)
+        check_inputs(complete, identity)
     return [folder / name for name in names]
-
-
-def scenario_to_resume(folder):
-    """
-    Scenario of a run that was stopped.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Of its results.
-
-    Returns
-    -------
-    scenario : fifesim.scenario.scenario.Scenario or None
-        None where no run was stopped.
-    """
-    path = Path(folder) / UNFINISHED / "run.toml"
-    return read_scenario(path) if path.is_file() else None
-
-
-def _identity(scenario, scene):
-    """What must be the same for blocks of two runs to fit together, as files."""
-    inputs = {}
-    for name in scenario.files.values():
-        if Path(name).is_file():
-            status = os.stat(name)
-            inputs[name] = [status.st_size, status.st_mtime_ns]
-    state = {"versions": versions(), "inputs": inputs, "scene": bool(scene)}
-    return {"run.json": json.dumps(state), "run.toml": write_scenario(scenario)}
-
-
-def _is_begun(path, identity):
-    """Whether a run has been begun that this one goes on with; another run than this is a mistake."""
-    if not (path / "run.toml").is_file():
-        return False
-    before = {name: (path / name).read_text(encoding="utf-8") for name in identity}
-    if before["run.toml"] != identity["run.toml"]:
-        old, new = ({line.strip() for line in each["run.toml"].splitlines()} for each in (before, identity))
-        changed = sorted(line.partition("#")[0].strip() for line in old - new) or ["keys"]
-        raise ValueError(
-            f"the run to resume is of another scenario, with {', '.join(changed[:3])}: "
-            "leave out SCENARIO to go on with that one, or begin again with --overwrite"
-        )
-    kept, state = (json.loads(each["run.json"]) for each in (before, identity))
-    for key, what in (("versions", "other versions of its packages"), ("inputs", "an input file that has changed")):
-        if kept[key] != state[key]:
-            raise ValueError(f"the run to resume was begun with {what}: begin again with --overwrite")
-    if kept["scene"] != state["scene"]:
-        raise ValueError("the run to resume was begun with --scene or without it: give it as it was")
-    return True
 
 
 def _has_blocks(unfinished, error):
     """Whether a stopped run can go on: not with what can never end well, nor from nothing."""
-    return not isinstance(error, ValueError | TypeError) and any((unfinished / "blocks").glob("*/*.npy"))
+    hopeless = isinstance(error, ValueError | TypeError) and not isinstance(error, NotThisRun)
+    return not hopeless and any((unfinished / "blocks").glob(f"*/*{SUFFIX}"))
 
 
 @contextmanager
@@ -174,6 +122,8 @@ def _compute(found, lai, folder, client, threads, as_json):
     """Compute and save the blocks that are not saved yet."""
     blocks = folder / "blocks"
     saved = {name: saved_blocks(blocks, name, array) for name, array in found.arrays.items()}
+    for name in found.scene:
+        saved[f"scene-{name}"] = {each for each in saved[f"scene-{name}"] if _is_in_store(folder, name, each)}
     cells, image = grids.geobox(lai), found.arrays["image"]
     wanted = [each for each in wanted_blocks(found, lai.chunks, cells) if each[1] not in saved[each[0]]]
     per_pixel = cells.shape.x * cells.shape.y / (image.shape[-1] * image.shape[-2])
@@ -193,6 +143,14 @@ def _compute(found, lai, folder, client, threads, as_json):
             run_on_client(*tasks, deliver, client)
 
 
+def _is_in_store(folder, name, index):
+    """Whether the shard of a block that is said to be saved holds what was written."""
+    try:
+        return shard_checksum(folder / SCENE, name, index) == saved_block(folder / "blocks", f"scene-{name}", index)
+    except (OSError, ValueError, RuntimeError):
+        return False
+
+
 def _pixels(array, index):
     return int(np.prod([sizes[at] for sizes, at in zip(array.chunks[-2:], index[-2:], strict=True)]))
 
@@ -203,6 +161,7 @@ def _write_files(scenario, tree, found, folder):
         name: raster.copy(data=saved_array(folder / "blocks", name, found.arrays[name]))
         for name, raster in found.rasters.items()
     }
+    _check_some_data(scenario, saved["image"])
     image = xr.Dataset({"dn": saved["image"]})
     if "ndvi" in tree["image"]:
         image["ndvi"] = ndvi(saved["image"])
@@ -215,22 +174,28 @@ def _write_files(scenario, tree, found, folder):
         terrain = xr.Dataset({name: saved[f"terrain-{name}"].compute() for name in tree["terrain"].data_vars})
         terrain.attrs = dict(tree["terrain"].attrs)
     detail = saved["detail"].compute()
-    quicklook, page = report.run_page(scenario, image, truth, detail, terrain, level, _fits(image, truth))
+    quicklook, page = report.run_page(scenario, image, truth, detail, terrain, level, *_fits(image, truth))
     (folder / "quicklook.png").write_bytes(quicklook)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "scenario.toml").write_text(write_scenario(scenario), encoding="utf-8")
 
 
+def _check_some_data(scenario, image):
+    if not bool((image != 0).any()):
+        offset, share = scenario.sensor.offset, scenario.sensor.min_valid
+        raise ValueError(
+            f"no pixel of the image has data: none has {share:g} of its footprint on cells with leaf area and elevation; "
+            f"see sensor.offset = {offset} and sensor.min_valid, and whether the files have data here"
+        )
+
+
 def _fits(image, truth):
-    """Regressions of the true means on NDVI; none where there is no NDVI or nothing to fit."""
-    if "ndvi" not in image:
-        return {}
-    spread = float(image["ndvi"].std())
-    fits = {}
-    for name in truth.data_vars:
-        # By row and column: with an interval of its own, the image lies on other places than its truth.
-        known, found = matched(truth[name], image["ndvi"], "index")
-        valid = int((known.variable.notnull() & found.variable.notnull()).sum())
-        if valid > 2 and spread > 0:
-            fits[name] = regress(known, found, pair="index")
-    return fits
+    """Regressions of the true means on NDVI where there is one, and why a line fits to none of some."""
+    fits, reasons = {}, {}
+    for name in truth.data_vars if "ndvi" in image else ():
+        try:
+            # By row and column: with an interval of its own, the image lies on other places than its truth.
+            fits[name] = regress(*matched(truth[name], image["ndvi"], "index"), pair="index")
+        except ValueError as error:
+            reasons[name] = str(error)
+    return fits, reasons

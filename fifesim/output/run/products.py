@@ -1,5 +1,6 @@
 """What a run computes of a scenario, block by block, and the order of the blocks."""
 
+import zlib
 from typing import NamedTuple
 
 import dask.array as da
@@ -143,24 +144,52 @@ def _cell(grid, cells, axis, at):
 
 
 def _written(array, path, name):
-    """Blocks that write a shard each, and say so by a number."""
+    """Blocks that write a shard each, and give its checksum."""
     array = _one_chunk_of_bands(array)
     sizes = [tuple(min(_SHARD, size - start) for start in range(0, size, _SHARD)) for size in array.shape[-2:]]
 
     def ask(rows, columns):
-        return (rows, columns), [tuple(slice(part.start * _SHARD, part.stop * _SHARD) for part in (rows, columns))]
+        return (rows.start, columns.start), [tuple(slice(p.start * _SHARD, p.stop * _SHARD) for p in (rows, columns))]
 
     counts = tuple((1,) * len(each) for each in sizes)
 
-    def write(rows, columns, block):
-        import zarr  # slow, and few runs write cells
-
-        sink = zarr.open_array(str(path), path=name, mode="r+")
-        top, left = (part.start * _SHARD for part in (rows, columns))
-        height, width = (min(_SHARD, size - start) for size, start in zip(sink.shape[-2:], (top, left), strict=True))
-        sink[..., top : top + height, left : left + width] = block[..., :height, :width]
-        return np.ones((1, 1), bool)
+    def write(row, column, block):
+        sink, place = _shard(path, name, (row, column))
+        sink[place] = block[..., : place[1].stop - place[1].start, : place[2].stop - place[2].start]
+        return np.array([[shard_checksum(path, name, (row, column))]])
 
     return array_from_windows(
-        write, [array], counts, ask, token=tokenize("scene", str(path), name, array.name), dtype=bool
+        write, [array], counts, ask, token=tokenize("scene", str(path), name, array.name), dtype=np.uint32
     )
+
+
+def shard_checksum(path, name, index):
+    """
+    Checksum of what a shard of a scene product holds.
+
+    Parameters
+    ----------
+    path : path
+        Of the store.
+    name : str
+        Of the product.
+    index : (int, int)
+        Row and column of the shard.
+
+    Returns
+    -------
+    checksum : numpy.uint32
+    """
+    sink, place = _shard(path, name, index)
+    return np.uint32(zlib.crc32(np.ascontiguousarray(sink[place])))
+
+
+def _shard(path, name, index):
+    """An array of a store, and the place of a shard in it."""
+    import zarr  # slow, and few runs write cells
+
+    sink = zarr.open_array(str(path), path=name, mode="r+")
+    sides = [
+        slice(at * _SHARD, min((at + 1) * _SHARD, size)) for at, size in zip(index, sink.shape[-2:], strict=True)
+    ]
+    return sink, (..., *sides)

@@ -2,13 +2,17 @@
 
 import io
 import os
+import zlib
 from pathlib import Path
 
 import numpy as np
 
 from fifesim.rasters.windows import array_from_windows
 
-_SUFFIX = ".npy"
+SUFFIX = ".npy"
+
+# A block is followed by its checksum. [byte]
+_CHECKSUM = 4
 
 
 def save_block(folder, name, index, block):
@@ -35,6 +39,7 @@ def save_block(folder, name, index, block):
     # numpy would not say why a file cannot be written.
     content = io.BytesIO()
     np.save(content, block)
+    content.write(_checksum(content.getbuffer()))
     try:
         partial_path.write_bytes(content.getbuffer())
         os.replace(partial_path, path)
@@ -57,9 +62,33 @@ def saved_blocks(folder, name, array):
     Returns
     -------
     indices : set of tuple of int
-        Those whose file is whole and of the block's shape and type.
+        Those whose file is as it was written, and of the block's shape and type.
     """
     return {index for index in np.ndindex(array.numblocks) if _is_whole(_path(folder, name, index), array, index)}
+
+
+def saved_block(folder, name, index):
+    """
+    A block that was saved.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+    name : str
+        Of the array.
+    index : tuple of int
+        Of the block.
+
+    Returns
+    -------
+    block : numpy.ndarray
+
+    Raises
+    ------
+    OSError
+        If its file is not as it was written.
+    """
+    return _load(_path(folder, name, index))
 
 
 def saved_array(folder, name, array):
@@ -86,18 +115,29 @@ def saved_array(folder, name, array):
         return (str(_path(folder, name, index)),), ()
 
     return array_from_windows(
-        np.load, [], array.chunks[-2:], ask, token=f"saved-{folder}-{name}", leading=leading, dtype=array.dtype
+        _load, [], array.chunks[-2:], ask, token=f"saved-{folder}-{name}", leading=leading, dtype=array.dtype
     )
 
 
 def _path(folder, name, index):
-    return Path(folder) / name / ("-".join(f"{number:05d}" for number in index) + _SUFFIX)
+    return Path(folder) / name / ("-".join(f"{number:05d}" for number in index) + SUFFIX)
+
+
+def _checksum(content):
+    return zlib.crc32(content).to_bytes(_CHECKSUM, "little")
+
+
+def _load(path):
+    """A block as it was written."""
+    content = Path(path).read_bytes()
+    if _checksum(content[:-_CHECKSUM]) != content[-_CHECKSUM:]:
+        raise OSError(f"{path} is not what was written: a run with --resume makes it again")
+    return np.load(io.BytesIO(content), allow_pickle=False)
 
 
 def _is_whole(path, array, index):
     try:
-        # The header alone is read, and the size of the file is compared with it.
-        block = np.load(path, mmap_mode="r")
+        block = _load(path)
     except (OSError, ValueError, EOFError):
         return False
     shape = tuple(sizes[number] for sizes, number in zip(array.chunks, index, strict=True))

@@ -6,6 +6,9 @@ from contextlib import contextmanager
 import dask
 import dask.threaded
 
+# What distributed shows of itself by HTTP, which tells addresses.
+_PAGES = ("distributed.scheduler.http.routes", "distributed.worker.http.routes")
+
 # Without an answer for so long, there is no scheduler. [s]
 _TIMEOUT = 20
 
@@ -29,9 +32,12 @@ def cluster(workers=None, scheduler=None):
     Parameters
     ----------
     workers : int, optional
-        Start so many processes on this machine, which end with the context.
+        Start so many processes on this machine, which end with the context. They talk by TLS with a certificate made
+        for them, over the loopback interface, so that no other program can reach them.
     scheduler : str, optional
-        Address of a scheduler that runs, such as ``tcp://head:8786``.
+        Address of a scheduler that runs, such as ``tcp://head:8786``. It is trusted: it and its workers run as who
+        started them, and take part in what this run computes; by ``tls://`` with the certificates of dask's own
+        configuration.
 
     Yields
     ------
@@ -64,9 +70,19 @@ def cluster(workers=None, scheduler=None):
         with client:
             yield client
         return
+    from distributed.security import Security
+
+    # Whoever reaches a scheduler or a worker can run code as this user: only who has the certificate made here does.
+    guarded = {"protocol": "tls://", "host": "127.0.0.1", "security": Security.temporary(), "dashboard_address": None}
     with (
-        dask.config.set({"distributed.worker.daemon": True}),
-        LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs="ERROR") as local,
+        dask.config.set({"distributed.worker.daemon": True} | dict.fromkeys(_PAGES, [])),
+        LocalCluster(n_workers=workers, threads_per_worker=1, silence_logs="ERROR", **guarded) as local,
         Client(local, set_as_default=False) as client,
     ):
+        local.scheduler.http_server.stop()
+        client.run(_without_pages)
         yield client
+
+
+def _without_pages(dask_worker):
+    dask_worker.http_server.stop()
