@@ -28,6 +28,12 @@ class Exit(IntEnum):
 class _Door(TyperGroup):
     """The one way out of all commands: a mistake is a line, and the exit code says whose it is."""
 
+    def invoke(self, context):
+        try:
+            return super().invoke(context)
+        except KeyboardInterrupt:
+            _stop("interrupted; nothing is written", Exit.INTERRUPTED)
+
     def main(self, *arguments, **options):
         try:
             sys.exit(super().main(*arguments, **options | {"standalone_mode": False}))
@@ -35,9 +41,7 @@ class _Door(TyperGroup):
             error.message = _shown(error.message)
             error.show()
             sys.exit(error.exit_code)
-        except typer.Abort:
-            _stop("interrupted; nothing is written", Exit.INTERRUPTED)
-        except ValueError as error:
+        except (ValueError, FileNotFoundError, IsADirectoryError) as error:
             _stop(error, Exit.MISTAKE)
         except (OSError, MemoryError, RuntimeError, ImportError) as error:
             _stop(error or "memory does not suffice", Exit.FAILURE)
@@ -97,7 +101,7 @@ def simulate(
     found = scenario_to_resume(output) if resume and scenario is None else None
     found = found or (Scenario() if scenario is None else read_scenario(scenario))
     if dry_run:
-        _say(estimate_in_words(estimate(found, threads=workers or threads, scene=scene), as_json))
+        _say(estimate_in_words(estimate(found, output, threads=workers or threads, scene=scene), as_json))
         return
     found.complete()
     try:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -138,6 +139,8 @@ def test_sensors_of_no_such_instrument_is_a_mistake(invoke, name, said):
         ('[terrain]\ndem = "flint-hils"\n', "did you mean 'flint-hills'"),
         ('[terrain]\ndem = "missing.tif"\n', "missing.tif"),
         ("[ground\n", "not valid TOML"),
+        ("[grid]\nwidth = 1e12\n", "of memory"),
+        ("[terrain]\nhorizon_reach = 100000\n", "50000"),
     ],
 )
 def test_a_mistake_is_named_with_exit_code_2_and_nothing_is_written(invoke, tmp_path, text, said):
@@ -197,6 +200,47 @@ def test_workers_and_a_scheduler_are_not_asked_for_together(invoke, small):
     result = invoke("simulate", small, "--workers", 2, "--scheduler", "tcp://nowhere:1")
     assert result.exit_code == 2
     assert "one of them" in result.stderr
+
+
+def test_names_and_values_do_not_steer_the_terminal(invoke, tmp_path):
+    (tmp_path / "wrong.toml").write_text('[ground]\n"\\u001b[31mred" = 1\n[grid]\ncrs = "\\u001b]0;title\\u0007"\n')
+    for arguments in (["simulate", "wrong.toml"], ["sensors", "\x1b[31m"], ["simulate", "--\x1b[31m"], ["\x1b[2J"]):
+        result = invoke(*arguments)
+        assert result.exit_code == 2
+        assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", result.output + result.stderr), arguments
+
+
+def test_a_message_is_not_longer_than_a_person_reads(invoke, tmp_path):
+    (tmp_path / "wrong.toml").write_text("".join(f"[ground{number}]\nseed = 1\n" for number in range(300)))
+    result = invoke("simulate", "wrong.toml")
+    assert result.exit_code == 2 and len(result.stderr) <= 520
+
+
+@pytest.mark.parametrize("command", ["reproduce", "budget", "verify", "simulate"])
+def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
+    def pressed(*arguments, **options):
+        raise KeyboardInterrupt
+
+    for name in (
+        "friedl1995.folder.reproduce_to_folder",
+        "scatter.folder.budget_to_folder",
+        "verification.areas.deviations",
+    ):
+        monkeypatch.setattr(f"fifesim.experiments.{name}", pressed)
+    monkeypatch.setattr("fifesim.output.run.folder.simulate_to_folder", pressed)
+    result = invoke(command)
+    assert result.exit_code == 130
+    assert "interrupted; nothing is written" in result.stderr and "Traceback" not in result.stderr
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that takes nothing is Linux's")
+@pytest.mark.parametrize("command", ["scenario", "sensors", "verify"])
+def test_a_full_standard_output_is_an_error_in_one_line(command):
+    code = "from fifesim.cli import app; app()"
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-c", code, command], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1 and "space" in done.stderr
 
 
 def test_help_does_not_import_what_is_slow():

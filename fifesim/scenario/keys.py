@@ -67,7 +67,7 @@ class TerrainKeys(Section):
     seed: int = seed(7, "of the synthetic hills")
     fill: float | None = number(None, "m", "holes of the file are interpolated up to this distance", gt=0)
     vertical_units: str | None = text(None, "of the file's elevation where they are not metres, such as ft")
-    horizon_reach: float = number(5000.0, "m", "greatest distance of terrain that hides the sky", ge=30, le=100_000)
+    horizon_reach: float = number(5000.0, "m", "greatest distance of terrain that hides the sky", ge=30, le=50_000)
     upwelling: bool = text(True, "with the view's cosine on slopes (Eq. 5)")
 
     @model_validator(mode="after")

@@ -1,18 +1,22 @@
 """Results appear under their names when all of them are whole, and nothing else is touched."""
 
+import multiprocessing
+import os
+import signal
+
 import pytest
 
-from fifesim.output.folders import UNFINISHED, check_folder, results
+from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, results
 
 NAMES = ("one.txt", "two.txt")
 
 
 def contents(folder):
-    return {path.name: path.read_text() for path in folder.iterdir()}
+    return {path.name: path.read_text() for path in folder.iterdir() if path.name not in ("lock", "holder")}
 
 
-def write(folder, text, names=NAMES):
-    with results(folder, names) as hidden:
+def write(folder, text, names=NAMES, **options):
+    with results(folder, names, **options) as hidden:
         for name in names:
             (hidden / name).write_text(text)
 
@@ -29,13 +33,13 @@ def test_files_are_there_when_all_are_written(tmp_path):
 def test_files_replace_those_of_their_names_and_no_others(tmp_path):
     write(tmp_path, "old")
     (tmp_path / "notes.txt").write_text("mine")
-    write(tmp_path, "new")
+    write(tmp_path, "new", overwrite=True)
     assert contents(tmp_path) == {"one.txt": "new", "two.txt": "new", "notes.txt": "mine"}
 
 
 def test_a_folder_replaces_a_folder(tmp_path):
     for text in ("old", "new"):
-        with results(tmp_path, ["store"]) as hidden:
+        with results(tmp_path, ["store"], overwrite=True) as hidden:
             (hidden / "store").mkdir()
             (hidden / "store" / text).touch()
     assert [path.name for path in (tmp_path / "store").iterdir()] == ["new"]
@@ -45,7 +49,7 @@ def test_a_folder_replaces_a_folder(tmp_path):
 def test_an_error_leaves_a_folder_as_it_was(tmp_path, error):
     write(tmp_path / "there", "old")
     for name in ("there", "new"):
-        with pytest.raises(error), results(tmp_path / name, NAMES) as hidden:
+        with pytest.raises(error), results(tmp_path / name, NAMES, overwrite=True) as hidden:
             (hidden / "one.txt").write_text("half")
             raise error("in the middle")
     assert contents(tmp_path / "there") == {"one.txt": "old", "two.txt": "old"}
@@ -57,6 +61,7 @@ def keep_from(tmp_path, error, **options):
     out = tmp_path / "out"
     options |= {"worth_keeping": lambda hidden, error: isinstance(error, OSError)}
     with pytest.raises(error), results(out, NAMES, **options) as hidden:
+        (hidden / BEGUN).touch()
         (hidden / "block").write_text("done")
         raise error("in the middle")
     return out
@@ -66,7 +71,7 @@ def test_what_is_worth_it_is_kept_and_gone_on_with(tmp_path):
     out = keep_from(tmp_path, OSError)
     assert [path.name for path in out.iterdir()] == [UNFINISHED]
     with results(out, NAMES, resume=True, worth_keeping=lambda hidden, error: True) as hidden:
-        assert contents(hidden) == {"block": "done"}
+        assert contents(hidden) == {BEGUN: "", "block": "done"}
         for name in NAMES:
             (hidden / name).write_text("whole")
     assert contents(out) == {"one.txt": "whole", "two.txt": "whole"}
@@ -78,7 +83,8 @@ def test_what_is_not_worth_it_goes(tmp_path):
 
 def test_another_beginning_finds_nothing_of_the_one_before(tmp_path):
     out = keep_from(tmp_path, OSError)
-    with pytest.raises(OSError), results(out, NAMES, worth_keeping=lambda hidden, error: True) as hidden:
+    kept = {"overwrite": True, "worth_keeping": lambda hidden, error: True}
+    with pytest.raises(OSError), results(out, NAMES, **kept) as hidden:
         assert contents(hidden) == {}
         raise OSError("again")
 
@@ -86,25 +92,88 @@ def test_another_beginning_finds_nothing_of_the_one_before(tmp_path):
 @pytest.mark.parametrize(
     ("held", "options", "said"),
     [
-        (["notes.txt"], {"overwrite": False}, "--overwrite"),
-        ([UNFINISHED], {"overwrite": False}, "--resume"),
-        ([UNFINISHED, "notes.txt"], {"overwrite": False}, "--resume"),
+        (["notes.txt"], {"overwrite": False}, "not empty.*--overwrite"),
+        (["notes.txt"], {"overwrite": False, "resume": True}, "nothing to resume.*--overwrite"),
+        (["notes.txt", f"{UNFINISHED}/block"], {"overwrite": False, "resume": True}, "nothing to resume"),
+        ([f"{UNFINISHED}/{BEGUN}"], {"overwrite": False}, "--resume"),
+        ([f"{UNFINISHED}/{BEGUN}", "notes.txt"], {"overwrite": False}, "--resume"),
     ],
 )
 def test_a_folder_in_use_is_refused_with_what_to_type(tmp_path, held, options, said):
     for name in held:
-        (tmp_path / name).mkdir()
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("kept")
     with pytest.raises(ValueError, match=said):
         check_folder(tmp_path, **options)
+    with pytest.raises(ValueError, match=said), results(tmp_path, NAMES, **options):
+        pass
+    assert all((tmp_path / name).read_text() == "kept" for name in held)
 
 
 @pytest.mark.parametrize("options", [{"overwrite": True}, {"overwrite": False, "resume": True}])
 def test_a_folder_in_use_is_taken_when_asked_to(tmp_path, options):
     (tmp_path / UNFINISHED).mkdir()
+    (tmp_path / UNFINISHED / BEGUN).touch()
     check_folder(tmp_path, **options)
+
+
+def test_what_a_dead_run_left_before_it_began_is_no_run(tmp_path):
+    (tmp_path / UNFINISHED).mkdir()
+    (tmp_path / UNFINISHED / "half").touch()
+    write(tmp_path, "1")
+    assert contents(tmp_path) == dict.fromkeys(NAMES, "1")
 
 
 def test_a_file_is_no_folder(tmp_path):
     (tmp_path / "out").touch()
     with pytest.raises(ValueError, match="is a file"):
         check_folder(tmp_path / "out", overwrite=True)
+
+
+@pytest.mark.parametrize("error", [ValueError, OSError])
+def test_files_of_others_stay_in_a_folder_that_fails(tmp_path, error):
+    out = tmp_path / "new"
+    with pytest.raises(error), results(out, NAMES):
+        (out / "notes.txt").write_text("mine")
+        raise error
+    assert contents(out) == {"notes.txt": "mine"}
+
+
+def hold(folder, ready, end):
+    with results(folder, NAMES, overwrite=True) as hidden:
+        for name in NAMES:
+            (hidden / name).write_text("first")
+        ready.set()
+        end.wait(60)
+
+
+@pytest.fixture
+def rival(tmp_path):
+    """A process that writes into the folder until it is told to end."""
+    spawn = multiprocessing.get_context("spawn")
+    ready, end = spawn.Event(), spawn.Event()
+    process = spawn.Process(target=hold, args=(tmp_path / "out", ready, end))
+    process.start()
+    assert ready.wait(60)
+    yield process, end
+    process.kill()
+    process.join()
+
+
+@pytest.mark.parametrize("options", [{"overwrite": True}, {"overwrite": False}, {"overwrite": False, "resume": True}])
+def test_a_second_run_in_a_folder_is_refused_with_the_name_of_the_first(tmp_path, rival, options):
+    process, end = rival
+    for attempt in (check_folder, lambda folder, **options: write(folder, "second", **options)):
+        with pytest.raises(ValueError, match=f"in use by process {process.pid} on "):
+            attempt(tmp_path / "out", **options)
+    end.set()
+    process.join(60)
+    assert contents(tmp_path / "out") == dict.fromkeys(NAMES, "first")
+
+
+def test_a_dead_run_holds_nothing(tmp_path, rival):
+    process, _ = rival
+    os.kill(process.pid, signal.SIGKILL)
+    process.join(60)
+    write(tmp_path / "out", "second")
+    assert contents(tmp_path / "out") == dict.fromkeys(NAMES, "second")

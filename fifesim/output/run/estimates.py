@@ -9,6 +9,7 @@ from dask.utils import format_bytes, format_time
 from fifesim.output.progress import memory
 from fifesim.output.run.products import products_of, wanted_blocks
 from fifesim.output.run.schedule import run_on_threads, tasks_of
+from fifesim.output.run.size import check_size, disk_of
 from fifesim.output.run.workers import usable_cores
 from fifesim.rasters import grid as grids
 from fifesim.scenario.simulation import simulate
@@ -20,13 +21,15 @@ _PIECE = 2016
 _SLACK = 1.1
 
 
-def estimate(scenario, *, threads=None, scene=False):
+def estimate(scenario, folder=".", *, threads=None, scene=False):
     """
     Cells, tasks, memory, disk and time of a run.
 
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario
+    folder : path, optional
+        Of its results.
     threads : int, optional
         Or workers; by default one for each core that this process may use.
     scene : bool, optional
@@ -40,31 +43,27 @@ def estimate(scenario, *, threads=None, scene=False):
     Raises
     ------
     ValueError
-        If the scenario cannot be simulated.
+        If the scenario cannot be simulated, or does not fit on this machine.
 
     Notes
     -----
     A piece of up to 2016 x 2016 cells of the same ground is simulated twice; the second time counts.
     """
     complete = scenario.complete()
+    check_size(complete, folder, scene)
     threads = threads or usable_cores()
     tree = simulate(complete)
     found = products_of(tree)
     lai, image = tree["scene"]["lai"], found.arrays["image"]
     tasks = tasks_of(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))[0]
     rate, used = _calibrate(complete, threads)
-    bands = image.shape[0]
-    pixels = image.shape[-2] * image.shape[-1]
-    kept = pixels * (bands * image.dtype.itemsize + 16)
-    in_scene = sum(array.nbytes for array in tree["scene"].data_vars.values()) if scene else 0
     return {
         "cells": lai.size,
-        "pixels": pixels,
+        "pixels": image.shape[-2] * image.shape[-1],
         "tasks": len(tasks),
         "threads": threads,
         "memory": used,
-        # Blocks, the stream, its copy with overviews.
-        "disk": round(3.4 * kept + in_scene),
+        "disk": round(disk_of(complete, scene)),
         "seconds": _SLACK * lai.size / rate,
     }
 

@@ -21,6 +21,7 @@ from fifesim.output.run.identity import NotThisRun, begin, check_inputs, identit
 from fifesim.output.run.products import make_scene_store, products_of, shard_checksum, wanted_blocks
 from fifesim.output.run.saved import SUFFIX, save_block, saved_array, saved_block, saved_blocks
 from fifesim.output.run.schedule import run_on_client, run_on_threads, tasks_of
+from fifesim.output.run.size import check_size
 from fifesim.output.run.workers import usable_cores
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
@@ -81,6 +82,7 @@ def simulate_to_folder(
     folder = Path(folder)
     check_folder(folder, overwrite, resume)
     complete = scenario.complete()
+    check_size(complete, folder, scene)
     identity, names = identity_of(complete, scene), FILES + (SCENE,) * scene
     kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=_has_blocks)
     with _errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
@@ -184,7 +186,7 @@ def _check_some_data(scenario, image):
     if not bool((image != 0).any()):
         offset, share = scenario.sensor.offset, scenario.sensor.min_valid
         raise ValueError(
-            f"no pixel of the image has data: none has {share:g} of its footprint on cells with leaf area and elevation; "
+            f"no pixel of the image has {share:g} of its footprint on cells with leaf area and elevation: "
             f"see sensor.offset = {offset} and sensor.min_valid, and whether the files have data here"
         )
 

@@ -71,11 +71,10 @@ def inputs_of(scenario):
         Size [byte] and time of the last change [ns] by path.
     """
     found = {}
-    for name in scenario.files.values():
-        for path in _read_with(name):
-            if Path(path).is_file():
-                status = os.stat(path)
-                found[str(path)] = [status.st_size, status.st_mtime_ns]
+    for name in filter(os.path.isfile, scenario.files.values()):
+        for path in filter(os.path.isfile, _read_with(name)):
+            status = os.stat(path)
+            found[str(path)] = [status.st_size, status.st_mtime_ns]
     return found
 
 

@@ -189,7 +189,5 @@ def _shard(path, name, index):
     import zarr  # slow, and few runs write cells
 
     sink = zarr.open_array(str(path), path=name, mode="r+")
-    sides = [
-        slice(at * _SHARD, min((at + 1) * _SHARD, size)) for at, size in zip(index, sink.shape[-2:], strict=True)
-    ]
+    sides = [slice(at * _SHARD, min((at + 1) * _SHARD, size)) for at, size in zip(index, sink.shape[-2:], strict=True)]
     return sink, (..., *sides)

@@ -75,7 +75,7 @@ def cluster(workers=None, scheduler=None):
     # Whoever reaches a scheduler or a worker can run code as this user: only who has the certificate made here does.
     guarded = {"protocol": "tls://", "host": "127.0.0.1", "security": Security.temporary(), "dashboard_address": None}
     with (
-        dask.config.set({"distributed.worker.daemon": True} | dict.fromkeys(_PAGES, [])),
+        dask.config.set({"distributed.worker.daemon": True} | {key: [] for key in _PAGES}),
         LocalCluster(n_workers=workers, threads_per_worker=1, silence_logs="ERROR", **guarded) as local,
         Client(local, set_as_default=False) as client,
     ):

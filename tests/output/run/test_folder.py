@@ -125,3 +125,25 @@ def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_
     scenario = parse_scenario(SMALL | {"sensor": {"interval": "native"}, "terrain": {"dem": "flat"}})
     simulate_to_folder(scenario, tmp_path / "own")
     assert "What NDVI tells" in (tmp_path / "own" / "report.html").read_text(encoding="utf-8")
+
+
+def lai_map(path, values):
+    profile = {"driver": "GTiff", "width": 30, "height": 20, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
+    with rasterio.open(path, "w", **profile, transform=rasterio.transform.from_origin(704970, 4334220, 30, 30)) as sink:
+        sink.write(np.full((1, 20, 30), values, "float32"))
+    return {"ground": {"lai_file": str(path)}}
+
+
+def test_a_uniform_map_has_no_line_and_still_a_report(tmp_path):
+    files = simulate_to_folder(parse_scenario(lai_map(tmp_path / "lai.tif", 2.0)), tmp_path / "out")
+    assert all(path.stat().st_size > 0 for path in files)
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "What NDVI tells" not in page and re.search("R² of .*none, all", page, re.DOTALL)
+
+
+@pytest.mark.parametrize("values", [2.0, np.nan])
+def test_an_image_without_a_valid_pixel_is_an_error_that_says_why(tmp_path, values):
+    offset = {"sensor": {"offset": [1000.0, 0.0]}} if values == 2.0 else {}
+    with pytest.raises(ValueError, match=r"no pixel of the image has 0\.98.*sensor\.offset"):
+        simulate_to_folder(parse_scenario(lai_map(tmp_path / "lai.tif", values) | offset), tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -40,6 +40,17 @@ def test_a_cut_block_is_none(tmp_path, array, kept):
     assert saved_blocks(tmp_path, "image", array) == set()
 
 
+def test_a_changed_block_is_none_and_is_not_read(tmp_path, array):
+    save(tmp_path, array, *np.ndindex(array.numblocks))
+    path = tmp_path / "image" / "00000-00000-00000.npy"
+    content = bytearray(path.read_bytes())
+    content[-20] ^= 1
+    path.write_bytes(content)
+    assert (0, 0, 0) not in saved_blocks(tmp_path, "image", array)
+    with pytest.raises(OSError, match="not what was written"):
+        saved_array(tmp_path, "image", array).compute()
+
+
 def test_a_block_of_another_shape_or_type_is_none(tmp_path, array):
     save(tmp_path, array, (0, 0, 0))
     assert saved_blocks(tmp_path, "image", array.astype("float32")) == set()

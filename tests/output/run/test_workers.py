@@ -1,7 +1,12 @@
 """Workers of a cluster are other processes: what goes to them must pickle, and what they write must be whole."""
 
+import socket
+import subprocess
+import sys
+
 import dask
 import numpy as np
+import psutil
 import pytest
 import rasterio
 import xarray as xr
@@ -9,6 +14,7 @@ from distributed import Client, LocalCluster
 
 import fifesim
 from fifesim.output.run.folder import simulate_to_folder
+from fifesim.output.run.workers import cluster
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -72,3 +78,46 @@ def test_processes_without_a_cluster_give_the_same_bits():
     with dask.config.set(scheduler="processes", num_workers=2):
         there = image.compute()
     np.testing.assert_array_equal(there, image.compute(scheduler="synchronous"))
+
+
+def listening():
+    """Addresses on which this process and those that it started take connections."""
+    processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+    found = [connection for process in processes for connection in process.net_connections(kind="inet")]
+    return {connection.laddr for connection in found if connection.status == psutil.CONN_LISTEN}
+
+
+def answer(place):
+    """What somebody without a certificate is told."""
+    try:
+        with socket.create_connection(place, timeout=5) as plain:
+            plain.sendall(b"GET /info/main/workers.html HTTP/1.0\r\n\r\n")
+            return plain.recv(4096)
+    except ConnectionResetError:
+        return b""
+
+
+STRANGER = """
+import os, sys
+from distributed import Client
+tls = sys.argv[1]
+for address, options in ((tls, {}), (tls.replace("tls", "tcp"), {}), (tls, {"security": Security.temporary()})):
+    try:
+        Client(address, timeout=2, set_as_default=False, **options)
+    except (OSError, TypeError) as error:
+        print("refused", flush=True)
+os._exit(0)
+"""
+
+
+def test_workers_listen_to_nobody_without_their_certificate():
+    before = listening()
+    with cluster(workers=1) as guarded:
+        assert guarded.submit(abs, -2).result() == 2
+        address, places = guarded.scheduler.address, listening() - before
+        assert address.startswith("tls://127.0.0.1:") and len(places) >= 3
+        for place in places:
+            assert place.ip == "127.0.0.1" and b"HTTP" not in answer(place)
+        stranger = [sys.executable, "-c", STRANGER, address]
+        told = subprocess.run(stranger, stdout=subprocess.PIPE, text=True, timeout=120, check=True)
+        assert told.stdout.split() == ["refused"] * 3
