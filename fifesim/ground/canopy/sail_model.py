@@ -44,17 +44,7 @@ class _Scattering(NamedTuple):
     w: np.ndarray  # sunbeam to observer
 
 
-def sail(
-    lai,
-    leaf_reflectance,
-    leaf_transmittance,
-    *,
-    sza,
-    vza=0.0,
-    raa=0.0,
-    leaf_angles="spherical",
-    hotspot=0.0,
-):
+def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, leaf_angles="spherical", hotspot=0.0):
     r"""
     Reflectances and transmittances of a leaf canopy by the four-stream SAIL model with Kuusk's hot spot.
 

@@ -11,7 +11,7 @@ the roughness of a real model.
 from functools import lru_cache, partial
 
 import numpy as np
-from scipy import interpolate
+from scipy.interpolate import PchipInterpolator
 
 from fifesim.base.seeds import generator
 from fifesim.ground.terrain.spline import REACH, spline_grid, spline_of_tiles, spline_points
@@ -149,9 +149,4 @@ def hypsometry(eroded):
         A rising function: valleys keep falling. Beyond the table it goes on in a line of a fifth of the slope there.
     """
     low, high = eroded.clip(max=_ERODED[0]) - _ERODED[0], eroded.clip(min=_ERODED[-1]) - _ERODED[-1]
-    return _hypsometry()(eroded.clip(_ERODED[0], _ERODED[-1])) + 0.2 * (low + high)
-
-
-@lru_cache
-def _hypsometry():
-    return interpolate.PchipInterpolator(_ERODED, _WATERSHED)
+    return PchipInterpolator(_ERODED, _WATERSHED)(eroded.clip(_ERODED[0], _ERODED[-1])) + 0.2 * (low + high)
