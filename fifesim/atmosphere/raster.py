@@ -146,10 +146,10 @@ def _varying(verb, reflectance, atmosphere, bands, geometry, elevation):
         cf.check_quantity(elevation, "dem")
         altitude = elevation / 1000
 
+    options = {"atmosphere": atmosphere, "bands": tuple(bands), "to_surface": verb == "to_surface"}
+
     def kernel(rho, *places):
-        return lookup.varying_reflectance(
-            rho, *places, atmosphere=atmosphere, bands=tuple(bands), to_surface=verb == "to_surface"
-        )
+        return lookup.varying_reflectance(rho, *places, **options)
 
     return chunks.pointwise(kernel, reflectance, altitude, *directions.angles(geometry), bands=len(bands))
 

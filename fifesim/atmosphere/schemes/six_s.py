@@ -291,11 +291,8 @@ def terms_of(outputs, sza, vza):
     molecules, aerosol = outputs.transmittance_rayleigh_scattering, outputs.transmittance_aerosol_scattering
     down, up = outputs.transmittance_total_scattering.downward, outputs.transmittance_total_scattering.upward
     albedo, depth = outputs.spherical_albedo.total, outputs.optical_depth_total
-    path, background, target = (
-        outputs.atmospheric_intrinsic_radiance,
-        outputs.background_radiance,
-        outputs.pixel_radiance,
-    )
+    path, background = outputs.atmospheric_intrinsic_radiance, outputs.background_radiance
+    target = outputs.pixel_radiance
     from_ground, seen = target + background, path + target + background
     path = outputs.apparent_reflectance * (path / seen if seen else 1.0)
     ground = SURFACE_REFLECTANCE / (1 - SURFACE_REFLECTANCE * albedo) * down * up

@@ -213,6 +213,11 @@ def check_lai(lai):
     lai : array
         [m2 m-2]
 
+    Returns
+    -------
+    lai : array
+        What was given.
+
     Raises
     ------
     ValueError
@@ -221,15 +226,17 @@ def check_lai(lai):
     Examples
     --------
     >>> check_lai(2.5)
+    2.5
     """
-    lai = np.asarray(lai, float)
+    cells = np.asarray(lai, float)
     # Two passes without a temporary; NaN is passed over.
-    if np.fmin.reduce(lai, axis=None, initial=0.0) < 0 or np.fmax.reduce(lai, axis=None, initial=0.0) > LARGEST_LAI:
-        wrong = (lai < 0) | (lai > LARGEST_LAI)
+    if np.fmin.reduce(cells, axis=None, initial=0.0) < 0 or np.fmax.reduce(cells, axis=None, initial=0.0) > LARGEST_LAI:
+        wrong = (cells < 0) | (cells > LARGEST_LAI)
         raise ValueError(
-            f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {lai[wrong].flat[0]:g} in "
-            f"{wrong.sum()} of {lai.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
+            f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
+            f"{wrong.sum()} of {cells.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
         )
+    return lai
 
 
 def _check_fraction(name, values):

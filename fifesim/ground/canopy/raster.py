@@ -93,15 +93,9 @@ def level_reflectance(
         out = chunking.pointwise(_reflectance, lai, background, bands=len(bands), **parameters)
     out = out.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
     out = directions.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
-    return cf.label(
-        out,
-        "surface_reflectance",
-        source=lai,
-        history=f"surface_reflectance: SAIL, {angles} leaves, {_directions(geometry)}",
-        leaf_angles=str(angles),
-        background=described,
-        **provenance,
-    )
+    said = f"surface_reflectance: SAIL, {angles} leaves, {_directions(geometry)}"
+    provenance = {"leaf_angles": str(angles), "background": described, **provenance}
+    return cf.label(out, "surface_reflectance", source=lai, history=said, **provenance)
 
 
 def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPAR_INF):
@@ -188,8 +182,7 @@ def _directions(geometry):
 
 
 def _fpar(lai, **parameters):
-    check_lai(lai)
-    return absorption.fpar(lai, **parameters)
+    return absorption.fpar(check_lai(lai), **parameters)
 
 
 def _background_bands(background, bands):

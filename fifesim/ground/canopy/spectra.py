@@ -86,8 +86,13 @@ class Background:
         if not isinstance(self.fractions, Mapping):
             raise TypeError(f"Background takes {{spectrum: fraction}}, got {self.fractions!r}")
         fractions = {str(name): float(value) for name, value in self.fractions.items()}
+        names = spectrum_names()
         for name, value in fractions.items():
-            _check_name(name)
+            if name not in names and not _is_file(name):
+                raise ValueError(
+                    f"Background: no spectrum {name!r}{did_you_mean(name, names)} There are {', '.join(names)}, "
+                    "or the path of a .csv file"
+                )
             if not 0 <= value <= 1:
                 raise ValueError(f"Background: the fraction of {name!r} must be in [0, 1], got {value:g}")
         total = sum(fractions.values())
@@ -240,15 +245,6 @@ def did_you_mean(name, allowed):
 
 def _is_file(name):
     return Path(str(name)).suffix.lower() == ".csv"
-
-
-def _check_name(name):
-    names = spectrum_names()
-    if name not in names and not _is_file(name):
-        raise ValueError(
-            f"Background: no spectrum {name!r}{did_you_mean(name, names)} There are {', '.join(names)}, "
-            "or the path of a .csv file"
-        )
 
 
 def _spectrum(name):

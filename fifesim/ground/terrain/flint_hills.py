@@ -115,11 +115,9 @@ def _bent_uplands(seed, south, east):
     for number in np.unique(line):
         for column in np.unique(place[line == number]):
             here = (line == number) & (place == column)
-            coefficients = upland(seed, int(number), int(column))
-            positions = (
-                (axis[here] - start) * (NODES - 1) + REACH for axis, start in ((across, number), (along, column))
-            )
-            out[here] = spline_points(coefficients, *(position[None] for position in positions))[0]
+            rows = (across[here] - number) * (NODES - 1) + REACH
+            columns = (along[here] - column) * (NODES - 1) + REACH
+            out[here] = spline_points(upland(seed, int(number), int(column)), rows[None], columns[None])[0]
     return out + BASE_NOISE[0] * smooth_noise(seed, _LEVEL, BASE_NOISE[1], south, east)
 
 

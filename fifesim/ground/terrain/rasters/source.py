@@ -66,13 +66,9 @@ class Source:
         return out
 
     def _array_window(self, rows, columns):
-        values = np.asarray(
-            self.cells[
-                rows.start - self.origin[0] : rows.stop - self.origin[0],
-                columns.start - self.origin[1] : columns.stop - self.origin[1],
-            ],
-            float,
-        )
+        top, left = self.origin
+        window = slice(rows.start - top, rows.stop - top), slice(columns.start - left, columns.stop - left)
+        values = np.asarray(self.cells[window], float)
         return values if self.nodata is None else np.where(values == self.nodata, np.nan, values)
 
 
