@@ -281,10 +281,10 @@ def _outer(surroundings, array, along):
             f"the surroundings must lie within {REACH / 1000:g} km of the scene, {grids.extent(here)}, "
             f"got {grids.extent(there)}"
         )
-    shape = along[0].count + 2 * down.margin, along[1].count + 2 * across.margin
+    shape = along_y.count + 2 * down.margin, along_x.count + 2 * across.margin
     grid = GeoBox(shape, Affine(across.block, 0.0, across.edge, 0.0, down.block, down.edge), here.crs)
-    wanted = _same_bands(surroundings, array)
-    return (down.margin, across.margin), regularized(wanted, areas(grid), grid, min_valid=0.0)
+    means = regularized(_same_bands(surroundings, array), areas(grid), grid, min_valid=0.0)
+    return (down.margin, across.margin), means
 
 
 class _OuterAxis(NamedTuple):

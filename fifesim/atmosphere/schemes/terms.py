@@ -230,6 +230,5 @@ def _steps(limits, name):
             f"band {name} spans {limits[0]:g} to {limits[1]:g} um, "
             f"the gas tables only {table[0]:g} to {table[-1]:g} um: leave it out"
         )
-    first, last = np.searchsorted(table, limits[0], side="right") - 1, np.searchsorted(table, limits[1])
-    used = slice(first, last + 1)
+    used = slice(np.searchsorted(table, limits[0], side="right") - 1, np.searchsorted(table, limits[1]) + 1)
     return table[used], solar_irradiance_steps(table)[used]

@@ -113,8 +113,6 @@ def _array_source(raster, vertical_units):
     if raster.ndim != 2:
         raise ValueError(f"an elevation model has one band of rows and columns, got dimensions {raster.dims}")
     crs = raster.rio.crs
-    if crs is None:
-        return _in_metres(Source(name, None, raster.shape, Affine.identity(), None, 1.0), None, None, vertical_units)
     found = raster.odc.geobox
     if found is None:
         raise ValueError(f"the x and y of {name} are not the centres of a regular grid")
@@ -127,7 +125,7 @@ def _array_source(raster, vertical_units):
     nodata = raster.rio.nodata
     nodata = None if nodata is None or np.isnan(nodata) else float(nodata)
     source = Source(name, cells, cells.shape, found.affine, None, 1.0, nodata)
-    return _in_metres(source, crs.to_wkt(), raster.attrs.get("units"), vertical_units)
+    return _in_metres(source, crs.to_wkt() if crs else None, raster.attrs.get("units"), vertical_units)
 
 
 def _in_metres(source, wkt, unit, vertical_units):
