@@ -154,14 +154,7 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
 
 
 def to_toa(
-    reflectance,
-    atmosphere=None,
-    *,
-    geometry=None,
-    instrument=None,
-    elevation=None,
-    adjacency=False,
-    surroundings=None,
+    reflectance, atmosphere=None, *, geometry=None, instrument=None, elevation=None, adjacency=False, surroundings=None
 ):
     """
     Apparent reflectance at the top of the atmosphere.
@@ -215,14 +208,7 @@ def to_toa(
 
 
 def to_surface(
-    reflectance,
-    atmosphere=None,
-    *,
-    geometry=None,
-    instrument=None,
-    elevation=None,
-    adjacency=False,
-    surroundings=None,
+    reflectance, atmosphere=None, *, geometry=None, instrument=None, elevation=None, adjacency=False, surroundings=None
 ):
     """
     Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.

@@ -174,21 +174,14 @@ def _warp_tile(path, state, grid, pipeline, back, tile_row, tile_column):
         cells = [
             np.ptp(places) / size for places, size in zip(_source_places(source, grid, back), grid.shape, strict=True)
         ]
-        resampling = Resampling.average if max(cells) > 1.01 else Resampling.bilinear
+        options = {"src_transform": source.window_transform(window), "src_crs": source.crs, "src_nodata": np.nan}
+        options |= {"dst_crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()), "dst_nodata": np.nan}
+        options |= {"resampling": Resampling.average if max(cells) > 1.01 else Resampling.bilinear}
+        options |= {"COORDINATE_OPERATION": pipeline} if pipeline else {}
         for first in range(0, _TILE, _STRIP):
             strip = np.full((_TILE, _STRIP), np.nan)
+            transform = Affine(a.a, 0.0, west + first * a.a, 0.0, a.e, north)
             with _ONE_AT_A_TIME:
-                reproject(
-                    values,
-                    strip,
-                    src_transform=source.window_transform(window),
-                    src_crs=source.crs,
-                    src_nodata=np.nan,
-                    dst_transform=Affine(a.a, 0.0, west + first * a.a, 0.0, a.e, north),
-                    dst_crs=rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
-                    dst_nodata=np.nan,
-                    resampling=resampling,
-                    **({"COORDINATE_OPERATION": pipeline} if pipeline else {}),
-                )
+                reproject(values, strip, dst_transform=transform, **options)
             out[:, first : first + _STRIP] = strip
     return out

@@ -244,9 +244,8 @@ def density(array, points=256, bandwidth=None):
 
 def _ndvi_bias(red, nir, rr, rn, nn):
     mixed = rn - red * nir
-    return scaling.second_order_bias(
-        scaling.ndvi_hessian(red, nir), np.array([[rr - red**2, mixed], [mixed, nn - nir**2]])
-    )
+    covariance = np.array([[rr - red**2, mixed], [mixed, nn - nir**2]])
+    return scaling.second_order_bias(scaling.ndvi_hessian(red, nir), covariance)
 
 
 def _fpar_bias(mean, square, **parameters):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fifesim.sensor.description.axes import AlongAcross, Angles, by_axes
+from fifesim.sensor.description.fields import AlongAcross, Angles, by_axes
 from fifesim.sensor.description.spatial_response import BoxcarResponse, TwoAxesResponse
 
 
