@@ -177,9 +177,8 @@ def _check_written(streamed, finished, array):
         if os.path.getsize(streamed) < _streamed_bytes(array):
             raise rasterio.errors.RasterioIOError("the disk did not take all of it")
         for _, window in other.block_windows(1):
-            if not np.array_equal(
-                one.read(window=window), other.read(window=window), equal_nan=array.dtype.kind == "f"
-            ):
+            blocks = one.read(window=window), other.read(window=window)
+            if not np.array_equal(*blocks, equal_nan=array.dtype.kind == "f"):
                 raise rasterio.errors.RasterioIOError("what was written is not what is read")
 
 
@@ -264,9 +263,8 @@ def _describe(sink, array, described):
         sink.scales, sink.offsets = array["gain"].values.tolist(), array["offset"].values.tolist()
         sink.units = [cf.QUANTITIES["toa_radiance"].units] * len(names)
     else:
-        sink.units = [
-            cf.QUANTITIES[name].units if name in cf.QUANTITIES else array.attrs.get("units", "") for name in names
-        ]
+        own = array.attrs.get("units", "")
+        sink.units = [cf.QUANTITIES[name].units if name in cf.QUANTITIES else own for name in names]
 
 
 def _describe_band(sink, number, band):

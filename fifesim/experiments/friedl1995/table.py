@@ -197,9 +197,8 @@ def mean_noise(variable, ndvi, increment):
         Mean of the variable and its relative equivalent noise in increments of at least three pixels. [1]
     """
     first, last = int(np.floor(variable.min() / increment)), int(np.floor(variable.max() / increment))
-    sums = uncertainty.increment_sums(
-        variable[None], ndvi[None], first, increment, last - first + 1, float(ndvi.mean())
-    )
+    increments, origin = last - first + 1, float(ndvi.mean())
+    sums = uncertainty.increment_sums(variable[None], ndvi[None], first, increment, increments, origin)
     count, mean, deviation = uncertainty.increment_moments(sums)
     enough = count >= _FEWEST
     slope = line(variable, ndvi)[1]

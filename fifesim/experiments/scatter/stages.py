@@ -157,10 +157,8 @@ def _scene(scenario):
 
 def _red_and_nir(bands):
     """The two bands of NDVI."""
-    wavelength = ("band", [band.wavelength for band in bands])
-    numbers = xr.DataArray(
-        np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords={"wavelength": wavelength}
-    )
+    coords = {"wavelength": ("band", [band.wavelength for band in bands])}
+    numbers = xr.DataArray(np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords=coords)
     return tuple(bands[number.item()] for number in analysis.red_and_nir(numbers))
 
 
