@@ -205,12 +205,5 @@ def fit(sums, y_origin=0.0, x_origin=0.0):
     slope = sxy / sxx
     residual = max(syy - slope * sxy, 0.0)
     x_mean, y_mean = x_origin + x / n, y_origin + y / n
-    return Regression(
-        slope=slope,
-        intercept=y_mean - slope * x_mean,
-        r2=1.0 - residual / syy if syy > 0 else 0.0,
-        n=int(n),
-        residual_deviation=math.sqrt(residual / (n - 2)),
-        x_mean=x_mean,
-        x_sum_of_squares=sxx,
-    )
+    r2 = 1.0 - residual / syy if syy > 0 else 0.0
+    return Regression(slope, y_mean - slope * x_mean, r2, int(n), math.sqrt(residual / (n - 2)), x_mean, sxx)

@@ -39,12 +39,9 @@ def lag_sums(cells, margin, reach, origin=0.0):
     first[inside] = valid[inside]
     # Twice the reach apart nothing wraps round.
     shape = tuple(fft.next_fast_len(size + each, real=True) for size, each in zip(values.shape, reach, strict=True))
-
-    def transform(factors):
-        return fft.rfft2(factors, shape)
-
-    one, one_z, one_zz = transform(first * 1.0), transform(first * values), transform(first * values**2)
-    two, two_z, two_zz = transform(valid * 1.0), transform(valid * values), transform(valid * values**2)
+    factors = 1.0, values, values**2
+    one, one_z, one_zz = (fft.rfft2(first * factor, shape) for factor in factors)
+    two, two_z, two_zz = (fft.rfft2(valid * factor, shape) for factor in factors)
     pairs = (one, two), (one_z, two), (one, two_z), (one_z, two_z), (one_zz, two), (one, two_zz)
     rows, columns = np.arange(reach[0] + 1), np.arange(-reach[1], reach[1] + 1)
     sums = np.stack([fft.irfft2(np.conj(a) * b, shape)[np.ix_(rows, columns)] for a, b in pairs])

@@ -48,7 +48,7 @@ def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacenc
     """
     cf.check_quantity(reflectance, "surface_reflectance")
     said = ("toa_reflectance", "to_toa")
-    return _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings)
+    return _carry(*said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings)
 
 
 def to_surface(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacency=False, surroundings=None):
@@ -78,7 +78,7 @@ def to_surface(reflectance, atmosphere, bands, geometry, *, elevation=None, adja
     """
     cf.check_quantity(reflectance, "toa_reflectance")
     said = ("surface_reflectance", "to_surface")
-    return _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings)
+    return _carry(*said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings)
 
 
 def diffuse_fraction(atmosphere, bands, geometry):
@@ -109,12 +109,8 @@ def diffuse_fraction(atmosphere, bands, geometry):
     return chunks.pointwise(kernel, geometry.sza, bands=len(bands))
 
 
-def _carry(said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings):
-    name, verb = said
-    if "band" not in reflectance.dims:
-        reflectance = reflectance.expand_dims("band")
-    if set(reflectance.dims) != {"band", "y", "x"}:
-        raise ValueError(f"a reflectance has dimensions (band, y, x), got {reflectance.dims}: select one layer first")
+def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings):
+    reflectance = adjacency_raster.banded(reflectance)
     if surroundings is not None and not adjacency:
         raise ValueError("surroundings matter with adjacency=True only: give both, or leave surroundings out")
     plain = reflectance.drop_vars(["band", *ANGLES], errors="ignore")
@@ -150,10 +146,10 @@ def _varying(verb, reflectance, atmosphere, bands, geometry, elevation):
         cf.check_quantity(elevation, "dem")
         altitude = elevation / 1000
 
+    options = {"atmosphere": atmosphere, "bands": tuple(bands), "to_surface": verb == "to_surface"}
+
     def kernel(rho, *places):
-        return lookup.varying_reflectance(
-            rho, *places, atmosphere=atmosphere, bands=tuple(bands), to_surface=verb == "to_surface"
-        )
+        return lookup.varying_reflectance(rho, *places, **options)
 
     return chunks.pointwise(kernel, reflectance, altitude, *directions.angles(geometry), bands=len(bands))
 

@@ -92,6 +92,4 @@ def _responses(array, instrument):
     centres = np.atleast_1d(array["wavelength"].values).astype(float)
     if np.max(centres) > 100:
         raise ValueError(f"wavelengths are in um, got {np.max(centres):g}: divide nanometres by 1000")
-    return tuple(
-        Band(f"{centre:g} um", (centre - _NARROW, centre, centre + _NARROW), (0.0, 1.0, 0.0)) for centre in centres
-    )
+    return tuple(Band(f"{at:g} um", (at - _NARROW, at, at + _NARROW), (0.0, 1.0, 0.0)) for at in centres)

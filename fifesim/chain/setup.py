@@ -11,6 +11,10 @@ from fifesim.chain import steps
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import Instrument
 
+# What surface_reflectance and sense take of a setup, by the same names.
+_GROUND = ("bands", "dem", "horizon", "upwelling", "atmosphere", "leaf_optics", "background", "leaf_angles", "hotspot")
+_SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
+
 
 @dataclass(frozen=True, eq=False)
 class Setup:
@@ -80,20 +84,7 @@ def reflectance_of(setup, lai):
     --------
     fifesim.chain.steps.surface_reflectance
     """
-    return steps.surface_reflectance(
-        lai,
-        setup.instrument,
-        bands=setup.bands,
-        dem=setup.dem,
-        horizon=setup.horizon,
-        upwelling=setup.upwelling,
-        atmosphere=setup.atmosphere,
-        geometry=setup.geometry,
-        leaf_optics=setup.leaf_optics,
-        background=setup.background,
-        leaf_angles=setup.leaf_angles,
-        hotspot=setup.hotspot,
-    )
+    return steps.surface_reflectance(lai, setup.instrument, geometry=setup.geometry, **_of(setup, _GROUND))
 
 
 def image_of(setup, reflectance):
@@ -115,18 +106,9 @@ def image_of(setup, reflectance):
     --------
     fifesim.chain.steps.to_toa, fifesim.sensor.raster.sense
     """
-    toa = steps.to_toa(
-        reflectance, instrument=setup.instrument, adjacency=setup.adjacency, surroundings=setup.surroundings
-    )
-    return sensor.sense(
-        toa,
-        setup.instrument,
-        onto=setup.onto,
-        interval=setup.interval,
-        offset=setup.offset,
-        noise=setup.noise,
-        seed=setup.seed,
-        noise_models=setup.noise_models,
-        quantise=setup.quantise,
-        min_valid=setup.min_valid,
-    )
+    toa = steps.to_toa(reflectance, instrument=setup.instrument, **_of(setup, ("adjacency", "surroundings")))
+    return sensor.sense(toa, setup.instrument, **_of(setup, _SENSOR))
+
+
+def _of(setup, names):
+    return {name: getattr(setup, name) for name in names}

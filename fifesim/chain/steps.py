@@ -93,12 +93,11 @@ def surface_reflectance(
     geometry = directions.given_geometry(geometry, lai)
     description = find_instrument(instrument)
     selected = description.select(bands)
-    names = [band.name for band in selected]
     responses = tuple(band.response for band in selected)
     leaf_reflectance, leaf_transmittance = optics.leaf_optics(responses, leaf_optics)
     level = ground.level_reflectance(
         lai,
-        bands=names,
+        bands=[band.name for band in selected],
         wavelengths=[band.wavelength for band in selected],
         leaf_reflectance=leaf_reflectance,
         leaf_transmittance=leaf_transmittance,
@@ -113,10 +112,8 @@ def surface_reflectance(
     )
     if dem is None:
         return level
-    geometry = directions.uniform_geometry(geometry, "surface_reflectance on slopes")
-    terms = engines.band_terms(atmosphere, responses, geometry.sza, geometry.vza, geometry.raa)
-    light = _sunlight(terms) | {"geometry": geometry, "horizon": horizon}
-    return terrain.terrain_reflectance(level, dem, upwelling=upwelling, **light)
+    light = _sunlight(atmosphere, responses, geometry, "surface_reflectance on slopes")
+    return terrain.terrain_reflectance(level, dem, upwelling=upwelling, horizon=horizon, **light)
 
 
 def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instrument=None):
@@ -152,21 +149,12 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
     --------
     fifesim.ground.terrain.light.topographic_factor
     """
-    atmosphere, bands, geometry = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)
-    geometry = directions.uniform_geometry(geometry, "kt")
-    terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
-    return terrain.kt_on_slopes(reflectance, dem, geometry=geometry, horizon=horizon, **_sunlight(terms))
+    light = _sunlight(*air_bands_and_geometry(reflectance, atmosphere, geometry, instrument), "kt")
+    return terrain.kt_on_slopes(reflectance, dem, horizon=horizon, **light)
 
 
 def to_toa(
-    reflectance,
-    atmosphere=None,
-    *,
-    geometry=None,
-    instrument=None,
-    elevation=None,
-    adjacency=False,
-    surroundings=None,
+    reflectance, atmosphere=None, *, geometry=None, instrument=None, elevation=None, adjacency=False, surroundings=None
 ):
     """
     Apparent reflectance at the top of the atmosphere.
@@ -220,14 +208,7 @@ def to_toa(
 
 
 def to_surface(
-    reflectance,
-    atmosphere=None,
-    *,
-    geometry=None,
-    instrument=None,
-    elevation=None,
-    adjacency=False,
-    surroundings=None,
+    reflectance, atmosphere=None, *, geometry=None, instrument=None, elevation=None, adjacency=False, surroundings=None
 ):
     """
     Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.
@@ -272,9 +253,9 @@ def _background(responses, given):
     return optics.background(responses, given)
 
 
-def _sunlight(terms):
-    """What Kt needs of the atmosphere."""
-    return {
-        "direct_transmittance": terms.direct_transmittance_down,
-        "transmittance_down": terms.transmittance_down,
-    }
+def _sunlight(atmosphere, bands, geometry, what):
+    """What Kt needs of the atmosphere, below one direction of sun and sensor."""
+    geometry = directions.uniform_geometry(geometry, what)
+    terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
+    down, direct = terms.transmittance_down, terms.direct_transmittance_down
+    return {"geometry": geometry, "transmittance_down": down, "direct_transmittance": direct}

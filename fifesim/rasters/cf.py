@@ -106,12 +106,7 @@ def attributes(name):
     attributes : dict of str
     """
     quantity = QUANTITIES[name]
-    found = {
-        "standard_name": quantity.standard_name,
-        "long_name": quantity.long_name,
-        "units": quantity.units,
-        "comment": quantity.comment,
-    }
+    found = {key: getattr(quantity, key) for key in ("standard_name", "long_name", "units", "comment")}
     return {key: value for key, value in found.items() if value}
 
 

@@ -121,7 +121,7 @@ def margin_reads(array, rows, columns=None, offset=(0, 0), shape=None):
     return Reads(array, *((at - depth, at + depth + 1) for at, depth in zip(cells, (rows, columns), strict=True)))
 
 
-def windows(kernel, reads, shape, chunks=None):
+def windows(kernel, reads, shape, chunks=None, dtype=float):
     """
     Array whose every block is made from windows of others.
 
@@ -135,6 +135,8 @@ def windows(kernel, reads, shape, chunks=None):
         Of the result; its last axes are y and x.
     chunks : (tuple of int, tuple of int), optional
         Of a lazy result over y and x. Without them all is made at once.
+    dtype : dtype, optional
+        Of a lazy result.
 
     Returns
     -------
@@ -148,7 +150,8 @@ def windows(kernel, reads, shape, chunks=None):
         return (rows, columns), [each.window(rows, columns) for each in reads]
 
     token = tokenize(kernel, reads, shape, chunks)
-    return array_from_windows(kernel, [each.array for each in reads], chunks, ask, token=token, leading=shape[:-2])
+    arrays, leading = [each.array for each in reads], shape[:-2]
+    return array_from_windows(kernel, arrays, chunks, ask, token=token, leading=leading, dtype=dtype)
 
 
 def in_blocks(kernel, reads, shape, size):

@@ -9,7 +9,7 @@ from fifesim.rasters import cf
 _GEOMETRY = (*ANGLES, "earth_sun_distance")
 
 
-def with_geometry(array, geometry):
+def with_geometry(array, geometry, names=_GEOMETRY):
     """
     Carry the directions of sun and sensor as coordinates: numbers, or rasters on the same cells.
 
@@ -18,12 +18,14 @@ def with_geometry(array, geometry):
     array : xarray.DataArray or xarray.Dataset
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset
         From `checked_geometry`.
+    names : sequence of str, optional
+        Which of them; all by default.
 
     Returns
     -------
     array : xarray.DataArray or xarray.Dataset
     """
-    angles = {name: _angle(geometry, name) for name in _GEOMETRY}
+    angles = {name: _angle(geometry, name) for name in names}
     return array.assign_coords(
         {name: xr.Variable(angle.dims, angle.data, cf.attributes(name)) for name, angle in angles.items()}
     )
@@ -44,9 +46,8 @@ def geometry_of(array):
     """
     if "sza" not in array.coords:
         return None
-    carried = {
-        name: array.coords[name].variable for name in (*_GEOMETRY, "y", "x", "spatial_ref") if name in array.coords
-    }
+    names = [name for name in (*_GEOMETRY, "y", "x", "spatial_ref") if name in array.coords]
+    carried = {name: array.coords[name].variable for name in names}
     return checked_geometry(xr.Dataset(carried).set_coords(["spatial_ref"] if "spatial_ref" in carried else []))
 
 

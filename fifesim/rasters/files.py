@@ -27,6 +27,8 @@ from fifesim.rasters.clients import found_client
 # GDAL's own block size for cloud-optimised files.
 _BLOCK = 512
 
+_TILED = {"driver": "GTiff", "tiled": True, "blockxsize": _BLOCK, "blockysize": _BLOCK, "bigtiff": "if_safer"}
+_COG = {"driver": "COG", "compress": "deflate", "predictor": "yes", "overview_resampling": "average"}
 # The tag that keeps names, types and attributes beyond what GDAL's model of a raster holds.
 _TAG = "FIFESIM"
 
@@ -76,15 +78,7 @@ def to_geotiff(raster, path):
         )
     with _whole(path) as (streamed, finished), _ErrorsOfGdal(path):
         _stream(array, grid, streamed, described=raster)
-        rasterio.shutil.copy(
-            streamed,
-            finished,
-            driver="COG",
-            compress="deflate",
-            predictor="yes",
-            blocksize=_BLOCK,
-            overview_resampling="average",
-        )
+        rasterio.shutil.copy(streamed, finished, blocksize=_BLOCK, **_COG)
         _check_written(streamed, finished, array)
     return path
 
@@ -114,7 +108,7 @@ def open_image(path, chunks=None):
     try:
         with rasterio.open(path) as source:
             kept = json.loads(source.tags().get(_TAG, "null"))
-            fallback = _gdal_description(source)
+            plain_description, storage = _gdal_description(source)
         with warnings.catch_warnings():
             # rioxarray has one scale and offset for all bands; here they are coordinates along band.
             warnings.filterwarnings("ignore", "(Scales|Offsets) differ across bands")
@@ -122,11 +116,11 @@ def open_image(path, chunks=None):
             plain = opened.load() if chunks is None else opened
     except rasterio.errors.RasterioIOError as error:
         raise ValueError(f"cannot read {path} as a raster: {error}") from None
-    description = kept or fallback["description"]
+    description = kept or plain_description
     grid = grids.geobox(plain)
     array = xr.DataArray(plain.data, dims=("band", "y", "x"), name=description["name"])
     if kept is None:
-        array = _physical(array, **fallback["storage"])
+        array = _physical(array, **storage)
     coords = {name: _variable(item) for name, item in description["coords"].items()}
     array = grids.place(array.assign_coords(coords), grid)
     array.attrs = dict(description["attrs"])
@@ -138,13 +132,9 @@ def open_image(path, chunks=None):
 def _stacked(dataset):
     """A dataset's variables as bands."""
     names = [str(name) for name in dataset.data_vars]
-    array = xr.concat(
-        [dataset[name].drop_vars(["band"], errors="ignore") for name in names],
-        dim=xr.DataArray(names, dims="band", name="band"),
-        combine_attrs="drop",
-        coords="minimal",
-        compat="override",
-    )
+    bands = [dataset[name].drop_vars(["band"], errors="ignore") for name in names]
+    dim = xr.DataArray(names, dims="band", name="band")
+    array = xr.concat(bands, dim, combine_attrs="drop", coords="minimal", compat="override")
     histories = [dataset[name].attrs.get("history", "") for name in names]
     array.attrs = {"history": histories[0], "long_name": ", ".join(names)}
     return array
@@ -187,9 +177,8 @@ def _check_written(streamed, finished, array):
         if os.path.getsize(streamed) < _streamed_bytes(array):
             raise rasterio.errors.RasterioIOError("the disk did not take all of it")
         for _, window in other.block_windows(1):
-            if not np.array_equal(
-                one.read(window=window), other.read(window=window), equal_nan=array.dtype.kind == "f"
-            ):
+            blocks = one.read(window=window), other.read(window=window)
+            if not np.array_equal(*blocks, equal_nan=array.dtype.kind == "f"):
                 raise rasterio.errors.RasterioIOError("what was written is not what is read")
 
 
@@ -208,7 +197,6 @@ def _stream(array, grid, path, described):
     """A tiled GeoTIFF, block by block, with all metadata."""
     dtype = array.dtype
     profile = {
-        "driver": "GTiff",
         "dtype": dtype.name,
         "count": array.sizes["band"],
         "height": grid.shape.y,
@@ -216,12 +204,8 @@ def _stream(array, grid, path, described):
         "crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
         "transform": grid.affine,
         "nodata": 0 if dtype.kind == "u" else np.nan if dtype.kind == "f" else None,
-        "tiled": True,
-        "blockxsize": _BLOCK,
-        "blockysize": _BLOCK,
-        "bigtiff": "if_safer",
     }
-    with rasterio.open(path, "w", **profile) as sink:
+    with rasterio.open(path, "w", **_TILED, **profile) as sink:
         _describe(sink, array, described)
         if not isinstance(array.data, da.Array):
             sink.write(array.values)
@@ -279,9 +263,8 @@ def _describe(sink, array, described):
         sink.scales, sink.offsets = array["gain"].values.tolist(), array["offset"].values.tolist()
         sink.units = [cf.QUANTITIES["toa_radiance"].units] * len(names)
     else:
-        sink.units = [
-            cf.QUANTITIES[name].units if name in cf.QUANTITIES else array.attrs.get("units", "") for name in names
-        ]
+        own = array.attrs.get("units", "")
+        sink.units = [cf.QUANTITIES[name].units if name in cf.QUANTITIES else own for name in names]
 
 
 def _describe_band(sink, number, band):
@@ -329,5 +312,4 @@ def _gdal_description(source):
     }
     units = {} if counts or not source.units[0] else {"units": source.units[0]}
     storage = {"scales": None if counts else source.scales, "offsets": source.offsets, "nodata": source.nodata}
-    description = {"name": "image", "dims": ["band", "y", "x"], "attrs": units, "coords": coords}
-    return {"description": description, "storage": storage}
+    return {"name": "image", "dims": ["band", "y", "x"], "attrs": units, "coords": coords}, storage

@@ -136,12 +136,8 @@ def coordinates(grid):
     places = {"y": centres(a.f, a.e, np.arange(grid.shape.y)), "x": centres(a.c, a.a, np.arange(grid.shape.x))}
     out = {}
     for axis, values in places.items():
-        attrs = {
-            "standard_name": f"projection_{axis}_coordinate",
-            "long_name": f"{axis} coordinate of projection",
-            "units": "m",
-            "axis": axis.upper(),
-        }
+        attrs = {"standard_name": f"projection_{axis}_coordinate", "long_name": f"{axis} coordinate of projection"}
+        attrs |= {"units": "m", "axis": axis.upper()}
         out[axis] = xr.DataArray(values, dims=axis, attrs=attrs)
     out["spatial_ref"] = xr_coords(_snapped(grid))["spatial_ref"]
     return out

@@ -83,9 +83,8 @@ def _best(source, target, area):
     with warnings.catch_warnings():
         # PROJ names a better operation whose grid file is not installed; the accuracy of the one taken is known.
         warnings.filterwarnings("ignore", "Best transformation is not available")
-        group = TransformerGroup(
-            source, target, area_of_interest=AreaOfInterest(*area) if area else None, allow_ballpark=False
-        )
+        around = AreaOfInterest(*area) if area else None
+        group = TransformerGroup(source, target, area_of_interest=around, allow_ballpark=False)
     known = [found for found in group.transformers if found.accuracy >= 0]
     return min(known, key=lambda found: found.accuracy, default=None)
 
@@ -159,7 +158,4 @@ def transform_points(affine, columns, rows):
     x, y : array
     """
     columns, rows = np.asarray(columns, float), np.asarray(rows, float)
-    return (
-        affine.a * columns + affine.b * rows + affine.c,
-        affine.d * columns + affine.e * rows + affine.f,
-    )
+    return affine.a * columns + affine.b * rows + affine.c, affine.d * columns + affine.e * rows + affine.f

@@ -1,14 +1,14 @@
 """Means of a raster of cells over the footprints of the pixels of another grid."""
 
+from typing import NamedTuple
+
 import numpy as np
 import xarray as xr
-from dask.base import tokenize
 
-from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.footprints import AxisOperator, axis_operator, regularize
 from fifesim.base.line_spread import Boxcar
 from fifesim.rasters import chunks
 from fifesim.rasters import grid as grids
-from fifesim.rasters.windows import array_from_windows, slices
 
 
 def areas(pixels):
@@ -85,6 +85,17 @@ def regularized(array, spreads, pixels, *, shifts=(0.0, 0.0), min_valid):
     return resample(rows, columns, array, pixels, min_valid=min_valid)
 
 
+class _Covered(NamedTuple):
+    """What the pixels of two operators read of an array, as `fifesim.rasters.chunks.windows` asks it."""
+
+    array: object
+    rows: AxisOperator
+    columns: AxisOperator
+
+    def window(self, rows, columns):
+        return self.rows[rows].window, self.columns[columns].window
+
+
 def resample(rows, columns, array, grid, *, min_valid=0.98):
     """
     Carry a raster onto another grid by one operator for each axis.
@@ -104,33 +115,19 @@ def resample(rows, columns, array, grid, *, min_valid=0.98):
         Float, lazy where the input is.
     """
     array = array.transpose(..., "y", "x")
-    data = array.data
-    if array.chunks is None:
-        these, those = rows[:], columns[:]
-        out = regularize(data[..., these.window, those.window], these, those, min_valid=min_valid)
-    else:
-        out = _resample_lazily(rows, columns, data, min_valid)
+    sizes = None
+    if array.chunks is not None:
+        # A pixel is made with the chunk of its last cell: what it needs of earlier ones is cut off when these are made.
+        lasts = [axis.start + np.maximum(axis.count, 1) - 1 for axis in (rows, columns)]
+        sizes = tuple(chunks.runs(last, each) for last, each in zip(lasts, array.chunks[-2:], strict=True))
+
+    def means(these, those, cells):
+        return regularize(cells, rows[these], columns[those], min_valid=min_valid)
+
+    shape = (*array.shape[:-2], len(rows), len(columns))
+    # What regularize makes of it.
+    dtype = np.dtype(np.float32 if array.dtype == np.float32 else np.float64)
+    out = chunks.windows(means, [_Covered(array.data, rows, columns)], shape, sizes, dtype)
     # xarray would take over dask's name.
     out = xr.DataArray(out, dims=array.dims, coords=chunks.other_coordinates(array), attrs=array.attrs)
     return grids.place(out.rename(array.name), grid)
-
-
-def _resample_lazily(rows, columns, data, min_valid):
-    """One task for each block of pixels, on the merged window of cells."""
-    # What regularize makes of it.
-    dtype = np.dtype(np.float32 if data.dtype == np.float32 else np.float64)
-    # A pixel is made with the chunk of its last cell: what it needs of earlier chunks is cut off when these are made.
-    lasts = [axis.start + np.maximum(axis.count, 1) - 1 for axis in (rows, columns)]
-    sizes = tuple(chunks.runs(last, each) for last, each in zip(lasts, data.chunks[-2:], strict=True))
-    down = {part.start: rows[part] for part in slices(sizes[0])}
-    across = {part.start: columns[part] for part in slices(sizes[1])}
-
-    def ask(row_range, column_range):
-        these, those = down[row_range.start], across[column_range.start]
-        return (these, those), [(these.window, those.window)]
-
-    def block(these, those, window):
-        return regularize(window, these, those, min_valid=min_valid)
-
-    token = tokenize(rows, columns, min_valid, data.name)
-    return array_from_windows(block, [data], sizes, ask, token=token, leading=data.shape[:-2], dtype=dtype)

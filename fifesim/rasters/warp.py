@@ -63,7 +63,7 @@ def file_onto_grid(path, grid, chunks=None):
         area = projection.degrees(grid)
         pipeline, _ = projection.operation(source.crs, grid.crs.to_wkt(), area)
         back, _ = projection.operation(grid.crs.to_wkt(), source.crs, area)
-        if not _meets(source, grid, back):
+        if _source_window(source, grid, back) is None:
             raise ValueError(f"{path} does not overlap the grid, which spans {grids.extent(grid)}")
     # A file that has changed is another file to the cache.
     state = Path(path).stat().st_mtime_ns
@@ -134,26 +134,23 @@ def _opened(path):
     return source
 
 
-def _source_points(grid, crs, back, source_crs):
-    """The outline of a grid, and its middle, in the source's CRS."""
+def _source_places(source, grid, back):
+    """Rows and columns of a file at the outline of a grid, and at its middle."""
     share = np.linspace(0, 1, 17)
     columns, rows = (values.ravel() for values in np.meshgrid(share * grid.shape.x, share * grid.shape.y))
     x, y = projection.transform_points(grid.affine, columns, rows)
-    return projection.carry(back, crs, source_crs, x, y)
+    x, y = projection.carry(back, grid.crs.to_wkt(), source.crs, x, y)
+    columns, rows = projection.transform_points(~source.transform, x, y)
+    return rows, columns
 
 
 def _source_window(source, grid, back):
-    """Window of the file that a grid reads; empty where they do not meet."""
-    x, y = _source_points(grid, grid.crs.to_wkt(), back, source.crs)
-    columns, rows = projection.transform_points(~source.transform, x, y)
+    """Window of the file that a grid reads; None where they do not meet."""
+    rows, columns = _source_places(source, grid, back)
     around = _SOURCE_MARGIN
     top, bottom = max(int(np.min(rows)) - around, 0), min(int(np.max(rows)) + around + 1, source.height)
     left, right = max(int(np.min(columns)) - around, 0), min(int(np.max(columns)) + around + 1, source.width)
     return rasterio.windows.Window(left, top, right - left, bottom - top) if bottom > top and right > left else None
-
-
-def _meets(source, grid, back):
-    return _source_window(source, grid, back) is not None
 
 
 @lru_cache(maxsize=16)
@@ -173,29 +170,18 @@ def _warp_tile(path, state, grid, pipeline, back, tile_row, tile_column):
         except rasterio.errors.RasterioIOError as error:
             raise OSError(f"cannot read {path}: {error.__cause__ or error}") from error
         values = values * source.scales[0] + source.offsets[0]
-        down, across = _cells_per_cell(source, grid, back)
-        resampling = Resampling.average if max(down, across) > 1.01 else Resampling.bilinear
+        # Of the file in one of the grid, down and across.
+        cells = [
+            np.ptp(places) / size for places, size in zip(_source_places(source, grid, back), grid.shape, strict=True)
+        ]
+        options = {"src_transform": source.window_transform(window), "src_crs": source.crs, "src_nodata": np.nan}
+        options |= {"dst_crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()), "dst_nodata": np.nan}
+        options |= {"resampling": Resampling.average if max(cells) > 1.01 else Resampling.bilinear}
+        options |= {"COORDINATE_OPERATION": pipeline} if pipeline else {}
         for first in range(0, _TILE, _STRIP):
             strip = np.full((_TILE, _STRIP), np.nan)
+            transform = Affine(a.a, 0.0, west + first * a.a, 0.0, a.e, north)
             with _ONE_AT_A_TIME:
-                reproject(
-                    values,
-                    strip,
-                    src_transform=source.window_transform(window),
-                    src_crs=source.crs,
-                    src_nodata=np.nan,
-                    dst_transform=Affine(a.a, 0.0, west + first * a.a, 0.0, a.e, north),
-                    dst_crs=rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
-                    dst_nodata=np.nan,
-                    resampling=resampling,
-                    **({"COORDINATE_OPERATION": pipeline} if pipeline else {}),
-                )
+                reproject(values, strip, dst_transform=transform, **options)
             out[:, first : first + _STRIP] = strip
     return out
-
-
-def _cells_per_cell(source, grid, back):
-    """Source cells in one cell of the grid, down and across."""
-    x, y = _source_points(grid, grid.crs.to_wkt(), back, source.crs)
-    columns, rows = projection.transform_points(~source.transform, x, y)
-    return np.ptp(rows) / grid.shape.y, np.ptp(columns) / grid.shape.x

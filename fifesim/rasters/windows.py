@@ -167,11 +167,7 @@ def array_by_place(kernel, chunks, *, token):
 
 def _part_by_place(kernel, rows, columns):
     shape = rows.stop - rows.start, columns.stop - columns.start
-    return (partial(_make_by_place, rows.start, columns.start, shape), kernel)
-
-
-def _make_by_place(row, column, shape, kernel):
-    return kernel(row, column, shape)
+    return (partial(_make, (rows.start, columns.start, shape), []), kernel, [])
 
 
 def _lazy(array):

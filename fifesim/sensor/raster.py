@@ -142,14 +142,9 @@ def recorded(radiance, description, bands, quantise):
     if quantise:
         full_scale, lowest = [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands]
         gain, offset = calibration.gain_offset(full_scale, lowest, description.bits)
-        radiance = chunks.pointwise(
-            calibration.radiance_to_dn,
-            radiance,
-            xr.DataArray(gain, dims="band"),
-            xr.DataArray(offset, dims="band"),
-            dtype=np.uint8 if description.bits <= 8 else np.uint16,
-            bits=description.bits,
-        )
+        scales, bits = [xr.DataArray(each, dims="band") for each in (gain, offset)], description.bits
+        dtype = np.uint8 if bits <= 8 else np.uint16
+        radiance = chunks.pointwise(calibration.radiance_to_dn, radiance, *scales, dtype=dtype, bits=bits)
         along_band |= {"gain": gain, "offset": offset}
     along_band["solar_irradiance"] = [band.solar_irradiance for band in bands]
     return radiance.assign_coords(cf.band_coordinates(**along_band))

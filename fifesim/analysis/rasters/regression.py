@@ -44,9 +44,8 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     blocks = grids.aligned(grids.geobox(array), pixel)
     spreads = areas(blocks) if lsf is None else (lsf, lsf)
     means = regularized(array, spreads, blocks, min_valid=min_valid)
-    means.attrs = dict(array.attrs) | {
-        "history": "\n".join(filter(None, [array.attrs.get("history", ""), f"aggregate: means over {pixel:g} m"]))
-    }
+    history = "\n".join(filter(None, [array.attrs.get("history", ""), f"aggregate: means over {pixel:g} m"]))
+    means.attrs = dict(array.attrs) | {"history": history}
     return means
 
 

@@ -49,10 +49,8 @@ def scale_bias(algorithm, array, pixel=30.0):
     bias = chunks.pointwise(np.subtract, of_cells, of_mean)
     found = {"mean_of_algorithm": of_cells, "algorithm_of_mean": of_mean, "bias": bias}
     out = xr.Dataset({name: values.rename(name) for name, values in found.items()})
-    out["bias"].attrs = {
-        "long_name": "mean of the algorithm less the algorithm of the mean",
-        "units": of_cells.attrs.get("units", "1"),
-    }
+    long_name = "mean of the algorithm less the algorithm of the mean"
+    out["bias"].attrs = {"long_name": long_name, "units": of_cells.attrs.get("units", "1")}
     return out
 
 
@@ -244,9 +242,8 @@ def density(array, points=256, bandwidth=None):
 
 def _ndvi_bias(red, nir, rr, rn, nn):
     mixed = rn - red * nir
-    return scaling.second_order_bias(
-        scaling.ndvi_hessian(red, nir), np.array([[rr - red**2, mixed], [mixed, nn - nir**2]])
-    )
+    covariance = np.array([[rr - red**2, mixed], [mixed, nn - nir**2]])
+    return scaling.second_order_bias(scaling.ndvi_hessian(red, nir), covariance)
 
 
 def _fpar_bias(mean, square, **parameters):

@@ -67,15 +67,9 @@ class Blocks(NamedTuple):
     def interpolation(self):
         """Operator from blocks, with one more on either side, to cells."""
         # The overlap of a block's width around a cell with the blocks is the weight of linear interpolation.
-        return axis_operator(
-            Boxcar(float(self.cells)),
-            cell_origin=-self.cells,
-            cell_size=self.cells,
-            n_cells=self.count + 2,
-            pixel_origin=self.offset,
-            pixel_size=1,
-            n_pixels=self.n_cells,
-        )
+        blocks = {"cell_origin": -self.cells, "cell_size": self.cells, "n_cells": self.count + 2}
+        cells = {"pixel_origin": self.offset, "pixel_size": 1, "n_pixels": self.n_cells}
+        return axis_operator(Boxcar(float(self.cells)), **blocks, **cells)
 
     @property
     def interpolation_weights(self):

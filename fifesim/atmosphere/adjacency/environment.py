@@ -101,12 +101,9 @@ def environment_weights(diffuse_up_molecules, diffuse_up_aerosol):
     >>> [float(share) for share in environment_weights(0.25, 0.75)]
     [0.25, 0.75]
     """
-    molecules, aerosol = np.broadcast_arrays(
-        np.asarray(diffuse_up_molecules, float), np.asarray(diffuse_up_aerosol, float)
-    )
-    total = molecules + aerosol
+    total = np.add(diffuse_up_molecules, diffuse_up_aerosol, dtype=float)
     total = np.where(total > 0, total, 1.0)
-    return Scatterers(molecules / total, aerosol / total)
+    return Scatterers(diffuse_up_molecules / total, diffuse_up_aerosol / total)
 
 
 def mixed_environment_function(radius, vza, diffuse_up_molecules, diffuse_up_aerosol):

@@ -173,8 +173,4 @@ def environment_of_target(moments, surroundings, spread, terms):
 def _weighted(slope, around):
     """Sums over cells of what is interpolated from blocks, times the moments in these."""
     rows, columns = slope.shape[2:]
-    return sum(
-        slope[k, m] * around[k : k + rows, m : m + columns]
-        for k in range(slope.shape[0])
-        for m in range(slope.shape[1])
-    )
+    return sum(slope[k, m] * around[k : k + rows, m : m + columns] for k, m in np.ndindex(slope.shape[:2]))

@@ -50,7 +50,7 @@ def environment(reflectance, weight_molecules, weight_aerosol, vza, *, surroundi
     --------
     fifesim.atmosphere.adjacency.environment_grid.environment
     """
-    reflectance = _banded(reflectance)
+    reflectance = banded(reflectance)
     return _on_cells(_environment(reflectance, (weight_molecules, weight_aerosol), vza, surroundings), reflectance)
 
 
@@ -84,7 +84,7 @@ def apparent_reflectance_of_scene(reflectance, terms, vza, surroundings=None):
     --------
     fifesim.atmosphere.schemes.coupling.inhomogeneous_reflectance
     """
-    reflectance = _banded(reflectance)
+    reflectance = banded(reflectance)
     weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
     coarse = _environment(reflectance, weights, vza, surroundings)
     return _couple(coupling.inhomogeneous_reflectance, reflectance, coarse, _by_band(terms, reflectance))
@@ -126,7 +126,7 @@ def corrected_reflectance_of_scene(toa_reflectance, terms, vza, surroundings=Non
     fifesim.atmosphere.adjacency.environment_grid.environment_of_target,
     fifesim.atmosphere.schemes.coupling.target_reflectance
     """
-    toa_reflectance = _banded(toa_reflectance)
+    toa_reflectance = banded(toa_reflectance)
     weights = adjacency.environment_weights(terms.diffuse_up_molecules, terms.diffuse_up_aerosol)
     by_band = _by_band(terms, toa_reflectance)
     each_band = (coupling.TargetTerms(*row) for row in np.stack(by_band, axis=-1).tolist())
@@ -135,7 +135,23 @@ def corrected_reflectance_of_scene(toa_reflectance, terms, vza, surroundings=Non
     return _couple(coupling.target_reflectance, toa_reflectance, coarse, by_band)
 
 
-def _banded(array):
+def banded(array):
+    """
+    A reflectance with dimensions (band, y, x), of one band where it has none.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+
+    Returns
+    -------
+    array : xarray.DataArray, dims (band, y, x)
+
+    Raises
+    ------
+    ValueError
+        If it has other dimensions.
+    """
     array = array if "band" in array.dims else array.expand_dims("band")
     if set(array.dims) != {"band", "y", "x"}:
         raise ValueError(f"a reflectance has dimensions (band, y, x), got {array.dims}: select one layer first")
@@ -212,13 +228,10 @@ def _on_cells(coarse, array):
     kernel = partial(blocks.on_cells, along_y=along_y, along_x=along_x)
     reads = [chunks.Reads(coarse, *((axis.start, axis.start + axis.count) for axis in (along_y, along_x)))]
     sizes = array.chunks or _one_chunk(array.shape)
-    lazy = not isinstance(coarse, np.ndarray)
-    data = passes.windows_by_band(
-        [kernel] * len(sizes[0]), reads, sizes[0], array.shape[1:], sizes[1:] if lazy else None
-    )
-    place = {name: value for name, value in array.coords.items() if not {"y", "x"} & set(value.dims)}
+    cuts = None if isinstance(coarse, np.ndarray) else sizes[1:]
+    data = passes.windows_by_band([kernel] * len(sizes[0]), reads, sizes[0], array.shape[1:], cuts)
     # xarray would take over dask's name.
-    out = xr.DataArray(data, dims=("band", "y", "x"), coords=place).rename(None)
+    out = xr.DataArray(data, dims=("band", "y", "x"), coords=chunks.other_coordinates(array)).rename(None)
     return grids.place(out, grids.geobox(array))
 
 
@@ -268,10 +281,10 @@ def _outer(surroundings, array, along):
             f"the surroundings must lie within {REACH / 1000:g} km of the scene, {grids.extent(here)}, "
             f"got {grids.extent(there)}"
         )
-    shape = along[0].count + 2 * down.margin, along[1].count + 2 * across.margin
+    shape = along_y.count + 2 * down.margin, along_x.count + 2 * across.margin
     grid = GeoBox(shape, Affine(across.block, 0.0, across.edge, 0.0, down.block, down.edge), here.crs)
-    wanted = _same_bands(surroundings, array)
-    return (down.margin, across.margin), regularized(wanted, areas(grid), grid, min_valid=0.0)
+    means = regularized(_same_bands(surroundings, array), areas(grid), grid, min_valid=0.0)
+    return (down.margin, across.margin), means
 
 
 class _OuterAxis(NamedTuple):

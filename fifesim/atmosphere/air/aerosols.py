@@ -97,8 +97,7 @@ def aerosol_optics(aerosol, wavelength):
     >>> [float(values) for values in aerosol_optics("continental", 0.55)][0]
     1.0
     """
-    wavelength = _checked_wavelength(wavelength)
-    fractions = mixture(aerosol)
+    wavelength, fractions = _checked_wavelength(wavelength), mixture(aerosol)
     extinction, scattering, directed = _cross_sections(fractions, wavelength)
     reference, _, _ = _cross_sections(fractions, REFERENCE_WAVELENGTH)
     return extinction / reference, scattering / extinction, directed / scattering
@@ -143,10 +142,8 @@ def aerosol_phase(aerosol, scattering_cosine, wavelength):
     >>> bool(aerosol_phase("continental", 1.0, 0.55) > aerosol_phase("continental", 0.0, 0.55))
     True
     """
-    wavelength = _checked_wavelength(wavelength)
-    return _weighted_mean(
-        mixture(aerosol), wavelength, lambda name: components.phase(name, scattering_cosine, wavelength)
-    )
+    wavelength, fractions = _checked_wavelength(wavelength), mixture(aerosol)
+    return _weighted_mean(fractions, wavelength, lambda name: components.phase(name, scattering_cosine, wavelength))
 
 
 def aerosol_polarization(aerosol, scattering_cosine, wavelength):
@@ -181,8 +178,7 @@ def aerosol_polarization(aerosol, scattering_cosine, wavelength):
     >>> [float(value) for value in aerosol_polarization("urban", [-1.0, 1.0], 0.55)]
     [0.0, 0.0]
     """
-    wavelength = _checked_wavelength(wavelength)
-    fractions = mixture(aerosol)
+    wavelength, fractions = _checked_wavelength(wavelength), mixture(aerosol)
 
     def mean(element):
         return _weighted_mean(fractions, wavelength, lambda name: element(name, scattering_cosine, wavelength))
@@ -228,10 +224,8 @@ def phase_moments(aerosol, wavelength, count):
     >>> bool(abs(second - aerosol_optics("continental", 0.55)[2]) < 1e-3)
     True
     """
-    wavelength = np.atleast_1d(_checked_wavelength(wavelength))
-    return _weighted_mean(
-        mixture(aerosol), wavelength[:, None], lambda name: components.phase_moments(name, wavelength, count)
-    )
+    at, fractions = np.atleast_1d(_checked_wavelength(wavelength)), mixture(aerosol)
+    return _weighted_mean(fractions, at[:, None], lambda name: components.phase_moments(name, at, count))
 
 
 def _checked_wavelength(wavelength):

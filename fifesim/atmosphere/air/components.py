@@ -136,7 +136,7 @@ def phase_moments(component, wavelength, count):
 
 def _by_angle(table, scattering_cosine):
     """Values between the angles of a table, for the number of a column."""
-    row, low = _angle_place(scattering_cosine)
+    row, low = _place(_angles(), np.degrees(np.arccos(np.clip(scattering_cosine, -1, 1))))
     return lambda column: table[row, column] * (1 - low) + table[row + 1, column] * low
 
 
@@ -146,20 +146,15 @@ def _by_wavelength(values, wavelength):
     return values(column) * (1 - share) + values(column + 1) * share
 
 
-def _angle_place(scattering_cosine):
-    """Row of the angle tables before each scattering angle, and the share of the next."""
-    nodes = _angles()
-    angle = np.degrees(np.arccos(np.clip(scattering_cosine, -1, 1)))
-    row = np.clip(np.searchsorted(nodes, angle) - 1, 0, nodes.size - 2)
-    return row, (angle - nodes[row]) / (nodes[row + 1] - nodes[row])
-
-
 def _wavelength_place(wavelength):
     """Column of the tables before each wavelength, and the share of the next."""
-    nodes = _optics(COMPONENTS[0]).log_wavelength
-    logarithm = np.log(wavelength)
-    column = np.clip(np.searchsorted(nodes, logarithm) - 1, 0, nodes.size - 2)
-    return column, (logarithm - nodes[column]) / (nodes[column + 1] - nodes[column])
+    return _place(_optics(COMPONENTS[0]).log_wavelength, np.log(wavelength))
+
+
+def _place(nodes, values):
+    """Node before each value, and the share of the next."""
+    before = np.clip(np.searchsorted(nodes, values) - 1, 0, nodes.size - 2)
+    return before, (values - nodes[before]) / (nodes[before + 1] - nodes[before])
 
 
 class _Optics(NamedTuple):

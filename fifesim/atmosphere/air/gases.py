@@ -253,17 +253,11 @@ def gas_transmittance(wavelength, atmosphere, air_mass, *, gases=GASES):
     index = np.clip(np.searchsorted(nodes, wavelength) - 1, 0, nodes.size - 2)
     share = (wavelength - nodes[index]) / (nodes[index + 1] - nodes[index])
     first, last = index.min(), index.max() + 2
-    transmittance = np.exp(-_optical_depth(atmosphere, np.asarray(air_mass, float), gases, first, last))
-    return transmittance[..., index - first] * (1 - share) + transmittance[..., index - first + 1] * share
-
-
-def _optical_depth(atmosphere, air_mass, gases, first, last):
-    """Sum over the gases at the wavelengths of the table from `first` up to `last`, shape (..., last - first)."""
-    depth = np.zeros((*air_mass.shape, last - first))
+    mass = np.asarray(air_mass, float)[..., None]
+    depth = np.zeros((*mass.shape[:-1], last - first))
     for gas in gases:
-        index, weak, saturation = _vertical(atmosphere, gas)
-        start, stop = np.searchsorted(index, (first, last))
-        used = slice(start, stop)
-        mass = air_mass[..., None]
-        depth[..., index[used] - first] += BAND_MODEL[gas](weak[used] * mass, saturation[used] * mass)
-    return depth
+        absorbing, weak, saturation = _vertical(atmosphere, gas)
+        used = slice(*np.searchsorted(absorbing, (first, last)))
+        depth[..., absorbing[used] - first] += BAND_MODEL[gas](weak[used] * mass, saturation[used] * mass)
+    transmittance = np.exp(-depth)
+    return transmittance[..., index - first] * (1 - share) + transmittance[..., index - first + 1] * share

@@ -116,14 +116,10 @@ class Atmosphere:
         """One line that says all, for `parse`."""
         by_aot = self.visibility is None
         amount = f"aot={_shortest(self.aot)}" if by_aot else f"visibility={_shortest(self.visibility)} km"
-        return " ".join(
-            [
-                f"profile={self.profile} aerosol={self.aerosol} {amount} altitude={_shortest(self.altitude)} km",
-                *([] if self.h2o is None else [f"h2o={_shortest(self.h2o)} g cm-2"]),
-                *([] if self.o3 is None else [f"o3={_shortest(self.o3)} cm-atm"]),
-                *([] if self.engine == "5S" else [f"engine={self.engine}"]),
-            ]
-        )
+        text = f"profile={self.profile} aerosol={self.aerosol} {amount} altitude={_shortest(self.altitude)} km"
+        text += "" if self.h2o is None else f" h2o={_shortest(self.h2o)} g cm-2"
+        text += "" if self.o3 is None else f" o3={_shortest(self.o3)} cm-atm"
+        return text if self.engine == "5S" else f"{text} engine={self.engine}"
 
     @classmethod
     def parse(cls, text):

@@ -7,14 +7,7 @@ import numpy as np
 
 from fifesim.base import datasets
 
-PROFILES = (
-    "tropical",
-    "midlatitude-summer",
-    "midlatitude-winter",
-    "subarctic-summer",
-    "subarctic-winter",
-    "us-1962",
-)
+PROFILES = ("tropical", "midlatitude-summer", "midlatitude-winter", "subarctic-summer", "subarctic-winter", "us-1962")
 
 GRAVITY = 9.80665  # [m s-2]
 GAS_CONSTANT = 8.314463  # [J mol-1 K-1]

@@ -35,16 +35,9 @@ def atmosphere_in_words(atmosphere):
         "",
         "band                         um" + "".join(f"  {low:.2f}-{high:.2f}" for low, high in _BANDS),
     ]
-    return "\n".join(lines + [_row(name, values) for name, values in _columns(atmosphere).items()])
-
-
-def _row(name, values):
-    return f"{name:<31}" + "".join(f"{value:>11.4f}" for value in values)
-
-
-def _columns(atmosphere):
-    parts = [_of_band(atmosphere, low, high) for low, high in _BANDS]
-    return {name: [part[name] for part in parts] for name in parts[0]}
+    columns = [_of_band(atmosphere, low, high) for low, high in _BANDS]
+    rows = [f"{name:<31}" + "".join(f"{column[name]:>11.4f}" for column in columns) for name in columns[0]]
+    return "\n".join(lines + rows)
 
 
 def _of_band(atmosphere, low, high):

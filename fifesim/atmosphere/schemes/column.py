@@ -54,9 +54,8 @@ class Column(NamedTuple):
         if components == 1:
             return np.ascontiguousarray(beta[..., None, None])
         none = np.zeros_like(beta)
-        return np.ascontiguousarray(
-            np.moveaxis(np.array([[beta, gamma, none], [gamma, alpha, none], [none, none, zeta]]), (0, 1), (2, 3))
-        )
+        matrix = np.array([[beta, gamma, none], [gamma, alpha, none], [none, none, zeta]])
+        return np.ascontiguousarray(np.moveaxis(matrix, (0, 1), (2, 3)))
 
     def steps(self, cosine):
         """

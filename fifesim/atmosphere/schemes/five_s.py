@@ -44,9 +44,8 @@ def five_s_scattering(atmosphere, wavelength, sza, vza, raa):
     mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))[:, None, None]
     cosine = scattering_angle_cosine(sza, vza[:, None], raa)[..., None]
     tau_r, tau_a = atmosphere.rayleigh_optical_depth(wavelength), atmosphere.aerosol_optical_depth(wavelength)
-    molecules_reflectance = scattering.sobolev_conservative_reflectance(
-        tau_r, molecules.rayleigh_phase(cosine), mu_s, mu_v
-    )
+    phase = molecules.rayleigh_phase(cosine)
+    molecules_reflectance = scattering.sobolev_conservative_reflectance(tau_r, phase, mu_s, mu_v)
     albedo, asymmetry, aerosol_reflectance = _aerosol(atmosphere, tau_a, cosine, wavelength, mu_s, mu_v)
     down_r, up_r = (scattering.conservative_transmittance(tau_r, mu) for mu in (mu_s, mu_v))
     (_, down_a), (_, up_a) = (scattering.delta_eddington(tau_a, albedo, asymmetry, mu) for mu in (mu_s, mu_v))

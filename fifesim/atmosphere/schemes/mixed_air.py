@@ -1,12 +1,12 @@
 """Molecules and aerosol mixed: what successive orders of scattering say of an atmosphere."""
 
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
 from fifesim.atmosphere.air import aerosols
-from fifesim.atmosphere.schemes import successive_orders
 from fifesim.atmosphere.schemes.phase_expansion import matrix_moments
+from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
 from fifesim.atmosphere.schemes.terms import Scattering
 from fifesim.base.geometry import scattering_angle_cosine
 
@@ -50,22 +50,15 @@ def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
 def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
     at = np.array([wavelength])
     tau_r, tau_a = float(atmosphere.rayleigh_optical_depth(at)[0]), float(atmosphere.aerosol_optical_depth(at)[0])
-    albedo, moments, phase = _aerosol(
-        atmosphere, at, scattering_angle_cosine(sza, np.array(vza)[:, None], np.array(raa)), polarized
-    )
+    cosine = scattering_angle_cosine(sza, np.array(vza)[:, None], np.array(raa))
+    albedo, moments, phase = _aerosol(atmosphere, at, cosine, polarized)
 
     def reflectance(tau_aerosol):
-        return successive_orders.path_reflectance(
-            tau_r, tau_aerosol, albedo, moments, phase, sza, vza, raa, polarized=polarized
-        )
+        return path_reflectance(tau_r, tau_aerosol, albedo, moments, phase, sza, vza, raa, polarized=polarized)
 
-    flux = partial(
-        successive_orders.flux_transmittance,
-        single_scattering_albedo=albedo,
-        moments=moments,
-        zenith=(sza, *vza),
-        polarized=polarized,
-    )
+    def flux(tau_molecules, tau_aerosol):
+        return flux_transmittance(tau_molecules, tau_aerosol, albedo, moments, (sza, *vza), polarized=polarized)
+
     total, spherical_albedo = flux(tau_r, tau_a)
     molecules, _ = flux(tau_r, 0.0)
     aerosol, _ = flux(0.0, tau_a)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fifesim.atmosphere.air import mixtures, profiles
+from fifesim.atmosphere.air import components, mixtures, profiles
 from fifesim.atmosphere.schemes.terms import BandTerms
 from fifesim.base import datasets
 
@@ -25,15 +25,8 @@ PROCESSES = 2  # runs at a time
 COARSE = 1.0  # below it the last digit of a radiance or an irradiance is more than 0.1 % [W m-2 um-1]
 LEAST_GAS_TRANSMITTANCE = 1e-6  # where no light of the ground arrives, so that the path can be divided by it [1]
 
-# The engine's numbers of the model atmospheres and aerosols.
-_PROFILES = {
-    "tropical": 1,
-    "midlatitude-summer": 2,
-    "midlatitude-winter": 3,
-    "subarctic-summer": 4,
-    "subarctic-winter": 5,
-    "us-1962": 6,
-}
+# The engine's numbers of the model atmospheres, which it has in our order, and aerosols.
+_PROFILES = {name: number for number, name in enumerate(profiles.PROFILES, start=1)}
 _AEROSOLS = {"continental": 1, "maritime": 2, "urban": 3}
 
 
@@ -224,10 +217,9 @@ def _profile(atmosphere):
 def _aerosol(name):
     if name in _AEROSOLS:
         return Py6S.AeroProfile.PredefinedType(_AEROSOLS[name])
-    share = {"dust": 0.0, "water_soluble": 0.0, "oceanic": 0.0, "soot": 0.0} | dict(mixtures.mixture(name))
-    return Py6S.AeroProfile.User(
-        dust=share["dust"], water=share["water_soluble"], oceanic=share["oceanic"], soot=share["soot"]
-    )
+    fractions = mixtures.mixture(name)
+    dust, water, oceanic, soot = (fractions.get(component, 0.0) for component in components.COMPONENTS)
+    return Py6S.AeroProfile.User(dust=dust, water=water, oceanic=oceanic, soot=soot)
 
 
 def run(model):
@@ -296,13 +288,11 @@ def terms_of(outputs, sza, vza):
     within 3e-5 in TM1 to 4 and 4e-5 in TM5 and 7.
     """
     mu_s, mu_v = np.cos(np.radians([sza, vza]))
-    rayleigh, particles, total = (
-        getattr(outputs, f"transmittance_{name}_scattering") for name in ("rayleigh", "aerosol", "total")
-    )
-    down, up, albedo, depth = total.downward, total.upward, outputs.spherical_albedo.total, outputs.optical_depth_total
-    path, background, target = (
-        getattr(outputs, f"{part}_radiance") for part in ("atmospheric_intrinsic", "background", "pixel")
-    )
+    molecules, aerosol = outputs.transmittance_rayleigh_scattering, outputs.transmittance_aerosol_scattering
+    down, up = outputs.transmittance_total_scattering.downward, outputs.transmittance_total_scattering.upward
+    albedo, depth = outputs.spherical_albedo.total, outputs.optical_depth_total
+    path, background = outputs.atmospheric_intrinsic_radiance, outputs.background_radiance
+    target = outputs.pixel_radiance
     from_ground, seen = target + background, path + target + background
     path = outputs.apparent_reflectance * (path / seen if seen else 1.0)
     ground = SURFACE_REFLECTANCE / (1 - SURFACE_REFLECTANCE * albedo) * down * up
@@ -321,8 +311,8 @@ def terms_of(outputs, sza, vza):
         direct_transmittance_down=direct_down,
         diffuse_fraction=1 - direct_down / down,
         direct_transmittance_up=direct_up,
-        diffuse_up_molecules=max(rayleigh.upward - np.exp(-depth.rayleigh / mu_v), 0.0),
-        diffuse_up_aerosol=max(particles.upward - np.exp(-depth.aerosol / mu_v), 0.0),
+        diffuse_up_molecules=max(molecules.upward - np.exp(-depth.rayleigh / mu_v), 0.0),
+        diffuse_up_aerosol=max(aerosol.upward - np.exp(-depth.aerosol / mu_v), 0.0),
     )
     if not np.all(np.isfinite(terms)):
         raise RuntimeError(f"6S printed no number for {', '.join(np.array(terms._fields)[~np.isfinite(terms)])}")

@@ -188,12 +188,8 @@ def band_means(scattering, nodes, atmosphere, bands, sza, vza):
     [Tanre1990]_
     """
     parts = [_one_band(scattering, nodes, atmosphere, band, sza, vza) for band in bands]
-    return BandTerms(*(_views_first(np.stack(values, axis=-1)) for values in zip(*parts, strict=True)))
-
-
-def _views_first(values):
-    """A term of every band with axes for views and azimuths."""
-    return values.reshape((1,) * (3 - values.ndim) + values.shape)
+    # Every term has axes for views and azimuths.
+    return BandTerms(*(np.array(np.stack(values, axis=-1), ndmin=3) for values in zip(*parts, strict=True)))
 
 
 def _one_band(scattering, nodes, atmosphere, band, sza, vza):
@@ -234,6 +230,5 @@ def _steps(limits, name):
             f"band {name} spans {limits[0]:g} to {limits[1]:g} um, "
             f"the gas tables only {table[0]:g} to {table[-1]:g} um: leave it out"
         )
-    first, last = np.searchsorted(table, limits[0], side="right") - 1, np.searchsorted(table, limits[1])
-    used = slice(first, last + 1)
+    used = slice(np.searchsorted(table, limits[0], side="right") - 1, np.searchsorted(table, limits[1]) + 1)
     return table[used], solar_irradiance_steps(table)[used]

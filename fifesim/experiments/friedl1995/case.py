@@ -83,15 +83,33 @@ READINGS = (
 
 def _setup():
     """That of the experiment, with its leaf optics."""
-    table = datasets.table("friedl1995_optics.csv").set_index("band")
-    optics = {band: tuple(row) for band, row in zip(table.index, table.to_numpy(), strict=True)}
+    optics = {band: tuple(pair) for band, *pair in datasets.table("friedl1995_optics.csv").itertuples(index=False)}
     return Setup(instrument=find_instrument("TM"), bands=BANDS, leaf_optics=optics)
 
 
-def _densities():
-    """Those of the experiment, by treatment."""
-    table = datasets.table("friedl1995_densities.csv").set_index("treatment")
-    return {name: truncated_normal(*row) for name, row in zip(table.index, table.to_numpy(), strict=True)}
+def densities(shift=0.0, factor=1.0, bound=0.0):
+    """
+    Distributions of LAI of the experiment, or changed ones.
+
+    Parameters
+    ----------
+    shift : float, optional
+        Added to mean and bounds. [m2 m-2]
+    factor : float, optional
+        Of the standard deviation. [1]
+    bound : float, optional
+        By how many standard deviations the bounds move outward; a lower one of 0 stays. [1]
+
+    Returns
+    -------
+    densities : dict of str to frozen scipy distribution
+        By treatment.
+    """
+    found = {}
+    for name, mean, deviation, low, high in datasets.table("friedl1995_densities.csv").itertuples(index=False):
+        moved = low + shift - bound * deviation if low else low, high + shift + bound * deviation
+        found[name] = truncated_normal(mean + shift, factor * deviation, *moved)
+    return found
 
 
 @dataclass(frozen=True)
@@ -112,7 +130,7 @@ class Case:
 
     cells: int = CELLS
     reading: Reading = USED
-    densities: Mapping = field(default_factory=_densities)
+    densities: Mapping = field(default_factory=densities)
     setup: Setup = field(default_factory=_setup)
 
     def __post_init__(self):

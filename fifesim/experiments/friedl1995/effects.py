@@ -5,12 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from fifesim.base import datasets
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
 from fifesim.ground.canopy.optics import background
-from fifesim.ground.landscape.distribution import treatments, truncated_normal
 
 SIZES = (256, 300, 333, 400)
 
@@ -127,16 +125,16 @@ def changes(case):
         optics = {**case.setup.leaf_optics, band: tuple(pair)}
         found.append(Change(name, f"{before:g}", f"{pair[position]:g}", _but(case, leaf_optics=optics)))
     for band, step in (("TM3", 0.01), ("TM4", 0.01)):
-        changed = {**ground, band: round(ground[band] + step, 6)}
-        found.append(
-            Change(f"background {band}", f"{ground[band]:g}", f"{changed[band]:g}", _but(case, background=changed))
-        )
+        after = round(ground[band] + step, 6)
+        changed = _but(case, background={**ground, band: after})
+        found.append(Change(f"background {band}", f"{ground[band]:g}", f"{after:g}", changed))
     for name, after, shift, factor, bound in (
         ("mean LAI", "each + 0.1", 0.1, 1.0, 0.0),
         ("standard deviation of LAI", "each less a tenth", 0.0, 0.9, 0.0),
         ("bounds of LAI", "2.75 standard deviations from the mean", 0.0, 1.0, -0.25),
     ):
-        found.append(Change(name, "the table's", after, replace(case, densities=_densities(shift, factor, bound))))
+        densities = friedl1995.densities(shift, factor, bound)
+        found.append(Change(name, "the table's", after, replace(case, densities=densities)))
     instrument = case.setup.instrument
     finer = _but(case, instrument=replace(instrument, bits=16))
     found.append(Change("radiometric bits", f"{instrument.bits}", "16, next to no quantisation", finer))
@@ -146,17 +144,6 @@ def changes(case):
 def _but(case, **changes):
     """The case with another setup."""
     return replace(case, setup=replace(case.setup, **changes))
-
-
-def _densities(shift, factor, bound):
-    """The tabulated densities with means moved, deviations multiplied, or bounds moved out by deviations."""
-    table = datasets.table("friedl1995_densities.csv").set_index("treatment")
-    found = {}
-    for name in treatments():
-        mean, deviation, lower, upper = table.loc[name]
-        moved = lower + shift - bound * deviation if lower else lower, upper + shift + bound * deviation
-        found[name] = truncated_normal(mean + shift, factor * deviation, *moved)
-    return found
 
 
 def _row(name, case, seeds):

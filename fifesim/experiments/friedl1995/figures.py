@@ -39,8 +39,8 @@ def pixels(case, treatment, seed):
     -------
     scenes : list of dict
         For each arp: ``cells``, LAI by cells; ``of_cells``, a dict of LAI, FPAR and TOA NDVI of all cells;
-        ``pixels``, a dict of values over pixels, of which a sample of 200 has the numbers ``sample``; ``moments``, a
-        dict of means of the reflectances within the pixels, their variances and their covariance.
+        ``pixels``, a dict of values over pixels, among them means of the products of reflectances; ``sample``, the
+        same of a sample of 200.
     """
     return [_scene(case, treatment, arp, seed) for arp in ARPS]
 
@@ -119,9 +119,9 @@ def figure5(scenes):
     figure = Figure(figsize=(_FIGURE_WIDTH, 8.2), layout="constrained")
     axes = figure.subplots(len(ARPS), len(VARIABLES))
     for row, scene, arp in zip(axes, scenes, ARPS, strict=True):
-        values, sample = scene["pixels"], scene["sample"]
+        values = scene["sample"]
         for axis, variable in zip(row, VARIABLES, strict=True):
-            truth, toa, boa = values[variable][sample], values["ndvi"][sample], values["boa_ndvi"][sample]
+            truth, toa, boa = values[variable], values["ndvi"], values["boa_ndvi"]
             axis.scatter(boa, truth, color=_COLORS[0], marker="^", label="ground (BOA)", **_DOT)
             axis.scatter(toa, truth, color=_COLORS[1], marker="o", label="sensor (TOA)", **_DOT)
             fit = regression.fit(regression.row_sums(truth[None], toa[None], truth.mean(), toa.mean()), truth.mean(),
@@ -160,8 +160,8 @@ def figure6(scenes):
         axis.plot(at, density.gaussian_density((edges[1:] + edges[:-1]) / 2, at, bandwidth, counts), color=_BLACK,
                   linewidth=1, label="cells")  # fmt: skip
         for scene, arp, color, dash in zip(scenes, ARPS, _COLORS, _DASHES, strict=True):
-            values = scene["pixels"][variable][scene["sample"]]
-            axis.plot(at, density.sample_density(values, at), dash, color=color, label=f"pixels, arp {arp:g}")
+            found = density.sample_density(scene["sample"][variable], at)
+            axis.plot(at, found, dash, color=color, label=f"pixels, arp {arp:g}")
         unit = "[m² m⁻²]⁻¹" if variable == "lai" else "[1]"
         axis.set(xlabel=_LABELS[variable], ylabel=f"density {unit}", ylim=(0, None))
         _finish(axis)
@@ -184,10 +184,8 @@ def figure7(scenes):
     figure = Figure(figsize=(_FIGURE_WIDTH, 3.0), layout="constrained")
     for axis, variable in zip(figure.subplots(1, 2), VARIABLES, strict=True):
         for scene, arp, color, dash, marker in zip(scenes, ARPS, _COLORS, _DASHES, "osD", strict=True):
-            values, sample = scene["pixels"], scene["sample"]
-            at, noise = friedl1995_table.mean_noise(
-                values[variable][sample], values["ndvi"][sample], friedl1995_table.INCREMENTS[variable]
-            )
+            values, increment = scene["sample"], friedl1995_table.INCREMENTS[variable]
+            at, noise = friedl1995_table.mean_noise(values[variable], values["ndvi"], increment)
             axis.plot(at, noise, dash, color=color, marker=marker, markersize=4, linewidth=1.2,
                       label=f"arp {arp:g}, mean {noise.mean():.2f}")  # fmt: skip
         axis.set(xlabel=_LABELS[variable], ylabel=f"REN of {variable.upper()} [1]", ylim=(0, None))
@@ -211,15 +209,16 @@ def figure8(scenes):
     figure = Figure(figsize=(_FIGURE_WIDTH, 4.6), layout="constrained")
     axes = figure.subplots(2, len(ARPS), height_ratios=(1.25, 1))
     for column, scene, arp in zip(axes.T, scenes, ARPS, strict=True):
-        values, sample, moments = scene["pixels"], scene["sample"], scene["moments"]
-        mean, of_mean = values["boa_ndvi"][sample], values["ndvi_of_mean"][sample]
+        values = scene["sample"]
+        mean, of_mean, red, nir = (values[name] for name in ("boa_ndvi", "ndvi_of_mean", "boa_red", "boa_nir"))
         column[0].scatter(mean, of_mean, color=_COLORS[0], **_DOT)
         ends = np.array([mean.min(), mean.max()])
         column[0].plot(ends, ends, color=_BLACK, linewidth=0.9)
         column[0].set_title(f"arp {arp:g}")
         column[0].set_aspect("equal", "datalim")
-        hessian = scaling.ndvi_hessian(moments["red"][sample], moments["nir"][sample])
-        predicted = -scaling.second_order_bias(hessian, moments["covariance"][..., sample])
+        mixed = values["red_nir"] - red * nir
+        covariance = np.array([[values["red_red"] - red**2, mixed], [mixed, values["nir_nir"] - nir**2]])
+        predicted = -scaling.second_order_bias(scaling.ndvi_hessian(red, nir), covariance)
         column[1].axhline(0, color=_BLACK, linewidth=0.9)
         column[1].scatter(mean, of_mean - mean, color=_COLORS[0], label="simulated", **_DOT)
         column[1].scatter(mean, predicted, facecolors="none", edgecolors=_COLORS[1], s=10, linewidths=0.5,
@@ -248,12 +247,10 @@ def figure9(scenes):
     figure = Figure(figsize=(_FIGURE_WIDTH, 5.0), layout="constrained")
     for row, band, name in zip(figure.subplots(len(BANDS), len(ARPS)), BANDS, ("red", "nir"), strict=True):
         for axis, scene, arp in zip(row, scenes, ARPS, strict=True):
-            values, sample = scene["pixels"], scene["sample"]
-            boa, toa = values[f"boa_{name}"][sample], values[f"toa_{name}"][sample]
+            # What the atmosphere alone makes of the mean reflectance of the ground is clear.
+            boa, toa, clear = (scene["sample"][f"{kind}_{name}"] for kind in ("boa", "toa", "clear"))
             axis.scatter(boa, toa, color=_COLORS[1], label="simulated image", **_DOT)
             at = np.array([boa.min(), boa.max()])
-            # What the atmosphere alone makes of the mean reflectance of the ground.
-            clear = scene["pixels"][f"clear_{name}"][scene["sample"]]
             order = np.argsort(boa)
             axis.plot(boa[order], clear[order], color=_BLACK, linewidth=1.1, label="atmosphere alone")
             axis.plot(at, at, ":", color=_GREY, linewidth=1, label="1 : 1")
@@ -287,14 +284,11 @@ def _scene(case, treatment, arp, seed):
     } | {name: analysis.aggregate(product.drop_vars("band", errors="ignore"), PIXEL)
          for name, product in products.items()}  # fmt: skip
     values = dict(zip(rasters, friedl1995.pixel_values(*rasters.values()), strict=True))
-    red, nir = values["boa_red"], values["boa_nir"]
-    mixed = values["red_nir"] - red * nir
-    covariance = np.array([[values["red_red"] - red**2, mixed], [mixed, values["nir_nir"] - nir**2]])
-    numbers = np.arange(red.size)[None]
-    sample = friedl1995_table.draw(numbers, friedl1995_table.SAMPLE, [seed, ARPS.index(arp)], 1)[0, 0]
+    numbers = np.arange(values["ndvi"].size)[None]
+    chosen = friedl1995_table.draw(numbers, friedl1995_table.SAMPLE, [seed, ARPS.index(arp)], 1)[0, 0]
+    sample = {name: value[chosen] for name, value in values.items()}
     of_cells = {"lai": lai.values.ravel(), "fpar": fpar.values.ravel(), "ndvi": ndvi(toa).values.ravel()}
-    moments = {"red": red, "nir": nir, "covariance": covariance}
-    return {"cells": lai.values, "of_cells": of_cells, "pixels": values, "sample": sample, "moments": moments}
+    return {"cells": lai.values, "of_cells": of_cells, "pixels": values, "sample": sample}
 
 
 def _legend_below(figure, axis):
@@ -305,9 +299,8 @@ def _legend_below(figure, axis):
 
 def _finish(axis):
     axis.title.set_fontsize(9)
-    axis.xaxis.label.set_fontsize(9)
-    axis.yaxis.label.set_fontsize(9)
     axis.tick_params(labelsize=8)
-    axis.xaxis.set_major_locator(MaxNLocator(5))
-    axis.yaxis.set_major_locator(MaxNLocator(5))
+    for each in (axis.xaxis, axis.yaxis):
+        each.label.set_fontsize(9)
+        each.set_major_locator(MaxNLocator(5))
     axis.spines[["top", "right"]].set_visible(False)

@@ -69,19 +69,14 @@ def reproduce_to_folder(folder, *, realisations=20, cells=333, seed=1995, overwr
     run = {"realisations": realisations, "effect_realisations": _EFFECT_REALISATIONS, "cells": cells, "seed": seed}
     with results(folder, FILES) as partial:
         table.to_csv(partial / "table2.csv", index=False, float_format="%.6g")
-        drawn = _draw(case, seed)
-        for number, picture in drawn.items():
+        scenes = figures.pixels(case, figures.BURNED_GRAZED, seed)
+        drawn = {number: getattr(figures, f"figure{number}")(scenes) for number in NUMBERS[1:]}
+        pictures = {n: pages.png(figure, _DPI) for n, figure in ({3: figures.figure3(case)} | drawn).items()}
+        for number, picture in pictures.items():
             (partial / f"figure{number}.png").write_bytes(picture)
-        page = friedl1995_report.reproduction_page(case, table, text, tables, drawn, run)
+        page = friedl1995_report.reproduction_page(case, table, text, tables, pictures, run)
         (partial / "report.html").write_text(page, encoding="utf-8")
     return [folder / name for name in FILES]
-
-
-def _draw(case, seed):
-    """The figures as PNG, by number."""
-    scenes = figures.pixels(case, figures.BURNED_GRAZED, seed)
-    drawn = {3: figures.figure3(case)} | {number: getattr(figures, f"figure{number}")(scenes) for number in NUMBERS[1:]}
-    return {number: pages.png(figure, _DPI) for number, figure in drawn.items()}
 
 
 def _shown(label):

@@ -143,11 +143,11 @@ def text_table(outcome):
     table : pandas.DataFrame
         Columns quantity, variable, arp, value, deviation over realisations, and paper, NaN where it states none.
     """
-    names = {"ren": VARIABLES, "range_kept": (*VARIABLES, "ndvi")}
     paper = friedl1995.paper_text().set_index(["quantity", "variable", "arp"])["value"]
     rows = []
     for quantity, values in (("ren", outcome.ren), ("range_kept", outcome.kept)):
-        for k, variable in enumerate(names[quantity]):
+        # Two variables have REN, NDVI keeps a range as well.
+        for k, variable in enumerate((*VARIABLES, "ndvi")[: values.shape[-1]]):
             # Burned and grazed is the first treatment of the table.
             for scene, arp in enumerate(ARPS):
                 found = values[:, scene, k]
@@ -197,9 +197,8 @@ def mean_noise(variable, ndvi, increment):
         Mean of the variable and its relative equivalent noise in increments of at least three pixels. [1]
     """
     first, last = int(np.floor(variable.min() / increment)), int(np.floor(variable.max() / increment))
-    sums = uncertainty.increment_sums(
-        variable[None], ndvi[None], first, increment, last - first + 1, float(ndvi.mean())
-    )
+    increments, origin = last - first + 1, float(ndvi.mean())
+    sums = uncertainty.increment_sums(variable[None], ndvi[None], first, increment, increments, origin)
     count, mean, deviation = uncertainty.increment_moments(sums)
     enough = count >= _FEWEST
     slope = line(variable, ndvi)[1]

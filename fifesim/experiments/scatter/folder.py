@@ -47,13 +47,9 @@ def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None,
         complete, realisations=realisations, cells=cells, seed=seed, each=lambda cases: steps(cases, "stage by stage")
     )
     table = scatter.table(found)
-    shape = complete.geobox().shape
-    run = {
-        "realisations": found.sizes["realisation"],
-        "rows": min(cells, shape.y),
-        "columns": min(cells, shape.x),
-        "seed": complete.ground.seed if seed is None else seed,
-    }
+    rows, columns = (min(cells, size) for size in complete.geobox().shape)
+    run = {"realisations": found.sizes["realisation"], "rows": rows, "columns": columns}
+    run["seed"] = complete.ground.seed if seed is None else seed
     with results(folder, FILES) as partial:
         table.to_csv(partial / "budget.csv", index=False, float_format="%.6g")
         chart = pages.png(scatter_report.chart(table), _DPI)

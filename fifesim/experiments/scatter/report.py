@@ -56,9 +56,8 @@ def chart(table):
         for y, value, spread in zip(at, share, np.nan_to_num(error), strict=True):
             # Exactly nothing is a stage that is ideal already.
             text = "0" if value == 0 else fixed(value, 1)
-            axis.annotate(
-                text, (max(value, 0) + spread, y), (5, 0), textcoords="offset points", va="center", fontsize=7
-            )
+            end = max(value, 0) + spread, y
+            axis.annotate(text, end, (5, 0), textcoords="offset points", va="center", fontsize=7)
     axis.axvline(0, color="#222222", linewidth=0.8)
     axis.set_yticks(np.arange(len(names)), names)
     axis.invert_yaxis()

@@ -150,15 +150,15 @@ def table(budget):
     rows = []
     for variable in VARIABLES:
         one = budget.sel(variable=variable)
-        for stage in STAGES:
-            columns = {name: one[name].sel(stage=stage) for name in ("alone", "first", "share")}
-            rows.append({"stage": stage, "variable": variable} | _statistics(columns))
-        for stage, columns in (
-            (CURVATURE, {"share": one["curvature"]}),
-            (TOTAL, {"share": one["total"]}),
-            (VARIATION, {"alone": one["variation"]}),
-        ):
-            rows.append({"stage": stage, "variable": variable} | _statistics(columns))
+        by_stage = one[["alone", "first", "share"]]
+        cases = [(stage, by_stage.sel(stage=stage)) for stage in STAGES]
+        cases += [(CURVATURE, {"share": one["curvature"]}), (TOTAL, {"share": one["total"]})]
+        cases += [(VARIATION, {"alone": one["variation"]})]
+        for stage, columns in cases:
+            row = {"stage": stage, "variable": variable}
+            for name, values in columns.items():
+                row |= {name: float(values.mean("realisation")), f"{name}_error": float(standard_error(values))}
+            rows.append(row)
     order = [f"{name}{suffix}" for name in ("alone", "first", "share") for suffix in ("", "_error")]
     return pd.DataFrame(rows, columns=["stage", "variable", *order])
 
@@ -230,15 +230,6 @@ def _one(scenario):
         for name, value in one.items():
             found.setdefault(name, []).append(value)
     return {name: np.array(values) for name, values in found.items()}
-
-
-def _statistics(columns):
-    """Means and standard errors by name of a column."""
-    found = {}
-    for name, values in columns.items():
-        found[name] = float(values.mean("realisation"))
-        found[f"{name}_error"] = float(standard_error(values))
-    return found
 
 
 def _windows(scenario, cells):

@@ -157,10 +157,8 @@ def _scene(scenario):
 
 def _red_and_nir(bands):
     """The two bands of NDVI."""
-    wavelength = ("band", [band.wavelength for band in bands])
-    numbers = xr.DataArray(
-        np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords={"wavelength": wavelength}
-    )
+    coords = {"wavelength": ("band", [band.wavelength for band in bands])}
+    numbers = xr.DataArray(np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords=coords)
     return tuple(bands[number.item()] for number in analysis.red_and_nir(numbers))
 
 
@@ -245,21 +243,19 @@ def _means(scene, cells, blurred, displaced):
 def _recorded(scene, means, counts, grains):
     """NDVI of what the detectors record of the mean reflectances."""
     setup, geometry, bands = scene.setup, scene.setup.geometry, scene.bands
+    known = [(band.full_scale_radiance, band.min_radiance, band.solar_irradiance) for band in bands]
+    full_scale, lowest, irradiance = np.array(known).T[..., None, None]
     radiance = sensor.as_radiance(xr.DataArray(means, dims=("band", "y", "x")), bands, geometry)
     if grains:
         first = grids.lattice_position(scene.image)
         radiance = noisy(radiance, setup.instrument, bands, setup.noise, setup.seed, first)
     radiance = radiance.values
     if counts:
-        gain, offset = calibration.gain_offset(
-            [[[band.full_scale_radiance]] for band in bands], [[[band.min_radiance]] for band in bands],
-            setup.instrument.bits,
-        )  # fmt: skip
+        gain, offset = calibration.gain_offset(full_scale, lowest, setup.instrument.bits)
         dn = calibration.radiance_to_dn(radiance, gain, offset, setup.instrument.bits)
         radiance = calibration.dn_to_radiance(dn, gain, offset)
-    red, nir = calibration.radiance_to_reflectance(
-        radiance, np.array([[[band.solar_irradiance]] for band in bands]), geometry.mu_s, geometry.earth_sun_distance
-    )
+    distance = geometry.earth_sun_distance
+    red, nir = calibration.radiance_to_reflectance(radiance, irradiance, geometry.mu_s, distance)
     return indices.normalized_difference(nir, red)
 
 

@@ -183,7 +183,7 @@ def _varying():
     air = Atmosphere(visibility=23.0)
     ground = np.array([[0.05, 0.4], [0.3, 0.1], [0.2, 0.6], [0.5, 0.02]])
     between = _Places(
-        altitude=np.array([3.55, 3.6, 3.7, 3.9]),
+        altitude=np.array([3.05, 3.6, 3.7, 3.9]),
         sza=np.array([72.6, 73.9, 74.6, 73.1]),
         saa=np.array([10.0, 80.0, 300.0, 120.0]),
         vza=np.array([3.0, 20.0, 44.0, 61.0]),

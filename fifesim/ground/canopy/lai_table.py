@@ -62,7 +62,7 @@ def tabulate(function, rate, combine=None, tolerance=1e-6):
     combine = combine or (lambda values: values)
     # Nodes for the slow decay of dense canopies too, which is of the order of 1.
     rate = float(np.sqrt(rate))
-    length = _length(rate)
+    length = rate * LIMIT / (1 + rate * LIMIT)
     values = function(_lai(np.linspace(0, 1, _COARSEST + 1), rate, length))
     while values.shape[1] <= _FINEST:
         position = np.linspace(0, 1, values.shape[1])
@@ -75,10 +75,6 @@ def tabulate(function, rate, combine=None, tolerance=1e-6):
             coefficients = np.ascontiguousarray(spline.c[::-1].transpose(1, 2, 0))
             return LaiTable(rate, len(coefficients) / length, coefficients)
     raise ValueError(f"no table of {_FINEST} nodes reaches {tolerance:g}: use exact=True")
-
-
-def _length(rate):
-    return rate * LIMIT / (1 + rate * LIMIT)
 
 
 def _lai(position, rate, length):

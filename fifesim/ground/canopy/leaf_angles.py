@@ -111,8 +111,6 @@ def leaf_angle_classes(distribution="spherical", classes=90):
     >>> float(round(sum(leaf_angle_classes("spherical").fraction[60:]), 12))
     0.5
     """
-    if isinstance(distribution, LeafAngles):
-        return distribution
     if isinstance(distribution, str):
         distribution = _parsed(distribution)
     if isinstance(distribution, LeafAngles):

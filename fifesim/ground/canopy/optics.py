@@ -1,6 +1,5 @@
 """Leaf and background optics of bands, and the ranges that SAIL accepts."""
 
-import difflib
 from collections.abc import Mapping
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from fifesim.base import datasets
 from fifesim.base.bands import Band
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
-from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, is_mixture
+from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, did_you_mean, is_mixture
 
 LARGEST_LAI = 100.0
 """Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
@@ -48,9 +47,8 @@ def leaf_optics(bands, given=None):
     [0.11, 0.87]
     """
     if given is None:
-        table = datasets.table("leaf_optics.csv").set_index("band")
-        given = {band: tuple(row) for band, row in zip(table.index, table.to_numpy(), strict=True)}
-        given |= _leaf_means([band for band in _responses(bands) if band.name not in given], Leaf())
+        given = datasets.table("leaf_optics.csv").set_index("band").T.to_dict("list")
+        given |= _leaf_means(_lacking(given, bands), Leaf())
     elif isinstance(given, Leaf):
         given = _leaf_means(_responses(bands, "Leaf"), given)
     if isinstance(given, Mapping):
@@ -93,11 +91,8 @@ def background(bands, given=None):
     elif is_mixture(given) and not set(given) <= set(_names(bands)):
         given = Background(given)
     if given is None:
-        table = datasets.table("background.csv")
-        given = dict(zip(table["band"], table["background"], strict=True))
-        given |= _background_means(
-            [band for band in _responses(bands) if band.name not in given], Background(_DEFAULT_BACKGROUND)
-        )
+        given = datasets.table("background.csv").set_index("band")["background"].to_dict()
+        given |= _background_means(_lacking(given, bands), Background(_DEFAULT_BACKGROUND))
     elif isinstance(given, Background | Spectrum):
         given = _background_means(_responses(bands, type(given).__name__), given)
     if isinstance(given, Mapping):
@@ -111,12 +106,16 @@ def _names(bands):
     return [band.name if isinstance(band, Band) else band for band in bands]
 
 
-def _responses(bands, needed_by=None):
-    """Bands whose response is known."""
-    known = [band for band in bands if isinstance(band, Band)]
-    if needed_by and len(known) < len(bands):
+def _lacking(given, bands):
+    """Bands whose response is known, and which are not given."""
+    return [band for band in bands if isinstance(band, Band) and band.name not in given]
+
+
+def _responses(bands, needed_by):
+    """The bands, if the responses of all are known."""
+    if not all(isinstance(band, Band) for band in bands):
         raise TypeError(f"a {needed_by} is a spectrum, it needs the bands' responses: give Band objects, not names")
-    return known
+    return bands
 
 
 def _leaf_means(bands, leaf):
@@ -138,11 +137,9 @@ def _background_means(bands, mixture):
 def _of_band(given, band, what):
     if band in given:
         return given[band]
-    near = difflib.get_close_matches(str(band), map(str, given), n=1, cutoff=0.4)
-    nearest = f", did you mean {near[0]!r}?" if near else "."
     typed = "(reflectance, transmittance)" if what == "leaf optics" else "reflectance"
     raise ValueError(
-        f"no {what} for band {band!r}{nearest} There are {', '.join(map(str, given))}; "
+        f"no {what} for band {band!r}{did_you_mean(band, given)} There are {', '.join(map(str, given))}; "
         f"for another band pass its own as {{{band!r}: {typed}, ...}}"
     )
 
@@ -216,6 +213,11 @@ def check_lai(lai):
     lai : array
         [m2 m-2]
 
+    Returns
+    -------
+    lai : array
+        What was given.
+
     Raises
     ------
     ValueError
@@ -224,15 +226,17 @@ def check_lai(lai):
     Examples
     --------
     >>> check_lai(2.5)
+    2.5
     """
-    lai = np.asarray(lai, float)
+    cells = np.asarray(lai, float)
     # Two passes without a temporary; NaN is passed over.
-    if np.fmin.reduce(lai, axis=None, initial=0.0) < 0 or np.fmax.reduce(lai, axis=None, initial=0.0) > LARGEST_LAI:
-        wrong = (lai < 0) | (lai > LARGEST_LAI)
+    if np.fmin.reduce(cells, axis=None, initial=0.0) < 0 or np.fmax.reduce(cells, axis=None, initial=0.0) > LARGEST_LAI:
+        wrong = (cells < 0) | (cells > LARGEST_LAI)
         raise ValueError(
-            f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {lai[wrong].flat[0]:g} in "
-            f"{wrong.sum()} of {lai.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
+            f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
+            f"{wrong.sum()} of {cells.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
         )
+    return lai
 
 
 def _check_fraction(name, values):

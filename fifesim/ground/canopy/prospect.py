@@ -1,6 +1,6 @@
 """PROSPECT-D: reflectance and transmittance of a leaf from its chemistry and structure."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import exp1
@@ -111,8 +111,7 @@ def leaf_spectrum(leaf):
     """
     table = datasets.table("prospect_d.csv")
     refractive_index = table["refractive_index"].to_numpy()
-    contents = {name: value for name, value in asdict(leaf).items() if name in CONTENTS}
-    absorption = sum(value * table[name].to_numpy() for name, value in contents.items()) / leaf.structure
+    absorption = sum(getattr(leaf, name) * table[name].to_numpy() for name in CONTENTS) / leaf.structure
     tau = layer_transmissivity(absorption)
     # Reflectance of one layer that is lit from outside, and of one between others.
     first = plate(refractive_index, tau, _INCIDENCE)

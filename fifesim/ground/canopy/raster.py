@@ -80,32 +80,22 @@ def level_reflectance(
         "hotspot": float(hotspot),
     }
     _check_scene(lai)
-    if isinstance(background, xr.DataArray):
+    described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
+    if described == "raster":
         cf.check_units(background, "surface_reflectance")
         background = _background_bands(background, bands)
-        described = "raster"
-    else:
-        background = tuple(map(float, background))
-        described = ",".join(f"{value:g}" for value in background)
+    background = _per_band(background)
     if directions.varying(geometry):
         out = _in_directions(lai, background, diffuse_fraction, geometry, parameters)
     else:
         parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
         parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
-        rasters = (lai, background) if described == "raster" else (lai,)
-        parameters |= {} if described == "raster" else {"background": background}
-        out = chunking.pointwise(_reflectance, *rasters, bands=len(bands), **parameters)
+        out = chunking.pointwise(_reflectance, lai, background, bands=len(bands), **parameters)
     out = out.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
     out = directions.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
-    return cf.label(
-        out,
-        "surface_reflectance",
-        source=lai,
-        history=f"surface_reflectance: SAIL, {angles} leaves, {_directions(geometry)}",
-        leaf_angles=str(angles),
-        background=described,
-        **provenance,
-    )
+    said = f"surface_reflectance: SAIL, {angles} leaves, {_directions(geometry)}"
+    provenance = {"leaf_angles": str(angles), "background": described, **provenance}
+    return cf.label(out, "surface_reflectance", source=lai, history=said, **provenance)
 
 
 def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPAR_INF):
@@ -159,20 +149,20 @@ def _check_scene(lai):
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
 
 
-def _reflectance(lai, background_raster=None, *, background=None, **parameters):
-    if background is None:
-        # apply_ufunc hands the bands over as the last axis.
-        background = np.moveaxis(background_raster, -1, 0)
-    return canopy_reflectance(lai, background=background, **parameters)
+def _per_band(values):
+    """A raster, or values of each band, without the names of the bands."""
+    if isinstance(values, xr.DataArray):
+        return values.drop_vars("band", errors="ignore")
+    return xr.DataArray(np.asarray(values, float), dims="band")
+
+
+def _reflectance(lai, background, **parameters):
+    # apply_ufunc hands the bands over as the last axis.
+    return canopy_reflectance(lai, background=np.moveaxis(background, -1, 0), **parameters)
 
 
 def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
     """Reflectance where the directions of sun or sensor vary over the scene."""
-    per_band = [
-        values if isinstance(values, xr.DataArray) else xr.DataArray(np.asarray(values, float), dims="band")
-        for values in (background, diffuse_fraction)
-    ]
-    per_band = [values.drop_vars("band", errors="ignore") for values in per_band]
 
     def kernel(cells, ground, sky, sza, saa, vza, vaa):
         directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
@@ -180,7 +170,7 @@ def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
 
     plain = lai.drop_vars(ANGLES, errors="ignore")
     angles, bands = directions.angles(geometry), len(parameters["leaf_reflectance"])
-    return chunking.pointwise(kernel, plain, *per_band, *angles, bands=bands)
+    return chunking.pointwise(kernel, plain, background, _per_band(diffuse_fraction), *angles, bands=bands)
 
 
 def _directions(geometry):
@@ -192,8 +182,7 @@ def _directions(geometry):
 
 
 def _fpar(lai, **parameters):
-    check_lai(lai)
-    return absorption.fpar(lai, **parameters)
+    return absorption.fpar(check_lai(lai), **parameters)
 
 
 def _background_bands(background, bands):

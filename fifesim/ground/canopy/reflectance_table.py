@@ -154,11 +154,10 @@ def directional_reflectance(
     check_lai(lai)
     check_leaf_optics(leaf_reflectance, leaf_transmittance)
     check_background(background)
-    for name, angle in (("sza", sza), ("vza", vza)):
-        wrong = (np.asarray(angle) < 0) | (np.asarray(angle) >= 90)
-        if np.any(wrong):
-            found = np.asarray(angle, float)[wrong].flat[0]
-            raise ValueError(f"{name} must be in [0, 90) degrees in every cell, got {found:g}")
+    for name, angle in (("sza", np.asarray(sza, float)), ("vza", np.asarray(vza, float))):
+        wrong = angle[(angle < 0) | (angle >= 90)]
+        if wrong.size:
+            raise ValueError(f"{name} must be in [0, 90) degrees in every cell, got {wrong[0]:g}")
     cells, bands = np.shape(lai), len(leaf_reflectance)
     lai, sza, vza, raa = (np.broadcast_to(np.asarray(v, float), cells).reshape(-1) for v in (lai, sza, vza, raa))
     ground, sky = (

@@ -44,17 +44,7 @@ class _Scattering(NamedTuple):
     w: np.ndarray  # sunbeam to observer
 
 
-def sail(
-    lai,
-    leaf_reflectance,
-    leaf_transmittance,
-    *,
-    sza,
-    vza=0.0,
-    raa=0.0,
-    leaf_angles="spherical",
-    hotspot=0.0,
-):
+def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, leaf_angles="spherical", hotspot=0.0):
     r"""
     Reflectances and transmittances of a leaf canopy by the four-stream SAIL model with Kuusk's hot spot.
 
@@ -111,7 +101,9 @@ def sail(
     c = _scattering(rho, tau, sza, vza, raa, leaf_angle_classes(leaf_angles))
     alpha = _hotspot_decay(sza, vza, raa, c.ks + c.ko, np.asarray(hotspot, float))
     tsstoo, sunlit_and_seen = _bidirectional_gap(lai, c.ks, c.ko, alpha)
-    sinh, slab = _slab(lai, c)
+    # sinh(m L) / m and A(L) of a slab, both times e^(-m L).
+    sinh = exponential_chain(lai, 2 * c.m, 0.0)
+    slab = np.exp(-2 * c.m * lai) + (c.a + c.m) * sinh
     return Canopy(
         rso=c.w * sunlit_and_seen + _multiple_scattering(lai, c) / slab,
         rdo=_turned_back(lai, c, c.ko, c.vf, c.vb) / slab,
@@ -203,12 +195,6 @@ def volume_scattering(inclination, sza, vza, raa):
 #     toward the far side  A(u) = cosh(m u) + a sinh(m u) / m,   back  B(u) = sigma sinh(m u) / m,
 # both over A(L). Writing A(u) = e^(-m u) + (a + m) sinh(m u) / m leaves positive terms only, and sinh(m u) / m is
 # the chain of -m and m. All chains carry a factor e^(-m L) against overflow: each rate is m higher.
-
-
-def _slab(lai, c):
-    """sinh(m L) / m and A(L), both times e^(-m L)."""
-    sinh = exponential_chain(lai, 2 * c.m, 0.0)
-    return sinh, np.exp(-2 * c.m * lai) + (c.a + c.m) * sinh
 
 
 def _turned_back(lai, c, k, forward, backward):

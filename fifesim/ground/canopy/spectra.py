@@ -86,8 +86,13 @@ class Background:
         if not isinstance(self.fractions, Mapping):
             raise TypeError(f"Background takes {{spectrum: fraction}}, got {self.fractions!r}")
         fractions = {str(name): float(value) for name, value in self.fractions.items()}
+        names = spectrum_names()
         for name, value in fractions.items():
-            _check_name(name)
+            if name not in names and not _is_file(name):
+                raise ValueError(
+                    f"Background: no spectrum {name!r}{did_you_mean(name, names)} There are {', '.join(names)}, "
+                    "or the path of a .csv file"
+                )
             if not 0 <= value <= 1:
                 raise ValueError(f"Background: the fraction of {name!r} must be in [0, 1], got {value:g}")
         total = sum(fractions.values())
@@ -214,18 +219,32 @@ def background_means(bands, given):
     return np.sum([np.zeros(len(bands)), *means], axis=0)
 
 
+def did_you_mean(name, allowed):
+    """
+    Nearest of some names, in the words that follow one that is none of them.
+
+    Parameters
+    ----------
+    name : object
+        Taken as text.
+    allowed : iterable
+
+    Returns
+    -------
+    hint : str
+        A full stop if nothing is near.
+
+    Examples
+    --------
+    >>> did_you_mean("TM33", ["TM3", "TM4"])
+    ", did you mean 'TM3'?"
+    """
+    near = difflib.get_close_matches(str(name), map(str, allowed), n=1, cutoff=0.4)
+    return f", did you mean {near[0]!r}?" if near else "."
+
+
 def _is_file(name):
     return Path(str(name)).suffix.lower() == ".csv"
-
-
-def _check_name(name):
-    names = spectrum_names()
-    if name not in names and not _is_file(name):
-        near = difflib.get_close_matches(name, names, n=1, cutoff=0.4)
-        hint = f", did you mean {near[0]!r}?" if near else "."
-        raise ValueError(
-            f"Background: no spectrum {name!r}{hint} There are {', '.join(names)}, or the path of a .csv file"
-        )
 
 
 def _spectrum(name):

@@ -118,8 +118,7 @@ def margin(arp):
     """
     if arp == 0:
         return 0
-    decay = np.arccosh(1.0 / (2.0 * arp) - 1.0)
-    return int(np.ceil(DECAY_LENGTHS / decay))
+    return int(np.ceil(DECAY_LENGTHS / np.arccosh(1.0 / (2.0 * arp) - 1.0)))
 
 
 def autocorrelation(arp, lag):

@@ -1,7 +1,7 @@
 """Frequency distributions of leaf area index, and the mapping of a Gaussian field to them (Fig. 2, step 5)."""
 
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numba
@@ -154,7 +154,7 @@ class _ReflectedKernels(stats.rv_continuous):
     def __init__(self, samples, bandwidth):
         # Seven bandwidths past the largest sample lie 1e-12 of a kernel.
         super().__init__(a=0.0, b=float(samples.max() + 7 * bandwidth), name="reflected_kernels")
-        self._samples, self._bandwidth, self._inverse = samples, bandwidth, None
+        self._samples, self._bandwidth = samples, bandwidth
 
     def _updated_ctor_param(self):
         return {"samples": self._samples, "bandwidth": self._bandwidth}
@@ -172,19 +172,18 @@ class _ReflectedKernels(stats.rv_continuous):
         return np.mean(stats.norm.sf(z) + stats.norm.sf(mirrored), axis=-1)
 
     def _ppf(self, q):
-        nodes, below, _ = self._tables()
+        nodes, below, _ = self._tables
         return np.interp(q, below, nodes)
 
     def _isf(self, q):
-        nodes, _, above = self._tables()
+        nodes, _, above = self._tables
         return np.interp(-q, -above, nodes)
 
+    @cached_property
     def _tables(self):
         """Probability below and above evenly spaced values, a step of 1/8192 of the support apart."""
-        if self._inverse is None:
-            nodes = np.linspace(self.a, self.b, 2**13 + 1)
-            self._inverse = nodes, self._cdf(nodes), self._sf(nodes)
-        return self._inverse
+        nodes = np.linspace(self.a, self.b, 2**13 + 1)
+        return nodes, self._cdf(nodes), self._sf(nodes)
 
     def _distances(self, x):
         x = np.asarray(x)[..., None]

@@ -67,16 +67,9 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
         raise ValueError(f"method must be one of {', '.join(FIELD_METHODS)}, got {method!r}")
     make = _streaming_scene if method == "streaming" else _periodic_scene
     lai = make(grid, density, arp, seed, chunks)
-    return cf.label(
-        lai,
-        "lai",
-        history=f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}",
-        arp=float(arp),
-        rng_seed=str(seed),
-        lai_distribution=_distribution_name(distribution),
-        method=method,
-        references=_REFERENCE,
-    )
+    said = f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}"
+    made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": _distribution_name(distribution)}
+    return cf.label(lai, "lai", history=said, **made, method=method, references=_REFERENCE)
 
 
 def open_lai(path, grid, chunks=None):
@@ -103,7 +96,7 @@ def open_lai(path, grid, chunks=None):
         If the file is missing, has no CRS, does not overlap the grid, or needs a change of datum whose accuracy is
         unknown; and, when computed, if LAI is negative.
     """
-    lai = chunking.pointwise(_checked, warp.file_onto_grid(path, grid, chunks))
+    lai = chunking.pointwise(check_lai, warp.file_onto_grid(path, grid, chunks))
     name = Path(path).name
     return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
 
@@ -137,8 +130,3 @@ def _distribution_name(source):
     if hasattr(source, "dist"):
         return f"{source.dist.name}({', '.join(f'{value:g}' for value in [*source.args, *source.kwds.values()])})"
     return Path(source).name
-
-
-def _checked(lai):
-    check_lai(lai)
-    return lai

@@ -11,7 +11,7 @@ the roughness of a real model.
 from functools import lru_cache, partial
 
 import numpy as np
-from scipy import interpolate
+from scipy.interpolate import PchipInterpolator
 
 from fifesim.base.seeds import generator
 from fifesim.ground.terrain.spline import REACH, spline_grid, spline_of_tiles, spline_points
@@ -115,11 +115,9 @@ def _bent_uplands(seed, south, east):
     for number in np.unique(line):
         for column in np.unique(place[line == number]):
             here = (line == number) & (place == column)
-            coefficients = upland(seed, int(number), int(column))
-            positions = (
-                (axis[here] - start) * (NODES - 1) + REACH for axis, start in ((across, number), (along, column))
-            )
-            out[here] = spline_points(coefficients, *(position[None] for position in positions))[0]
+            rows = (across[here] - number) * (NODES - 1) + REACH
+            columns = (along[here] - column) * (NODES - 1) + REACH
+            out[here] = spline_points(upland(seed, int(number), int(column)), rows[None], columns[None])[0]
     return out + BASE_NOISE[0] * smooth_noise(seed, _LEVEL, BASE_NOISE[1], south, east)
 
 
@@ -149,9 +147,4 @@ def hypsometry(eroded):
         A rising function: valleys keep falling. Beyond the table it goes on in a line of a fifth of the slope there.
     """
     low, high = eroded.clip(max=_ERODED[0]) - _ERODED[0], eroded.clip(min=_ERODED[-1]) - _ERODED[-1]
-    return _hypsometry()(eroded.clip(_ERODED[0], _ERODED[-1])) + 0.2 * (low + high)
-
-
-@lru_cache
-def _hypsometry():
-    return interpolate.PchipInterpolator(_ERODED, _WATERSHED)
+    return PchipInterpolator(_ERODED, _WATERSHED)(eroded.clip(_ERODED[0], _ERODED[-1])) + 0.2 * (low + high)

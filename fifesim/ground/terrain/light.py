@@ -143,11 +143,8 @@ def topographic_factor(sky_view, terrain_view, reflectance, mu_s_local, mu_s, di
     >>> float(topographic_factor(1.0, 0.0, 0.3, 0.8, 0.8, 0.6, 0.9))
     1.0
     """
-    return (
-        sky_view
-        + terrain_view * reflectance
-        + direct_transmittance / transmittance_down * (mu_s_local / mu_s - sky_view)
-    )
+    direct = direct_transmittance / transmittance_down
+    return sky_view + terrain_view * reflectance + direct * (mu_s_local / mu_s - sky_view)
 
 
 @register_jitable

@@ -6,16 +6,7 @@ import numpy as np
 _UNITS = {
     "m": (1.0, "metre", "metres", "meter", "meters"),
     "ft": (0.3048, "foot", "feet", "international foot", "foot (international)"),
-    "us-ft": (
-        1200.0 / 3937.0,
-        "us survey foot",
-        "us survey feet",
-        "survey foot",
-        "ftus",
-        "us_survey_foot",
-        "foot_us",
-        "us foot",
-    ),
+    "us-ft": (1200.0 / 3937.0, "us survey foot", "us survey feet", "survey foot", "ftus", "foot us", "us foot"),
     "km": (1000.0, "kilometre", "kilometer"),
     "dm": (0.1, "decimetre", "decimeter"),
     "cm": (0.01, "centimetre", "centimeter"),
@@ -50,7 +41,7 @@ def metres_per_unit(name):
     >>> metres_per_unit("Foot")
     0.3048
     """
-    plain = str(name).strip().lower()
+    plain = str(name).strip().lower().replace("_", " ")
     for unit, (metres, *names) in _UNITS.items():
         if plain in (unit, *names):
             return metres

@@ -1,13 +1,12 @@
 """One band of an instrument: spectral response and radiometry, and what it sees otherwise than the others."""
 
-from dataclasses import field, replace
+from dataclasses import asdict, field, replace
 from typing import Literal
 
 from pydantic.dataclasses import dataclass
 
 from fifesim.base.bands import solar_irradiance
-from fifesim.sensor.description.axes import Angle
-from fifesim.sensor.description.fields import CONFIG, Count, Name, Number, Positive
+from fifesim.sensor.description.fields import CONFIG, Angle, Count, Name, Number, Positive
 from fifesim.sensor.description.performance import Gain, Noise
 from fifesim.sensor.description.spatial_response import SpatialResponse
 from fifesim.sensor.description.spectral_response import SpectralResponse
@@ -116,11 +115,4 @@ class InstrumentBand:
             raise ValueError(f"{self.name} has no gain state {gain!r}: it has {', '.join([self.gain, *self.gains])}")
         own = Gain(self.full_scale_radiance, self.min_radiance)
         others = {name: state for name, state in self.gains.items() if name != gain}
-        new = self.gains[gain]
-        return replace(
-            self,
-            full_scale_radiance=new.full_scale_radiance,
-            min_radiance=new.min_radiance,
-            gain=gain,
-            gains={self.gain: own, **others},
-        )
+        return replace(self, gain=gain, gains={self.gain: own, **others}, **asdict(self.gains[gain]))

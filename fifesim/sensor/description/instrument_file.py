@@ -7,9 +7,8 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from fifesim.sensor.description.axes import AlongAcross, Angle, by_axes
 from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
-from fifesim.sensor.description.fields import CONFIG, Count, Name, Positive
+from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
 from fifesim.sensor.description.names import lookup
 from fifesim.sensor.description.performance import Scan
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
@@ -156,12 +155,9 @@ class Instrument:
         lsf : AlongAcross
             As `fifesim.base.footprints` takes them: along for its rows, across for its columns.
         """
-        lsf, ifov, interval = map(
-            by_axes, (band.lsf or self.lsf, band.ifov or self.ifov, band.interval or self.interval)
-        )
-        along = lsf.along.spread(View(self.altitude, ifov.along, interval.along, band))
-        across = lsf.across.spread(View(self.altitude, ifov.across, interval.across, band))
-        return AlongAcross(along, across)
+        given = band.lsf or self.lsf, band.ifov or self.ifov, band.interval or self.interval
+        axes = zip(*map(by_axes, given), strict=True)
+        return AlongAcross(*(lsf.spread(View(self.altitude, ifov, interval, band)) for lsf, ifov, interval in axes))
 
     def noise_model(self, band):
         """

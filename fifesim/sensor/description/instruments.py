@@ -49,7 +49,10 @@ def instrument(name):
     if isinstance(name, Instrument):
         return name
     if isinstance(name, Path) or (isinstance(name, str) and name.lower().endswith(".toml")):
-        return _read_again(*_state(Path(name)))
+        path = Path(name)
+        # A file that has changed is read again; one that is not there is an error of reading.
+        state = path.stat() if path.exists() else None
+        return _read_again(path, state and (state.st_mtime_ns, state.st_size))
     return lookup(name, _catalogue(), "instrument")
 
 
@@ -117,16 +120,11 @@ def _parse(path):
 def _with_folder(content, folder):
     """The content of a file, whose tables of responses know the folder that they may lie in."""
     bands = content.get("bands")
-    if not isinstance(bands, list):
-        return content
-    return {**content, "bands": [_placed(band, folder) for band in bands]}
-
-
-def _placed(band, folder):
-    srf = band.get("srf") if isinstance(band, dict) else None
-    if not (isinstance(srf, dict) and "table" in srf):
-        return band
-    return {**band, "srf": {**srf, "folder": str(folder)}}
+    for band in bands if isinstance(bands, list) else []:
+        srf = band.get("srf") if isinstance(band, dict) else None
+        if isinstance(srf, dict) and "table" in srf:
+            srf["folder"] = str(folder)
+    return content
 
 
 def _explain(error):
@@ -171,15 +169,6 @@ def _catalogue():
     return found
 
 
-def _state(path):
-    """A file and what tells whether it changed."""
-    try:
-        status = path.stat()
-    except FileNotFoundError:
-        raise FileNotFoundError(f"there is no instrument file {path}") from None
-    return path, status.st_mtime_ns, status.st_size
-
-
 @lru_cache(maxsize=32)
-def _read_again(path, *state):
+def _read_again(path, changed):
     return read_instrument(path)

@@ -1,6 +1,6 @@
 """Instruments as text, for people to read."""
 
-from fifesim.sensor.description.axes import TwoAxes, by_axes
+from fifesim.sensor.description.fields import TwoAxes, by_axes
 from fifesim.sensor.description.spectral_response import half_peak
 
 
@@ -73,12 +73,8 @@ def _sampling(instrument):
     """Lines on pixels and line spread, one for each group of bands that share them."""
     groups = {}
     for band in instrument.bands:
-        seen = (
-            instrument.pixel(band),
-            instrument.ground_intervals(band),
-            instrument.ground_fields(band),
-            band.lsf or instrument.lsf,
-        )
+        angles = instrument.ground_intervals(band), instrument.ground_fields(band)
+        seen = (instrument.pixel(band), *angles, band.lsf or instrument.lsf)
         groups.setdefault(seen, []).append(band)
     lines = []
     for (pixel, intervals, fields, response), bands in groups.items():

@@ -69,15 +69,9 @@ class Noise:
         -------
         model : fifesim.sensor.response.noise.NoiseModel
         """
-        return NoiseModel.from_snr(
-            self.radiance,
-            self.radiance / self.equivalent_radiance,
-            self.shot or 0.0,
-            detectors=detectors,
-            gain_spread=self.gain_spread,
-            offset_spread=self.offset_spread,
-            along=along,
-        )
+        snr, shot = self.radiance / self.equivalent_radiance, self.shot or 0.0
+        spread = {"gain_spread": self.gain_spread, "offset_spread": self.offset_spread}
+        return NoiseModel.from_snr(self.radiance, snr, shot, detectors=detectors, along=along, **spread)
 
 
 @dataclass(frozen=True, config=CONFIG)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fifesim.sensor.description.axes import by_axes
+from fifesim.sensor.description.fields import by_axes
 from fifesim.sensor.description.spectral_response import half_peak
 from fifesim.sensor.scan.track import swath_width
 
@@ -170,9 +170,7 @@ def _check_scan(instrument):
                 f"scan.max_angle = {scan.max_angle:g}: it is in degrees from nadir, and {scan.samples} samples of the "
                 f"first band reach {half:.3g} degrees to either side; radians times 180 / pi"
             )
-    if scan.swath is None:
-        return
-    if abs(np.log(width / scan.swath)) > np.log(1 + _SWATH):
+    if scan.swath is not None and abs(np.log(width / scan.swath)) > np.log(1 + _SWATH):
         raise ValueError(
             f"scan: max_angle = {scan.max_angle:g} degrees gives a swath of {width / 1000:.0f} km from this altitude, "
             f"and swath = {scan.swath:g} m; the angle is from nadir, in degrees, and the swath in metres"

@@ -11,8 +11,7 @@ from pydantic import Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
 from fifesim.base.line_spread import Boxcar
-from fifesim.sensor.description.axes import TwoAxes
-from fifesim.sensor.description.fields import CONFIG, Count, Number, Positive, Share
+from fifesim.sensor.description.fields import CONFIG, Count, Number, Positive, Share, TwoAxes
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread, TableSpread
 from fifesim.sensor.response.transfer import Diffraction, LowPass, SystemSpread
 

@@ -39,7 +39,7 @@ class NamedResponse:
         ValueError
             If there is no such response, its wavelengths are not in um or do not increase, or it is negative.
         """
-        return self._read(name)
+        return _read(self, name)
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -58,7 +58,17 @@ class PyrsrResponse(NamedResponse):
     band: Name
 
     def _read(self, name):
-        return _read_pyrsr(name, self)
+        try:
+            table = RSR_reader(self.satellite, self.sensor, LayerBandsAssignment=[self.band])[self.band]
+        except (KeyError, FileNotFoundError, ValueError, NotADirectoryError):
+            raise ValueError(
+                f"srf: pyrsr has no response of {self.satellite} {self.sensor} {self.band}: write it out as "
+                "srf = { wavelength = [...], response = [...] } or name a table"
+            ) from None
+        # pyrsr holds some sensors in nanometres and others in micrometres.
+        wavelength = table[:, 0] / 1000 if table[-1, 0] > _LONGEST else table[:, 0]
+        # Measured responses scatter around zero outside of the band.
+        return Band(name, wavelength, np.maximum(table[:, 1], 0))
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -82,7 +92,24 @@ class ResponseTable(NamedResponse):
     folder: str = ""
 
     def _read(self, name):
-        return _read_table(name, self)
+        beside = Path(self.folder) / self.table
+        try:
+            path = beside if self.folder and beside.is_file() else datasets.path(self.table)
+        except FileNotFoundError:
+            raise ValueError(
+                f"srf.table = {self.table!r}: no such file beside the instrument file or in the data folder"
+            ) from None
+        table = pd.read_csv(path, comment="#", dtype={"satellite": str, "band": str})
+        missing = {"satellite", "band", "wavelength", "response"} - set(table.columns)
+        if missing:
+            raise ValueError(f"srf.table: {self.table} lacks the columns {', '.join(sorted(missing))}")
+        rows = table[(table["satellite"] == self.satellite) & (table["band"] == self.band)]
+        if rows.empty:
+            known = ", ".join(sorted(set(table["satellite"] + " " + table["band"])))
+            raise ValueError(
+                f"srf.table: {self.table} has no {self.satellite} {self.band}: it has {known or 'no rows'}"
+            )
+        return ResponseList(tuple(rows["wavelength"].astype(float)), tuple(rows["response"].astype(float))).read(name)
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -146,41 +173,5 @@ def half_peak(response):
 
 
 @lru_cache(maxsize=512)
-def _read_pyrsr(name, response):
-    try:
-        table = RSR_reader(response.satellite, response.sensor, LayerBandsAssignment=[response.band])[response.band]
-    except (KeyError, FileNotFoundError, ValueError, NotADirectoryError):
-        raise ValueError(
-            f"srf: pyrsr has no response of {response.satellite} {response.sensor} {response.band}: write it out as "
-            "srf = { wavelength = [...], response = [...] } or name a table"
-        ) from None
-    # pyrsr holds some sensors in nanometres and others in micrometres.
-    wavelength = table[:, 0] / 1000 if table[-1, 0] > _LONGEST else table[:, 0]
-    # Measured responses scatter around zero outside of the band.
-    return Band(name, wavelength, np.maximum(table[:, 1], 0))
-
-
-@lru_cache(maxsize=512)
-def _read_table(name, response):
-    beside = Path(response.folder) / response.table
-    path = beside if response.folder and beside.is_file() else _in_data(response.table)
-    table = pd.read_csv(path, comment="#", dtype={"satellite": str, "band": str})
-    missing = {"satellite", "band", "wavelength", "response"} - set(table.columns)
-    if missing:
-        raise ValueError(f"srf.table: {response.table} lacks the columns {', '.join(sorted(missing))}")
-    rows = table[(table["satellite"] == response.satellite) & (table["band"] == response.band)]
-    if rows.empty:
-        known = ", ".join(sorted(set(table["satellite"] + " " + table["band"])))
-        raise ValueError(
-            f"srf.table: {response.table} has no {response.satellite} {response.band}: it has {known or 'no rows'}"
-        )
-    return ResponseList(tuple(rows["wavelength"].astype(float)), tuple(rows["response"].astype(float))).read(name)
-
-
-def _in_data(table):
-    try:
-        return datasets.path(table)
-    except FileNotFoundError:
-        raise ValueError(
-            f"srf.table = {table!r}: no such file beside the instrument file or in the data folder"
-        ) from None
+def _read(response, name):
+    return response._read(name)

@@ -109,18 +109,26 @@ class NoiseModel:
             )
         variance = (radiance / snr) ** 2
         if radiance.size == 1:
-            return cls(*_split(radiance[0], variance[0], shot_share), **fixed_pattern)
-        if shot_share is not None:
-            raise ValueError("shot_share belongs to one published snr; two decide it: leave it out")
-        if radiance[0] == radiance[1]:
-            raise ValueError(f"two points of noise need two radiances, got {radiance[0]:g} twice")
-        shot = np.diff(variance)[0] / np.diff(radiance)[0]
-        thermal = variance[0] - shot * radiance[0]
-        if min(shot, thermal) < 0:
-            raise ValueError(
-                f"snr {snr.tolist()} at {radiance.tolist()} W m-2 sr-1 um-1 need a negative variance of "
-                f"{'shot' if shot < 0 else 'thermal'} noise: give one of them, with a shot_share"
-            )
+            if shot_share is None:
+                raise ValueError(
+                    "one published snr does not say how much of the noise is shot noise: give shot_share in [0, 1], 0 "
+                    "for noise that is the same at any radiance"
+                )
+            if not 0 <= shot_share <= 1:
+                raise ValueError(f"shot_share must be in [0, 1], got {shot_share}: it is a share of the variance")
+            thermal, shot = (1 - shot_share) * variance[0], shot_share * variance[0] / radiance[0]
+        else:
+            if shot_share is not None:
+                raise ValueError("shot_share belongs to one published snr; two decide it: leave it out")
+            if radiance[0] == radiance[1]:
+                raise ValueError(f"two points of noise need two radiances, got {radiance[0]:g} twice")
+            shot = np.diff(variance)[0] / np.diff(radiance)[0]
+            thermal = variance[0] - shot * radiance[0]
+            if min(shot, thermal) < 0:
+                raise ValueError(
+                    f"snr {snr.tolist()} at {radiance.tolist()} W m-2 sr-1 um-1 need a negative variance of "
+                    f"{'shot' if shot < 0 else 'thermal'} noise: give one of them, with a shot_share"
+                )
         return cls(float(np.sqrt(thermal)), float(shot), **fixed_pattern)
 
     def noise_equivalent_radiance(self, radiance, kinds=("shot", "thermal")):
@@ -159,18 +167,6 @@ class NoiseModel:
         """
         with np.errstate(divide="ignore"):
             return np.asarray(radiance, float) / self.noise_equivalent_radiance(radiance)
-
-
-def _split(radiance, variance, shot_share):
-    """Thermal standard deviation and shot variance at a radiance of 1."""
-    if shot_share is None:
-        raise ValueError(
-            "one published snr does not say how much of the noise is shot noise: give shot_share in [0, 1], 0 for "
-            "noise that is the same at any radiance"
-        )
-    if not 0 <= shot_share <= 1:
-        raise ValueError(f"shot_share must be in [0, 1], got {shot_share}: it is a share of the variance")
-    return float(np.sqrt((1 - shot_share) * variance)), float(shot_share * variance / radiance)
 
 
 def check_kinds(kinds):

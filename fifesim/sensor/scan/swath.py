@@ -108,7 +108,7 @@ def footprint_operator(footprints, rows, columns):
     step = np.sqrt(np.abs(np.linalg.det(footprints.frame)))
     pieces = np.clip(np.ceil(step / (_PIECE * min(along.width, across.width))), 1, 64).astype(np.int64)
     half_row, half_column = footprints.reach()
-    boxes = _Boxes(footprints.row, footprints.column, footprints.frame, half_row, half_column, pieces)
+    boxes = footprints.row, footprints.column, footprints.frame, half_row, half_column, pieces
     limit = np.sum((2 * half_row + 3).astype(np.int64) * (2 * half_column + 3).astype(np.int64))
     pointers = np.zeros(footprints.row.size + 1, np.int64)
     indices, weights = np.empty(limit, np.int64), np.empty(limit)
@@ -172,17 +172,6 @@ def _table(spread):
     return _Table(spread.cumulative(np.linspace(-half, half, _NODES)), half, (_NODES - 1) / (2 * half))
 
 
-class _Boxes(NamedTuple):
-    """Pixels with half the box around each, and into how many pieces a side of a cell is cut."""
-
-    row: np.ndarray
-    column: np.ndarray
-    frame: np.ndarray
-    half_row: np.ndarray
-    half_column: np.ndarray
-    pieces: np.ndarray
-
-
 @njit(nogil=True, cache=True)
 def _cumulative(table, x):
     place = min(max((x + table.half) * table.scale, 0.0), table.cumulative.size - 1.0)
@@ -222,10 +211,12 @@ def _cell_weight(i, j, row, column, frame, n, a, b, along, across):
 def _fill(boxes, along, across, window, pointers, indices, weights):
     used = 0
     top, bottom, left, right = window
-    for pixel in range(boxes.row.size):
+    # Half the box around each pixel, and into how many pieces a side of a cell is cut.
+    rows, columns, frames, half_rows, half_columns, pieces = boxes
+    for pixel in range(rows.size):
         start, total = used, 0.0
-        row, column, frame, n = boxes.row[pixel], boxes.column[pixel], boxes.frame[pixel], boxes.pieces[pixel]
-        half_row, half_column = boxes.half_row[pixel], boxes.half_column[pixel]
+        row, column, frame, n = rows[pixel], columns[pixel], frames[pixel], pieces[pixel]
+        half_row, half_column = half_rows[pixel], half_columns[pixel]
         # Half sides of a piece.
         a = np.hypot(frame[0, 0], frame[0, 1]) / (2 * n)
         b = np.hypot(frame[1, 0], frame[1, 1]) / (2 * n)

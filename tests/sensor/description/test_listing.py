@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from fifesim.sensor.description.axes import Angles
+from fifesim.sensor.description.fields import Angles
 from fifesim.sensor.description.instruments import instrument, instrument_names
 from fifesim.sensor.description.listing import instrument_in_words, list_instruments
 

@@ -64,12 +64,8 @@ def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=Non
         check_cover(model, grid)
         warn_of_terraces(model, grid)
         out = places.tiles(partial(known_elevation, model, model.tiles()), grid, chunks, tile=TILE)
-    return cf.label(
-        out,
-        "dem",
-        history=f"fine_dem: {model.source.name}, cells of {model.resolution:.4g} m, quintic spline",
-        source_resolution=model.resolution,
-    )
+    history = f"fine_dem: {model.source.name}, cells of {model.resolution:.4g} m, quintic spline"
+    return cf.label(out, "dem", history=history, source_resolution=model.resolution)
 
 
 def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None):

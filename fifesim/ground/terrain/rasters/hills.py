@@ -57,11 +57,5 @@ def flint_hills(grid, seed=0, *, chunks=None):
         return elevation(seed, northing[row : row + shape[0]], easting[column : column + shape[1]])
 
     dem = places.tiles(cells, grid, chunks, tile=_TILE)
-    return cf.label(
-        dem,
-        "dem",
-        history=f"flint_hills: seed {seed}",
-        rng_seed=str(seed),
-        source_resolution=30.0,
-        references=_REFERENCE,
-    )
+    made = {"rng_seed": str(seed), "source_resolution": 30.0, "references": _REFERENCE}
+    return cf.label(dem, "dem", history=f"flint_hills: seed {seed}", **made)

@@ -1,7 +1,6 @@
 """Terrain on labelled rasters: sky, horizon and the light on a slope, from an elevation model."""
 
 from dataclasses import replace
-from operator import attrgetter
 
 import numpy as np
 import xarray as xr
@@ -48,7 +47,7 @@ def sky_view(dem, horizon=None):
     --------
     fifesim.ground.terrain.sky.sky_factor, fifesim.ground.terrain.sky.sky_vector
     """
-    return _light(dem, horizon, None, "sky_view", attrgetter("sky_view"))
+    return _light(dem, horizon, None, "sky_view", lambda light: light.sky_view)
 
 
 def terrain_view(dem, horizon=None):
@@ -74,7 +73,7 @@ def terrain_view(dem, horizon=None):
     --------
     fifesim.ground.terrain.sky.terrain_view
     """
-    return _light(dem, horizon, None, "terrain_view", _terrain_view)
+    return _light(dem, horizon, None, "terrain_view", lambda light: skies.terrain_view(light.sky_view, light.cosine))
 
 
 def illumination(dem, geometry=None, horizon=None):
@@ -104,7 +103,7 @@ def illumination(dem, geometry=None, horizon=None):
     --------
     fifesim.ground.terrain.slope.along_normal, fifesim.ground.terrain.light.horizon_toward
     """
-    return _light(dem, horizon, _sun(dem, geometry), "illumination", attrgetter("mu_s_local"))
+    return _light(dem, horizon, _sun(dem, geometry), "illumination", lambda light: light.mu_s_local)
 
 
 def shadow(dem, geometry=None, horizon=None):
@@ -223,10 +222,6 @@ def terrain_reflectance(
     return _of_level(kernel, reflectance, dem, geometry, horizon, "surface_reflectance", said)
 
 
-def _terrain_view(light):
-    return skies.terrain_view(light.sky_view, light.cosine)
-
-
 def _shadow(light):
     return np.where(np.isnan(light.mu_s_local), np.nan, light.mu_s_local == 0)
 
@@ -266,7 +261,9 @@ def _on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True):
     known = None if horizon is None else horizon.data
     level, data, known = lazy_together(level, dem.transpose("y", "x").data, known)
     horizon = None if horizon is None else horizon.copy(data=known)
-    geometry, cell = _from_grid_north(geometry, grid), grids.cell_size(grid)
+    # Aspects and horizons count from the north of the grid.
+    turn, cell = projection.convergence(grid), grids.cell_size(grid)
+    geometry = replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
     layers, places = sky_above(data, dem_grid, source_resolution(dem), horizon, geometry, check)
     between = places.between(offset, shape)
 
@@ -278,12 +275,6 @@ def _on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True):
     reads += [] if level is None else [chunking.margin_reads(level, 0)]
     chunks = None if isinstance(of, np.ndarray) else of.chunks[-2:]
     return chunking.windows(block, reads, of.shape, chunks)
-
-
-def _from_grid_north(geometry, grid):
-    """Directions whose azimuths count from the north of the grid, as aspects and horizons do."""
-    turn = projection.convergence(grid)
-    return replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
 
 
 def _offset(dem_grid, grid):

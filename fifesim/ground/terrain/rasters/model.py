@@ -151,10 +151,8 @@ class Model:
             return np.full((TILE, TILE), np.nan)
         found = looked_up(known, rows - top, columns - left)
         # Places past the window are unknown; they are moved into it to be passed over.
-        rows, columns = (
-            rows.clip(top + 3 * down, top + height - 4 * down),
-            columns.clip(left + 3 * across, left + width - 4 * across),
-        )
+        rows = rows.clip(top + 3 * down, top + height - 4 * down)
+        columns = columns.clip(left + 3 * across, left + width - 4 * across)
         if down > 1 or across > 1:
             values = block_means(extend(values, 2 * max(self.blocks), rest=False), down, across)
         coefficients = spline_coefficients(extend(values, MARGIN))

@@ -66,13 +66,9 @@ class Source:
         return out
 
     def _array_window(self, rows, columns):
-        values = np.asarray(
-            self.cells[
-                rows.start - self.origin[0] : rows.stop - self.origin[0],
-                columns.start - self.origin[1] : columns.stop - self.origin[1],
-            ],
-            float,
-        )
+        top, left = self.origin
+        window = slice(rows.start - top, rows.stop - top), slice(columns.start - left, columns.stop - left)
+        values = np.asarray(self.cells[window], float)
         return values if self.nodata is None else np.where(values == self.nodata, np.nan, values)
 
 
@@ -117,8 +113,6 @@ def _array_source(raster, vertical_units):
     if raster.ndim != 2:
         raise ValueError(f"an elevation model has one band of rows and columns, got dimensions {raster.dims}")
     crs = raster.rio.crs
-    if crs is None:
-        return _in_metres(Source(name, None, raster.shape, Affine.identity(), None, 1.0), None, None, vertical_units)
     found = raster.odc.geobox
     if found is None:
         raise ValueError(f"the x and y of {name} are not the centres of a regular grid")
@@ -131,7 +125,7 @@ def _array_source(raster, vertical_units):
     nodata = raster.rio.nodata
     nodata = None if nodata is None or np.isnan(nodata) else float(nodata)
     source = Source(name, cells, cells.shape, found.affine, None, 1.0, nodata)
-    return _in_metres(source, crs.to_wkt(), raster.attrs.get("units"), vertical_units)
+    return _in_metres(source, crs.to_wkt() if crs else None, raster.attrs.get("units"), vertical_units)
 
 
 def _in_metres(source, wkt, unit, vertical_units):

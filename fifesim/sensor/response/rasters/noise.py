@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from fifesim.base.seeds import check_seed
 from fifesim.rasters import places
 from fifesim.sensor.response.noise import NoiseModel, add_noise, check_kinds
@@ -54,18 +56,9 @@ def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
 
     def kernel(block, starts):
         band, row, column = starts
-        out = block.astype(float)
-        for layer in range(block.shape[0]):
-            out[layer] = add_noise(
-                block[layer],
-                models[band + layer],
-                kinds,
-                seed=seed,
-                band=numbers[band + layer],
-                row=first_row + row,
-                column=first_column + column,
-            )
-        return out
+        place = {"seed": seed, "row": first_row + row, "column": first_column + column}
+        noise = [add_noise(one, models[k], kinds, band=numbers[k], **place) for k, one in enumerate(block, band)]
+        return np.stack(noise)
 
     return places.located(kernel, radiance)
 

@@ -82,7 +82,8 @@ def sense_swath(
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, pixels.first, noise_models)
     image = recorded(radiance, description, bands, quantise).assign_coords(_coordinates(scene, pixels, description))
     history = f"sense_swath: {description.name}, track {track.heading:.2f} degrees"
-    image = labelled(_with_sun(image, geometry), toa, description, history)
+    image = directions.with_geometry(image, geometry, ("sza", "saa", "earth_sun_distance"))
+    image = labelled(image, toa, description, history)
     image.encoding = {"grid_mapping": "spatial_ref"}
     return image
 
@@ -190,11 +191,3 @@ def _coordinates(scene, pixels, description):
     for axis, first, size in zip(("line", "sample"), pixels.first, pixels.row.shape, strict=True):
         out[axis] = (axis, first + np.arange(size), {"long_name": f"{axis} of the scan, from the track's point"})
     return out | {"spatial_ref": grids.coordinates(scene)["spatial_ref"]}
-
-
-def _with_sun(image, geometry):
-    """The sun as scalar coordinates; the view stays with the pixels."""
-    names = ("sza", "saa", "earth_sun_distance")
-    return image.assign_coords(
-        {name: xr.DataArray(getattr(geometry, name), attrs=cf.attributes(name)) for name in names}
-    )
