@@ -100,6 +100,7 @@ def answer(place):
 STRANGER = """
 import os, sys
 from distributed import Client
+from distributed.security import Security
 tls = sys.argv[1]
 for address, options in ((tls, {}), (tls.replace("tls", "tcp"), {}), (tls, {"security": Security.temporary()})):
     try:
