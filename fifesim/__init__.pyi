@@ -62,7 +62,7 @@ from .sensor.description.instrument_file import Instrument as Instrument
 from .base.bands import Band as Band
 
 # Analysis
-from .analysis.rasters.regression import aggregate as aggregate  # method
+from .analysis.rasters.means import aggregate as aggregate  # method
 from .chain.images import ndvi as ndvi  # method
 from .analysis.rasters.regression import regress as regress  # method
 from .analysis.regression import Regression as Regression

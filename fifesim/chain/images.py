@@ -1,6 +1,6 @@
 """What an image of any kind tells: it is brought to planetary reflectance first, as in the paper."""
 
-from fifesim.analysis.rasters import regression as analysis
+from fifesim.analysis.rasters import indices
 from fifesim.rasters import cf
 from fifesim.sensor import raster as sensor
 
@@ -26,9 +26,9 @@ def ndvi(image):
 
     See Also
     --------
-    fifesim.analysis.rasters.regression.ndvi
+    fifesim.analysis.rasters.indices.ndvi
     """
-    return analysis.ndvi(planetary_reflectance(image))
+    return indices.ndvi(planetary_reflectance(image))
 
 
 def planetary_reflectance(image):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import xarray as xr
 
-from fifesim.analysis.rasters import regression as analysis
+from fifesim.analysis.rasters.means import aggregate
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi
@@ -46,7 +46,7 @@ def simulate(scenario, chunks="auto"):
     grid, land, setup = scenario.geobox(), scenario.ground, setup_of(scenario)
 
     def means(array):
-        return analysis.aggregate(array, scenario.sensor.size, min_valid=setup.min_valid)
+        return aggregate(array, scenario.sensor.size, min_valid=setup.min_valid)
 
     lai = leaf_area(scenario, grid, chunks)
     fpar = ground.fpar(lai, geometry=setup.geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)

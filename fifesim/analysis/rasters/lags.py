@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from fifesim.analysis import variogram as kernels
+from fifesim.analysis.rasters.means import aggregate
 from fifesim.analysis.rasters.pairs import check_no_counts, origins
-from fifesim.analysis.rasters.regression import aggregate
 from fifesim.base.line_spread import Boxcar
 from fifesim.rasters import grid as grids
 from fifesim.rasters.reductions import extremes, sums_by_block

@@ -8,8 +8,10 @@ import xarray as xr
 
 from fifesim.analysis import density as densities
 from fifesim.analysis import scaling
+from fifesim.analysis.rasters.indices import red_and_nir
+from fifesim.analysis.rasters.means import aggregate
 from fifesim.analysis.rasters.pairs import check_no_counts
-from fifesim.analysis.rasters.regression import aggregate, red_and_nir, regress
+from fifesim.analysis.rasters.regression import regress
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
 from fifesim.rasters.reductions import extremes, sums_by_block

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from odc.geo.geobox import GeoBox
 
-from fifesim.analysis.rasters import regression as analysis
+from fifesim.analysis.rasters.means import aggregate
 from fifesim.base import datasets
 from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi
@@ -240,7 +240,7 @@ def run(case, treatment, arp, seed):
     lai, fpar = landscape(case, treatment, arp, seed)
     reflectance = reflectance_of(case.read, lai)
     image = image_of(case.read, reflectance)
-    truth = [analysis.aggregate(array, PIXEL) for array in (lai, fpar)]
+    truth = [aggregate(array, PIXEL) for array in (lai, fpar)]
     of_cells = ndvi(chain.to_toa(reflectance))
     limits = [(float(array.min()), float(array.max())) for array in (lai, fpar, of_cells)]
     return pixel_values(*truth, ndvi(image)), np.array(limits)

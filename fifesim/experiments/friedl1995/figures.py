@@ -5,7 +5,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fifesim.analysis import density, regression, scaling
-from fifesim.analysis.rasters import regression as analysis
+from fifesim.analysis.rasters import indices
+from fifesim.analysis.rasters.means import aggregate
 from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi, planetary_reflectance
 from fifesim.chain.setup import image_of, reflectance_of
@@ -268,20 +269,20 @@ def _scene(case, treatment, arp, seed):
     toa = chain.to_toa(ground)
     image = image_of(case.read, ground)
     planetary = planetary_reflectance(image)
-    boa_ndvi = analysis.ndvi(ground)
-    means = analysis.aggregate(ground, PIXEL)
+    boa_ndvi = indices.ndvi(ground)
+    means = aggregate(ground, PIXEL)
     clear = chain.to_toa(means)
     products = {"red_red": ground[0] ** 2, "red_nir": ground[0] * ground[1], "nir_nir": ground[1] ** 2}
     rasters = {
-        "lai": analysis.aggregate(lai, PIXEL),
-        "fpar": analysis.aggregate(fpar, PIXEL),
+        "lai": aggregate(lai, PIXEL),
+        "fpar": aggregate(fpar, PIXEL),
         "ndvi": ndvi(image),
-        "boa_ndvi": analysis.aggregate(boa_ndvi, PIXEL),
-        "ndvi_of_mean": analysis.ndvi(means),
+        "boa_ndvi": aggregate(boa_ndvi, PIXEL),
+        "ndvi_of_mean": indices.ndvi(means),
         "boa_red": means[0], "boa_nir": means[1],
         "toa_red": planetary[0], "toa_nir": planetary[1],
         "clear_red": clear[0], "clear_nir": clear[1],
-    } | {name: analysis.aggregate(product.drop_vars("band", errors="ignore"), PIXEL)
+    } | {name: aggregate(product.drop_vars("band", errors="ignore"), PIXEL)
          for name, product in products.items()}  # fmt: skip
     values = dict(zip(rasters, friedl1995.pixel_values(*rasters.values()), strict=True))
     numbers = np.arange(values["ndvi"].size)[None]

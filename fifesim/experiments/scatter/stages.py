@@ -8,7 +8,8 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.analysis import indices
-from fifesim.analysis.rasters import regression as analysis
+from fifesim.analysis.rasters.indices import red_and_nir
+from fifesim.analysis.rasters.means import aggregate
 from fifesim.base.footprints import regularize
 from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
@@ -150,7 +151,7 @@ def _scene(scenario):
     blocks = grids.aligned(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     lai = leaf_area(scenario, grid).compute()
-    middle = _spread_out(analysis.aggregate(lai, grids.cell_size(blocks)[0], min_valid=setup.min_valid), lai)
+    middle = _spread_out(aggregate(lai, grids.cell_size(blocks)[0], min_valid=setup.min_valid), lai)
     dem, horizon, _ = elevation(scenario, grid)
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, lai, middle, blocks, image)
 
@@ -159,7 +160,7 @@ def _red_and_nir(bands):
     """The two bands of NDVI."""
     coords = {"wavelength": ("band", [band.wavelength for band in bands])}
     numbers = xr.DataArray(np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords=coords)
-    return tuple(bands[number.item()] for number in analysis.red_and_nir(numbers))
+    return tuple(bands[number.item()] for number in red_and_nir(numbers))
 
 
 def _spread_out(means, cells):
@@ -189,7 +190,7 @@ def _truth(scene, lai, curve):
 
     size, (rows, columns) = grids.cell_size(scene.blocks)[0], scene.shape
     return [
-        analysis.aggregate(array, size, min_valid=scene.setup.min_valid).values[:rows, :columns]
+        aggregate(array, size, min_valid=scene.setup.min_valid).values[:rows, :columns]
         for array in (lai, fpar(lai) if curve else _tangent(fpar, lai, scene.middle))
     ]
 
@@ -204,7 +205,7 @@ def _cells(scene, lai, curve, relief, air):
     seen = reflectance(lai) if curve else _tangent(reflectance, lai, scene.middle)
     if air:
         seen = chain.to_toa(seen, adjacency=setup.adjacency)
-    red, nir = analysis.red_and_nir(seen)
+    red, nir = red_and_nir(seen)
     return np.stack([red.values, nir.values, indices.normalized_difference(nir.values, red.values)])
 
 

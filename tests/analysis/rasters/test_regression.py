@@ -1,106 +1,13 @@
-"""Analysis on labelled rasters: true means, indices and regressions."""
+"""Regression of labelled rasters."""
 
 import numpy as np
 import pytest
-import xarray as xr
-from lazy import CHUNKS, ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_compute
+from lazy import CHUNKS, ODD_CHUNKS, in_chunks
 from scipy import stats
 
 import fifesim
-from fifesim.analysis import indices
-from fifesim.analysis.rasters.regression import ndvi
-from fifesim.rasters import grid as grids
 
 CELL = 30 / 9
-
-
-def test_aggregate_is_the_mean_of_blocks(lai):
-    """Cells of 30/9 m: 81 in a pixel, no cell cut."""
-    truth = check_raster_function(lambda lai: fifesim.aggregate(lai, 30.0), lai, quantity="lai")
-    expected = lai.values.reshape(5, 9, 6, 9).mean(axis=(1, 3))
-    np.testing.assert_allclose(truth, expected, rtol=1e-14)
-    assert grids.same_grid(grids.geobox(truth), grids.aligned(grids.geobox(lai), 30.0))
-
-
-def test_mean_of_the_scene_is_the_mean_of_its_aggregates(lai):
-    assert float(fifesim.aggregate(lai, 30.0).mean()) == pytest.approx(float(lai.mean()), rel=1e-14)
-
-
-def test_blocks_that_cut_cells_share_them(lai):
-    """Brute force: every cell split into a hundred parts."""
-    truth = fifesim.aggregate(lai, 25.0)
-    parts = np.repeat(np.repeat(lai.values, 10, axis=0), 10, axis=1)
-    expected = parts[: 5 * 75, : 7 * 75].reshape(5, 75, 7, 75).mean(axis=(1, 3))
-    np.testing.assert_allclose(truth[:5, :7], expected, rtol=1e-12)
-
-
-def test_block_with_too_few_valid_cells_is_missing(lai):
-    lai[0:9, 0:2] = np.nan
-    lai[9, 9] = np.nan
-    truth = fifesim.aggregate(lai, 30.0)
-    assert np.isnan(truth[0, 0]) and int(np.isnan(truth).sum()) == 1
-    block = lai.values[9:18, 9:18]
-    assert float(truth[1, 1]) == pytest.approx(np.nanmean(block), rel=1e-14)
-    assert np.isfinite(fifesim.aggregate(lai, 30.0, min_valid=0.5)).all()
-
-
-def test_blocks_may_be_weighted_by_a_line_spread(lai):
-    """A matrix of the instrument's weights for each axis, without the package's operators."""
-    lsf = fifesim.instrument("TM").line_spread
-    weights = [
-        [[lsf.cumulative(CELL * (j + 1) - 30 * (i + 0.5)) - lsf.cumulative(CELL * j - 30 * (i + 0.5)) for j in range(n)]
-         for i in range(n // 9)]
-        for n in lai.shape
-    ]  # fmt: skip
-    rows, columns = (np.array(each) / np.sum(each, axis=1, keepdims=True) for each in weights)
-    found = fifesim.aggregate(lai, 30.0, lsf=lsf)
-    np.testing.assert_allclose(found, rows @ lai.values @ columns.T, rtol=1e-12)
-
-
-def test_block_larger_than_the_scene_is_refused(lai):
-    with pytest.raises(ValueError, match="no pixel of 500 x 500 m fits"):
-        fifesim.aggregate(lai, 500.0)
-
-
-def reflectance(lai, wavelengths=(0.56, 0.66, 0.83, 1.65)):
-    bands = xr.DataArray(np.linspace(0.1, 0.6, len(wavelengths)), dims="band")
-    cube = (lai * bands + 0.02).transpose("band", "y", "x")
-    cube = grids.place(cube.assign_coords(wavelength=("band", list(wavelengths))), grids.geobox(lai))
-    cube.attrs = {"units": "1", "atmosphere": "some", "arp": 0.15}
-    return cube.rename("toa_reflectance")
-
-
-def test_ndvi_keeps_its_word_and_equals_the_kernel(lai_with_hole):
-    cube = reflectance(lai_with_hole)
-    result = check_raster_function(ndvi, cube, quantity="ndvi")
-    np.testing.assert_array_equal(result, indices.normalized_difference(cube.values[2], cube.values[1]))
-    np.testing.assert_array_equal(np.isnan(result), np.isnan(lai_with_hole))
-    assert result.dims == ("y", "x") and "band" not in result.coords and "wavelength" not in result.coords
-    assert result.attrs["arp"] == 0.15
-
-
-@pytest.mark.parametrize(
-    "wavelengths, red, nir",
-    [((0.83, 0.66), 1, 0), ((0.61, 0.64, 0.69, 0.76, 0.95, 0.86), 1, 5), ((0.45, 0.665, 0.71, 0.842, 1.6), 1, 3)],
-)
-def test_bands_are_picked_by_wavelength(lai, wavelengths, red, nir):
-    cube = reflectance(lai, wavelengths)
-    np.testing.assert_array_equal(ndvi(cube), indices.normalized_difference(cube.values[nir], cube.values[red]))
-
-
-@pytest.mark.parametrize(
-    "change, message",
-    [
-        (lambda cube: cube.isel(band=[0, 2]), r"no red band between 0\.6 and 0\.7 um: the raster has 0\.560, 0\.830"),
-        (lambda cube: cube.isel(band=[1, 3]), "no near infrared band"),
-        (lambda cube: cube.drop_vars("wavelength"), "no coordinate 'wavelength'"),
-        (lambda cube: cube.isel(band=1), "along band"),
-        (lambda cube: cube.assign_attrs(units="K"), "units 'K'"),
-    ],
-)
-def test_raster_without_the_bands_is_refused(lai, change, message):
-    with pytest.raises(ValueError, match=message):
-        ndvi(change(reflectance(lai)))
 
 
 def test_regression_agrees_with_scipy(pair):
@@ -122,11 +29,3 @@ def test_regression_works_where_the_first_row_is_empty(pair):
     y, x = pair
     y[0], x[0] = np.nan, np.nan
     assert fifesim.regress(y, x).n == 44 * 54
-
-
-def test_aggregates_of_bands_keep_them(lai):
-    with no_compute():
-        truth = fifesim.aggregate(in_chunks(reflectance(lai), ODD_CHUNKS), 30.0)
-    assert truth.sizes == {"band": 4, "y": 5, "x": 6}
-    check_place(truth, grids.geobox(lai).crs)
-    np.testing.assert_array_equal(truth.isel(band=1), fifesim.aggregate(reflectance(lai).isel(band=1), 30.0))
