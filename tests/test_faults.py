@@ -88,6 +88,57 @@ def test_a_killed_run_goes_on_to_the_same_files(scenario, whole, tmp_path):
     assert 0 < lines[0]["cells_done"] < lines[0]["cells"]
 
 
+def all_of(folder):
+    """Every file of a folder, those of a store too."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def whole_scene(scenario, tmp_path_factory):
+    """The same with its cells, and how long it takes. [s]"""
+    folder, began = tmp_path_factory.mktemp("whole") / "scene", time.monotonic()
+    assert run(scenario, "-o", folder, "--scene").returncode == 0
+    return all_of(folder), time.monotonic() - began
+
+
+# How a run is killed in turn: its options, and the part of its time in which that happens.
+WAYS = (((), 0.0), (("--workers", 2), 0.0), (("--scene",), 0.0), ((), 0.8), (("--scene",), 0.8))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(int(os.environ.get("FIFESIM_KILLS", len(WAYS)))))
+def test_a_run_killed_at_any_moment_goes_on_to_the_same_files(scenario, whole_scene, tmp_path, number):
+    """As many as the variable FIFESIM_KILLS says."""
+    (options, earliest), out = WAYS[number % len(WAYS)], tmp_path / "out"
+    expected, duration = whole_scene
+    process = start(scenario, "-o", out, *options)
+    time.sleep(duration * np.random.default_rng(number).uniform(earliest, 1))
+    children = psutil.Process(process.pid).children(recursive=True) if process.poll() is None else []
+    process.kill()
+    process.communicate()
+    _, orphans = psutil.wait_procs(children, timeout=30)
+    assert not orphans
+    if not out.exists() or any(path.name == UNFINISHED for path in out.iterdir()):
+        done = run(scenario, "-o", out, "--resume", *options[:1] * (options[:1] == ("--scene",)))
+        assert done.returncode == 0, done.stderr
+    found = all_of(out)
+    assert found == {name: expected[name] for name in found} and set(FILES) <= set(found)
+    assert ("--scene" in options) == (len(found) > len(FILES))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(int(os.environ.get("FIFESIM_RIVALS", 1))))
+@pytest.mark.parametrize("option", ["--overwrite", "--resume"])
+def test_of_two_runs_at_once_one_wins_whole(scenario, whole, tmp_path, option, number):
+    """As often as the variable FIFESIM_RIVALS says."""
+    out = tmp_path / "out"
+    processes = [start(scenario, "-o", out, option) for _ in range(2)]
+    said = [process.communicate(timeout=PATIENCE)[1] for process in processes]
+    assert sorted(process.returncode for process in processes) == [0, 2], said
+    assert "in use by" in "".join(said)
+    assert all_of(out) == whole
+
+
 @pytest.mark.slow
 def test_a_half_written_block_is_made_again(scenario, whole, tmp_path):
     out = tmp_path / "out"

@@ -10,6 +10,7 @@ from fifesim.experiments.friedl1995.case import Case
 from fifesim.output import pages
 from fifesim.output.folders import check_folder, results
 from fifesim.output.progress import steps
+from fifesim.output.run.size import check_cells
 
 NUMBERS = range(3, 10)
 FILES = ("table2.csv", *(f"figure{number}.png" for number in NUMBERS), "report.html")
@@ -57,17 +58,18 @@ def reproduce_to_folder(folder, *, realisations=20, cells=333, seed=1995, overwr
         raise ValueError(f"realisations must be at least 1, got {realisations}")
     case = Case(cells=cells)
     check_seed(seed)
+    check_cells(cells)
     seeds = range(seed, seed + realisations)
-    outcome = friedl1995_table.realise(case, seeds, each=_shown("nine scenes"))
-    table, text = friedl1995_table.table2(outcome), friedl1995_table.text_table(outcome)
-    few = range(seed, seed + _EFFECT_REALISATIONS)
-    tables = {
-        "readings": effects.readings(case, few, each=_shown("readings of Table 1")),
-        "sizes": effects.sizes(case, few, each=_shown("sizes of the scene")),
-        "sensitivity": effects.sensitivity(case, few, each=_shown("numbers chosen")),
-    }
-    run = {"realisations": realisations, "effect_realisations": _EFFECT_REALISATIONS, "cells": cells, "seed": seed}
-    with results(folder, FILES) as partial:
+    with results(folder, FILES, overwrite=overwrite) as partial:
+        outcome = friedl1995_table.realise(case, seeds, each=_shown("nine scenes"))
+        table, text = friedl1995_table.table2(outcome), friedl1995_table.text_table(outcome)
+        few = range(seed, seed + _EFFECT_REALISATIONS)
+        tables = {
+            "readings": effects.readings(case, few, each=_shown("readings of Table 1")),
+            "sizes": effects.sizes(case, few, each=_shown("sizes of the scene")),
+            "sensitivity": effects.sensitivity(case, few, each=_shown("numbers chosen")),
+        }
+        run = {"realisations": realisations, "effect_realisations": _EFFECT_REALISATIONS, "cells": cells, "seed": seed}
         table.to_csv(partial / "table2.csv", index=False, float_format="%.6g")
         scenes = figures.pixels(case, figures.BURNED_GRAZED, seed)
         drawn = {number: getattr(figures, f"figure{number}")(scenes) for number in NUMBERS[1:]}

@@ -7,6 +7,7 @@ from fifesim.experiments.scatter import shares as scatter
 from fifesim.output import pages
 from fifesim.output.folders import check_folder, results
 from fifesim.output.progress import steps
+from fifesim.output.run.size import check_cells
 from fifesim.scenario.toml import write_scenario
 
 FILES = ("budget.csv", "budget.png", "report.html", "scenario.toml")
@@ -43,14 +44,14 @@ def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None,
     folder = Path(folder)
     check_folder(folder, overwrite)
     complete = (scatter.default_scenario() if scenario is None else scenario).complete()
-    found = scatter.budget(
-        complete, realisations=realisations, cells=cells, seed=seed, each=lambda cases: steps(cases, "stage by stage")
-    )
-    table = scatter.table(found)
-    rows, columns = (min(cells, size) for size in complete.geobox().shape)
-    run = {"realisations": found.sizes["realisation"], "rows": rows, "columns": columns}
-    run["seed"] = complete.ground.seed if seed is None else seed
-    with results(folder, FILES) as partial:
+    check_cells(min(cells, *complete.geobox().shape))
+    options = {"realisations": realisations, "cells": cells, "seed": seed}
+    with results(folder, FILES, overwrite=overwrite) as partial:
+        found = scatter.budget(complete, **options, each=lambda cases: steps(cases, "stage by stage"))
+        table = scatter.table(found)
+        rows, columns = (min(cells, size) for size in complete.geobox().shape)
+        run = {"realisations": found.sizes["realisation"], "rows": rows, "columns": columns}
+        run["seed"] = complete.ground.seed if seed is None else seed
         table.to_csv(partial / "budget.csv", index=False, float_format="%.6g")
         chart = pages.png(scatter_report.chart(table), _DPI)
         (partial / "budget.png").write_bytes(chart)

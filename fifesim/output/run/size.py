@@ -15,6 +15,9 @@ _GRAPH = 120_000
 # Of a cell of a field, with its transform. [byte]
 _CELL = 48
 
+# Of a cell of a scene from its field to its image, all in memory; measured, and half as much again. [byte]
+_CELL_IN_MEMORY = 400
+
 # Of a pixel of one band while its chunk is made, and of the truth beside the bands. [byte]
 _PIXEL, _TRUTH = 32, 16
 
@@ -78,6 +81,28 @@ def check_size(scenario, folder, scene=False):
                 f"{cells:.3g} cells and {pixels:.3g} pixels need {_bytes(needed)} of {what}, of which {_bytes(free)} "
                 f"may be taken here: {key} = {fits:.2g} fits"
             )
+
+
+def check_cells(cells):
+    """
+    Refuse scenes that are computed in memory and do not fit.
+
+    Parameters
+    ----------
+    cells : int
+        Along the edge.
+
+    Raises
+    ------
+    ValueError
+        If memory does not suffice, with what fits.
+    """
+    needed, free = cells**2 * _CELL_IN_MEMORY, psutil.virtual_memory().available / 2
+    if needed > free:
+        raise ValueError(
+            f"cells = {cells}: a scene of so many along its edge needs {_bytes(needed)} of memory, of which "
+            f"{_bytes(free)} may be taken here: cells = {int(math.sqrt(free / _CELL_IN_MEMORY)):.2g} fits"
+        )
 
 
 def _cells(scenario):

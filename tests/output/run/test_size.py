@@ -7,7 +7,7 @@ from collections import namedtuple
 import pytest
 
 from fifesim.output.run import size
-from fifesim.output.run.size import check_size, disk_of
+from fifesim.output.run.size import check_cells, check_size, disk_of
 from fifesim.scenario.scenario import parse_scenario
 
 FLAT = {"terrain": {"dem": "flat"}}
@@ -60,3 +60,9 @@ def test_a_disk_that_is_too_small_is_named(tmp_path, monkeypatch, free, refused)
 def test_the_cells_of_a_scene_are_on_the_disk_too(tmp_path):
     scenario = complete()
     assert disk_of(scenario, scene=True) - disk_of(scenario) > 4 * 8 * 4000**2
+
+
+def test_scenes_in_memory_are_judged_by_their_edge():
+    check_cells(333)
+    with pytest.raises(ValueError, match=r"cells = 1000000: .* cells = \S+ fits"):
+        check_cells(1_000_000)
