@@ -1,6 +1,8 @@
 """Every key of a scenario: its default, unit, range and meaning. What physics says of a value is beside its meaning."""
 
 import math
+import re
+from datetime import datetime
 from typing import Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -11,6 +13,10 @@ from fifesim.scenario.section import Section, file, nearest, number, seed, text
 LAND_FORMS = ("flint-hills", "flat")
 INTERVALS = ("product", "native")
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
+
+# A date alone is no sun, and a month that could be a day no date.
+_TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,6})?)?(Z|[+-]\d\d:\d\d)?", re.ASCII)
+_YEARS = 1700, 2200  # what dates in nanoseconds hold
 
 
 class GridKeys(Section):
@@ -89,13 +95,30 @@ class TerrainKeys(Section):
 class SunAndViewKeys(Section):
     """Directions; the sun's from time and place, or given by sza and saa."""
 
-    time: str = text(fife.TIME, "UTC; a hypothetical overpass by default")
+    time: str = text(
+        fife.TIME, "date and time of day, UTC without an offset such as -05:00; a hypothetical overpass by default"
+    )
     latitude: float = number(fife.LATITUDE, "degree", "north", ge=-90, le=90)
     longitude: float = number(fife.LONGITUDE, "degree", "east", ge=-180, le=360)
     sza: float | None = number(None, "degree", "solar zenith, instead of that of time and place", ge=0, lt=90)
     saa: float | None = number(None, "degree", "solar azimuth, clockwise from north")
     vza: float = number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=75)
     vaa: float = number(0.0, "degree", "azimuth toward the sensor, clockwise from north")
+
+    @field_validator("time", mode="before")
+    @classmethod
+    def _full_date(cls, value):
+        # TOML has dates of its own.
+        written = value.isoformat() if isinstance(value, datetime) else value
+        try:
+            if _TIME.fullmatch(written) and _YEARS[0] <= datetime.fromisoformat(written).year < _YEARS[1]:
+                return written
+        except (TypeError, ValueError):
+            pass
+        raise ValueError(
+            f"must be a date and a time of day from {_YEARS[0]} to {_YEARS[1]}, such as '1987-06-06T16:35:00Z' or "
+            "'1987-06-06 11:35-05:00'"
+        )
 
     @model_validator(mode="after")
     def _whole_sun(self):

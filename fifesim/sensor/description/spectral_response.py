@@ -1,5 +1,6 @@
 """Spectral responses as instrument files name them: in pyrsr, in a table beside the file, or written out."""
 
+import os
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +13,7 @@ from pyrsr.rsr import RSR_reader
 
 from fifesim.base import datasets
 from fifesim.base.bands import Band
+from fifesim.base.foreign import check_regular, shown
 from fifesim.sensor.description.fields import CONFIG, Name, Number
 
 # No band of these instruments reaches 100 um, and none begins below 100 nm.
@@ -163,7 +165,7 @@ def _read_pyrsr(name, response):
 @lru_cache(maxsize=512)
 def _read_table(name, response):
     beside = Path(response.folder) / response.table
-    path = beside if response.folder and beside.is_file() else _in_data(response.table)
+    path = beside if response.folder and os.path.isfile(beside) else _in_data(response.table)
     table = pd.read_csv(path, comment="#", dtype={"satellite": str, "band": str})
     missing = {"satellite", "band", "wavelength", "response"} - set(table.columns)
     if missing:
@@ -179,8 +181,10 @@ def _read_table(name, response):
 
 def _in_data(table):
     try:
-        return datasets.path(table)
-    except FileNotFoundError:
+        path = datasets.path(table)
+        check_regular(path)
+    except OSError:
         raise ValueError(
-            f"srf.table = {table!r}: no such file beside the instrument file or in the data folder"
+            f"srf.table = {shown(table)}: no such file beside the instrument file or in the data folder"
         ) from None
+    return path
