@@ -3,11 +3,12 @@
 import math
 import re
 from datetime import datetime
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from fifesim.base import fife
+from fifesim.base.foreign import shown
 from fifesim.scenario.section import Section, file, nearest, number, seed, text
 
 LAND_FORMS = ("flint-hills", "flat")
@@ -19,6 +20,12 @@ _TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,6})?)?(Z|[+-]\d\d
 _YEARS = 1700, 2200  # what dates in nanoseconds hold
 
 
+# By the name of a band, a spectrum or a part of a leaf.
+_ByName = dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False)]]
+_LONGEST_NAME = 60
+_LEAST_HOTSPOT = 1e-6  # below it the hot spot is narrower than the sun
+
+
 class GridKeys(Section):
     """Ground cells. Without any key but cell, a scene that reads a LAI file covers that file."""
 
@@ -27,7 +34,7 @@ class GridKeys(Section):
     north: float = number(fife.CORNERS["NAD83"][2], "m", "northing of the upper left corner")
     width: float = number(fife.SIZE, "m", "west to east", gt=0)
     height: float = number(fife.SIZE, "m", "north to south", gt=0)
-    cell: float = number(30 / 9, "m", "size of a cell", gt=0)
+    cell: float = number(30 / 9, "m", "size of a cell", ge=0.001)
 
 
 class GroundKeys(Section):
@@ -39,19 +46,34 @@ class GroundKeys(Section):
     method: Literal["streaming", "periodic"] = text("streaming", "streaming, or the paper's periodic (in memory)")
     lai_file: str | None = file(None, "a LAI map to use instead of a random field")
     leaf_angles: str = text("spherical", "leaf angle distribution")
-    hotspot: float = number(0.0, "1", "leaf size over canopy height", ge=0)
+    hotspot: float = number(0.0, "1", "leaf size over canopy height", ge=0, le=10)
     fpar_inf: float = number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
-    leaf_reflectance: dict[str, float] = text({}, "by band [1]; all bands or none")
-    leaf_transmittance: dict[str, float] = text({}, "by band [1]; all bands or none")
-    background: dict[str, float] = text({}, "reflectance below the canopy by band [1]; all bands or none")
-    leaf: dict[str, float] = text(
+    leaf_reflectance: _ByName = text({}, "by band [1]; all bands or none")
+    leaf_transmittance: _ByName = text({}, "by band [1]; all bands or none")
+    background: _ByName = text({}, "reflectance below the canopy by band [1]; all bands or none")
+    leaf: _ByName = text(
         {},
         "instead of leaf optics by band: structure [1], chlorophyll, carotenoids, anthocyanins [ug cm-2], "
         "brown [1], water [cm], dry_matter [g cm-2]",
     )
-    background_spectra: dict[str, float] = text(
+    background_spectra: _ByName = text(
         {}, "instead of background by band: shares of soil_dry, soil_wet, dead_grass, golden_grass, shade"
     )
+
+    @field_validator("hotspot")
+    @classmethod
+    def _wide_enough(cls, value):
+        if 0 < value < _LEAST_HOTSPOT:
+            raise ValueError(f"must be 0, for no hot spot, or at least {_LEAST_HOTSPOT:g}")
+        return value
+
+    @field_validator("leaf_reflectance", "leaf_transmittance", "background", "leaf", "background_spectra")
+    @classmethod
+    def _names_that_print(cls, value):
+        for name in value:
+            if len(name) > _LONGEST_NAME or not name.isprintable():
+                raise ValueError(f"{shown(name)} is no name: names have up to {_LONGEST_NAME} characters that print")
+        return value
 
     @model_validator(mode="after")
     def _one_description(self):
@@ -101,9 +123,9 @@ class SunAndViewKeys(Section):
     latitude: float = number(fife.LATITUDE, "degree", "north", ge=-90, le=90)
     longitude: float = number(fife.LONGITUDE, "degree", "east", ge=-180, le=360)
     sza: float | None = number(None, "degree", "solar zenith, instead of that of time and place", ge=0, lt=90)
-    saa: float | None = number(None, "degree", "solar azimuth, clockwise from north")
+    saa: float | None = number(None, "degree", "solar azimuth, clockwise from north", ge=-360, le=360)
     vza: float = number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=75)
-    vaa: float = number(0.0, "degree", "azimuth toward the sensor, clockwise from north")
+    vaa: float = number(0.0, "degree", "azimuth toward the sensor, clockwise from north", ge=-360, le=360)
 
     @field_validator("time", mode="before")
     @classmethod
