@@ -1,6 +1,5 @@
 """Sections of a scenario: tables whose keys know their units, and which of them name files."""
 
-import os
 import re
 from difflib import get_close_matches
 from pathlib import Path
@@ -172,7 +171,7 @@ class Section(BaseModel):
 
     def with_whole_paths(self):
         """The same with the full paths of its files, so that it can be run from elsewhere."""
-        return self.model_copy(update={key: os.path.realpath(value) for key, value in self.files.items()})
+        return self.model_copy(update={key: str(Path(value).absolute()) for key, value in self.files.items()})
 
 
 def nearest(value, allowed):

@@ -2,7 +2,6 @@
 
 import inspect
 import json
-import os
 import re
 from pathlib import Path
 
@@ -40,12 +39,13 @@ def load_values(path):
         values = read_toml(path)
     except OSError as error:
         raise ValueError(in_a_line(f"cannot read the scenario {path}: {error.strerror}")) from None
+    folder = path.parent.absolute()
     for name, field in Keys.model_fields.items():
         table = values.get(name)
         for key, value in table.items() if isinstance(table, dict) else ():
-            # No path holds a zero; what does is refused with its key.
-            if field.annotation.names_a_file(key, value) and value and "\0" not in value:
-                table[key] = os.path.realpath(path.parent / value)
+            # A link stays one: what it leads to may have another suffix.
+            if field.annotation.names_a_file(key, value) and value:
+                table[key] = str(folder / value)
     return values
 
 

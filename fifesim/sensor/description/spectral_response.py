@@ -181,9 +181,8 @@ def _read_table(name, response):
 
 def _in_data(table):
     try:
-        path = datasets.path(table)
-        check_regular(path)
-    except OSError:
+        check_regular(path := datasets.path(table))
+    except (OSError, ValueError):
         raise ValueError(
             f"srf.table = {shown(table)}: no such file beside the instrument file or in the data folder"
         ) from None
