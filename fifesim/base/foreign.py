@@ -9,8 +9,10 @@ from pathlib import Path
 
 # Larger than any scenario or instrument file, and read in a second. [byte]
 _LARGEST = 1_000_000
-# Tables within tables in one dotted key; tomllib takes the square of their number in time.
+# Tables within tables in one dotted key, for which tomllib takes the square of their number in time. The dots of a path
+# lie beside slashes.
 _DEEPEST = 100
+_DOT_OF_KEY = re.compile(r"[\w\"'-][ \t]*\.(?=[ \t]*[\w\"'-])")
 
 _KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
 
@@ -65,7 +67,7 @@ def read_toml(path):
         raise ValueError(f"{name} has {size} bytes: a file of keys has at most {_LARGEST}; is it another file?")
     try:
         text = path.read_text(encoding="utf-8")
-        if any(part.count(".") > _DEEPEST for part in re.split(r"[=,\n]", text)):
+        if any(len(_DOT_OF_KEY.findall(part)) > _DEEPEST for part in re.split(r"[=,\n]", text)):
             raise RecursionError
         return tomllib.loads(text)
     except RecursionError:

@@ -35,12 +35,13 @@ def test_a_missing_file_is_for_the_reader_to_tell(tmp_path):
         ("a = ", "not valid TOML"),
         ("a = " + "[" * 100_000, "too deeply"),
         ("a." * 100_000 + "a = 1", "too deeply"),
+        ("'a' . " * 100_000 + "a = 1", "too deeply"),
         ("x = { " + "a." * 100_000 + "a = 1 }", "too deeply"),
         ("a = " + "9" * 5000, "not valid TOML"),
         ("a = 1\n" * 200_000, "has 1200000 bytes: a file of keys has at most 1000000"),
         ("'\x1b' = 1", "not valid TOML"),
     ],
-    ids=["cut", "brackets", "dots", "dots inside", "digits", "size", "escape"],
+    ids=["cut", "brackets", "dots", "quoted", "dots inside", "digits", "size", "escape"],
 )
 def test_text_that_would_break_the_parser_is_refused(tmp_path, text, said):
     (tmp_path / "a\x1bb.toml").write_text(text, encoding="utf-8")
@@ -48,6 +49,11 @@ def test_text_that_would_break_the_parser_is_refused(tmp_path, text, said):
         read_toml(tmp_path / "a\x1bb.toml")
     assert str(caught.value).startswith(r"a\x1bb.toml") and len(str(caught.value)) < 300
     assert str(caught.value).isprintable()
+
+
+def test_the_dots_of_a_path_nest_nothing(tmp_path):
+    (tmp_path / "a.toml").write_text(f"file = '{'../' * 1000}a.b.tif'")
+    assert read_toml(tmp_path / "a.toml")["file"].endswith("a.b.tif")
 
 
 def test_bytes_that_are_no_text_are_refused(tmp_path):
