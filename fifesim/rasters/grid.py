@@ -2,7 +2,6 @@
 
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
-import pyproj
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
@@ -77,7 +76,7 @@ def check_grid(grid):
         grid = GeoBox(grid.shape, grid.affine, flat)
     if grid.crs.geographic:
         raise ValueError(
-            f"the grid is in a geographic CRS ({projection.name_of(pyproj.CRS(grid.crs))}), whose cells are degrees: "
+            f"the grid is in a geographic CRS ({projection.name_of(grid.crs.proj)}), whose cells are degrees: "
             "reproject it to a projected CRS in metres, for instance with .rio.reproject('EPSG:26914')"
         )
     a = grid.affine
@@ -86,7 +85,7 @@ def check_grid(grid):
             f"the grid must be north up and not rotated, got the transform {tuple(a)[:6]}: "
             "sort it with .sortby('y', ascending=False) or reproject it"
         )
-    projection.check_metres(pyproj.CRS(grid.crs), tuple(grid.boundingbox))
+    projection.check_metres(grid.crs.proj, tuple(grid.boundingbox))
     return grid
 
 
@@ -315,7 +314,7 @@ def in_words(grid):
     a = grid.affine
     return (
         f"{grid.shape.y} x {grid.shape.x} cells of {-a.e:g} x {a.a:g} m from {a.c:.3f} E {a.f:.3f} N "
-        f"in {projection.name_of(pyproj.CRS(grid.crs))}"
+        f"in {projection.name_of(grid.crs.proj)}"
     )
 
 

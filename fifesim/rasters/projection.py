@@ -116,6 +116,7 @@ def _north_first(crs):
     return first.name.startswith("North") if first.direction == second.direction else first.direction == "north"
 
 
+@lru_cache
 def horizontal(crs):
     """
     The part of a CRS that maps: a height beside it is left out.
@@ -226,6 +227,7 @@ def _undistorted(longitude, latitude):
     return f"EPSG:{32601 + int((longitude + 180) // 6) % 60 + (0 if latitude >= 0 else 100)}"
 
 
+@lru_cache
 def name_of(crs):
     """
     A CRS as messages name it.

@@ -15,7 +15,7 @@ LAND_FORMS = ("flint-hills", "flat")
 INTERVALS = ("product", "native")
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
-# A date alone is no sun, and a month that could be a day no date.
+# A date alone has no sun, and 06/07/1987 is in June or in July.
 _TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,6})?)?(Z|[+-]\d\d:\d\d)?", re.ASCII)
 _YEARS = 1700, 2200  # what dates in nanoseconds hold
 

@@ -119,6 +119,10 @@ ANYTHING = SCALARS | LISTS | st.dictionaries(st.text(max_size=9), SCALARS | LIST
 def scenarios(draw):
     """A small scenario, some keys of which are anything."""
     found = {name: dict(keys) for name, keys in SMALL.items()}
+    if draw(st.integers(0, 9)) == 0:
+        # The whole site, or what a map covers.
+        del found["grid"]
+        found["ground"] = {"lai_file": "lai.tif"} if draw(st.booleans()) else {}
     sections = st.sampled_from(list(Keys.model_fields))
     wild = draw(st.integers(0, 2)) == 0
     for _ in range(draw(st.integers(1, 3))):
