@@ -38,7 +38,7 @@ def check_regular(path):
     """
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode):
-        raise ValueError(f"{shown(str(path))} is {_KINDS.get(stat.S_IFMT(mode), 'a device')}: name a file")
+        raise ValueError(f"{in_a_line(str(path), 200)} is {_KINDS.get(stat.S_IFMT(mode), 'a device')}: name a file")
 
 
 def read_toml(path):

@@ -66,7 +66,9 @@ class Scenario(Keys):
         ------
         ValueError
             If the image would have fewer than 2 x 2 pixels, or pixels smaller than cells; if the grid, sun, optics or
-            bands are not possible, or a file or the engine is missing.
+            bands are not possible, or a file is missing.
+        ImportError
+            If the engine is not installed.
         """
         for (section, key), path in self.files.items():
             if not os.path.exists(path) and not path.startswith("/vsi"):
@@ -111,10 +113,7 @@ class Scenario(Keys):
         """Light must come through it, by an engine that is there."""
         check_zenith("sza", self.sun_and_view().sza)
         if self.atmosphere.engine == "6S":
-            try:
-                six_s.check_installed()
-            except ImportError as error:
-                raise ValueError(f"atmosphere.{error}") from None
+            six_s.check_installed()
 
     @property
     def files(self):

@@ -245,5 +245,5 @@ def test_heights_beside_a_crs_are_left_out():
 def test_engine_that_is_not_installed_is_told_at_once(monkeypatch):
     monkeypatch.setattr(six_s, "Py6S", None)
     engine = parse_scenario(SMALL | {"atmosphere": {"engine": "6S"}})
-    with pytest.raises(ValueError, match=r"atmosphere\.engine='6S' needs the 6S engine: type pip install"):
+    with pytest.raises(ImportError, match="engine='6S' needs the 6S engine: type pip install"):
         engine.complete()
