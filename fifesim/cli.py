@@ -10,8 +10,10 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
-# Of a message. [character]
-_LONGEST = 500
+from fifesim.base.foreign import in_a_line
+
+# Of a message, and of a line in one of many. [character]
+_LONGEST, _SHORTEST = 500, 50
 
 # What click, or the one that typer brings, says of arguments.
 _UsageError = typer.BadParameter.__base__
@@ -38,7 +40,7 @@ class _Door(TyperGroup):
         try:
             sys.exit(super().main(*arguments, **options | {"standalone_mode": False}))
         except _UsageError as error:
-            error.message = _shown(error.message)
+            error.message = in_a_line(error.message)
             error.show()
             sys.exit(error.exit_code)
         except (ValueError, FileNotFoundError, IsADirectoryError) as error:
@@ -202,21 +204,18 @@ def _check_spelling(scenario):
         check_spelling(scenario)
 
 
-def _say(*lines, err=False):
-    for line in lines:
-        typer.echo(_shown(str(line)), err=err)
-
-
-def _shown(text):
-    """Text whose names and values from elsewhere cannot steer a terminal."""
-    return "".join(each if each.isprintable() or each == "\n" else ascii(each)[1:-1] for each in text)
+def _say(*texts, err=False):
+    """Print texts, in which names and values from elsewhere cannot steer a terminal."""
+    for text in texts:
+        typer.echo("\n".join(in_a_line(line, sys.maxsize) for line in str(text).split("\n")), err=err)
 
 
 def _stop(error, code):
-    said = str(error)
-    if len(said) > _LONGEST:
-        said = f"{said[: _LONGEST - 200]} ... {said[-150:]}"
-    _say(f"fifesim: {said}", err=True)
+    lines = str(error).split("\n")
+    length = max(_LONGEST // len(lines), 40)
+    _say(
+        "\n".join(in_a_line(line, length) for line in ["fifesim: " + lines[0], *lines[1:]][: _LONGEST // 40]), err=True
+    )
     try:
         sys.stdout.flush()
     except OSError:

@@ -11,6 +11,8 @@ from odc.geo.xr import xr_coords
 from fifesim.base.lattice import centres, whole_cells
 from fifesim.rasters import projection
 
+_LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
+
 
 def grid_at(crs, west, north, width, height, cell):
     """
@@ -34,13 +36,16 @@ def grid_at(crs, west, north, width, height, cell):
     Raises
     ------
     ValueError
-        If the CRS is not projected in metres, or the size holds no cell.
+        If there is no such CRS, it is not one that `check_grid` passes, or the size holds no cell.
     """
     down, across = np.broadcast_to(np.asarray(cell, float), 2).tolist()
+    size, of = f"a grid of width = {width:g}, height = {height:g} m holds", f"of {down:g} x {across:g} m"
     if not (min(down, across) > 0 and width >= across and height >= down):
-        raise ValueError(f"a grid of {width:g} x {height:g} m holds no cell of {down:g} x {across:g} m")
+        raise ValueError(f"{size} no cell {of}: type a width and height of a cell or more, or a smaller cell")
+    if not max(width / across, height / down) < _LONGEST:
+        raise ValueError(f"{size} over {_LONGEST} cells {of} along a side: type a smaller size, or a larger cell")
     shape = int(height / down + 1e-6), int(width / across + 1e-6)
-    return check_grid(GeoBox(shape, Affine(across, 0.0, west, 0.0, -down, north), crs))
+    return check_grid(GeoBox(shape, Affine(across, 0.0, west, 0.0, -down, north), projection.horizontal(crs)))
 
 
 def check_grid(grid):
@@ -54,12 +59,12 @@ def check_grid(grid):
     Returns
     -------
     grid : odc.geo.geobox.GeoBox
-        The same.
+        The same; of a CRS with heights, in the part without.
 
     Raises
     ------
     ValueError
-        If it has no CRS, a geographic one, one in other units, or is not north up.
+        If it has no CRS, a geographic one, or one that `projection.check_metres` refuses, or is not north up.
     TypeError
         If it is no GeoBox.
     """
@@ -67,19 +72,20 @@ def check_grid(grid):
         raise TypeError(f"a grid is an odc.geo.geobox.GeoBox, got {type(grid).__name__}: see fifesim.fife_site")
     if grid.crs is None:
         raise ValueError("the grid has no CRS: make it with one, such as fifesim.grid_at('EPSG:26914', ...)")
+    if (flat := projection.horizontal(grid.crs)) is not grid.crs:
+        grid = GeoBox(grid.shape, grid.affine, flat)
     if grid.crs.geographic:
         raise ValueError(
-            f"the grid is in a geographic CRS ({_crs_name(grid.crs)}), whose cells are degrees: "
+            f"the grid is in a geographic CRS ({projection.name_of(grid.crs.proj)}), whose cells are degrees: "
             "reproject it to a projected CRS in metres, for instance with .rio.reproject('EPSG:26914')"
         )
-    if not all(unit in ("metre", "meter", "m") for unit in grid.crs.units):
-        raise ValueError(f"the CRS must be in metres, {_crs_name(grid.crs)} is in {grid.crs.units[0]}: reproject")
     a = grid.affine
     if a.b or a.d or a.a <= 0 or a.e >= 0:
         raise ValueError(
             f"the grid must be north up and not rotated, got the transform {tuple(a)[:6]}: "
             "sort it with .sortby('y', ascending=False) or reproject it"
         )
+    projection.check_metres(grid.crs.proj, tuple(grid.boundingbox))
     return grid
 
 
@@ -304,7 +310,7 @@ def in_words(grid):
     a = grid.affine
     return (
         f"{grid.shape.y} x {grid.shape.x} cells of {-a.e:g} x {a.a:g} m from {a.c:.3f} E {a.f:.3f} N "
-        f"in {_crs_name(grid.crs)}"
+        f"in {projection.name_of(grid.crs.proj)}"
     )
 
 
@@ -337,7 +343,3 @@ def _exact_cell(array, cell_x, cell_y):
         if np.allclose((numbers[1], numbers[5]), (cell_x, cell_y), rtol=1e-6):
             return numbers[1], numbers[5]
     return cell_x, cell_y
-
-
-def _crs_name(crs):
-    return f"EPSG:{crs.epsg}" if crs.epsg else str(crs)[:60]

@@ -1,11 +1,21 @@
 """Coordinates from one reference system to another, by operations whose accuracy is known."""
 
+import re
 import warnings
+from functools import lru_cache
 
 import numpy as np
 import pyproj
 from pyproj.aoi import AreaOfInterest
+from pyproj.exceptions import CRSError
 from pyproj.transformer import TransformerGroup
+
+from fifesim.base.foreign import in_a_line, shown
+
+# By how much a metre of a grid may differ from one on the ground. [1]
+_SCALE_BOUND = 0.035
+# A place that comes back this far from where it was lies where the projection does not reach. [m]
+_RETURNS = 1.0
 
 
 def operation(source, target, area=None):
@@ -50,9 +60,9 @@ def operation(source, target, area=None):
     if all(steps):
         return _pipeline(*steps), float(sum(step.accuracy for step in steps))
     raise ValueError(
-        f"no operation of known accuracy leads from {_name(source)} to {_name(target)}: PROJ would only assume that "
-        "both datums agree ('ballpark'), which can be off by 100 m. Name the datum of the data in its CRS, or install "
-        "PROJ's grid files (projsync), or reproject the data yourself"
+        f"no operation of known accuracy leads from {name_of(source)} to {name_of(target)}: PROJ would only assume "
+        "that both datums agree ('ballpark'), which can be off by 100 m. Name the datum of the data in its CRS, or "
+        "install PROJ's grid files (projsync), or reproject the data yourself"
     )
 
 
@@ -100,11 +110,136 @@ def _pipeline(*steps):
 
 def _north_first(crs):
     """Whether a CRS gives northing or latitude before easting or longitude."""
-    return pyproj.CRS.from_user_input(crs).axis_info[0].direction == "north"
+    first, second = pyproj.CRS.from_user_input(crs).axis_info[:2]
+    # From a pole both axes lead north, or both south: only their names tell.
+    return first.name.startswith("North") if first.direction == second.direction else first.direction == "north"
 
 
-def _name(crs):
-    return f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else crs.name
+@lru_cache
+def horizontal(crs):
+    """
+    The part of a CRS that maps: a height beside it is left out.
+
+    Parameters
+    ----------
+    crs : CRS, str or int
+        Anything that pyproj takes.
+
+    Returns
+    -------
+    crs : CRS, str or int
+        The same where it has no height.
+
+    Raises
+    ------
+    ValueError
+        If PROJ knows no such CRS.
+
+    Examples
+    --------
+    >>> horizontal("EPSG:26914+5703")
+    'EPSG:26914'
+    """
+    try:
+        found = pyproj.CRS.from_user_input(crs)
+    except (CRSError, RecursionError):
+        raise ValueError(
+            f"crs = {shown(crs)}: PROJ knows no such coordinate reference system; type one such as 'EPSG:26914'"
+        ) from None
+    if len(found.axis_info) < 3 or found.is_geocentric:
+        return crs
+    flat = found.to_2d()
+    return f"EPSG:{flat.to_epsg()}" if flat.to_epsg() else flat.to_wkt()
+
+
+def check_metres(crs, bounds):
+    """
+    Refuse a CRS whose coordinates, at a place, are not metres east and north on the ground.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS
+    bounds : (float, float, float, float)
+        West, south, east, north of the place.
+
+    Raises
+    ------
+    ValueError
+        If it is not projected, is in other units, has axes that lead elsewhere, does not reach the place, or has a
+        scale there that is not within 3.5 % of one.
+
+    Notes
+    -----
+    The scale is the largest and the smallest in any direction (Tissot's), at corners and middle. Both axes of a polar
+    CRS lead north, or both south.
+    """
+    name = name_of(crs)
+    if not crs.is_projected:
+        raise ValueError(f"the CRS must be projected, {name} is not: reproject, for instance to EPSG:26914")
+    if not all(axis.unit_name in ("metre", "meter", "m") for axis in crs.axis_info):
+        raise ValueError(f"the CRS must be in metres, {name} is in {crs.axis_info[0].unit_name}: reproject")
+    ways = {axis.direction for axis in crs.axis_info}
+    if ways not in ({"east", "north"}, {"north"}, {"south"}):
+        raise ValueError(f"the axes of the CRS must lead east and north, those of {name} lead {' and '.join(ways)}")
+    west, south, east, north = bounds
+    for x, y in (((west + east) / 2, (south + north) / 2), (west, north), (east, north), (west, south), (east, south)):
+        scale, longitude, latitude = _scale(crs, x, y)
+        if scale is None:
+            raise ValueError(
+                f"west = {west:.10g}, north = {north:.10g}: the grid lies outside of the area of {name}{_reach(crs)}; "
+                "type its corner and size in metres of the CRS"
+            )
+        if abs(scale - 1) > _SCALE_BOUND:
+            raise ValueError(
+                f"the scale of {name} is {scale:.3f} at longitude {longitude:.2f}, latitude {latitude:.2f}: a metre of "
+                f"a grid may be {_SCALE_BOUND:.1%} off; use another CRS, such as {_undistorted(longitude, latitude)}"
+            )
+
+
+@lru_cache(maxsize=1024)
+def _scale(crs, x, y):
+    """Scale furthest from one at a point, None where the CRS does not reach it; longitude and latitude. [degree]"""
+    # Longitude from the CRS's own prime meridian, for `get_factors` takes none other into account.
+    plane = pyproj.Proj(re.sub(r"\+pm=\S+", "", pyproj.Proj(crs).srs))
+    longitude, latitude = plane(x, y, inverse=True, errcheck=False)
+    if not np.allclose(plane(longitude, latitude, errcheck=False), (x, y), rtol=0, atol=_RETURNS):
+        return None, longitude, latitude
+    found = plane.get_factors(longitude, latitude, errcheck=False)
+    extremes = found.tissot_semimajor, found.tissot_semiminor
+    scale = max(extremes, key=lambda each: abs(each - 1)) if np.all(np.isfinite(extremes)) else None
+    return scale, longitude, latitude
+
+
+def _reach(crs):
+    """Words on the coordinates that a CRS is made for, where PROJ knows them."""
+    if crs.area_of_use is None:
+        return ""
+    to_plane = pyproj.Transformer.from_crs(crs.geodetic_crs, crs, always_xy=True)
+    west, south, east, north = to_plane.transform_bounds(*crs.area_of_use.bounds)
+    return f", {west:.0f} to {east:.0f} E and {south:.0f} to {north:.0f} N" if np.isfinite(west + north) else ""
+
+
+def _undistorted(longitude, latitude):
+    """EPSG code of the UTM zone of a place, or of the stereographic projection of its pole."""
+    if not -80 <= latitude <= 84:
+        return "EPSG:5041" if latitude > 0 else "EPSG:5042"
+    return f"EPSG:{32601 + int((longitude + 180) // 6) % 60 + (0 if latitude >= 0 else 100)}"
+
+
+@lru_cache
+def name_of(crs):
+    """
+    A CRS as messages name it.
+
+    Parameters
+    ----------
+    crs : pyproj.CRS
+
+    Returns
+    -------
+    name : str
+    """
+    return f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else in_a_line(crs.name, 60)
 
 
 def degrees(grid):

@@ -1,16 +1,29 @@
 """Every key of a scenario: its default, unit, range and meaning. What physics says of a value is beside its meaning."""
 
 import math
-from typing import Literal
+import re
+from datetime import datetime
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from fifesim.base import fife
+from fifesim.base.foreign import shown
 from fifesim.scenario.section import Section, file, nearest, number, seed, text
 
 LAND_FORMS = ("flint-hills", "flat")
 INTERVALS = ("product", "native")
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
+
+# A date alone has no sun, and 06/07/1987 is in June or in July.
+_TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,6})?)?(Z|[+-]\d\d:\d\d)?", re.ASCII)
+_YEARS = 1700, 2200  # what dates in nanoseconds hold
+
+
+# By the name of a band, a spectrum or a part of a leaf.
+_ByName = dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False)]]
+_LONGEST_NAME = 60
+_LEAST_HOTSPOT = 1e-6  # below it the hot spot is narrower than the sun
 
 
 class GridKeys(Section):
@@ -21,7 +34,7 @@ class GridKeys(Section):
     north: float = number(fife.CORNERS["NAD83"][2], "m", "northing of the upper left corner")
     width: float = number(fife.SIZE, "m", "west to east", gt=0)
     height: float = number(fife.SIZE, "m", "north to south", gt=0)
-    cell: float = number(30 / 9, "m", "size of a cell", gt=0)
+    cell: float = number(30 / 9, "m", "size of a cell", ge=0.001)
 
 
 class GroundKeys(Section):
@@ -33,19 +46,34 @@ class GroundKeys(Section):
     method: Literal["streaming", "periodic"] = text("streaming", "streaming, or the paper's periodic (in memory)")
     lai_file: str | None = file(None, "a LAI map to use instead of a random field")
     leaf_angles: str = text("spherical", "leaf angle distribution")
-    hotspot: float = number(0.0, "1", "leaf size over canopy height", ge=0)
+    hotspot: float = number(0.0, "1", "leaf size over canopy height", ge=0, le=10)
     fpar_inf: float = number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
-    leaf_reflectance: dict[str, float] = text({}, "by band [1]; all bands or none")
-    leaf_transmittance: dict[str, float] = text({}, "by band [1]; all bands or none")
-    background: dict[str, float] = text({}, "reflectance below the canopy by band [1]; all bands or none")
-    leaf: dict[str, float] = text(
+    leaf_reflectance: _ByName = text({}, "by band [1]; all bands or none")
+    leaf_transmittance: _ByName = text({}, "by band [1]; all bands or none")
+    background: _ByName = text({}, "reflectance below the canopy by band [1]; all bands or none")
+    leaf: _ByName = text(
         {},
         "instead of leaf optics by band: structure [1], chlorophyll, carotenoids, anthocyanins [ug cm-2], "
         "brown [1], water [cm], dry_matter [g cm-2]",
     )
-    background_spectra: dict[str, float] = text(
+    background_spectra: _ByName = text(
         {}, "instead of background by band: shares of soil_dry, soil_wet, dead_grass, golden_grass, shade"
     )
+
+    @field_validator("hotspot")
+    @classmethod
+    def _wide_enough(cls, value):
+        if 0 < value < _LEAST_HOTSPOT:
+            raise ValueError(f"must be 0, for no hot spot, or at least {_LEAST_HOTSPOT:g}")
+        return value
+
+    @field_validator("leaf_reflectance", "leaf_transmittance", "background", "leaf", "background_spectra")
+    @classmethod
+    def _names_that_print(cls, value):
+        for name in value:
+            if len(name) > _LONGEST_NAME or not name.isprintable():
+                raise ValueError(f"{shown(name)} is no name: names have up to {_LONGEST_NAME} characters that print")
+        return value
 
     @model_validator(mode="after")
     def _one_description(self):
@@ -89,13 +117,30 @@ class TerrainKeys(Section):
 class SunAndViewKeys(Section):
     """Directions; the sun's from time and place, or given by sza and saa."""
 
-    time: str = text(fife.TIME, "UTC; a hypothetical overpass by default")
+    time: str = text(
+        fife.TIME, "date and time of day, UTC without an offset such as -05:00; a hypothetical overpass by default"
+    )
     latitude: float = number(fife.LATITUDE, "degree", "north", ge=-90, le=90)
     longitude: float = number(fife.LONGITUDE, "degree", "east", ge=-180, le=360)
     sza: float | None = number(None, "degree", "solar zenith, instead of that of time and place", ge=0, lt=90)
-    saa: float | None = number(None, "degree", "solar azimuth, clockwise from north")
+    saa: float | None = number(None, "degree", "solar azimuth, clockwise from north", ge=-360, le=360)
     vza: float = number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=75)
-    vaa: float = number(0.0, "degree", "azimuth toward the sensor, clockwise from north")
+    vaa: float = number(0.0, "degree", "azimuth toward the sensor, clockwise from north", ge=-360, le=360)
+
+    @field_validator("time", mode="before")
+    @classmethod
+    def _full_date(cls, value):
+        # TOML has dates of its own.
+        written = value.isoformat() if isinstance(value, datetime) else value
+        try:
+            if _TIME.fullmatch(written) and _YEARS[0] <= datetime.fromisoformat(written).year < _YEARS[1]:
+                return written
+        except (TypeError, ValueError):
+            pass
+        raise ValueError(
+            f"must be a date and a time of day from {_YEARS[0]} to {_YEARS[1]}, such as '1987-06-06T16:35:00Z' or "
+            "'1987-06-06 11:35-05:00'"
+        )
 
     @model_validator(mode="after")
     def _whole_sun(self):

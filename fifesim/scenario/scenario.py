@@ -1,6 +1,11 @@
 """The scenario of a run: every number with its unit and range, and what they mean."""
 
+import os
+
+from fifesim.atmosphere.schemes import six_s
+from fifesim.atmosphere.schemes.engines import check_zenith
 from fifesim.base import geometry
+from fifesim.base.foreign import shown
 from fifesim.rasters import grid as grids
 from fifesim.rasters import warp
 from fifesim.scenario.keys import GridKeys, Keys
@@ -60,19 +65,55 @@ class Scenario(Keys):
         Raises
         ------
         ValueError
-            If the image would have fewer than 2 x 2 pixels, or the grid, optics or bands are not possible.
+            If the image would have fewer than 2 x 2 pixels, or pixels smaller than cells; if the grid, sun, optics or
+            bands are not possible, or a file is missing.
+        ImportError
+            If the engine is not installed.
         """
+        for (section, key), path in self.files.items():
+            if not os.path.exists(path) and not path.startswith("/vsi"):
+                raise ValueError(f"{section}.{key} = {shown(path)}: there is no such file")
         box, own = self.geobox(), self.sensor
         bands = [band.response for band in own.description.select(own.bands)]
-        if min(grids.aligned(box, own.size).shape) < 2:
-            raise ValueError(
-                f"grid: the image must have 2 x 2 pixels of {own.size:g} m or more, got {grids.in_words(box)}"
-            )
+        self._check_image(box)
+        self._check_air()
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
         sections = {"ground": ground, "terrain": self.terrain, "sensor": sensor}
         whole = {name: section.with_whole_paths() for name, section in sections.items()}
         return self.model_copy(update={"grid": grid_keys(box), **whole})
+
+    def _check_image(self, box):
+        """Pixels must be at least cells, and see them."""
+        own, cell = self.sensor, max(grids.cell_size(box))
+        spaced = {"pixel": (own.size, own.size)}
+        if own.interval == "native":
+            spaced["interval"] = own.description.ground_intervals(own.description.select(own.bands)[0])
+        elif own.interval != "product":
+            spaced["interval"] = own.interval, own.interval
+        for key, (down, across) in spaced.items():
+            if min(down, across) < cell * (1 - 1e-6) and (key, own.interval) != ("interval", "native"):
+                raise ValueError(
+                    f"sensor.{key} = {down:g} m is smaller than a cell of the ground: type {cell:g} m or more, or a "
+                    "smaller grid.cell"
+                )
+            fitting = int(box.shape.y * cell / down + 1e-6), int(box.shape.x * cell / across + 1e-6)
+            if min(fitting) < 2:
+                raise ValueError(
+                    f"grid: the image must have 2 x 2 pixels or more, sensor.{key} of {down:g} x {across:g} m fits "
+                    f"{fitting[0]} x {fitting[1]} times into {grids.in_words(box)}: type a larger width and height"
+                )
+            if any(abs(shift) >= size for shift, size in zip(own.offset, fitting, strict=True)):
+                raise ValueError(
+                    f"sensor.offset = {own.offset} pixels moves the image beyond the scene, which has {fitting[0]} x "
+                    f"{fitting[1]}: type smaller numbers"
+                )
+
+    def _check_air(self):
+        """Light must come through it, by an engine that is there."""
+        check_zenith("sza", self.sun_and_view().sza)
+        if self.atmosphere.engine == "6S":
+            six_s.check_installed()
 
     @property
     def files(self):

@@ -5,9 +5,11 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import get_args
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-_QUANTITY = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+from fifesim.base.foreign import check_regular, shown
+
+_QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
 
 def number(default, unit, description, **limits):
@@ -91,20 +93,22 @@ class Section(BaseModel):
     @classmethod
     def _strip_units(cls, values):
         if not isinstance(values, dict):
-            raise ValueError(f"expected a table of keys, got {values!r}")
+            raise ValueError(f"expected a table of keys, got {shown(values)}")
         return {key: cls._in_unit(key, value) for key, value in values.items()}
 
     @classmethod
     def _in_unit(cls, key, value):
         unit = cls.unit(key) if key in cls.model_fields else ""
+        if unit and isinstance(value, bool):
+            raise ValueError(f"{key} = {value}: {key} is in {unit}; write a number")
         if not unit or not isinstance(value, str):
             return value
-        match = _QUANTITY.fullmatch(value)
+        match = _QUANTITY.fullmatch(value.strip())
         if match is None and str in get_args(cls.model_fields[key].annotation):
             # A key that takes words beside numbers.
             return value
         if match is None or match[2] not in ("", unit):
-            raise ValueError(f"{key} = {value!r}: {key} is in {unit}; write a number, or a number and {unit!r}")
+            raise ValueError(f"{key} = {shown(value)}: {key} is in {unit}; write a number, or a number and {unit!r}")
         return float(match[1])
 
     @classmethod
@@ -143,6 +147,22 @@ class Section(BaseModel):
         found = Path(value).suffix.lower()
         return kind["suffix"] is None or (bool(found) if kind["suffix"] == "*" else found == kind["suffix"])
 
+    @field_validator("*")
+    @classmethod
+    def _openable(cls, value, info):
+        """A missing file is told by who reads it, which may know it by another name."""
+        if cls.names_a_file(info.field_name, value):
+            if not value:
+                raise ValueError("name a file, or drop the key")
+            value.encode()  # a ValueError where it could not be written
+            try:
+                check_regular(value)
+            except (FileNotFoundError, NotADirectoryError):
+                pass
+            except OSError as error:
+                raise ValueError(f"the file cannot be opened: {error.strerror}") from None
+        return value
+
     @property
     def files(self):
         """Files that the section names, a dict of their paths by key."""
@@ -151,7 +171,7 @@ class Section(BaseModel):
 
     def with_whole_paths(self):
         """The same with the full paths of its files, so that it can be run from elsewhere."""
-        return self.model_copy(update={key: str(Path(value).resolve()) for key, value in self.files.items()})
+        return self.model_copy(update={key: str(Path(value).absolute()) for key, value in self.files.items()})
 
 
 def nearest(value, allowed):

@@ -5,6 +5,7 @@ from dataclasses import asdict, fields
 from pydantic import field_validator, model_validator
 
 from fifesim.atmosphere.air import mixtures, models
+from fifesim.base.foreign import shown
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.prospect import Leaf
@@ -170,8 +171,18 @@ class Sensor(SensorKeys):
 
     @property
     def description(self):
-        """The instrument, a `fifesim.sensor.description.instruments.Instrument`."""
-        return instrument(self.instrument)
+        """
+        The instrument, a `fifesim.sensor.description.instruments.Instrument`.
+
+        Raises
+        ------
+        ValueError
+            If there is no such instrument, or its file is not right.
+        """
+        try:
+            return instrument(self.instrument)
+        except OSError as error:
+            raise ValueError(f"instrument = {shown(self.instrument)}: {error.strerror or error}") from None
 
     @property
     def size(self):

@@ -1,13 +1,19 @@
 """Scenarios as TOML text: spelled as keys may be, with one line a mistake, and written with every unit."""
 
 import inspect
-import tomllib
+import json
+import re
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from fifesim.base.foreign import in_a_line, read_toml, shown
 from fifesim.scenario.keys import Keys
 from fifesim.scenario.section import nearest
+
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+# The longest that is said of the mistakes of a scenario; a line of one is shorter.
+_LONGEST = 500
 
 
 def load_values(path):
@@ -26,20 +32,20 @@ def load_values(path):
     Raises
     ------
     ValueError
-        If it is missing or not TOML.
+        If it is missing, no regular file, too large, or not TOML.
     """
     path = Path(path)
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = read_toml(path)
     except OSError as error:
-        raise ValueError(f"cannot read the scenario {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path.name} is not valid TOML: {error}") from None
+        raise ValueError(in_a_line(f"cannot read the scenario {path}: {error.strerror}")) from None
+    folder = path.parent.absolute()
     for name, field in Keys.model_fields.items():
         table = values.get(name)
         for key, value in table.items() if isinstance(table, dict) else ():
-            if field.annotation.names_a_file(key, value):
-                table[key] = str((path.parent / value).resolve())
+            # A link stays one: what it leads to may have another suffix.
+            if field.annotation.names_a_file(key, value) and value:
+                table[key] = str(folder / value)
     return values
 
 
@@ -66,7 +72,17 @@ def validated(model, values):
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise ValueError("\n".join(_explain(item) for item in error.errors())) from None
+        raise ValueError(_shortened([_explain(item) for item in error.errors()])) from None
+
+
+def _shortened(lines):
+    """As many of some lines as can be read at once, and how many more there are."""
+    kept = lines[:1]
+    for line in lines[1:]:
+        if len("\n".join((*kept, line))) > _LONGEST - len("\nand 1000000 more"):
+            return "\n".join((*kept, f"and {len(lines) - len(kept)} more"))
+        kept.append(line)
+    return "\n".join(kept)
 
 
 def check_spelling(path):
@@ -111,7 +127,7 @@ def write_scenario(scenario):
                 tables += [
                     "",
                     f"[{name}.{key}]  # {meaning}",
-                    *(f"{band} = {number!r}" for band, number in value.items()),
+                    *(f"{_toml_key(part)} = {_toml(number)}" for part, number in value.items()),
                 ]
             elif value is None:
                 lines.append(f"# {key} =   # {meaning}")
@@ -125,22 +141,29 @@ def _toml(value):
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        # JSON escapes as TOML does, all but one character.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list):
         return "[" + ", ".join(map(_toml, value)) + "]"
     return repr(value)
 
 
+def _toml_key(name):
+    return name if _BARE_KEY.fullmatch(name) else _toml(name)
+
+
 def _explain(error):
     """One line that names the key, the value and what is allowed."""
-    key = ".".join(str(part) for part in error["loc"])
+    place, value = [str(part) for part in error["loc"]], error["input"]
+    key = in_a_line(".".join(place), 100)
     if error["type"] == "extra_forbidden":
         known = list(Keys.model_fields)
-        if len(error["loc"]) > 1 and error["loc"][0] in Keys.model_fields:
-            known = list(Keys.model_fields[error["loc"][0]].annotation.model_fields)
-        hint = nearest(str(error["loc"][-1]), known)
-        return f"unknown key {key} = {error['input']!r}: {hint}allowed are {', '.join(known)}"
+        if len(place) > 1 and place[0] in Keys.model_fields:
+            known = list(Keys.model_fields[place[0]].annotation.model_fields)
+        hint = nearest(place[-1], known)
+        return in_a_line(f"unknown key {key} = {shown(value)}: {hint}allowed are {', '.join(known)}")
     message = str(error["ctx"]["error"]) if error["type"] == "value_error" else error["msg"]
-    if isinstance(error["input"], dict):
-        return f"{key}: {message}"
-    return f"{key} = {error['input']!r}: {message}"
+    if isinstance(value, str):
+        # What others say of a value repeats it whole.
+        message = message.replace(repr(value), shown(value))
+    return in_a_line(f"{key}: {message}" if isinstance(value, dict) else f"{key} = {shown(value)}: {message}")

@@ -172,3 +172,24 @@ def test_position_moves_by_as_many_cells_as_the_window(cell):
     for shift in range(1, 6):
         moved = grids.lattice_position(whole[shift:, shift:])
         assert moved == (first[0] + shift, first[1] + shift)
+
+
+def test_raster_with_heights_beside_its_crs_lies_on_the_map():
+    grid = box("EPSG:26914")
+    raster = ramp(grid).rio.write_crs("EPSG:26914+5703")
+    assert grids.same_grid(grids.geobox(raster), grid)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "cell"),
+    [(0.0, 90.0, 30.0), (90.0, -90.0, 30.0), (90.0, 90.0, 0.0), (90.0, 90.0, 91.0), (float("nan"), 90.0, 30.0)],
+)
+def test_grid_without_a_cell_is_refused(width, height, cell):
+    with pytest.raises(ValueError, match=r"holds no cell of .* type a width and height of a cell or more"):
+        fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, width, height, cell)
+
+
+@pytest.mark.parametrize(("width", "cell"), [(1e12, 30.0), (90.0, 1e-9), (1e300, 1e-300), (float("inf"), 30.0)])
+def test_grid_of_more_cells_than_a_file_counts_is_refused(width, cell):
+    with pytest.raises(ValueError, match="holds over 2147483647 cells"):
+        fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, width, 90.0, cell)

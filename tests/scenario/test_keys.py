@@ -1,13 +1,15 @@
 """Keys: what is spelled, and what is left to physics."""
 
+import math
 import subprocess
 import sys
+from datetime import date, datetime, timedelta, timezone
 
 import pytest
 from pydantic import ValidationError
 
 from fifesim.atmosphere.air import models
-from fifesim.scenario.keys import AirKeys, Keys, SensorKeys, TerrainKeys
+from fifesim.scenario.keys import AirKeys, GridKeys, GroundKeys, Keys, SensorKeys, SunAndViewKeys, TerrainKeys
 from fifesim.scenario.scenario import Scenario
 
 
@@ -52,3 +54,49 @@ def test_impossible_values_are_refused(section, values, said):
 def test_optical_thickness_stands_in_the_place_of_visibility():
     assert AirKeys(aot=0.1).visibility is None
     assert AirKeys().visibility == 45.0
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        *("now", "today", "12:00", "-1987-06-06", "-1987-06-06T12:00", "1987-06-06", "1987-06", "06/07/1987 16:35"),
+        *("June 6 1987 16:35", "1987-W23-6T12:00", "1987-02-30T12:00", "1987-06-06T24:00", "NaT", "", " ", 1987, None),
+        *("1987-06-06T16:35 US/Central", "0001-01-01T12:00", "9999-12-31T23:59", date(1987, 6, 6)),
+    ],
+)
+def test_what_is_no_date_and_time_is_refused(time):
+    """It would be another sun tomorrow, or another date to another reader."""
+    with pytest.raises(ValidationError, match=r"must be a date and a time of day .* such as '1987-06-06T16:35:00Z'"):
+        SunAndViewKeys(time=time)
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        *("1987-06-06T16:35:00Z", "1987-06-06 16:35", "1987-06-06T16:35:00.0", "1987-06-06 11:35-05:00"),
+        datetime(1987, 6, 6, 16, 35),
+        datetime(1987, 6, 6, 11, 35, tzinfo=timezone(timedelta(hours=-5))),
+    ],
+)
+def test_time_is_utc_unless_it_names_an_offset(time):
+    sun = Scenario(geometry={"time": time}).sun_and_view()
+    assert sun == Scenario().sun_and_view()
+
+
+@pytest.mark.parametrize(
+    ("section", "values"),
+    [
+        (SunAndViewKeys, {"vaa": 1e20}),
+        (GridKeys, {"cell": 1e-9}),
+        (GridKeys, {"cell": True}),
+        (GroundKeys, {"hotspot": 5e-324}),
+        (GroundKeys, {"hotspot": 1e300}),
+        (GroundKeys, {"background": {"TM3": math.nan}}),
+        (GroundKeys, {"background": {"TM3": True}}),
+        (GroundKeys, {"background": {"TM\x1b3": 0.1}}),
+        (GroundKeys, {"background": {"TM3" * 100: 0.1}}),
+    ],
+)
+def test_nonsense_is_refused(section, values):
+    with pytest.raises(ValidationError):
+        section(**values)

@@ -10,6 +10,7 @@ import rasterio
 from affine import Affine
 
 import fifesim
+from fifesim.atmosphere.schemes import six_s
 from fifesim.base import fife
 from fifesim.base.geometry import earth_sun_distance
 from fifesim.rasters import grid as grids
@@ -200,3 +201,49 @@ def test_a_map_of_real_ground_lies_on_no_invented_hills():
     given = {"ground": {"lai_file": "lai.tif"}, "terrain": {"dem": "flint-hills"}}
     assert parse_scenario(given).terrain.dem == "flint-hills"
     assert Scenario(ground=Ground(lai_file="lai.tif")).terrain.dem == "flat"
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"grid": {"north": 1e300}}, "north = 1e+300: the grid lies outside of the area of EPSG:26914"),
+        ({"grid": {"north": 2**64}}, "north = 1.844674407e+19: the grid lies outside"),
+        ({"grid": {"west": 1e12}}, "west = 1e+12, north = 4334220: the grid lies outside"),
+        ({"grid": {"cell": 1000}}, "holds no cell of 1000 x 1000 m: type a width and height of a cell or more"),
+        ({"grid": {"width": 1}}, "width = 1, height = 150 m holds no cell of 3.33333 x 3.33333 m"),
+        ({"grid": {"width": 1e12}}, "holds over 2147483647 cells of 3.33333 x 3.33333 m along a side"),
+        ({"grid": {"width": 10}}, "the image must have 2 x 2 pixels or more, sensor.pixel of 30 x 30 m fits 5 x 0"),
+        ({"grid": {"width": 30}}, "fits 5 x 1 times"),
+        ({"grid": {"width": 56}, "sensor": {"interval": "native"}}, "sensor.pixel of 30 x 30 m fits 5 x 1 times"),
+        ({"sensor": {"interval": 100.0}}, "sensor.interval of 100 x 100 m fits 1 x 3 times"),
+        ({"sensor": {"pixel": 0.1}}, "sensor.pixel = 0.1 m is smaller than a cell of the ground: type 3.33333 m or"),
+        ({"sensor": {"interval": 0.1}}, "sensor.interval = 0.1 m is smaller than a cell"),
+        (
+            {"sensor": {"offset": [0.0, 1000.0]}},
+            "sensor.offset = [0.0, 1000.0] pixels moves the image beyond the scene",
+        ),
+        ({"grid": {"crs": "nonsense\x1b"}}, r"crs = 'nonsense\x1b': PROJ knows no such coordinate reference system"),
+        ({"grid": {"crs": "EPSG:3857", "west": -1.075e7, "north": 4.7e6}}, "use another CRS, such as EPSG:32614"),
+        ({"geometry": {"time": "1987-06-06T06:00Z"}}, "the sun is below the horizon"),
+        ({"geometry": {"sza": 80, "saa": 0}}, "sza must be from 0 to 75 degrees, got 80"),
+        ({"ground": {"lai_file": "none.tif"}}, "ground.lai_file = 'none.tif': there is no such file"),
+    ],
+)
+def test_what_no_run_can_be_is_one_line_before_it_begins(values, said):
+    whole = {name: SMALL.get(name, {}) | values.get(name, {}) for name in {*SMALL, *values}}
+    with pytest.raises(ValueError) as caught:
+        parse_scenario(whole).complete()
+    assert said in str(caught.value)
+    assert str(caught.value).isprintable() and len(str(caught.value)) <= 500
+
+
+def test_heights_beside_a_crs_are_left_out():
+    found = parse_scenario(SMALL | {"grid": SMALL["grid"] | {"crs": "EPSG:26914+5703"}}).complete()
+    assert found.grid.crs == "EPSG:26914" and found.geobox() == parse_scenario(SMALL).geobox()
+
+
+def test_engine_that_is_not_installed_is_told_at_once(monkeypatch):
+    monkeypatch.setattr(six_s, "Py6S", None)
+    engine = parse_scenario(SMALL | {"atmosphere": {"engine": "6S"}})
+    with pytest.raises(ImportError, match="engine='6S' needs the 6S engine: type pip install"):
+        engine.complete()

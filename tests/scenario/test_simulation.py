@@ -7,12 +7,13 @@ import xarray as xr
 from lazy import no_compute
 
 import fifesim
-from fifesim.base import fife
+from fifesim.base import datasets, fife
 from fifesim.base.geometry import Geometry, earth_sun_distance
 from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import elevation
+from fifesim.sensor.description.instruments import instrument
 
 GRID = {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 600.0, "height": 450.0}
 
@@ -265,3 +266,42 @@ def test_every_key_of_a_scenario_reaches_its_stage():
     np.testing.assert_array_equal(tree["image"]["dn"], image)
     np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))
     np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fpar, 50.0, min_valid=1.0))
+
+
+def test_instrument_and_its_tables_lie_beside_the_scenario(tmp_path, monkeypatch):
+    """Wherever it is run from: the scenario's file, the instrument's beside it, and the table beside that."""
+    (tmp_path / "sensors").mkdir()
+    description = datasets.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
+    assert "avhrr_response.csv" in description
+    mine = description.replace("avhrr_response.csv", "responses.csv")
+    (tmp_path / "sensors" / "mine.toml").write_text(mine, encoding="utf-8")
+    table = datasets.path("avhrr_response.csv").read_text(encoding="utf-8")
+    (tmp_path / "sensors" / "responses.csv").write_text(table, encoding="utf-8")
+    bands = [band.name for band in instrument("AVHRR9").bands[:2]]
+    text = f"""
+        grid = {{ width = 9000.0, height = 9000.0, cell = 300.0 }}
+        terrain.dem = "flat"
+        sensor = {{ instrument = "sensors/mine.toml", bands = {bands}, pixel = 1500.0, min_valid = 0.5 }}
+    """
+    (tmp_path / "s.toml").write_text(text, encoding="utf-8")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    by_name = text.replace("sensors/mine.toml", "AVHRR9")
+    (elsewhere / "named.toml").write_text(by_name, encoding="utf-8")
+    mine, named = (
+        fifesim.simulate(fifesim.read_scenario(path).complete())["image"]["dn"].compute()
+        for path in ("../s.toml", "named.toml")
+    )
+    np.testing.assert_array_equal(mine, named)
+
+
+@pytest.mark.parametrize(
+    ("crs", "west", "north"), [("EPSG:3031", 0.0, 1.8e6), ("EPSG:3413", 0.0, -2.0e6), ("EPSG:5042", 2.1e6, 2.2e6)]
+)
+def test_polar_scene_is_simulated(crs, west, north):
+    grid = {"crs": crs, "west": west, "north": north, "width": 120.0, "height": 90.0, "cell": 10.0}
+    sun = {"sza": 60.0, "saa": 0.0}
+    case = parse_scenario({"grid": grid, "geometry": sun, "terrain": {"horizon_reach": 300}})
+    image = fifesim.simulate(case)["image"]["dn"].compute()
+    assert image.rio.crs == crs and image.shape == (2, 3, 4) and (image[:, 1, 1:3] > 0).all()

@@ -1,9 +1,14 @@
 """Scenarios as text."""
 
-import pytest
+import os
+import tomllib
 
-from fifesim.scenario.scenario import Scenario
-from fifesim.scenario.toml import check_spelling, load_values, write_scenario
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fifesim.scenario.scenario import Scenario, parse_scenario, read_scenario
+from fifesim.scenario.toml import _toml, _toml_key, check_spelling, load_values, write_scenario
 
 
 def written(tmp_path, text):
@@ -43,3 +48,93 @@ def test_quotes_and_backslashes_go_through(tmp_path):
     odd = Scenario(ground={"lai_file": 'a "map" in C:\\maps.tif'}, terrain={"dem": "flat"})
     path = written(tmp_path, write_scenario(odd))
     assert load_values(path)["ground"]["lai_file"].endswith('a "map" in C:\\maps.tif')
+
+
+@pytest.mark.parametrize(
+    "name", ["a\nb.tif", "a\tb", "\x1b[31mred.tif", "a\x7fb.tif", "röd 😀.tif", "a\u202eb", "\"'.tif", "a\\b"]
+)
+def test_any_name_of_a_file_is_read_back(tmp_path, name):
+    scenario = parse_scenario({"ground": {"lai_file": str(tmp_path / name)}})
+    path = written(tmp_path, write_scenario(scenario))
+    assert read_scenario(path) == scenario
+
+
+@pytest.mark.parametrize("name", ["B 3", "röd", 'b"3', "b.3", "b\\3", "", "=", "3"])
+def test_any_name_of_a_band_is_read_back(tmp_path, name):
+    scenario = parse_scenario({"ground": {"background": {name: 0.1, "TM3": 0.2}}})
+    assert read_scenario(written(tmp_path, write_scenario(scenario))) == scenario
+
+
+@given(st.text(st.characters(exclude_categories=["Cs"]), max_size=30), st.floats())
+def test_text_and_numbers_are_written_as_toml(text, number):
+    """tomllib reads what was meant."""
+    line = f"{_toml_key(text)} = {{ text = {_toml(text)}, list = {_toml([text, number])}, flag = {_toml(True)} }}"
+    found = tomllib.loads(line)[text]
+    assert (found["text"], found["list"][0], found["flag"]) == (text, text, True)
+    assert found["list"][1] == number or number != number
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "suffix"),
+    [
+        *(("ground", "lai_file", ".tif"), ("terrain", "dem", ".tif"), ("ground", "distribution", ".csv")),
+        ("sensor", "instrument", ".toml"),
+    ],
+)
+def test_no_file_of_a_scenario_makes_it_wait(tmp_path, section, key, suffix):
+    """A pipe would, for ever; each is a line that names the key, before anything is loaded."""
+    os.mkfifo(tmp_path / f"pipe{suffix}")
+    (tmp_path / f"folder{suffix}").mkdir()
+    (tmp_path / f"loop{suffix}").symlink_to(f"loop{suffix}")
+    (tmp_path / f"zero{suffix}").symlink_to("/dev/zero")
+    for name in ("pipe", "folder", "loop", "zero", "a" * 5000, "a\0b"):
+        said = refusal(written(tmp_path, f'{section}.{key} = "{name.replace(chr(0), chr(92) + "u0000")}{suffix}"'))
+        assert said.startswith(f"{section}.{key} = "), said
+
+
+def test_an_empty_name_is_no_file(tmp_path):
+    assert refusal(written(tmp_path, "[ground]\nlai_file = ''")) == (
+        "ground.lai_file = '': name a file, or drop the key"
+    )
+
+
+def refusal(path):
+    """What is said of a scenario by its spelling, in a few lines that print."""
+    with pytest.raises(ValueError) as caught:
+        check_spelling(path)
+    said = str(caught.value)
+    assert len(said) <= 500 and all(line.isprintable() for line in said.splitlines())
+    return said
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x = " + "[" * 5000, "nests its tables too deeply"),
+        ("[" + "a." * 5000 + "a]", "nests its tables too deeply"),
+        ("[ground]\n" + "k" * 5000 + " = 1", "allowed are distribution, arp"),
+        ("[ground]\n'\\x' = '\\'\n\"\\u001b[31m\" = 1", "ground.\\x1b[31m = 1"),
+        ("[ground]\nleaf_angles = 3\ndistribution = 4\n" + "".join(f"k{i} = 1\n" for i in range(999)), "and 99"),
+        ("grid.north = 0x" + "f" * 9000, "grid.north"),
+        ("grid.north = '1" + " " * 900_000 + "x'", "north is in m"),
+        ("[atmosphere]\nvisibility = '1.2.3'", "visibility is in km"),
+        ("#" * 2_000_000, "has 2000000 bytes"),
+    ],
+    ids=["brackets", "tables", "long key", "escape", "many", "digits", "spaces", "dots", "size"],
+)
+def test_a_message_is_short_and_prints(tmp_path, text, said):
+    assert said in refusal(written(tmp_path, text))
+
+
+def test_what_is_no_file_is_no_scenario(tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "loop.toml").symlink_to("loop.toml")
+    for name in ("pipe.toml", "loop.toml", ".", "/dev/zero", "a" * 5000, "none.toml"):
+        refusal(tmp_path / name)
+
+
+def test_a_link_is_followed_whatever_it_leads_to(tmp_path):
+    """What it leads to has no suffix that tells it from a name."""
+    (tmp_path / "version1").write_text("lai\n1\n2\n3\n")
+    (tmp_path / "samples.csv").symlink_to("version1")
+    assert read_scenario(written(tmp_path, "ground.distribution = 'samples.csv'")).ground.distribution.endswith(".csv")

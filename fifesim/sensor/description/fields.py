@@ -2,8 +2,18 @@
 
 from typing import Annotated, NamedTuple
 
-from pydantic import ConfigDict, Discriminator, Field, Tag
+from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
+
+from fifesim.base.foreign import shown
+
+
+def _prints(name):
+    """Names stand in messages, tables and files of images."""
+    if not name.isprintable():
+        raise ValueError(f"{shown(name)} must have characters that print")
+    return name
+
 
 CONFIG = ConfigDict(extra="forbid")
 
@@ -12,7 +22,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 Count = Annotated[int, Field(strict=True, gt=0)]
 Share = Annotated[float, Field(strict=True, gt=0, lt=1, allow_inf_nan=False)]
-Name = Annotated[str, Field(strict=True, min_length=1)]
+Name = Annotated[str, Field(strict=True, min_length=1, max_length=200), AfterValidator(_prints)]
 
 
 class AlongAcross(NamedTuple):

@@ -4,13 +4,13 @@ Instruments by name, and from files of one's own.
 The descriptions are the files ``data/instruments/*.toml``; a further instrument is a further file.
 """
 
-import tomllib
 from functools import lru_cache
 from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
 from fifesim.base import datasets
+from fifesim.base.foreign import in_a_line, read_toml, shown
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import lookup
 from fifesim.sensor.description.plausibility import check_units
@@ -48,8 +48,8 @@ def instrument(name):
     """
     if isinstance(name, Instrument):
         return name
-    if isinstance(name, Path) or (isinstance(name, str) and name.lower().endswith(".toml")):
-        path = Path(name)
+    if isinstance(name, Path) or (isinstance(name, str) and Path(name).suffix.lower() == ".toml"):
+        path = Path(name).absolute()
         # A file that has changed is read again; one that is not there is an error of reading.
         state = path.stat() if path.exists() else None
         return _read_again(path, state and (state.st_mtime_ns, state.st_size))
@@ -89,12 +89,13 @@ def read_instrument(path):
     Raises
     ------
     ValueError
-        If the file is no valid TOML, a key is missing, unknown or has a wrong value, or a number cannot be in the unit
-        of its key; the message names file, key and remedy.
+        If the file is no regular one or no valid TOML, a key is missing, unknown or has a wrong value, or a number
+        cannot be in the unit of its key; the message names file, key and remedy.
     FileNotFoundError
         If there is no such file.
     """
-    path = Path(path)
+    # Tables that it names lie beside it, wherever Python goes.
+    path = Path(path).absolute()
     found = _parse(path)
     try:
         check_units(found)
@@ -105,16 +106,14 @@ def read_instrument(path):
 
 def _parse(path):
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = read_toml(path)
     except FileNotFoundError:
-        raise FileNotFoundError(f"there is no instrument file {path}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path.name} is not valid TOML: {error}") from None
+        raise FileNotFoundError(f"there is no instrument file {in_a_line(str(path))}") from None
     try:
         return TypeAdapter(Instrument).validate_python(_with_folder(content, path.parent))
     except ValidationError as error:
         reasons = "; ".join(_explain(item) for item in error.errors())
-        raise ValueError(f"{path.name}: {reasons}") from None
+        raise ValueError(in_a_line(f"{path.name}: {reasons}")) from None
 
 
 def _with_folder(content, folder):
@@ -135,12 +134,12 @@ def _explain(error):
     if error["type"] == "missing":
         return f"the key {key} is missing"
     if error["type"] == "union_tag_invalid":
-        return f"{key}.kind = {error['ctx']['tag']!r}: it must be one of {error['ctx']['expected_tags']}"
+        return f"{key}.kind = {shown(error['ctx']['tag'])}: it must be one of {error['ctx']['expected_tags']}"
     if error["type"] == "union_tag_not_found":
         return f"the key {key}.kind is missing"
     if error["type"] == "value_error":
         return ": ".join(filter(None, (key, str(error["ctx"]["error"]))))
-    return f"{key} = {error['input']!r}: {error['msg']}"
+    return f"{key} = {shown(error['input'])}: {error['msg']}"
 
 
 def _key_parts(places):

@@ -1,5 +1,6 @@
 """Spectral responses as instrument files name them: in pyrsr, in a table beside the file, or written out."""
 
+import os
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +13,7 @@ from pyrsr.rsr import RSR_reader
 
 from fifesim.base import datasets
 from fifesim.base.bands import Band
+from fifesim.base.foreign import check_regular, shown
 from fifesim.sensor.description.fields import CONFIG, Name, Number
 
 # No band of these instruments reaches 100 um, and none begins below 100 nm.
@@ -94,10 +96,12 @@ class ResponseTable(NamedResponse):
     def _read(self, name):
         beside = Path(self.folder) / self.table
         try:
-            path = beside if self.folder and beside.is_file() else datasets.path(self.table)
-        except FileNotFoundError:
+            # A name may be too long to ask for.
+            path = beside if self.folder and os.path.isfile(beside) else datasets.path(self.table)
+            check_regular(path)
+        except (OSError, ValueError):
             raise ValueError(
-                f"srf.table = {self.table!r}: no such file beside the instrument file or in the data folder"
+                f"srf.table = {shown(self.table)}: no such file beside the instrument file or in the data folder"
             ) from None
         table = pd.read_csv(path, comment="#", dtype={"satellite": str, "band": str})
         missing = {"satellite", "band", "wavelength", "response"} - set(table.columns)

@@ -64,7 +64,7 @@ def test_impossible_scene_is_refused_before_it_computes(site, options, message):
 
 
 def test_scene_too_large_for_memory_names_the_streaming_method():
-    grid = fifesim.grid_at("EPSG:26914", 0, 5e6, 4e6, 4e6, 1.0)
+    grid = fifesim.grid_at("EPSG:26914", 3e5, 5e6, 4e5, 4e5, 0.1)
     with pytest.raises(ValueError, match=r"needs .* GB of memory.*method=\"streaming\""):
         fifesim.lai_scene(grid, method="periodic")
 

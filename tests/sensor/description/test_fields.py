@@ -14,7 +14,7 @@ from fifesim.sensor.description.spatial_response import BoxcarResponse, TwoAxesR
         (Positive, (1e-9, 2), (0, -1.0, "1", float("inf"))),
         (Count, (1, 16), (0, 1.0, "1", True)),
         (Share, (0.5, 1e-3), (0.0, 1.0, 30.0)),
-        (Name, ("TM",), ("", 5)),
+        (Name, ("TM", "B 3", "röd"), ("", 5, "B\x1b[31m", "B\n", "B" * 201)),
     ],
 )
 def test_a_field_takes_its_own_kind_alone(field, right, wrong):

@@ -1,5 +1,7 @@
 """Instruments by name and from files of one's own, and what is said of mistakes in them."""
 
+import os
+import shutil
 import tomllib
 
 import numpy as np
@@ -67,3 +69,34 @@ def test_every_file_is_listed_under_the_name_it_gives():
     for path in TM_FILE.parent.glob("*.toml"):
         content = tomllib.loads(path.read_text(encoding="utf-8"))
         assert content["name"] in instrument_names()
+
+
+def test_a_file_that_would_wait_or_break_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "deep.toml").write_text("x = " + "[" * 5000)
+    for name, said in (("pipe.toml", "is a pipe: name a file"), ("deep.toml", "nests its tables too deeply")):
+        with pytest.raises(ValueError, match=said):
+            instrument(tmp_path / name)
+
+
+def test_what_is_said_of_a_value_is_short_and_prints(changed):
+    with pytest.raises(ValueError, match=r"bits = '\\x1baaa.*integer") as caught:
+        changed("bits = 8 ", f'bits = "\\u001b{"a" * 5000}" ')
+    assert len(str(caught.value)) <= 400 and str(caught.value).isprintable()
+
+
+def test_a_suffix_tells_a_file_from_a_name():
+    with pytest.raises(ValueError, match=r"unknown instrument '\.toml'"):
+        instrument(".toml")
+
+
+def test_tables_of_a_file_are_found_from_wherever_it_was_named(tmp_path, monkeypatch):
+    """A relative path means another file once Python is elsewhere."""
+    text = datasets.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text.replace("avhrr_response.csv", "own.csv"), encoding="utf-8")
+    shutil.copy(datasets.path("avhrr_response.csv"), tmp_path / "own.csv")
+    monkeypatch.chdir(tmp_path)
+    mine = instrument("mine.toml")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir("elsewhere")
+    assert [band.response for band in mine.bands] == [band.response for band in instrument("AVHRR9").bands]

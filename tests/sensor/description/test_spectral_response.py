@@ -1,5 +1,7 @@
 """Spectral responses of instrument files: written out, in a table, in pyrsr."""
 
+import os
+
 import numpy as np
 import pytest
 from pyrsr.rsr import RSR_reader
@@ -62,3 +64,14 @@ def test_limits_lie_at_half_of_the_maximum():
     found = ResponseList((0.5, 0.6, 0.7, 0.8, 0.9), (0.0, 1.0, 2.0, 1.0, 0.9)).read("a")
     assert found == Band("a", (0.5, 0.6, 0.7, 0.8, 0.9), (0.0, 1.0, 2.0, 1.0, 0.9))
     assert half_peak(found) == (0.6, 0.8)
+
+
+@pytest.mark.parametrize("table", ["pipe.csv", "folder.csv", "/dev/zero", "a" * 5000, "loop.csv"])
+def test_a_table_that_is_no_file_is_refused_at_once(changed, tmp_path, table):
+    """A pipe would be waited for."""
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "loop.csv").symlink_to("loop.csv")
+    table = str(tmp_path / table) if table == "pipe.csv" else table
+    with pytest.raises(ValueError, match="srf"):
+        changed(f"srf = {PYRSR}", f'srf = {{ table = "{table}", satellite = "X", band = "1" }}')

@@ -1,0 +1,88 @@
+"""What comes from outside: no file makes a reader wait, and no value spoils a message."""
+
+import os
+import socket
+
+import pytest
+
+from fifesim.base.foreign import check_regular, in_a_line, read_toml, shown
+
+
+def test_only_regular_files_are_opened(tmp_path, monkeypatch):
+    """A pipe that nobody writes to would wait for ever."""
+    os.mkfifo(tmp_path / "pipe")
+    with socket.socket(socket.AF_UNIX) as listening:
+        # From there: the path of a socket may be 107 characters long.
+        monkeypatch.chdir(tmp_path)
+        listening.bind("socket")
+        for name, kind in (("pipe", "a pipe"), (".", "a folder"), ("/dev/null", "a device"), ("socket", "a socket")):
+            for read in (check_regular, read_toml):
+                with pytest.raises(ValueError, match=f"is {kind}: name a file"):
+                    read(tmp_path / name)
+
+
+def test_a_missing_file_is_for_the_reader_to_tell(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        read_toml(tmp_path / "none.toml")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    with pytest.raises(OSError):
+        check_regular(tmp_path / "loop")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a = ", "not valid TOML"),
+        ("a = " + "[" * 100_000, "too deeply"),
+        ("a." * 100_000 + "a = 1", "too deeply"),
+        ("'a' . " * 100_000 + "a = 1", "too deeply"),
+        ("x = { " + "a." * 100_000 + "a = 1 }", "too deeply"),
+        ("a = " + "9" * 5000, "not valid TOML"),
+        ("a = 1\n" * 200_000, "has 1200000 bytes: a file of keys has at most 1000000"),
+        ("'\x1b' = 1", "not valid TOML"),
+    ],
+    ids=["cut", "brackets", "dots", "quoted", "dots inside", "digits", "size", "escape"],
+)
+def test_text_that_would_break_the_parser_is_refused(tmp_path, text, said):
+    (tmp_path / "a\x1bb.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=said) as caught:
+        read_toml(tmp_path / "a\x1bb.toml")
+    assert str(caught.value).startswith(r"a\x1bb.toml") and len(str(caught.value)) < 300
+    assert str(caught.value).isprintable()
+
+
+def test_the_dots_of_a_path_nest_nothing(tmp_path):
+    (tmp_path / "a.toml").write_text(f"file = '{'../' * 1000}a.b.tif'")
+    assert read_toml(tmp_path / "a.toml")["file"].endswith("a.b.tif")
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    (tmp_path / "a.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(ValueError, match=r"a\.toml is not valid TOML"):
+        read_toml(tmp_path / "a.toml")
+
+
+def deep(levels):
+    found = {}
+    for _ in range(levels):
+        found = {"a": found}
+    return found
+
+
+@pytest.mark.parametrize(
+    "value",
+    ["a" * 1000, "\x1b[31m\n", 16**6000, list(range(1000)), deep(100_000), {"k" * 1000: 1}, b"\0" * 1000, "röd\u202e"],
+    ids=["long", "escapes", "digits", "list", "deep", "key", "bytes", "right to left"],
+)
+def test_any_value_is_shown_in_a_few_characters(value):
+    assert len(shown(value)) <= 60 and shown(value).isprintable()
+
+
+@pytest.mark.parametrize("value", ["TM", 0.25, ["TM3", "TM4"], True, {}])
+def test_short_values_are_shown_as_python_writes_them(value):
+    assert shown(value) == repr(value)
+
+
+def test_the_end_of_a_long_line_stays():
+    line = in_a_line("key: " + "a\n" * 1000 + ": type another")
+    assert line.startswith("key: a\\n") and line.endswith(": type another") and len(line) <= 400

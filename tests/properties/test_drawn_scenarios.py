@@ -1,0 +1,251 @@
+"""
+Whatever is typed into a scenario: it is refused in a few lines, or it runs.
+
+Keys are drawn from the schema, a new one without a change here. A few hundred scenarios in the suite; ten thousand by
+
+    FIFESIM_DRAWS=10000 pytest tests/properties/test_drawn_scenarios.py --hypothesis-show-statistics
+"""
+
+import math
+import os
+import re
+import tomllib
+from datetime import datetime
+from types import UnionType
+from typing import get_args, get_origin
+
+import numpy as np
+import pytest
+import rasterio
+from affine import Affine
+from hypothesis import HealthCheck, event, given, settings
+from hypothesis import strategies as st
+
+import fifesim
+from fifesim.atmosphere.air import models
+from fifesim.base import datasets
+from fifesim.scenario.keys import Keys
+from fifesim.scenario.scenario import parse_scenario, read_scenario
+from fifesim.scenario.simulation import simulate
+from fifesim.scenario.toml import check_spelling, write_scenario
+
+DRAWS = int(os.environ.get("FIFESIM_DRAWS", 300))
+
+# Nine pixels of nine cells, on level ground: what is not drawn.
+SMALL = {"grid": {"width": 90.0, "height": 90.0, "cell": 10.0}, "terrain": {"dem": "flat"}}
+FEW_CELLS = 3000
+
+# Names that no description has; what no key takes is tried with every one.
+NAMES = [
+    *("EPSG:26914", "EPSG:32614", "EPSG:3857", "EPSG:5041", "EPSG:2277", "EPSG:4326", "EPSG:26914+5703", "+proj=utm"),
+    *fifesim.instrument_names(),
+    *models.PROFILES,
+    *("maritime", "urban", "dust:0.5+soot:0.5", "none", "dust:1e308+soot:-1"),
+    *("erectophile", "planophile", "campbell(1.5)", "verhoef(-0.35,-0.15)", "verhoef(9,9)"),
+    *("TM1", "tm4", "OLI4", "shot", "thermal", "ft", "km"),
+    *("1987-06-06T16:35:00Z", "1987-12-06 17:00", "now", "today", "12:00", "-1987-06-06", "2199-12-31T23:59-12:00"),
+    *("mine.toml", "lai.tif", "samples.csv", "none.tif", "none.toml", "pipe.tif", "pipe.toml", "pipe.csv", "loop.toml"),
+    *("folder", "folder.toml", "/dev/zero", "/dev/stdin", "~/lai.tif", "../" * 50 + "a.tif", "a" * 300 + ".csv"),
+]
+ODD_TEXTS = ["", " ", "\x1b[31mred", "a\nb.tif", "a\tb", "röd", "B 3", "a\x7fb", '"', "'", "\\", "\0", "\u202e", "😀"]
+ODD_NUMBERS = [0, -1, 1, 2**31, 2**63 - 1, 2**63, 2**64, 10**400, 1e12, 1e300, -1e300, 5e-324, 1e-9, 0.1]
+ODD_NUMBERS += [math.nan, math.inf, -math.inf]
+
+
+def words(field):
+    """Names that the description of a key tells."""
+    return re.findall(r"[\w-]+", field.description) + [f"{field.default}"]
+
+
+def limits(field):
+    """Numbers at which the range of a key ends."""
+    ends = ("ge", "gt", "le", "lt")
+    return [float(getattr(each, end)) for each in field.metadata for end in ends if hasattr(each, end)]
+
+
+def sound_numbers(field):
+    """Inside the range of a key and at its ends."""
+    ends = limits(field)
+    found = [end for end in ends if end < 1000] or [1.0, 30.0]
+    if len(ends) == 2 and ends[1] < 1e6:
+        found += [ends[0] + share * (ends[1] - ends[0]) for share in (0.01, 0.1, 0.5)]
+    if isinstance(field.default, float):
+        found += [field.default, field.default / 2, 1.01 * field.default, field.default + 10]
+    integer = int in (field.annotation, *get_args(field.annotation))
+    return st.sampled_from(sorted({int(each) if integer else each for each in found}))
+
+
+def odd_numbers(field):
+    """Beside the ends of the range of a key, and far from it."""
+    beside = [math.nextafter(end, way) for end in limits(field) for way in (math.inf, -math.inf)]
+    return st.sampled_from([*beside, *ODD_NUMBERS]) | st.floats() | st.integers()
+
+
+def sound_texts(field):
+    return st.sampled_from(words(field)) | st.sampled_from(words(field)) | st.sampled_from(NAMES)
+
+
+def odd_texts(field):
+    units = ["3 m", "3 px", "1.2.3", "1e999 m", "23 km", "1" + " " * 3000 + "x"]
+    long = st.integers(60, 5000).map(lambda length: "x" * length)
+    return st.sampled_from(ODD_TEXTS) | st.sampled_from(units) | st.text(max_size=20) | long
+
+
+def of_type(annotation, field, numbers, texts):
+    """Values of the type of a key."""
+    kinds = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
+    found = []
+    for kind in kinds:
+        origin, inner = get_origin(kind), get_args(kind)
+        if origin is list:
+            found.append(st.lists(of_type(inner[0], field, numbers, texts), max_size=3))
+        elif origin is dict:
+            found.append(st.dictionaries(texts(field), numbers(field), max_size=3))
+        elif kind is bool:
+            found.append(st.booleans())
+        elif kind in (int, float):
+            found.append(numbers(field))
+        elif kind is not type(None):
+            found.append(texts(field))
+    return st.one_of(found)
+
+
+SCALARS = st.just(datetime(1987, 6, 6, 16, 35)) | st.booleans() | st.sampled_from(ODD_NUMBERS) | st.text(max_size=9)
+LISTS = st.lists(SCALARS, max_size=3)
+ANYTHING = SCALARS | LISTS | st.dictionaries(st.text(max_size=9), SCALARS | LISTS, max_size=3)
+
+
+@st.composite
+def scenarios(draw):
+    """A small scenario, some keys of which are anything."""
+    found = {name: dict(keys) for name, keys in SMALL.items()}
+    if draw(st.integers(0, 9)) == 0:
+        # The whole site, or what a map covers.
+        del found["grid"]
+        found["ground"] = {"lai_file": "lai.tif"} if draw(st.booleans()) else {}
+    sections = st.sampled_from(list(Keys.model_fields))
+    wild = draw(st.integers(0, 2)) == 0
+    for _ in range(draw(st.integers(1, 3))):
+        section = draw(sections)
+        fields = Keys.model_fields[section].annotation.model_fields
+        key = draw(st.sampled_from(list(fields)))
+        field = fields[key]
+        value = of_type(field.annotation, field, sound_numbers, sound_texts)
+        if wild:
+            value |= of_type(field.annotation, field, odd_numbers, odd_texts) | ANYTHING
+        found.setdefault(section, {})[key] = draw(value)
+    if wild and draw(st.integers(0, 5)) == 0:
+        found.setdefault(draw(sections), {})[draw(st.text() | st.just("k" * 5000))] = draw(ANYTHING)
+    if wild and draw(st.integers(0, 5)) == 0:
+        found[draw(sections | st.text() | st.just("k" * 5000))] = draw(ANYTHING)
+    return found
+
+
+def toml(value):
+    """TOML of a value, tables inline."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{toml(key)} = {toml(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    if isinstance(value, str):
+        return "".join(f"\\U{ord(each):08x}" if not each.isalnum() else each for each in value).join('""')
+    if isinstance(value, bool | datetime):
+        return str(value).lower()
+    return repr(value)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Files beside the scenario, good and bad; what is slow the first time is done."""
+    folder = tmp_path_factory.mktemp("drawn")
+    tm = datasets.path("instruments/tm.toml").read_text(encoding="utf-8")
+    (folder / "mine.toml").write_text(tm, encoding="utf-8")
+    (folder / "samples.csv").write_text("lai\n1\n1.5\n2\n2.5\n3\n")
+    with rasterio.open(
+        folder / "lai.tif",
+        "w",
+        driver="GTiff",
+        height=20,
+        width=20,
+        count=1,
+        dtype="float32",
+        crs="EPSG:26914",
+        transform=Affine(10, 0, 704970, 0, -10, 4334220),
+    ) as sink:
+        sink.write(np.linspace(0.5, 3, 400, dtype="float32").reshape(1, 20, 20))
+    for name in ("pipe.tif", "pipe.toml", "pipe.csv"):
+        os.mkfifo(folder / name)
+    (folder / "loop.toml").symlink_to("loop.toml")
+    (folder / "folder.toml").mkdir()
+    small = parse_scenario(SMALL)
+    check_image(small, simulate(small))
+    return folder
+
+
+def check_refusal(error):
+    said = str(error)
+    assert said and len(said) <= 500, f"{len(said)} characters: {said}"
+    assert all(line.isprintable() for line in said.split("\n")), repr(said)
+
+
+def few(scenario):
+    """Whether a scenario is computed in a moment."""
+    terrain = scenario.terrain
+    cheap = scenario.atmosphere.engine == "5S" and not scenario.atmosphere.adjacency
+    near = terrain.dem == "flat" or (terrain.dem == "flint-hills" and terrain.horizon_reach < 1000)
+    return cheap and near and math.prod(scenario.geobox().shape) <= FEW_CELLS
+
+
+def check_image(scenario, run):
+    """Counts within their bits, and a truth that leaves can have."""
+    run = run.compute()
+    dn, truth = run["image"]["dn"], run["truth"]
+    assert min(dn.sizes["y"], dn.sizes["x"]) >= 2
+    assert dn.min() >= 0 and dn.max() < 2**scenario.sensor.description.bits
+    assert np.isfinite(truth["lai"]).any() and truth["lai"].min() >= 0
+    assert truth["fpar"].min() >= 0 and truth["fpar"].max() <= 1
+
+
+@settings(
+    max_examples=DRAWS,
+    derandomize="FIFESIM_DRAWS" not in os.environ,
+    deadline=20_000,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+@given(scenarios())
+def test_a_drawn_scenario_is_refused_in_a_few_lines_or_runs(folder, drawn):
+    text = "\n".join(f"{toml(name)} = {toml(keys)}" for name, keys in drawn.items())
+    tomllib.loads(text)
+    path = folder / "drawn.toml"
+    path.write_text(text, encoding="utf-8")
+    try:
+        check_spelling(path)
+        scenario = read_scenario(path)
+    except ValueError as error:
+        check_refusal(error)
+        event("refused as it is read")
+        return
+    check_same(path, scenario)
+    try:
+        whole = scenario.complete()
+    except (ValueError, ImportError) as error:
+        check_refusal(error)
+        event("refused as it is completed")
+        return
+    check_same(path, whole)
+    event("accepted")
+    if few(scenario):
+        try:
+            run = simulate(scenario)
+        except ValueError as error:
+            check_refusal(error)
+            event("refused as it is simulated")
+            return
+        check_image(scenario, run)
+        event("computed")
+
+
+def check_same(path, scenario):
+    """What is written reads as the same."""
+    path.write_text(write_scenario(scenario), encoding="utf-8")
+    assert read_scenario(path) == scenario
