@@ -139,7 +139,8 @@ def test_sensors_of_no_such_instrument_is_a_mistake(invoke, name, said):
         ('[terrain]\ndem = "flint-hils"\n', "did you mean 'flint-hills'"),
         ('[terrain]\ndem = "missing.tif"\n', "missing.tif"),
         ("[ground\n", "not valid TOML"),
-        ("[grid]\nwidth = 1e12\n", "of memory"),
+        ("[grid]\nwidth = 1e12\n", "smaller size"),
+        ("[grid]\ncell = 0.01\n", "too large for the memory"),
         ("[terrain]\nhorizon_reach = 100000\n", "50000"),
     ],
 )

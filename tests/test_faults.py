@@ -196,9 +196,11 @@ def small_disk(tmp_path):
     subprocess.run(["umount", place], capture_output=True)
 
 
-@pytest.mark.parametrize("size", ["2000k", *(pytest.param(size, marks=pytest.mark.slow) for size in ("100k", "3000k"))])
+@pytest.mark.parametrize(
+    "size", ["2000k", *(pytest.param(size, marks=pytest.mark.slow) for size in ("4k", "100k", "3000k"))]
+)
 def test_a_full_disk_leaves_what_is_finished_and_nothing_half_written(scenario, whole, small_disk, size):
-    """Full with the first blocks, with the last ones, and with the files that are made of them."""
+    """Before all else, with the first blocks, with the last ones, and with the files that are made of them."""
     out = small_disk(f"size={size}") / "out"
     done = run(scenario, "-o", out)
     assert done.returncode == 1, done.stdout

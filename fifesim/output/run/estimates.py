@@ -50,7 +50,7 @@ def estimate(scenario, folder=".", *, threads=None, scene=False):
     A piece of up to 2016 x 2016 cells of the same ground is simulated twice; the second time counts.
     """
     complete = scenario.complete()
-    check_size(complete, folder, scene)
+    check_size(complete, folder)
     threads = threads or usable_cores()
     tree = simulate(complete)
     found = products_of(tree)
@@ -63,7 +63,7 @@ def estimate(scenario, folder=".", *, threads=None, scene=False):
         "tasks": len(tasks),
         "threads": threads,
         "memory": used,
-        "disk": round(disk_of(complete, scene)),
+        "disk": round(disk_of(complete, scene)[1]),
         "seconds": _SLACK * lai.size / rate,
     }
 

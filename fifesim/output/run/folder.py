@@ -82,7 +82,7 @@ def simulate_to_folder(
     folder = Path(folder)
     check_folder(folder, overwrite, resume)
     complete = scenario.complete()
-    check_size(complete, folder, scene)
+    check_size(complete, folder)
     identity, names = identity_of(complete, scene), FILES + (SCENE,) * scene
     kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=_has_blocks)
     with _errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):

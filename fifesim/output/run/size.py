@@ -1,6 +1,8 @@
 """Whether a run fits on this machine, by arithmetic, before anything is made."""
 
+import errno
 import math
+import os
 import shutil
 from pathlib import Path
 
@@ -18,8 +20,8 @@ _CELL = 48
 # Of a cell of a scene from its field to its image, all in memory; measured, and half as much again. [byte]
 _CELL_IN_MEMORY = 400
 
-# Of a pixel of one band while its chunk is made, and of the truth beside the bands. [byte]
-_PIXEL, _TRUTH = 32, 16
+# Of a pixel of the truth, beside the bands. [byte]
+_TRUTH = 16
 
 # Blocks, the stream, its copy with overviews.
 _COPIES = 3.4
@@ -27,7 +29,7 @@ _COPIES = 3.4
 
 def disk_of(scenario, scene=False):
     """
-    Disk that a run needs while it computes, at most.
+    Disk that a run needs while it computes.
 
     Parameters
     ----------
@@ -38,15 +40,15 @@ def disk_of(scenario, scene=False):
 
     Returns
     -------
-    disk : float
-        [byte]
+    least, most : float
+        The blocks alone, and with the files that are made of them, the products of the scene in full. [byte]
     """
     bands = len(scenario.sensor.bands)
-    kept = _pixels(scenario) * (bands * math.ceil(scenario.sensor.description.bits / 8) + _TRUTH)
-    return _COPIES * kept + (_cells(scenario) * 8 * (bands + 2) if scene else 0)
+    blocks = _pixels(scenario) * (bands * math.ceil(scenario.sensor.description.bits / 8) + _TRUTH)
+    return blocks, _COPIES * blocks + (_cells(scenario) * 8 * (bands + 2) if scene else 0)
 
 
-def check_size(scenario, folder, scene=False):
+def check_size(scenario, folder):
     """
     Refuse a run that cannot fit.
 
@@ -56,30 +58,28 @@ def check_size(scenario, folder, scene=False):
         Complete.
     folder : path
         Of its results.
-    scene : bool, optional
-        With the products of the scene.
 
     Raises
     ------
     ValueError
-        If memory or disk does not suffice; the message says what is needed, what is free, and what fits.
+        If memory does not suffice; the message says what is needed, what is free, and what fits.
+    OSError
+        The same of the disk, which others may empty.
     """
-    grid, own = scenario.grid, scenario.sensor
-    cells, pixels = _cells(scenario), _pixels(scenario)
-    memory, disk = psutil.virtual_memory().available / 2, shutil.disk_usage(_existing(folder)).free
-    at_once = cells if scenario.ground.method == "periodic" else TILE**2
-    in_chunk = min(TILE**2, cells) * (grid.cell / own.pixel) ** 2
-    edge = math.sqrt(grid.width * grid.height)
-    for what, needed, free, key, value, power in (
-        ("memory", cells / TILE**2 * _GRAPH + min(at_once, cells) * _CELL, memory, "grid.width = grid.height", edge, 1),
-        ("memory", in_chunk * len(own.bands) * _PIXEL, memory, "sensor.pixel", own.pixel, -1),
-        ("disk", disk_of(scenario, scene), disk, "grid.width = grid.height", edge, 1),
+    grid, cells = scenario.grid, _cells(scenario)
+    at_once = cells if scenario.ground.method == "periodic" else min(cells, TILE**2)
+    memory = cells / TILE**2 * _GRAPH + at_once * _CELL, psutil.virtual_memory().available / 2
+    disk = disk_of(scenario)[0], shutil.disk_usage(_existing(folder)).free
+    for kind, said, (needed, free) in (
+        (ValueError, "too large for the memory", memory),
+        (OSError, os.strerror(errno.ENOSPC), disk),
     ):
         if needed > free:
-            fits = value * math.sqrt(free / needed) ** power
-            raise ValueError(
-                f"{cells:.3g} cells and {pixels:.3g} pixels need {_bytes(needed)} of {what}, of which {_bytes(free)} "
-                f"may be taken here: {key} = {fits:.2g} fits"
+            fits = math.sqrt(grid.width * grid.height * free / needed)
+            raise kind(
+                f"{said}: {cells:.3g} cells and {_pixels(scenario):.3g} pixels need {format_bytes(int(needed))}, "
+                f"of which {format_bytes(int(free))} may be taken here; grid.width = grid.height = {fits:.2g} fits, "
+                "or larger cells and pixels"
             )
 
 
@@ -100,8 +100,8 @@ def check_cells(cells):
     needed, free = cells**2 * _CELL_IN_MEMORY, psutil.virtual_memory().available / 2
     if needed > free:
         raise ValueError(
-            f"cells = {cells}: a scene of so many along its edge needs {_bytes(needed)} of memory, of which "
-            f"{_bytes(free)} may be taken here: cells = {int(math.sqrt(free / _CELL_IN_MEMORY)):.2g} fits"
+            f"cells = {cells}: a scene of so many along its edge needs {format_bytes(needed)} of memory, of which "
+            f"{format_bytes(int(free))} may be taken here: cells = {int(math.sqrt(free / _CELL_IN_MEMORY)):.2g} fits"
         )
 
 
@@ -117,7 +117,3 @@ def _existing(folder):
     """The folder, or the first above it that there is."""
     folder = Path(folder).absolute()
     return next(each for each in (folder, *folder.parents) if each.exists())
-
-
-def _bytes(number):
-    return format_bytes(int(number)) if number < 1e18 else f"{number:.1g} bytes"

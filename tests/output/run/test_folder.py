@@ -141,9 +141,12 @@ def test_a_uniform_map_has_no_line_and_still_a_report(tmp_path):
     assert "What NDVI tells" not in page and re.search("R² of .*none, all", page, re.DOTALL)
 
 
-@pytest.mark.parametrize("values", [2.0, np.nan])
-def test_an_image_without_a_valid_pixel_is_an_error_that_says_why(tmp_path, values):
-    offset = {"sensor": {"offset": [1000.0, 0.0]}} if values == 2.0 else {}
+@pytest.mark.parametrize(("values", "offset"), [(2.0, [9.5, 0.0]), (np.nan, [0.0, 0.0])])
+def test_an_image_without_a_valid_pixel_is_an_error_that_says_why(tmp_path, values, offset):
+    scenario = lai_map(tmp_path / "lai.tif", values) | {
+        "grid": {"width": 300, "height": 300},
+        "sensor": {"offset": offset},
+    }
     with pytest.raises(ValueError, match=r"no pixel of the image has 0\.98.*sensor\.offset"):
-        simulate_to_folder(parse_scenario(lai_map(tmp_path / "lai.tif", values) | offset), tmp_path / "out")
+        simulate_to_folder(parse_scenario(scenario), tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -1,7 +1,6 @@
 """What cannot fit is refused by arithmetic, with what fits."""
 
 import re
-import time
 from collections import namedtuple
 
 import pytest
@@ -18,40 +17,30 @@ def complete(**sections):
 
 
 @pytest.mark.parametrize(
-    ("sections", "said"),
-    [
-        ({"grid": {"width": 1e12}}, "of memory.*grid.width = grid.height"),
-        ({"grid": {"width": 900, "height": 600, "cell": 1e-9}}, "of memory.*grid.width = grid.height"),
-        ({"sensor": {"pixel": 0.001}}, "of memory.*sensor.pixel"),
-        ({"grid": {"width": 3e6, "height": 3e6}, "ground": {"method": "periodic"}}, "of memory"),
-    ],
+    "sections", [{"grid": {"cell": 0.01}}, {"grid": {"cell": 0.3}, "ground": {"method": "periodic"}}]
 )
-def test_what_cannot_fit_is_refused_at_once_with_what_fits(tmp_path, sections, said):
-    scenario = complete(**sections)
-    start = time.process_time()
-    with pytest.raises(ValueError, match=said):
-        check_size(scenario, tmp_path / "a" / "b")
-    assert time.process_time() - start < 1
+def test_what_cannot_fit_is_refused_at_once_with_what_fits(tmp_path, sections):
+    """The edge that the message names is accepted, and a fifth more is not."""
+    with pytest.raises(ValueError, match=r"memory.*grid\.width = grid\.height") as caught:
+        check_size(complete(**sections), tmp_path / "a" / "b")
+    edge = float(re.search(r"grid\.height = (\S+) fits", str(caught.value))[1])
 
+    def square(edge):
+        return complete(**sections | {"grid": sections["grid"] | {"width": edge, "height": edge}})
 
-def test_what_fits_fits(tmp_path, monkeypatch):
-    """The edge that the message names is accepted, and a tenth more is not."""
-    scenario = complete(grid={"width": 1e12})
-    with pytest.raises(ValueError, match="fits") as caught:
-        check_size(scenario, tmp_path)
-    edge = float(re.search(r"grid.height = (\S+) fits", str(caught.value))[1])
-    check_size(complete(grid={"width": 0.9 * edge, "height": 0.9 * edge}), tmp_path)
+    check_size(square(0.9 * edge), tmp_path)
     with pytest.raises(ValueError, match="fits"):
-        check_size(complete(grid={"width": 1.2 * edge, "height": 1.2 * edge}), tmp_path)
+        check_size(square(1.2 * edge), tmp_path)
 
 
 @pytest.mark.parametrize(("free", "refused"), [(1e6, True), (1e9, False)])
 def test_a_disk_that_is_too_small_is_named(tmp_path, monkeypatch, free, refused):
     scenario = complete()
-    assert disk_of(scenario) == pytest.approx(3.4 * 500**2 * (2 + 16), rel=0.01)
+    least, most = disk_of(scenario)
+    assert least == pytest.approx(500**2 * (2 + 16), rel=0.01) and most == 3.4 * least
     monkeypatch.setattr(size.shutil, "disk_usage", lambda path: namedtuple("Usage", "free")(int(free)))
     if refused:
-        with pytest.raises(ValueError, match=r"of disk.*fits"):
+        with pytest.raises(OSError, match=r"space.*fits"):
             check_size(scenario, tmp_path)
     else:
         check_size(scenario, tmp_path)
@@ -59,7 +48,7 @@ def test_a_disk_that_is_too_small_is_named(tmp_path, monkeypatch, free, refused)
 
 def test_the_cells_of_a_scene_are_on_the_disk_too(tmp_path):
     scenario = complete()
-    assert disk_of(scenario, scene=True) - disk_of(scenario) > 4 * 8 * 4000**2
+    assert disk_of(scenario, scene=True)[1] - disk_of(scenario)[1] > 4 * 8 * 4000**2
 
 
 def test_scenes_in_memory_are_judged_by_their_edge():

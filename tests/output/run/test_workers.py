@@ -98,16 +98,15 @@ def answer(place):
 
 
 STRANGER = """
-import os, sys
-from distributed import Client
+import asyncio, sys
+from distributed.comm import connect
 from distributed.security import Security
 tls = sys.argv[1]
-for address, options in ((tls, {}), (tls.replace("tls", "tcp"), {}), (tls, {"security": Security.temporary()})):
+for address, security in ((tls, Security()), (tls.replace("tls", "tcp"), Security()), (tls, Security.temporary())):
     try:
-        Client(address, timeout=2, set_as_default=False, **options)
-    except (OSError, TypeError) as error:
+        asyncio.run(connect(address, timeout=5, **security.get_connection_args("client")))
+    except (OSError, TypeError):
         print("refused", flush=True)
-os._exit(0)
 """
 
 
