@@ -140,6 +140,18 @@ def test_of_two_runs_at_once_one_wins_whole(scenario, whole, tmp_path, option, n
 
 
 @pytest.mark.slow
+def test_processes_that_fill_an_empty_cache_of_kernels_together_give_the_same_files(tmp_path):
+    (tmp_path / "small.toml").write_text("[grid]\nwidth = 300\nheight = 300\n")
+    new = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    commands = [[*COMMAND, str(tmp_path / "small.toml"), "-o", str(tmp_path / str(number))] for number in range(4)]
+    processes = [subprocess.Popen(command, env=new, stderr=subprocess.PIPE, text=True) for command in commands]
+    said = [process.communicate(timeout=PATIENCE)[1] for process in processes]
+    assert [process.returncode for process in processes] == [0] * 4, said
+    assert all(contents(tmp_path / str(number)) == contents(tmp_path / "0") for number in range(4))
+    assert any((tmp_path / "cache").rglob("*.nbc"))
+
+
+@pytest.mark.slow
 def test_a_half_written_block_is_made_again(scenario, whole, tmp_path):
     out = tmp_path / "out"
     process = start(scenario, "-o", out, "--threads", 1)
