@@ -200,7 +200,7 @@ def histogram_figure(image, truth, detail):
         )
     axes[0].set(xlabel="LAI [m² m⁻²]", ylabel="density", title="Leaf area index")
     axes[0].legend(frameon=False)
-    axes[1].hist(_finite(truth["fpar"]), bins=60, density=True, color="#1a9850", histtype="stepfilled")
+    axes[1].hist(_finite(truth["fpar"]), bins=60, density=True, histtype="stepfilled", color="#1a9850")
     axes[1].set(xlabel="FPAR", ylabel="density", title="True FPAR of the pixels")
     for band, color in zip(image["dn"]["band"].values, _colors(image["dn"].sizes["band"]), strict=True):
         counts = image["dn"].sel(band=band).values
