@@ -193,9 +193,13 @@ def verify():
 
     found = []
     _say(HEADING)
-    for deviation in deviations():
-        _say(line(deviation))
-        found.append(deviation)
+    try:
+        for deviation in deviations():
+            _say(line(deviation))
+            found.append(deviation)
+    except FileNotFoundError as error:
+        # A table that the installation lacks is no mistake of who asks.
+        _stop(error, Exit.FAILURE)
     _say(summary(found))
     if not all(deviation.within for deviation in found):
         raise typer.Exit(Exit.FAILURE)
