@@ -159,7 +159,7 @@ def test_nad27_file_lands_where_it_belongs(tmp_path):
 
 
 def test_files_that_cannot_be_used_are_named(tmp_path):
-    with pytest.raises(ValueError, match=r"no raster file at '.*missing\.tif'"):
+    with pytest.raises(ValueError, match=r"cannot read .*missing\.tif as a raster: no raster file is there"):
         fifesim.open_lai(tmp_path / "missing.tif", GRID)
     text = tmp_path / "text.tif"
     text.write_text("no raster")

@@ -164,7 +164,7 @@ class Model:
         return np.where(found, out, np.nan)
 
 
-def model_under(grid, raster, fill, vertical_units):
+def model_under(grid, raster, fill, vertical_units, allow_remote=False):
     """
     Elevation model under a grid.
 
@@ -176,6 +176,8 @@ def model_under(grid, raster, fill, vertical_units):
         Distance from known elevation up to which gaps are filled. [m]
     vertical_units : str or None
         Wins over what the raster says.
+    allow_remote : bool, optional
+        As of `fifesim.rasters.opening.raster_file`.
 
     Returns
     -------
@@ -189,7 +191,7 @@ def model_under(grid, raster, fill, vertical_units):
     grids.check_grid(grid)
     if fill is not None and (isinstance(fill, bool) or not fill > 0):
         raise ValueError(f"fill is a distance from known elevation, above 0 m, got {fill!r}: give for instance fill=60")
-    place = placement(open_source(raster, vertical_units), grid)
+    place = placement(open_source(raster, vertical_units, allow_remote), grid)
     sizes = place.cell_size()
     blocks = tuple(max(1, round(float(np.mean(grids.cell_size(grid))) / size)) for size in sizes)
     resolution = round(float(np.mean([count * size for count, size in zip(blocks, sizes, strict=True)])), 6)
