@@ -7,6 +7,7 @@ import shutil
 import tempfile
 import warnings
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import dask.array as da
@@ -148,7 +149,18 @@ def _cells(file, crs, chunks):
     if not isinstance(opened, xr.DataArray):
         raise ValueError(f"{file.name} holds several rasters: take one of them out of it with gdal_translate")
     opened = opened.rio.write_crs(crs)
-    return opened.load() if chunks is None else opened
+    if chunks is None:
+        return opened.load()
+    read = partial(_read_block, file, file.state, opened.dtype)
+    return opened.copy(data=da.map_blocks(read, chunks=opened.chunks, meta=np.empty((0, 0, 0), opened.dtype)))
+
+
+def _read_block(file, state, dtype, block_info=None):
+    """A chunk of a file, which has changed where its state has."""
+    (first, last), (top, bottom), (left, right) = block_info[None]["array-location"]
+    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
+        window = Window(left, top, right - left, bottom - top)
+        return source.read(list(range(first + 1, last + 1)), window=window).astype(dtype, copy=False)
 
 
 def _stacked(dataset):

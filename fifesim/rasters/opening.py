@@ -164,8 +164,9 @@ def _formats(path, around=()):
     if re.match(r"[\w+.-]{2,}:", path) or path.lstrip().startswith("<"):
         raise ValueError(f"{readable(path)} is an address or a description, no file, and is not opened: {_CURE}")
     _check_regular(path, path)
-    for beside in (f"{path}.msk", f"{path}.ovr"):
-        if os.path.exists(beside) and _leads_elsewhere(beside):
+    for beside in filter(os.path.exists, (f"{path}.msk", f"{path}.ovr")):
+        _check_regular(beside, beside)
+        if mosaics.is_description(beside):
             raise ValueError(f"beside {readable(path)} lies a description that GDAL follows: {_CURE}")
     if not mosaics.is_mosaic(path):
         return FORMATS
@@ -202,11 +203,6 @@ def _check_regular(path, said):
     raise ValueError(f"cannot read {readable(said)} as a raster: {reason}")
 
 
-def _leads_elsewhere(path):
-    _check_regular(path, path)
-    return mosaics.is_description(path) and not mosaics.is_mosaic(path)
-
-
 def _check_mosaic(path, around):
     """Refuse a mosaic of anything but files of known formats; GDAL would open its sources by any format."""
     said = f"{readable(path)} is a mosaic"
@@ -217,6 +213,10 @@ def _check_mosaic(path, around):
     for name in names:
         if os.path.realpath(name) in around or len(around) > _DEEPEST:
             raise ValueError(f"{said} that holds itself, or mosaics within mosaics without end")
-        if _leads_elsewhere(name):
-            raise ValueError(f"{said} of {readable(name, 90)}, a description that may lead elsewhere: {_CURE}")
-        _first_that_opens(name, _formats(name, around))
+        try:
+            formats = _formats(name, around)
+            if formats is FORMATS and mosaics.is_description(name):
+                raise ValueError(f"{readable(name, 80)} is a description that may lead elsewhere: {_CURE}")
+            _first_that_opens(name, formats)
+        except ValueError as error:
+            raise ValueError(f"{said} of a file that is not opened: {readable(error, 280)}") from None
