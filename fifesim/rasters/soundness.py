@@ -7,6 +7,7 @@ import pyproj.exceptions
 import rasterio
 import rasterio.errors
 
+from fifesim.rasters import projection
 from fifesim.rasters.opening import readable
 
 # Coordinates beyond are none of the Earth's in any unit. [m or degree]
@@ -50,8 +51,8 @@ def _check_place(source, name, north_up):
         lacks = "is placed by control points only" if source.gcps[0] else "has no geotransform"
         raise ValueError(f"{name} {lacks}: bring it onto a grid with gdalwarp -t_srs EPSG:26914")
     said = f"its geotransform is {tuple(float(f'{each:.6g}') for each in a[:6])}"
-    edges = np.array([a * (column, row) for column in (0, source.width) for row in (0, source.height)])
-    farthest = np.abs(edges).max()
+    columns, rows = np.meshgrid([0, source.width], [0, source.height])
+    farthest = np.abs(projection.transform_points(a, columns, rows)).max()
     across, down = np.hypot(a.a, a.d), np.hypot(a.b, a.e)
     upright = abs(a.a * a.e - a.b * a.d) > 1e-6 * across * down
     # Where cells are smaller, their coordinates are all one number.

@@ -24,6 +24,9 @@ _NODES = 12
 # Heights that land has, with room to spare. [m]
 LAND = (-500, 9000)
 
+# A window of more cells takes several GB with what is made of it.
+_MOST_CELLS = 2**27
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
@@ -53,7 +56,17 @@ class Source:
         -------
         values : array, shape (rows, columns)
             NaN where unknown. [m]
+
+        Raises
+        ------
+        ValueError
+            If the window is larger than what is read at once.
         """
+        if rows * columns > _MOST_CELLS:
+            raise ValueError(
+                f"{self.name} is far finer than the cells, {rows * columns:.2g} of its cells lie in a tile of them: "
+                "average it first, with gdalwarp -r average -tr and a cell between the two"
+            )
         out = np.full((rows, columns), np.nan)
         (first, last), (west, east) = (
             (min(max(start, 0), size), max(min(start + length, size), 0))
