@@ -13,9 +13,10 @@ import rasterio.errors
 
 from fifesim.rasters import mosaics
 
-# Formats that hold their cells themselves. GDAL has others that describe servers or name other files.
+# Formats that hold their cells themselves. GDAL has others that describe servers or name other files,
+# and netCDF's reader can be made to search without end.
 FORMATS = (
-    "GTiff", "HFA", "ENVI", "EHdr", "AAIGrid", "SRTMHGT", "DTED", "USGSDEM", "netCDF", "JP2OpenJPEG", "PNG", "JPEG",
+    "GTiff", "HFA", "ENVI", "EHdr", "AAIGrid", "SRTMHGT", "DTED", "USGSDEM", "JP2OpenJPEG", "PNG", "JPEG",
 )  # fmt: skip
 
 # File systems of GDAL that stay on this machine.

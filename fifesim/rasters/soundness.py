@@ -53,13 +53,16 @@ def _check_place(source, name, north_up):
     said = f"its geotransform is {tuple(float(f'{each:.6g}') for each in a[:6])}"
     columns, rows = np.meshgrid([0, source.width], [0, source.height])
     farthest = np.abs(projection.transform_points(a, columns, rows)).max()
-    across, down = np.hypot(a.a, a.d), np.hypot(a.b, a.e)
-    upright = abs(a.a * a.e - a.b * a.d) > 1e-6 * across * down
-    # Where cells are smaller, their coordinates are all one number.
-    if not (farthest < _FARTHEST and upright and min(across, down) > 1e-12 * farthest):
+    if not (farthest < _FARTHEST and _has_area(a, farthest)):
         raise ValueError(f"the cells of {name} have no place on the Earth, {said}: mend it with gdal_edit.py -a_ullr")
     if north_up and (a.b or a.d or a.a < 0 or a.e > 0):
         raise ValueError(f"{name} is rotated or not north up, {said}: bring it onto a grid with gdalwarp")
+
+
+def _has_area(a, farthest):
+    """Whether cells are no lines, and so large that their coordinates differ."""
+    across, down = np.hypot(a.a, a.d), np.hypot(a.b, a.e)
+    return min(across, down) > 1e-12 * farthest and abs(a.a * a.e - a.b * a.d) > 1e-6 * across * down
 
 
 def horizontal_crs(source, name):
