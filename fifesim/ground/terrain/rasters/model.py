@@ -198,8 +198,8 @@ def model_under(grid, raster, fill, vertical_units, allow_remote=False):
     sizes = place.cell_size()
     if (fill or 0) > _MOST_FILLED * min(sizes):
         raise ValueError(
-            f"fill={fill:g} is more than {_MOST_FILLED} cells of {place.source.name}, which are {min(sizes):.3g} m: give "
-            f"at most fill={_MOST_FILLED * min(sizes):.3g}"
+            f"fill={fill:g} is more than {_MOST_FILLED} cells of {place.source.name}, of {min(sizes):.3g} m: give at "
+            f"most fill={_MOST_FILLED * min(sizes):.3g}"
         )
     blocks = tuple(max(1, round(float(np.mean(grids.cell_size(grid))) / size)) for size in sizes)
     resolution = round(float(np.mean([count * size for count, size in zip(blocks, sizes, strict=True)])), 6)
