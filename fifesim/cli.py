@@ -61,6 +61,11 @@ app = typer.Typer(
 )
 
 
+_AllowRemote = Annotated[
+    bool, typer.Option("--allow-remote", help="Rasters may come from addresses, in any format of GDAL.")
+]
+
+
 def _version(asked: bool):
     if asked:
         from fifesim import __version__
@@ -80,6 +85,7 @@ def _main(
 
 @app.command()
 def simulate(
+    context: typer.Context,
     scenario: Annotated[Path | None, typer.Argument(help="TOML file; the whole FIFE site by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("fife"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
@@ -90,6 +96,7 @@ def simulate(
     scheduler: Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only estimate time, memory and disk.")] = False,
+    allow_remote: _AllowRemote = False,
 ):
     """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
     _check_spelling(scenario)
@@ -102,6 +109,8 @@ def simulate(
         from fifesim.output.run.workers import cluster
         from fifesim.scenario.scenario import Scenario, read_scenario
 
+    if allow_remote:
+        _open_remote(context)
     check_folder(output, overwrite, resume)
     found = scenario_to_resume(output) if resume and scenario is None else None
     found = found or (Scenario() if scenario is None else read_scenario(scenario))
@@ -139,12 +148,14 @@ def reproduce(
 
 @app.command()
 def budget(
+    context: typer.Context,
     scenario: Annotated[Path | None, typer.Argument(help="TOML file; the paper's case by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("budget"),
     realisations: Annotated[int, typer.Option(help="How many scenes.")] = 20,
     cells: Annotated[int, typer.Option(help="Along the edge of a scene.")] = 333,
     seed: Annotated[int | None, typer.Option(help="Of the first scene; the scenario's by default.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+    allow_remote: _AllowRemote = False,
 ):
     """Find where the scatter comes from, stage by stage: budget.csv, budget.png, report.html, scenario.toml."""
     _check_spelling(scenario)
@@ -153,6 +164,8 @@ def budget(
         from fifesim.experiments.scatter.folder import budget_to_folder
         from fifesim.scenario.scenario import read_scenario
 
+    if allow_remote:
+        _open_remote(context)
     found = None if scenario is None else read_scenario(scenario)
     options = {"realisations": realisations, "cells": cells, "seed": seed}
     _say(*budget_to_folder(found, output, overwrite=overwrite, **options))
@@ -214,6 +227,13 @@ def _importing():
     finally:
         gc.freeze()
         gc.enable()
+
+
+def _open_remote(context):
+    """For as long as the command runs."""
+    from fifesim.rasters.opening import remote_allowed
+
+    context.with_resource(remote_allowed())
 
 
 def _check_spelling(scenario):

@@ -203,6 +203,21 @@ def test_workers_and_a_scheduler_are_not_asked_for_together(invoke, small):
     assert "one of them" in result.stderr
 
 
+def test_what_leads_to_other_files_is_opened_where_that_is_allowed(invoke, tmp_path):
+    """A grid of SAGA is none of the formats that are opened unasked."""
+    profile = {"width": 30, "height": 30, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
+    transform = rasterio.transform.from_origin(705000, 4334100, 30, 30)
+    values = np.random.default_rng(1).uniform(1, 3, (1, 30, 30)).astype("float32")
+    with rasterio.open(tmp_path / "lai.sdat", "w", driver="SAGA", **profile, transform=transform) as sink:
+        sink.write(values)
+    (tmp_path / "lai.toml").write_text('[ground]\nlai_file = "lai.sdat"\n')
+    refused = invoke("simulate", "lai.toml", "-o", "out")
+    assert refused.exit_code == 2 and "--allow-remote" in refused.stderr
+    opened = invoke("simulate", "lai.toml", "-o", "out", "--allow-remote")
+    assert opened.exit_code == 0, opened.stderr
+    assert invoke("simulate", "lai.toml", "-o", "again").exit_code == 2
+
+
 def test_names_and_values_do_not_steer_the_terminal(invoke, tmp_path):
     (tmp_path / "wrong.toml").write_text('[ground]\n"\\u001b[31mred" = 1\n[grid]\ncrs = "\\u001b]0;title\\u0007"\n')
     for arguments in (["simulate", "wrong.toml"], ["sensors", "\x1b[31m"], ["simulate", "--\x1b[31m"], ["\x1b[2J"]):

@@ -7,6 +7,7 @@ import shutil
 import tempfile
 import warnings
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import dask.array as da
@@ -23,14 +24,15 @@ from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
+from fifesim.rasters.opening import ErrorsOfGdal, raster_file, readable
+from fifesim.rasters.soundness import check_memory, check_raster, horizontal_crs
+from fifesim.rasters.tags import TAG, read_tag, tag_of
 
 # GDAL's own block size for cloud-optimised files.
 _BLOCK = 512
 
 _TILED = {"driver": "GTiff", "tiled": True, "blockxsize": _BLOCK, "blockysize": _BLOCK, "bigtiff": "if_safer"}
 _COG = {"driver": "COG", "compress": "deflate", "predictor": "yes", "overview_resampling": "average"}
-# The tag that keeps names, types and attributes beyond what GDAL's model of a raster holds.
-_TAG = "FIFESIM"
 
 
 def to_geotiff(raster, path):
@@ -76,14 +78,14 @@ def to_geotiff(raster, path):
             "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()",
             stacklevel=2,
         )
-    with _whole(path) as (streamed, finished), _ErrorsOfGdal(path):
+    with _whole(path) as (streamed, finished), ErrorsOfGdal(f"cannot write {path}"):
         _stream(array, grid, streamed, described=raster)
         rasterio.shutil.copy(streamed, finished, blocksize=_BLOCK, **_COG)
         _check_written(streamed, finished, array)
     return path
 
 
-def open_image(path, chunks=None):
+def open_image(path, chunks=None, *, allow_remote=False):
     """
     Open a GeoTIFF with its bands, wavelengths, sun and calibration.
 
@@ -93,6 +95,8 @@ def open_image(path, chunks=None):
         Written by `to_geotiff`; of other files, what GDAL knows of the bands is read.
     chunks : mapping or int, optional
         Makes the result lazy.
+    allow_remote : bool, optional
+        Take addresses, and formats that lead to other files: only for what you trust.
 
     Returns
     -------
@@ -103,30 +107,60 @@ def open_image(path, chunks=None):
     Raises
     ------
     ValueError
-        If the file cannot be read as a raster.
+        If the file cannot be read as a raster, is of a format that is not opened, has no north-up grid in metres, or
+        takes more memory than there is.
+    OSError
+        If its cells cannot be read.
     """
+    file = raster_file(path, allow_remote)
+    with ErrorsOfGdal(f"cannot read {file.name}"):
+        with file.opened() as source:
+            check_raster(source, file.name, north_up=True)
+            crs = horizontal_crs(source, file.name)
+            if chunks is None:
+                cells = source.count * source.height * source.width
+                size = np.dtype(source.dtypes[0]).itemsize
+                check_memory(cells, size, f"all of {file.name}", "give chunks='auto', which reads it by parts")
+            description = read_tag(source, file.name)
+            written_here = description is not None
+            if not written_here:
+                description, storage = _gdal_description(source, file.name)
+        plain = _cells(file, crs, chunks)
     try:
-        with rasterio.open(path) as source:
-            kept = json.loads(source.tags().get(_TAG, "null"))
-            plain_description, storage = _gdal_description(source)
-        with warnings.catch_warnings():
-            # rioxarray has one scale and offset for all bands; here they are coordinates along band.
-            warnings.filterwarnings("ignore", "(Scales|Offsets) differ across bands")
-            opened = rioxarray.open_rasterio(path, chunks=chunks, mask_and_scale=False)
-            plain = opened.load() if chunks is None else opened
-    except rasterio.errors.RasterioIOError as error:
-        raise ValueError(f"cannot read {path} as a raster: {error}") from None
-    description = kept or plain_description
-    grid = grids.geobox(plain)
+        grid = grids.geobox(plain)
+    except ValueError as error:
+        raise ValueError(f"cannot place {file.name}: {readable(error, 250)}") from None
     array = xr.DataArray(plain.data, dims=("band", "y", "x"), name=description["name"])
-    if kept is None:
+    if not written_here:
         array = _physical(array, **storage)
-    coords = {name: _variable(item) for name, item in description["coords"].items()}
-    array = grids.place(array.assign_coords(coords), grid)
+    array = grids.place(array.assign_coords(description["coords"]), grid)
     array.attrs = dict(description["attrs"])
     if "gain" in array.coords:
         array.attrs["_FillValue"] = array.dtype.type(0)
     return array if "band" in description["dims"] else array.isel(band=0, drop=True)
+
+
+def _cells(file, crs, chunks):
+    """Cells of a file as they are stored, with coordinates."""
+    with warnings.catch_warnings():
+        # rioxarray has one scale and offset for all bands; here they are coordinates along band.
+        warnings.filterwarnings("ignore", "(Scales|Offsets) differ across bands")
+        opened = rioxarray.open_rasterio(file.path, driver=file.driver, chunks=chunks, mask_and_scale=False)
+    if not isinstance(opened, xr.DataArray):
+        raise ValueError(f"{file.name} holds several rasters: take one of them out of it with gdal_translate")
+    opened = opened.rio.write_crs(crs)
+    if chunks is None:
+        return opened.load()
+    read = partial(_read_block, file, file.state, opened.dtype)
+    return opened.copy(data=da.map_blocks(read, chunks=opened.chunks, meta=np.empty((0, 0, 0), opened.dtype)))
+
+
+def _read_block(file, state, dtype, block_info=None):
+    """A chunk of a file, which has changed where its state has."""
+    (first, last), (top, bottom), (left, right) = block_info[None]["array-location"]
+    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
+        window = Window(left, top, right - left, bottom - top)
+        return source.read(list(range(first + 1, last + 1)), window=window).astype(dtype, copy=False)
 
 
 def _stacked(dataset):
@@ -155,20 +189,6 @@ def _check_room(array, path):
     if free < needed:
         said = f"{os.strerror(errno.ENOSPC)}: {needed / 1e6:.1f} MB are needed, {free / 1e6:.1f} MB are free"
         raise OSError(errno.ENOSPC, said, str(path))
-
-
-class _ErrorsOfGdal:
-    """A context in which what rasterio raises, of classes that it does not all publish, is an error of the system."""
-
-    def __init__(self, path):
-        self._path = path
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, error, traceback):
-        if kind is not None and kind.__module__.partition(".")[0] == "rasterio":
-            raise OSError(f"cannot write {self._path}: {error.__cause__ or error}") from error
 
 
 def _check_written(streamed, finished, array):
@@ -236,25 +256,10 @@ def _lock(name):
 
 
 def _describe(sink, array, described):
-    described = described if isinstance(described, xr.DataArray) else array
-    kept = {
-        "name": array.name,
-        "dims": [str(dim) for dim in described.dims],
-        "attrs": {key: _plain(value) for key, value in array.attrs.items() if key != "_FillValue"},
-        "coords": {
-            name: {
-                "dims": list(value.dims),
-                "values": _plain(value.values),
-                "dtype": value.dtype.str,
-                "attrs": dict(value.attrs),
-            }
-            for name, value in array.coords.items()
-            if not {"y", "x"} & set(value.dims) and name != "spatial_ref"
-        },
-    }
+    kept = tag_of(array, described.dims if isinstance(described, xr.DataArray) else array.dims)
     scalars = {name: item["values"] for name, item in kept["coords"].items() if not item["dims"]}
     readable = {key: str(value) for key, value in (kept["attrs"] | scalars).items()}
-    sink.update_tags(**readable, **{_TAG: json.dumps(kept)}, AREA_OR_POINT="Area")
+    sink.update_tags(**readable, **{TAG: json.dumps(kept)}, AREA_OR_POINT="Area")
     names = [str(name) for name in array["band"].values] if "band" in array.coords else [str(array.name)]
     for number, name in enumerate(names, 1):
         sink.set_band_description(number, name)
@@ -274,17 +279,6 @@ def _describe_band(sink, number, band):
         sink.update_tags(number, ns="IMAGERY", CENTRAL_WAVELENGTH_UM=per_band["wavelength"])
 
 
-def _plain(value):
-    """Numbers and text as JSON has them."""
-    if isinstance(value, np.generic | np.ndarray):
-        return value.astype(str).tolist() if value.dtype.kind in "mM" else value.tolist()
-    return value
-
-
-def _variable(item):
-    return xr.DataArray(np.array(item["values"], item.get("dtype")), dims=item["dims"], attrs=item["attrs"])
-
-
 def _physical(array, scales, offsets, nodata):
     """Values of another program's file: masked, scaled, shifted; digital numbers of radiance with 0 for no data."""
     missing = xr.zeros_like(array, dtype=bool) if nodata is None else array == nodata
@@ -296,20 +290,29 @@ def _physical(array, scales, offsets, nodata):
     return array.where(~missing) * gain + offset
 
 
-def _gdal_description(source):
+def _gdal_description(source, file_name):
     """Names, calibration and wavelengths of a file that fifesim did not write, and how its values are stored."""
     names = [name or f"band{number}" for number, name in enumerate(source.descriptions, 1)]
-    coords = {"band": {"dims": ["band"], "values": names, "attrs": {}}}
-    wavelengths = [source.tags(number, ns="IMAGERY").get("CENTRAL_WAVELENGTH_UM") for number in source.indexes]
-    values = {"wavelength": [float(value) for value in wavelengths] if all(wavelengths) else None}
+    values = {"wavelength": _wavelengths(source, file_name)}
     counts = np.dtype(source.dtypes[0]).kind == "u" and set(source.units) == {cf.QUANTITIES["toa_radiance"].units}
     if counts:
         values |= {"gain": list(source.scales), "offset": list(source.offsets)}
+    coords = {"band": xr.DataArray(names, dims="band")}
     coords |= {
-        name: {"dims": ["band"], "values": value, "attrs": cf.attributes(name)}
-        for name, value in values.items()
-        if value
+        name: xr.DataArray(value, dims="band", attrs=cf.attributes(name)) for name, value in values.items() if value
     }
     units = {} if counts or not source.units[0] else {"units": source.units[0]}
     storage = {"scales": None if counts else source.scales, "offsets": source.offsets, "nodata": source.nodata}
     return {"name": "image", "dims": ["band", "y", "x"], "attrs": units, "coords": coords}, storage
+
+
+def _wavelengths(source, file_name):
+    """Of all bands in micrometres, or None."""
+    said = [source.tags(number, ns="IMAGERY").get("CENTRAL_WAVELENGTH_UM") for number in source.indexes]
+    try:
+        return [float(value) for value in said] if all(said) else None
+    except ValueError:
+        raise ValueError(
+            f"{file_name} has wavelengths such as {readable(said[0], 40)!r}, not all numbers: open it with "
+            "rioxarray.open_rasterio"
+        ) from None

@@ -11,7 +11,7 @@ import xarray as xr
 from lazy import ODD_CHUNKS, in_chunks, no_compute
 
 import fifesim
-from fifesim.rasters import cf
+from fifesim.rasters import cf, tags
 from fifesim.rasters import files as export
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
@@ -223,7 +223,7 @@ def test_chain_goes_on_from_a_masked_netcdf(image, tmp_path):
 
 def test_tag_is_json_that_others_can_read(image, tmp_path):
     with rasterio.open(fifesim.to_geotiff(image, tmp_path / "tm.tif")) as source:
-        kept = json.loads(source.tags()[export._TAG])
+        kept = json.loads(source.tags()[tags.TAG])
     assert kept["dims"] == ["band", "y", "x"]
     assert kept["coords"]["solar_irradiance"]["values"] == image["solar_irradiance"].values.tolist()
 

@@ -159,7 +159,7 @@ def test_nad27_file_lands_where_it_belongs(tmp_path):
 
 
 def test_files_that_cannot_be_used_are_named(tmp_path):
-    with pytest.raises(ValueError, match=r"no raster file at '.*missing\.tif'"):
+    with pytest.raises(ValueError, match=r"cannot read .*missing\.tif as a raster: no raster file is there"):
         fifesim.open_lai(tmp_path / "missing.tif", GRID)
     text = tmp_path / "text.tif"
     text.write_text("no raster")
@@ -192,3 +192,31 @@ def test_covering_grid_covers_the_file_in_whole_pixels(tmp_path, crs):
         )
     assert (corners[:, 0] >= box.left).all() and (corners[:, 0] <= box.right).all()
     assert (corners[:, 1] >= box.bottom).all() and (corners[:, 1] <= box.top).all()
+
+
+@pytest.mark.parametrize("times", [8, 40])
+def test_far_finer_files_are_averaged_block_by_block(tmp_path, times):
+    """Means are exact, and the same in every window and chunk; a whole tile of the file is never read."""
+    grid = fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 400.0, 360.0, 10.0)
+    values = np.random.default_rng(0).random((36 * times, 40 * times)).astype("float32")
+    path = write(tmp_path / "fine.tif", values, grid.affine * Affine.scale(1 / times), "EPSG:26914", dtype="float32")
+    means = values.astype(float).reshape(36, times, 40, times).mean(axis=(1, 3))
+    whole = warp.file_onto_grid(path, grid)
+    np.testing.assert_allclose(whole, means, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(warp.file_onto_grid(path, grid[7:29, 11:30]), whole[7:29, 11:30])
+    np.testing.assert_array_equal(warp.file_onto_grid(path, grid, chunks=13), whole)
+
+
+def test_blocks_read_no_more_than_so_many_cells():
+    assert warp._block_size(warp._MUCH_FINER) == warp._TILE
+    assert [warp._block_size(cells) for cells in (7, 64, 65, 2048, 1e6, np.nan)] == [32, 32, 16, 1, 1, 32]
+
+
+def test_a_cell_of_too_many_is_refused(tmp_path):
+    path = tmp_path / "finest.tif"
+    profile = {"driver": "GTiff", "width": 100_000, "height": 100_000, "count": 1, "dtype": "uint8", "sparse_ok": True}
+    profile |= {"tiled": True, "blockxsize": 8192, "blockysize": 8192, "crs": "EPSG:26914"}
+    with rasterio.open(path, "w", **profile, transform=Affine(0.01, 0, 708000, 0, -0.01, 4332000)):
+        pass
+    with pytest.raises(ValueError, match=r"finest\.tif is far finer than the cells.*gdalwarp -r average -tr"):
+        fifesim.open_lai(path, fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 900.0, 900.0, 300.0))

@@ -13,6 +13,7 @@ from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
 from fifesim.rasters import cf, places, warp
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.opening import readable
 
 FIELD_METHODS = ("streaming", "periodic")
 
@@ -72,18 +73,20 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     return cf.label(lai, "lai", history=said, **made, method=method, references=_REFERENCE)
 
 
-def open_lai(path, grid, chunks=None):
+def open_lai(path, grid, chunks=None, *, allow_remote=False):
     """
     A user's own map of leaf area index on a grid.
 
     Parameters
     ----------
     path : str or path
-        Any raster that GDAL opens; its first band is LAI. [m2 m-2]
+        A raster file; its first band is LAI. [m2 m-2]
     grid : odc.geo.geobox.GeoBox
         Of ground cells. Cells no larger than the map's are interpolated bilinearly, larger ones hold means.
     chunks : mapping or int, optional
         Makes the result lazy.
+    allow_remote : bool, optional
+        Take addresses, and formats that lead to other files: only for what you trust.
 
     Returns
     -------
@@ -93,11 +96,11 @@ def open_lai(path, grid, chunks=None):
     Raises
     ------
     ValueError
-        If the file is missing, has no CRS, does not overlap the grid, or needs a change of datum whose accuracy is
-        unknown; and, when computed, if LAI is negative.
+        If the file is missing or not of a format that is opened, has no CRS, does not overlap the grid, or needs a
+        change of datum whose accuracy is unknown; and, when computed, if LAI is negative.
     """
-    lai = chunking.pointwise(check_lai, warp.file_onto_grid(path, grid, chunks))
-    name = Path(path).name
+    lai = chunking.pointwise(check_lai, warp.file_onto_grid(path, grid, chunks, allow_remote))
+    name = readable(Path(path).name)
     return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
 
 

@@ -79,8 +79,17 @@ def fill_gaps(values, distance):
             hole = labels[around] == number
             out[around][hole] = _least_bending(values[around], hole)
     near = ndimage.distance_transform_edt(unknown, sampling=[1 / size for size in distance]) <= 1
-    carried = extend(values, int(np.ceil(max(distance))), rest=False)
-    return np.where(np.isnan(out) & near, carried, out)
+    rings = int(np.ceil(max(distance)))
+    # Farther out nothing is carried.
+    around = tuple(slice(max(part.start - rings, 0), part.stop + rings) for part in _box(~unknown))
+    carried = extend(values[around], rings, rest=False)
+    out[around] = np.where(np.isnan(out[around]) & near[around], carried, out[around])
+    return out
+
+
+def _box(found):
+    """Slices of rows and columns around all that is true."""
+    return tuple(slice(int(axis.min()), int(axis.max()) + 1) for axis in np.nonzero(found))
 
 
 def _least_bending(values, hole):

@@ -4,10 +4,9 @@ import json
 import os
 from pathlib import Path
 
-import rasterio
-
 from fifesim.output.folders import BEGUN, UNFINISHED
 from fifesim.output.provenance import versions
+from fifesim.rasters.opening import raster_file
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.toml import write_scenario
 from fifesim.sensor.description.instruments import instrument
@@ -85,7 +84,7 @@ def _read_with(name):
         return [name, *(Path(each.folder) / each.table for each in responses if hasattr(each, "table"))]
     if suffix == ".csv":
         return [name]
-    with rasterio.open(name) as source:
+    with raster_file(name).opened() as source:
         return [name, *source.files]
 
 

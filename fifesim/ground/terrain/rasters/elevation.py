@@ -18,15 +18,15 @@ from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 
 
-def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=None):
+def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=None, allow_remote=False):
     """
     Elevation model on a grid, by low-pass interpolation.
 
     Parameters
     ----------
     path_or_raster : str, path or xarray.DataArray
-        Any raster that rioxarray opens, or has opened, in any CRS and orientation; its first band is elevation. It
-        should reach past the grid.
+        A raster file, or what rioxarray has opened, in any CRS and orientation; its first band is elevation. It should
+        reach past the grid.
     grid : odc.geo.geobox.GeoBox
         Of ground cells.
     fill : float, optional
@@ -35,6 +35,8 @@ def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=Non
         Of the elevations, where they are not metres: "ft", "us-ft" and others; wins over what the file says.
     chunks : mapping or int or "auto", optional
         Makes the result lazy, as it is without where the raster is.
+    allow_remote : bool, optional
+        Take addresses, and formats that lead to other files: only for what you trust.
 
     Returns
     -------
@@ -57,7 +59,7 @@ def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=Non
     --------
     fifesim.ground.terrain.spline.spline_coefficients, fifesim.ground.terrain.spline.spline_grid
     """
-    model = model_under(grid, path_or_raster, fill, vertical_units)
+    model = model_under(grid, path_or_raster, fill, vertical_units, allow_remote)
     if isinstance(model.source.cells, da.Array):
         out = _from_lazy(model, grid, "auto" if chunks is None else chunks)
     else:
@@ -68,13 +70,13 @@ def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=Non
     return cf.label(out, "dem", history=history, source_resolution=model.resolution)
 
 
-def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None):
+def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None, allow_remote=False):
     """
     Elevation model around a grid, at about its own resolution; for horizons.
 
     Parameters
     ----------
-    path_or_raster, grid, fill, vertical_units
+    path_or_raster, grid, fill, vertical_units, allow_remote
         As in `fine_dem`.
     margin : float
         Distance from the grid that is wanted on each side. [m]
@@ -93,7 +95,7 @@ def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None):
     ValueError
         As in `fine_dem`, but not for what the model lacks, unless that is all.
     """
-    model = model_under(grid, path_or_raster, fill, vertical_units)
+    model = model_under(grid, path_or_raster, fill, vertical_units, allow_remote)
     coarse, around = _coarse_grid(grid, model.resolution, margin)
     if isinstance(model.source.cells, da.Array):
         model = model.reading(model.source.cells.compute())

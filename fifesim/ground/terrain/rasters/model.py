@@ -14,6 +14,9 @@ from fifesim.rasters import grid as grids
 # Elevations are made in fixed tiles of this size. [cell]
 TILE = 504
 
+# Filling goes outward ring by ring. [source cell]
+_MOST_FILLED = 250
+
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -164,7 +167,7 @@ class Model:
         return np.where(found, out, np.nan)
 
 
-def model_under(grid, raster, fill, vertical_units):
+def model_under(grid, raster, fill, vertical_units, allow_remote=False):
     """
     Elevation model under a grid.
 
@@ -176,6 +179,8 @@ def model_under(grid, raster, fill, vertical_units):
         Distance from known elevation up to which gaps are filled. [m]
     vertical_units : str or None
         Wins over what the raster says.
+    allow_remote : bool, optional
+        As of `fifesim.rasters.opening.raster_file`.
 
     Returns
     -------
@@ -189,8 +194,13 @@ def model_under(grid, raster, fill, vertical_units):
     grids.check_grid(grid)
     if fill is not None and (isinstance(fill, bool) or not fill > 0):
         raise ValueError(f"fill is a distance from known elevation, above 0 m, got {fill!r}: give for instance fill=60")
-    place = placement(open_source(raster, vertical_units), grid)
+    place = placement(open_source(raster, vertical_units, allow_remote), grid)
     sizes = place.cell_size()
+    if (fill or 0) > _MOST_FILLED * min(sizes):
+        raise ValueError(
+            f"fill={fill:g} is more than {_MOST_FILLED} cells of {place.source.name}, of {min(sizes):.3g} m: give at "
+            f"most fill={_MOST_FILLED * min(sizes):.3g}"
+        )
     blocks = tuple(max(1, round(float(np.mean(grids.cell_size(grid))) / size)) for size in sizes)
     resolution = round(float(np.mean([count * size for count, size in zip(blocks, sizes, strict=True)])), 6)
     return Model(place, blocks, tuple((fill or 0) / size for size in sizes), resolution)

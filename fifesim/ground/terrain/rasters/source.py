@@ -7,8 +7,6 @@ import dask.array as da
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
 import pyproj
-import rasterio
-import rasterio.errors
 import rasterio.windows
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
@@ -17,6 +15,8 @@ from affine import Affine
 from fifesim.base.lattice import centres
 from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.rasters import projection
+from fifesim.rasters.opening import ErrorsOfGdal, RasterFile, raster_file, readable
+from fifesim.rasters.soundness import check_raster, horizontal_crs
 
 # Positions in another CRS are a polynomial through those at so many Chebyshev nodes along each axis of a tile.
 _NODES = 12
@@ -24,13 +24,16 @@ _NODES = 12
 # Heights that land has, with room to spare. [m]
 LAND = (-500, 9000)
 
+# A window of more cells takes several GB with what is made of it.
+_MOST_CELLS = 2**27
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
     """An elevation model: what holds its cells, their size and place, and metres in one unit of theirs."""
 
     name: str
-    cells: str | np.ndarray | da.Array
+    cells: RasterFile | np.ndarray | da.Array
     shape: tuple[int, int]
     affine: Affine
     crs: pyproj.CRS
@@ -53,7 +56,17 @@ class Source:
         -------
         values : array, shape (rows, columns)
             NaN where unknown. [m]
+
+        Raises
+        ------
+        ValueError
+            If the window is larger than what is read at once.
         """
+        if rows * columns > _MOST_CELLS:
+            raise ValueError(
+                f"{self.name} is far finer than the cells, {rows * columns:.2g} of its cells lie in a tile of them: "
+                "average it first, with gdalwarp -r average -tr and a cell between the two"
+            )
         out = np.full((rows, columns), np.nan)
         (first, last), (west, east) = (
             (min(max(start, 0), size), max(min(start + length, size), 0))
@@ -61,7 +74,9 @@ class Source:
         )
         if first < last and west < east:
             window = slice(first, last), slice(west, east)
-            found = _file_window(self.cells, *window) if isinstance(self.cells, str) else self._array_window(*window)
+            found = (
+                _file_window(self.cells, *window) if isinstance(self.cells, RasterFile) else self._array_window(*window)
+            )
             out[first - top : last - top, west - left : east - left] = found * self.metres
         return out
 
@@ -72,7 +87,7 @@ class Source:
         return values if self.nodata is None else np.where(values == self.nodata, np.nan, values)
 
 
-def open_source(raster, vertical_units=None):
+def open_source(raster, vertical_units=None, allow_remote=False):
     """
     Elevation model of a file or an array.
 
@@ -81,6 +96,8 @@ def open_source(raster, vertical_units=None):
     raster : str, path or xarray.DataArray
     vertical_units : str, optional
         Wins over what the file says.
+    allow_remote : bool, optional
+        As of `fifesim.rasters.opening.raster_file`.
 
     Returns
     -------
@@ -89,7 +106,8 @@ def open_source(raster, vertical_units=None):
     Raises
     ------
     ValueError
-        If there is no such file, no CRS or more than one band, or elevations are said to be in other units than metres.
+        If there is no such file or it is not to be opened, holds no numbers, has no CRS or more than one band, or
+        elevations are said to be in other units than metres.
     TypeError
         If it is neither.
     """
@@ -97,14 +115,13 @@ def open_source(raster, vertical_units=None):
         return _array_source(raster, vertical_units)
     if not isinstance(raster, str | Path):
         raise TypeError(f"an elevation model is a path or an xarray.DataArray, got {type(raster).__name__}")
-    path = str(raster)
-    try:
-        with rasterio.open(path) as file:
-            crs, unit = file.crs, file.units[0]
-            source = Source(Path(path).name, path, file.shape, file.transform, None, 1.0)
-    except rasterio.errors.RasterioIOError as error:
-        raise ValueError(f"cannot read {path!r} as a raster: {error}") from None
-    return _in_metres(source, crs.to_wkt() if crs else None, unit, vertical_units)
+    file = raster_file(raster, allow_remote)
+    name = readable(Path(file.path).name)
+    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as opened:
+        check_raster(opened, file.name)
+        horizontal_crs(opened, file.name)
+        source = Source(name, file, opened.shape, opened.transform, None, 1.0)
+        return _in_metres(source, opened.crs.to_wkt(), readable(opened.units[0] or "", 40), vertical_units)
 
 
 def _array_source(raster, vertical_units):
@@ -154,17 +171,12 @@ def _in_metres(source, wkt, unit, vertical_units):
     return Source(source.name, source.cells, source.shape, source.affine, horizontal, metres, source.nodata)
 
 
-def _file_window(path, rows, columns):
+def _file_window(file, rows, columns):
     window = rasterio.windows.Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
-    try:
-        with rasterio.open(path) as file:
-            values = file.read(1, window=window, masked=True).astype(float).filled(np.nan)
-            return values * file.scales[0] + file.offsets[0]
-    except rasterio.errors.RasterioIOError as error:
-        raise OSError(
-            f"cannot read rows {rows.start} to {rows.stop} and columns {columns.start} to {columns.stop} of {path}: "
-            f"{error.__cause__ or error}"
-        ) from error
+    said = f"cannot read rows {rows.start} to {rows.stop} and columns {columns.start} to {columns.stop} of {file.name}"
+    with ErrorsOfGdal(said), file.opened() as opened:
+        values = opened.read(1, window=window, masked=True).astype(float).filled(np.nan)
+        return values * opened.scales[0] + opened.offsets[0]
 
 
 @dataclass(frozen=True, eq=False)
