@@ -39,7 +39,7 @@ def read_aerosol(source, *, scale_height=None, layer=None):
 
     Parameters
     ----------
-    source : xarray.Dataset, or path of a NetCDF or CSV file
+    source : path of a NetCDF or CSV file, or xarray.Dataset
         ``wavelength`` [um], ``extinction`` [any one unit] and ``single_scattering_albedo`` [1] by wavelength; ``phase``
         [1, or sr-1 where its units say so] by ``angle`` [degree] or its cosine ``mu``, and by wavelength, or
         ``moments`` by ``order``; perhaps ``asymmetry`` [1] by wavelength and ``polarization`` [1] or ``f12``, as
