@@ -44,6 +44,14 @@ def test_phase_function_and_moments_are_those_of_the_formula(haze):
     assert not aerosols.aerosol_polarization(haze, cosine, 0.7).any()
 
 
+def test_phase_function_that_is_a_little_off_is_made_to_keep_energy():
+    """And by the same factor at all angles."""
+    bright = Aerosol(WAVELENGTH, WAVELENGTH**-1.3, np.full(4, 0.9), ANGLE, 1.015 * PHASE)
+    assert aerosols.phase_moments(bright, 0.7, 1)[0, 0] == pytest.approx(1, rel=1e-12)
+    found = aerosols.aerosol_phase(bright, np.array([-0.5, 0.5]), 0.44)
+    np.testing.assert_allclose(found, henyey_greenstein(0.6, np.array([-0.5, 0.5])), rtol=2e-4)
+
+
 def test_components_add_up_by_what_they_scatter():
     """Against the sums by hand at a tabulated wavelength."""
     extinction, albedo = np.array([[3.0, 1.0], [1.0, 1.0]]), np.array([[0.9, 0.9], [0.3, 0.3]])
