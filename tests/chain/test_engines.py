@@ -53,6 +53,14 @@ def test_quick_error_is_that_of_the_bands(both):
     np.testing.assert_allclose(list(found.values()), expected, atol=5e-3)
 
 
+def test_quick_error_names_the_bands_in_any_order():
+    """5S is 3 % low in the red over leaves, in the paper's own case."""
+    for bands in (("TM4", "TM3"), ("TM3", "TM4")):
+        error = engine_error(fifesim.Setup(bands=bands))
+        assert list(error) == list(bands)
+        assert -0.04 < error["TM3"] < -0.02 < error["TM4"] < 0
+
+
 def test_quick_error_of_successive_orders_is_none():
     air = fifesim.Atmosphere(aerosol="urban", visibility=6, engine="successive-orders")
     assert engine_error(setup(air)) == {"TM4": 0.0, "TM3": 0.0}
