@@ -39,8 +39,11 @@ from .chain.steps import kt as kt  # method
 
 # Atmosphere
 from .atmosphere.air.models import Atmosphere as Atmosphere
+from .atmosphere.air.raster import read_aerosol as read_aerosol
+from .atmosphere.air.raster import aerosol_tables as aerosol_tables
 from .chain.steps import to_toa as to_toa  # method
 from .chain.steps import to_surface as to_surface  # method
+from .chain.engines import compare_engines as compare_engines
 
 # Sensor
 from .sensor.raster import sense as sense  # method

@@ -2,15 +2,19 @@
 
 from pathlib import Path
 
+from fifesim.chain.engines import TYPICAL_LAI, engine_error
 from fifesim.output import pages
 from fifesim.output.figures import NAMES, detail_figure, fit_figure, histogram_figure, map_figure, terrain_figure
 from fifesim.rasters import grid as grids
 from fifesim.scenario.keys import Keys
+from fifesim.scenario.simulation import setup_of
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
 _DPI = 130
 # Figures show every so many pixels of an image that has more rows or columns. [pixel]
 _MOST = 600
+# Difference of 5S from successive orders from which a reader is told to change. [1]
+_ENGINE_BOUND = 0.02
 
 
 def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
@@ -57,13 +61,39 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     html = pages.html(
         _TEMPLATE,
         title=title(scenario),
-        summary=_summary(scenario, image, truth, fits, reasons) + _ground(terrain),
+        summary=_summary(scenario, image, truth, fits, reasons) + _ground(terrain) + engine_rows(scenario),
         figures=pictures,
         fits=[(NAMES[name], fit) for name, fit in fits.items()],
         parameters=_parameters(scenario),
         history=image["dn"].attrs.get("history", "").splitlines(),
     )
     return pictures["detail"], html
+
+
+def engine_rows(scenario):
+    """
+    What the closed forms cost a run, beside successive orders.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Returns
+    -------
+    rows : list of (str, str)
+        One, that names the bands beyond 2 %; none where another engine is used.
+
+    See Also
+    --------
+    fifesim.chain.engines.engine_error
+    """
+    if scenario.atmosphere.engine != "5S":
+        return []
+    error = engine_error(setup_of(scenario))
+    text = ", ".join(f"{band} {100 * each:+.1f} %" for band, each in error.items())
+    outside = ", ".join(band for band, each in error.items() if abs(each) > _ENGINE_BOUND)
+    advice = f'beyond 2 % in {outside}: engine = "successive-orders" is closer' if outside else "within 2 %"
+    return [(f"5S less successive orders, over a canopy of leaf area {TYPICAL_LAI:g}", f"{text}; {advice}")]
 
 
 def title(scenario):

@@ -153,7 +153,12 @@ class AirKeys(Section):
     """The atmosphere."""
 
     profile: str = text("midlatitude-summer", "of pressure, temperature, water vapour and ozone")
-    aerosol: str = text("continental", 'aerosol model, "none", or a mixture such as "dust:0.5+soot:0.5" by volume')
+    aerosol: str = file(
+        "continental",
+        'aerosol model, "none", a mixture such as "dust:0.5+soot:0.5" by volume, or a .nc or .csv file of your own '
+        "tables, which needs aot",
+        suffix=(".nc", ".csv"),
+    )
     visibility: float | None = number(45.0, "km", "meteorological range; give it or aot", ge=5, le=100)
     aot: float | None = number(None, "1", "aerosol optical thickness at 0.55 um, instead of visibility", ge=0, le=2)
     altitude: float = number(0.4, "km", "of the ground above the sea", ge=0, le=4)
@@ -165,7 +170,9 @@ class AirKeys(Section):
     @model_validator(mode="before")
     @classmethod
     def _one_amount(cls, values):
-        by_aot = isinstance(values, dict) and values.get("aot") is not None
+        if not isinstance(values, dict):
+            return values
+        by_aot = values.get("aot") is not None or cls.names_a_file("aerosol", values.get("aerosol"))
         return values | {"visibility": values.get("visibility")} if by_aot else values
 
 

@@ -79,7 +79,7 @@ class Scenario(Keys):
         self._check_air()
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
-        sections = {"ground": ground, "terrain": self.terrain, "sensor": sensor}
+        sections = {"ground": ground, "terrain": self.terrain, "atmosphere": self.atmosphere, "sensor": sensor}
         whole = {name: section.with_whole_paths() for name, section in sections.items()}
         return self.model_copy(update={"grid": grid_keys(box), **whole})
 

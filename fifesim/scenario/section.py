@@ -74,7 +74,7 @@ def file(default, description, *, names=(), suffix=None):
     description : str
     names : sequence of str, optional
         What stands for no file.
-    suffix : str, optional
+    suffix : str or tuple of str, optional
         Tells a file from a name where not all names are known; ``"*"`` is any suffix. Without it all else is a file.
 
     Returns
@@ -144,8 +144,10 @@ class Section(BaseModel):
         kind = (cls.model_fields[key].json_schema_extra or {}).get("file") if key in cls.model_fields else None
         if kind is None or not isinstance(value, str) or value in kind["names"]:
             return False
-        found = Path(value).suffix.lower()
-        return kind["suffix"] is None or (bool(found) if kind["suffix"] == "*" else found == kind["suffix"])
+        found, suffix = Path(value).suffix.lower(), kind["suffix"]
+        if suffix in (None, "*"):
+            return suffix is None or bool(found)
+        return found in suffix if isinstance(suffix, tuple) else found == suffix
 
     @field_validator("*")
     @classmethod

@@ -5,6 +5,7 @@ from dataclasses import asdict, fields
 from pydantic import field_validator, model_validator
 
 from fifesim.atmosphere.air import mixtures, models
+from fifesim.atmosphere.air.raster import read_aerosol
 from fifesim.base.foreign import shown
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
@@ -142,7 +143,7 @@ class Air(AirKeys):
     @field_validator("aerosol")
     @classmethod
     def _known_aerosol(cls, value):
-        return value if value == "none" else mixtures.canonical(value)
+        return value if value == "none" or cls.names_a_file("aerosol", value) else mixtures.canonical(value)
 
     @model_validator(mode="after")
     def _possible(self):
@@ -151,7 +152,10 @@ class Air(AirKeys):
 
     def model(self):
         """The atmosphere that these keys describe, a `fifesim.atmosphere.air.models.Atmosphere`."""
-        return models.Atmosphere(**self.model_dump(exclude={"adjacency"}))
+        keys = self.model_dump(exclude={"adjacency"})
+        if "aerosol" in self.files:
+            keys["aerosol"] = read_aerosol(self.aerosol)
+        return models.Atmosphere(**keys)
 
 
 class Sensor(SensorKeys):

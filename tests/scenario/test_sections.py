@@ -47,3 +47,23 @@ def test_size_of_a_pixel_is_the_products_unless_given():
 def test_what_physics_refuses(section, values, said):
     with pytest.raises(ValueError, match=said):
         section(**values)
+
+
+def test_file_of_an_aerosol_lies_beside_the_scenario(tmp_path, monkeypatch):
+    """It needs an optical thickness, and a run writes its full path."""
+    fifesim.aerosol_tables("urban").to_netcdf(tmp_path / "mine.nc")
+    (tmp_path / "mine.toml").write_text('[atmosphere]\naerosol = "mine.nc"\naot = 0.3\n')
+    scenario = fifesim.read_scenario(tmp_path / "mine.toml")
+    air = scenario.model_atmosphere()
+    assert (air.aerosol.name, air.aot, air.visibility) == ("mine", 0.3, None)
+    assert scenario.files["atmosphere", "aerosol"] == str(tmp_path / "mine.nc")
+    monkeypatch.chdir(tmp_path)
+    inside = fifesim.Scenario(atmosphere={"aerosol": "mine.nc", "aot": 0.3})
+    assert inside.complete().atmosphere.aerosol == str(tmp_path / "mine.nc")
+    for wrong, message in (
+        ({"aerosol": "mine.nc"}, "must be an aot"),
+        ({"aerosol": "mine.nc", "visibility": 23}, "must be an aot, from 0 to 2, got visibility=23"),
+        ({"aerosol": "other.nc", "aot": 0.3}, "other.nc' does not exist"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            fifesim.Scenario(atmosphere=wrong)

@@ -4,10 +4,8 @@ import numpy as np
 
 from fifesim.atmosphere.air import components
 from fifesim.atmosphere.air.mixtures import mixture
+from fifesim.atmosphere.air.own_aerosol import REFERENCE_WAVELENGTH, SCALE_HEIGHT, WAVELENGTH_RANGE, Aerosol
 from fifesim.base import datasets
-
-WAVELENGTH_RANGE = (0.35, 3.75)  # of the tables [um]
-REFERENCE_WAVELENGTH = 0.55  # at which the amount is given [um]
 
 # Extinction per particle at 0.55 um with which the number profiles give the visibility at the ground. [km-1 cm3]
 _EXTINCTION_PER_PARTICLE = 5.6032e-5
@@ -53,6 +51,89 @@ def aerosol_optical_thickness(visibility):
     return float(_EXTINCTION_PER_PARTICLE * layers.sum())
 
 
+def parts(aerosol):
+    """
+    Components of an aerosol, and how much there is of each.
+
+    Parameters
+    ----------
+    aerosol : str, mapping or Aerosol
+        As in `mixture`, or tables of one's own.
+
+    Returns
+    -------
+    fractions : dict
+        By the name or the tables of a component: the share of its volume, or 1. [1]
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `mixture`.
+
+    Examples
+    --------
+    >>> parts("soot:1")
+    {'soot': 1.0}
+    """
+    return dict.fromkeys(aerosol.components, 1.0) if isinstance(aerosol, Aerosol) else mixture(aerosol)
+
+
+def covers(aerosol, low, high):
+    """
+    Whether the tables of an aerosol hold some wavelengths.
+
+    Parameters
+    ----------
+    aerosol : str, mapping or Aerosol
+    low, high : float
+        [um]
+
+    Returns
+    -------
+    answer : bool
+
+    Examples
+    --------
+    >>> covers("continental", 0.4, 2.5), covers("continental", 0.4, 10.0)
+    (True, False)
+    """
+    first, last = limits(aerosol)
+    return bool(first <= low and high <= last)
+
+
+def limits(aerosol):
+    """
+    First and last wavelength of the tables of an aerosol.
+
+    Parameters
+    ----------
+    aerosol : str, mapping or Aerosol
+
+    Returns
+    -------
+    low, high : float
+        [um]
+    """
+    own = isinstance(aerosol, Aerosol)
+    return (float(aerosol.wavelength[0]), float(aerosol.wavelength[-1])) if own else WAVELENGTH_RANGE
+
+
+def vertical(aerosol):
+    """
+    Where an aerosol floats above the ground.
+
+    Parameters
+    ----------
+    aerosol : str, mapping or Aerosol
+
+    Returns
+    -------
+    vertical : float or pair of float
+        Scale height, or bottom and top of an even layer. [km]
+    """
+    return aerosol.vertical if isinstance(aerosol, Aerosol) else SCALE_HEIGHT
+
+
 def aerosol_optics(aerosol, wavelength):
     r"""
     Optical properties of an aerosol.
@@ -64,8 +145,8 @@ def aerosol_optics(aerosol, wavelength):
 
     Parameters
     ----------
-    aerosol : str or mapping
-        As in `mixture`; its volume fractions are :math:`c_j`.
+    aerosol : str, mapping or Aerosol
+        As in `mixture`; its volume fractions are :math:`c_j`, which are 1 for tables of one's own.
     wavelength : array, shape (n,)
         0.35 to 3.75. [um]
 
@@ -97,7 +178,7 @@ def aerosol_optics(aerosol, wavelength):
     >>> [float(values) for values in aerosol_optics("continental", 0.55)][0]
     1.0
     """
-    wavelength, fractions = _checked_wavelength(wavelength), mixture(aerosol)
+    wavelength, fractions = _checked_wavelength(wavelength), parts(aerosol)
     extinction, scattering, directed = _cross_sections(fractions, wavelength)
     reference, _, _ = _cross_sections(fractions, REFERENCE_WAVELENGTH)
     return extinction / reference, scattering / extinction, directed / scattering
@@ -111,8 +192,8 @@ def aerosol_phase(aerosol, scattering_cosine, wavelength):
 
     Parameters
     ----------
-    aerosol : str or mapping
-        As in `mixture`; its volume fractions are :math:`c_j`.
+    aerosol : str, mapping or Aerosol
+        As in `mixture`; its volume fractions are :math:`c_j`, which are 1 for tables of one's own.
     scattering_cosine : array, broadcastable with wavelength
         Cosine of the scattering angle. [1]
     wavelength : array
@@ -142,7 +223,7 @@ def aerosol_phase(aerosol, scattering_cosine, wavelength):
     >>> bool(aerosol_phase("continental", 1.0, 0.55) > aerosol_phase("continental", 0.0, 0.55))
     True
     """
-    wavelength, fractions = _checked_wavelength(wavelength), mixture(aerosol)
+    wavelength, fractions = _checked_wavelength(wavelength), parts(aerosol)
     return _weighted_mean(fractions, wavelength, lambda name: components.phase(name, scattering_cosine, wavelength))
 
 
@@ -178,7 +259,7 @@ def aerosol_polarization(aerosol, scattering_cosine, wavelength):
     >>> [float(value) for value in aerosol_polarization("urban", [-1.0, 1.0], 0.55)]
     [0.0, 0.0]
     """
-    wavelength, fractions = _checked_wavelength(wavelength), mixture(aerosol)
+    wavelength, fractions = _checked_wavelength(wavelength), parts(aerosol)
 
     def mean(element):
         return _weighted_mean(fractions, wavelength, lambda name: element(name, scattering_cosine, wavelength))
@@ -195,8 +276,8 @@ def phase_moments(aerosol, wavelength, count):
 
     Parameters
     ----------
-    aerosol : str or mapping
-        As in `mixture`.
+    aerosol : str, mapping or Aerosol
+        As in `mixture`, or tables of one's own.
     wavelength : array, shape (n,)
         0.35 to 3.75. [um]
     count : int
@@ -224,7 +305,7 @@ def phase_moments(aerosol, wavelength, count):
     >>> bool(abs(second - aerosol_optics("continental", 0.55)[2]) < 1e-3)
     True
     """
-    at, fractions = np.atleast_1d(_checked_wavelength(wavelength)), mixture(aerosol)
+    at, fractions = np.atleast_1d(_checked_wavelength(wavelength)), parts(aerosol)
     return _weighted_mean(fractions, at[:, None], lambda name: components.phase_moments(name, at, count))
 
 

@@ -1,7 +1,7 @@
 """Optics of the components of the aerosol, from tables that Mie theory made."""
 
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -10,14 +10,44 @@ from fifesim.base import datasets
 COMPONENTS = ("dust", "water_soluble", "oceanic", "soot")
 
 
+@dataclass(frozen=True, eq=False)
+class Component:
+    """
+    Optics of some particles, as tables.
+
+    Parameters
+    ----------
+    log_wavelength : array, shape (wavelength,)
+        Of micrometres, increasing.
+    log_extinction, log_scattering : array, shape (wavelength,)
+        Of the cross sections.
+    asymmetry : array, shape (wavelength,)
+        Mean cosine of the scattering angle. [1]
+    angle : array, shape (angle,)
+        Scattering angle, from 0 to 180. [degree]
+    log_phase : array, shape (angle, wavelength)
+        Of the phase function, whose mean over the sphere is 1.
+    polarization : array, shape (angle, wavelength)
+        Degree of linear polarization of natural light scattered once. [1]
+    """
+
+    log_wavelength: np.ndarray
+    log_extinction: np.ndarray
+    log_scattering: np.ndarray
+    asymmetry: np.ndarray
+    angle: np.ndarray
+    log_phase: np.ndarray
+    polarization: np.ndarray
+
+
 def cross_sections(component, wavelength):
     """
     Cross sections of the particles of a component, for a unit of their volume.
 
     Parameters
     ----------
-    component : str
-        One of `COMPONENTS`.
+    component : str or Component
+        One of `COMPONENTS`, or tables of one's own.
     wavelength : array
         0.35 to 3.75. [um]
 
@@ -38,7 +68,7 @@ def cross_sections(component, wavelength):
     >>> bool(extinction > scattering)
     True
     """
-    table, logarithm = _optics(component), np.log(wavelength)
+    table, logarithm = tabulated(component), np.log(wavelength)
     extinction = np.exp(np.interp(logarithm, table.log_wavelength, table.log_extinction))
     scattering = np.exp(np.interp(logarithm, table.log_wavelength, table.log_scattering))
     return extinction, scattering, scattering * np.interp(logarithm, table.log_wavelength, table.asymmetry)
@@ -50,8 +80,8 @@ def phase(component, scattering_cosine, wavelength):
 
     Parameters
     ----------
-    component : str
-        One of `COMPONENTS`.
+    component : str or Component
+        One of `COMPONENTS`, or tables of one's own.
     scattering_cosine, wavelength : array, broadcastable
         As in `aerosols.aerosol_phase`. [1, um]
 
@@ -70,8 +100,9 @@ def phase(component, scattering_cosine, wavelength):
     >>> bool(phase("dust", 1.0, 0.55) > 100 * phase("soot", 1.0, 0.55))
     True
     """
-    log_phase = _by_angle(_log_phase(component), scattering_cosine)
-    return _by_wavelength(lambda column: np.exp(log_phase(column)), wavelength)
+    tables = tabulated(component)
+    log_phase = _by_angle(tables.angle, tables.log_phase, scattering_cosine)
+    return _by_wavelength(tables, lambda column: np.exp(log_phase(column)), wavelength)
 
 
 def polarized_phase(component, scattering_cosine, wavelength):
@@ -99,9 +130,10 @@ def polarized_phase(component, scattering_cosine, wavelength):
     >>> float(polarized_phase("dust", 1.0, 0.55)), float(polarized_phase("dust", -1.0, 0.55))
     (0.0, 0.0)
     """
-    log_phase = _by_angle(_log_phase(component), scattering_cosine)
-    degree = _by_angle(_table("aerosol_polarization.csv", component), scattering_cosine)
-    return _by_wavelength(lambda column: np.exp(log_phase(column)) * degree(column), wavelength)
+    tables = tabulated(component)
+    log_phase = _by_angle(tables.angle, tables.log_phase, scattering_cosine)
+    degree = _by_angle(tables.angle, tables.polarization, scattering_cosine)
+    return _by_wavelength(tables, lambda column: np.exp(log_phase(column)) * degree(column), wavelength)
 
 
 def phase_moments(component, wavelength, count):
@@ -110,8 +142,8 @@ def phase_moments(component, wavelength, count):
 
     Parameters
     ----------
-    component : str
-        One of `COMPONENTS`.
+    component : str or Component
+        One of `COMPONENTS`, or tables of one's own.
     wavelength, count
         As in `aerosols.phase_moments`.
 
@@ -129,26 +161,68 @@ def phase_moments(component, wavelength, count):
     >>> bool(abs(phase_moments("dust", [0.55], 1)[0, 0] - 1) < 1e-12)
     True
     """
-    column, share = _wavelength_place(np.asarray(wavelength, float))
-    table, share = _tabulated_moments(component, count), share[:, None]
+    tables = tabulated(component)
+    column, share = _place(tables.log_wavelength, np.log(np.asarray(wavelength, float)))
+    table, share = _tabulated_moments(tables, count), share[:, None]
     return table[column] * (1 - share) + table[column + 1] * share
 
 
-def _by_angle(table, scattering_cosine):
+def sphere(angle):
+    """
+    Quadrature over the directions into which light is scattered.
+
+    Parameters
+    ----------
+    angle : array, shape (n,)
+        Scattering angles of a table, from 0 to 180. [degree]
+
+    Returns
+    -------
+    cosine, weights : array, shape (4 (n - 1),)
+        Four Gauss points between neighbours; the weights, by solid angle, add up to 1. [1]
+
+    Examples
+    --------
+    >>> _, weights = sphere([0.0, 90.0, 180.0])
+    >>> round(float(weights.sum()), 6)
+    1.0
+    """
+    points, weights = np.polynomial.legendre.leggauss(4)
+    nodes, half = np.asarray(angle)[:-1, None], np.diff(angle)[:, None] / 2
+    between = np.radians(nodes + half * (1 + points)).ravel()
+    return np.cos(between), (np.radians(half) * weights).ravel() * np.sin(between) / 2
+
+
+def phase_on_sphere(angle, log_phase):
+    """
+    Phase function of a table on the cosines of `sphere`.
+
+    Parameters
+    ----------
+    angle : array, shape (angle,)
+        [degree]
+    log_phase : array, shape (angle, wavelength)
+        As in `Component`.
+
+    Returns
+    -------
+    phase : array, shape (4 (angle - 1), wavelength)
+        [1]
+    """
+    cosine, _ = sphere(angle)
+    return np.exp(_by_angle(angle, log_phase, cosine[:, None])(np.arange(log_phase.shape[1])))
+
+
+def _by_angle(angle, table, scattering_cosine):
     """Values between the angles of a table, for the number of a column."""
-    row, low = _place(_angles(), np.degrees(np.arccos(np.clip(scattering_cosine, -1, 1))))
+    row, low = _place(angle, np.degrees(np.arccos(np.clip(scattering_cosine, -1, 1))))
     return lambda column: table[row, column] * (1 - low) + table[row + 1, column] * low
 
 
-def _by_wavelength(values, wavelength):
+def _by_wavelength(tables, values, wavelength):
     """Values between the wavelengths of the tables, from those of the columns."""
-    column, share = _wavelength_place(wavelength)
+    column, share = _place(tables.log_wavelength, np.log(wavelength))
     return values(column) * (1 - share) + values(column + 1) * share
-
-
-def _wavelength_place(wavelength):
-    """Column of the tables before each wavelength, and the share of the next."""
-    return _place(_optics(COMPONENTS[0]).log_wavelength, np.log(wavelength))
 
 
 def _place(nodes, values):
@@ -157,59 +231,54 @@ def _place(nodes, values):
     return before, (values - nodes[before]) / (nodes[before + 1] - nodes[before])
 
 
-class _Optics(NamedTuple):
-    """Optics of a component at the tabulated wavelengths, shape (wavelength,)."""
+def tabulated(component):
+    """
+    Tables of a component.
 
-    log_wavelength: np.ndarray
-    log_extinction: np.ndarray
-    log_scattering: np.ndarray
-    asymmetry: np.ndarray
+    Parameters
+    ----------
+    component : str or Component
+        One of `COMPONENTS`, or tables of one's own.
+
+    Returns
+    -------
+    tables : Component
+
+    References
+    ----------
+    [dAlmeida1991]_ micro-physics, by Mie theory
+
+    Examples
+    --------
+    >>> tabulated("soot").asymmetry.shape
+    (20,)
+    """
+    return component if isinstance(component, Component) else _from_data(component)
 
 
 @lru_cache
-def _optics(component):
+def _from_data(component):
+    """Those of the data folder, the phase function scaled so that the mean of what is read from it is 1."""
     table = datasets.table("aerosol_optics.csv").query("component == @component")
     wavelength, extinction, scattering, directed = table.drop(columns="component").to_numpy(float).T
-    return _Optics(np.log(wavelength), np.log(extinction), np.log(scattering), directed / scattering)
+    angle, phase_function = _by_scattering_angle("aerosol_phase.csv", component)
+    _, polarization = _by_scattering_angle("aerosol_polarization.csv", component)
+    _, weights = sphere(angle)
+    log_phase = np.log(phase_function)
+    log_phase = log_phase - np.log(weights @ phase_on_sphere(angle, log_phase))
+    optics = np.log(wavelength), np.log(extinction), np.log(scattering), directed / scattering
+    return Component(*optics, angle, log_phase, polarization)
+
+
+def _by_scattering_angle(name, component):
+    """Angles of a table, and its values by angle and wavelength."""
+    table = datasets.table(name).query("component == @component").drop(columns="component")
+    return table["angle"].to_numpy(float), table.drop(columns="angle").to_numpy(float)
 
 
 @lru_cache
-def _table(name, component):
-    """By angle and wavelength."""
-    return datasets.table(name).query("component == @component").drop(columns=["component", "angle"]).to_numpy(float)
-
-
-@lru_cache
-def _angles():
-    """Scattering angles of the tables [degree]."""
-    return datasets.table("aerosol_phase.csv").query("component == @COMPONENTS[0]")["angle"].to_numpy(float)
-
-
-@lru_cache
-def _quadrature():
-    """Angles, and weights by solid angle that add up to 1: four Gauss points between neighbours of the tables."""
-    points, weights = np.polynomial.legendre.leggauss(4)
-    nodes, half = _angles()[:-1, None], np.diff(_angles())[:, None] / 2
-    angle = np.radians(nodes + half * (1 + points)).ravel()
-    return np.cos(angle), (np.radians(half) * weights).ravel() * np.sin(angle) / 2
-
-
-def _on_quadrature(log_phase):
-    cosine, _ = _quadrature()
-    return np.exp(_by_angle(log_phase, cosine[:, None])(np.arange(log_phase.shape[1])))
-
-
-@lru_cache
-def _log_phase(component):
-    """Logarithm of the phase function, scaled so that the mean of what is read from the table is 1."""
-    table = np.log(_table("aerosol_phase.csv", component))
-    _, weights = _quadrature()
-    return table - np.log(weights @ _on_quadrature(table))
-
-
-@lru_cache
-def _tabulated_moments(component, count):
+def _tabulated_moments(tables, count):
     """Legendre moments at the tabulated wavelengths, shape (wavelength, count)."""
-    cosine, weights = _quadrature()
-    phase_function = _on_quadrature(_log_phase(component))
-    return (phase_function * weights[:, None]).T @ np.polynomial.legendre.legvander(cosine, count - 1)
+    cosine, weights = sphere(tables.angle)
+    scattered = phase_on_sphere(tables.angle, tables.log_phase) * weights[:, None]
+    return scattered.T @ np.polynomial.legendre.legvander(cosine, count - 1)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from difflib import get_close_matches
 from numbers import Real
+from pathlib import PurePath
 
 import numpy as np
 
@@ -37,7 +38,8 @@ def mixture(aerosol):
     ValueError
         If a model or a component is unknown, a fraction is negative, or their sum is not 1 within 1e-6.
     TypeError
-        If the aerosol is neither text nor mapping, or a fraction is not a number.
+        If the aerosol is neither text nor mapping, or a fraction is not a number; or it is a file or a Dataset, which
+        `fifesim.read_aerosol` takes.
 
     Examples
     --------
@@ -46,6 +48,13 @@ def mixture(aerosol):
     >>> mixture("urban") == MODELS["urban"]
     True
     """
+    is_file = isinstance(aerosol, PurePath) or (isinstance(aerosol, str) and aerosol.endswith((".nc", ".csv")))
+    # A Dataset is a mapping, too.
+    if is_file or hasattr(aerosol, "data_vars"):
+        raise TypeError(
+            "aerosol must be a text, a mapping or what fifesim.read_aerosol gives, got a Dataset or a file: "
+            "type aerosol=fifesim.read_aerosol(...)"
+        )
     if isinstance(aerosol, Mapping):
         return _checked_fractions(aerosol, aerosol)
     if not isinstance(aerosol, str):

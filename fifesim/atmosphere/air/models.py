@@ -7,6 +7,7 @@ from difflib import get_close_matches
 import numpy as np
 
 from fifesim.atmosphere.air import aerosols, mixtures, molecules
+from fifesim.atmosphere.air.own_aerosol import Aerosol, known_aerosol
 from fifesim.atmosphere.air.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
 from fifesim.atmosphere.air.summary import atmosphere_in_words
 
@@ -28,9 +29,10 @@ class Atmosphere:
     ----------
     profile : str, optional
         Pressure, temperature, water vapour and ozone by altitude, one of `PROFILES`.
-    aerosol : str or mapping, optional
+    aerosol : str, mapping or Aerosol, optional
         Optical properties of the aerosol: one of `mixtures.MODELS`, "none", or a mixture of
-        `components.COMPONENTS` by volume, such as ``{"dust": 0.5, "water_soluble": 0.5}``.
+        `components.COMPONENTS` by volume, such as ``{"dust": 0.5, "water_soluble": 0.5}``; or one's own, of
+        `fifesim.read_aerosol`, which needs an ``aot``.
     visibility : float, optional
         Meteorological range at the ground, 5 to 100; 45 where there is no ``aot``. [km]
     altitude : float, optional
@@ -53,6 +55,9 @@ class Atmosphere:
     Notes
     -----
     Raising the ground cuts the profile of the air off below; the aerosol stands on the ground and keeps its amount.
+    An aerosol of one's own goes by ``aot`` alone: visibility sets the profile of the standard haze at the ground, and
+    says nothing of what lies in another layer. 6S takes none: Py6S gives it components, or sizes and indices of
+    spheres, but no phase functions.
     The columns of the user scale the profile at all levels. `aot` is known afterwards in either case, `visibility` is
     None where the user gave `aot`.
 
@@ -69,7 +74,7 @@ class Atmosphere:
     """
 
     profile: str = "midlatitude-summer"
-    aerosol: str = "continental"
+    aerosol: str | Aerosol = "continental"
     visibility: float | None = None
     altitude: float = 0.4
     aot: float | None = None
@@ -80,12 +85,29 @@ class Atmosphere:
     def __post_init__(self):
         _check_name("profile", self.profile, PROFILES)
         _check_name("engine", self.engine, ENGINES)
-        aerosol = self.aerosol if self.aerosol == "none" else mixtures.canonical(self.aerosol)
-        self._set(aerosol=aerosol, altitude=_checked("altitude", self.altitude, 0, 4, "km"))
+        if isinstance(self.aerosol, Aerosol):
+            self._check_own_aerosol()
+        elif self.aerosol != "none":
+            self._set(aerosol=mixtures.canonical(self.aerosol))
+        self._set(altitude=_checked("altitude", self.altitude, 0, 4, "km"))
         for name, high, unit in (("h2o", 10, "g cm-2"), ("o3", 1, "cm-atm")):
             if getattr(self, name) is not None:
                 self._set(**{name: _checked(name, getattr(self, name), 0, high, unit)})
         self._set_amount()
+
+    def _check_own_aerosol(self):
+        name = self.aerosol.name
+        if self.visibility is not None or self.aot is None:
+            given = "nothing" if self.visibility is None else f"visibility={self.visibility:g}"
+            raise ValueError(
+                f"the amount of an aerosol of one's own ({name}) must be an aot, from 0 to 2, got {given}: "
+                "type aot=0.2, say; visibility is of the standard haze at the ground"
+            )
+        if self.engine == "6S":
+            raise ValueError(
+                f"engine must be one of {', '.join(ENGINES[:3])} with an aerosol of one's own ({name}), got '6S', "
+                "which takes no phase functions: type engine='successive-orders'"
+            )
 
     def _set_amount(self):
         visibility, aot = self.visibility, self.aot
@@ -138,12 +160,14 @@ class Atmosphere:
         Raises
         ------
         ValueError
-            If the text has another form, or names an atmosphere that is not allowed.
+            If the text has another form, names an atmosphere that is not allowed, or an aerosol of one's own that was
+            not read in this session.
         """
         match = _TEXT.fullmatch(text.strip())
         if match is None:
             raise ValueError(f"atmosphere must read like {cls().text!r}, got {text!r}")
         profile, aerosol, *numbers, engine = match.groups()
+        aerosol = known_aerosol(aerosol) if "#" in aerosol else aerosol
         visibility, aot, altitude, h2o, o3 = (None if number is None else float(number) for number in numbers)
         return cls(profile, aerosol, visibility, altitude, aot, h2o, o3, engine or "5S")
 

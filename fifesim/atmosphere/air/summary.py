@@ -20,23 +20,24 @@ def atmosphere_in_words(atmosphere):
     Returns
     -------
     text : str
-        Means over the nominal bands of the Thematic Mapper, along the vertical.
+        Means over the nominal bands of the Thematic Mapper that the aerosol's tables hold, along the vertical.
 
     References
     ----------
     [Tanre1990]_
     """
     amount = "" if atmosphere.visibility is None else f", visibility {atmosphere.visibility:g} km"
+    bands = [band for band in _BANDS if atmosphere.aot == 0 or aerosols.covers(atmosphere.aerosol, *band)]
     lines = [
         f"{atmosphere.profile}, {atmosphere.aerosol} aerosol{amount}, ground at {atmosphere.altitude:g} km, "
         f"engine {atmosphere.engine}",
         f"pressure {atmosphere.pressure:.1f} hPa, water vapour {atmosphere.water_vapour:.3f} g cm-2, "
         f"ozone {atmosphere.ozone:.4f} cm-atm, aerosol {atmosphere.aot:.4f} at 0.55 um",
         "",
-        "band                         um" + "".join(f"  {low:.2f}-{high:.2f}" for low, high in _BANDS),
+        "band                         um" + "".join(f"  {low:.2f}-{high:.2f}" for low, high in bands),
     ]
-    columns = [_of_band(atmosphere, low, high) for low, high in _BANDS]
-    rows = [f"{name:<31}" + "".join(f"{column[name]:>11.4f}" for column in columns) for name in columns[0]]
+    columns = [_of_band(atmosphere, low, high) for low, high in bands]
+    rows = [f"{name:<31}" + "".join(f"{column[name]:>11.4f}" for column in columns) for name in (columns or [{}])[0]]
     return "\n".join(lines + rows)
 
 

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fifesim.atmosphere.air.own_aerosol import SCALE_HEIGHT
 from fifesim.atmosphere.schemes.phase_expansion import rayleigh_expansion, truncated_expansion
 
-# Scale heights. [km] Their ratio makes the aerosol column above an altitude the fourth power of that of the molecules.
-MOLECULES_HEIGHT, AEROSOL_HEIGHT = 8.0, 2.0
+MOLECULES_HEIGHT = 8.0  # scale height [km]
 
 _LEAST_DEPTH = 1e-12  # optical depth that stands for none [1]
 
@@ -113,9 +113,9 @@ class Column(NamedTuple):
         return np.exp(-np.arange(len(self.molecules))[:, None] * self.depth / cosine)
 
 
-def mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, count, layers):
+def mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, count, layers, vertical=SCALE_HEIGHT):
     """
-    Molecules and aerosol whose density falls off exponentially, with scale heights of 8 and 2 km.
+    Molecules whose density falls off exponentially, with a scale height of 8 km, and aerosol among them.
 
     Parameters
     ----------
@@ -124,6 +124,8 @@ def mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, 
         As in `successive_orders.path_reflectance`. [1]
     count, layers : int
         Terms of the expansions, and number of layers.
+    vertical : float or pair of float
+        Scale height of the aerosol, or bottom and top of its even layer. [km]
 
     Returns
     -------
@@ -144,20 +146,40 @@ def mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, 
     thinned = tau_aerosol * (1 - single_scattering_albedo * peak)
     tau_molecules = np.maximum(tau_molecules, _LEAST_DEPTH)
     depth = (tau_molecules + thinned) / layers
-    edges = _edges(tau_molecules, thinned, layers)
-    air = tau_molecules * np.diff(edges) / depth
-    particles = np.diff(edges ** (MOLECULES_HEIGHT / AEROSOL_HEIGHT)) / depth
+    air_edges, particle_edges = _edges(tau_molecules, thinned, layers, vertical)
+    air = tau_molecules * np.diff(air_edges) / depth
+    particles = np.diff(particle_edges) / depth
     scattered = tau_aerosol * single_scattering_albedo * particles
     return Column(depth, air, scattered * (1 - peak), scattered, rayleigh_expansion(count), expansion)
 
 
-def _edges(tau_molecules, tau_aerosol, layers):
-    """Share of the molecules above the edges of layers of equal optical depth, by Newton's method."""
-    ratio = MOLECULES_HEIGHT / AEROSOL_HEIGHT
+def _edges(tau_molecules, tau_aerosol, layers, vertical):
+    """Shares of molecules and aerosol above the edges of layers of equal optical depth."""
     above = (tau_molecules + tau_aerosol) * np.arange(1, layers) / layers
-    share = np.ones(layers - 1)
+    inside = _exponential if np.ndim(vertical) == 0 else _even
+    share, particles = inside(tau_molecules, tau_aerosol, above, vertical)
+    return np.concatenate([[0.0], share, [1.0]]), np.concatenate([[0.0], particles, [1.0]])
+
+
+def _exponential(tau_molecules, tau_aerosol, above, scale_height):
+    """Shares above some optical depths where the aerosol falls off exponentially, by Newton's method."""
+    # The aerosol above an altitude is a power of the molecules above it.
+    ratio = MOLECULES_HEIGHT / scale_height
+    share = np.ones(above.size)
     # The depth above is a convex function of the share: from 1 the steps go down to the root and never beyond.
     for _ in range(60):
         excess = tau_molecules * share + tau_aerosol * share**ratio - above
         share = share - excess / (tau_molecules + ratio * tau_aerosol * share ** (ratio - 1))
-    return np.concatenate([[0.0], share, [1.0]])
+    return share, share**ratio
+
+
+def _even(tau_molecules, tau_aerosol, above, layer):
+    """Shares above some optical depths where the aerosol fills a layer evenly."""
+    bottom, top = layer
+    # Every 10 m, so that the molecules between two altitudes lie on a line, and at the layer's edges. [km]
+    altitude = np.union1d(np.linspace(0, 80, 8001), layer)[::-1]
+    molecules = np.exp(-altitude / MOLECULES_HEIGHT)
+    particles = np.clip((top - altitude) / (top - bottom), 0, 1)
+    depth = tau_molecules * molecules + tau_aerosol * particles
+    share = np.interp(above, depth, molecules)
+    return share, np.interp(above, depth, particles)

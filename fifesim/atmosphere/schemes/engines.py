@@ -4,6 +4,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
+from fifesim.atmosphere.air import aerosols
 from fifesim.atmosphere.schemes import six_s
 from fifesim.atmosphere.schemes.five_s import five_s_scattering
 from fifesim.atmosphere.schemes.mixed_air import mixed_scattering
@@ -44,7 +45,7 @@ def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
     ImportError
         If the engine is 6S and not installed.
     ValueError
-        If a zenith angle is out of range, or a band reaches beyond the gas table.
+        If a zenith angle is out of range, or a band reaches beyond the gas table or the aerosol's own.
 
     References
     ----------
@@ -89,6 +90,32 @@ def check_zenith(name, angle):
         )
 
 
+def check_aerosol(atmosphere, what, low, high):
+    """
+    Refuse wavelengths that the tables of an aerosol of one's own do not hold.
+
+    Parameters
+    ----------
+    atmosphere : models.Atmosphere
+    what : str
+        Spans them.
+    low, high : float
+        [um]
+
+    Raises
+    ------
+    ValueError
+        If the tables begin or end inside them.
+    """
+    own = atmosphere.aot > 0 and not isinstance(atmosphere.aerosol, str)
+    if own and not aerosols.covers(atmosphere.aerosol, low, high):
+        first, last = aerosols.limits(atmosphere.aerosol)
+        raise ValueError(
+            f"{what} must lie within the wavelengths of the aerosol {atmosphere.aerosol}, {first:g} to {last:g} um, "
+            f"got {low:g} to {high:g} um: add wavelengths to its tables, or choose other bands"
+        )
+
+
 def terms_at(atmosphere, bands, sza, vza, raa):
     """
     What the atmosphere does in each band for one sun and several views.
@@ -105,7 +132,14 @@ def terms_at(atmosphere, bands, sza, vza, raa):
     -------
     terms : BandTerms
         Shapes (V or 1, R or 1, band). [1]
+
+    Raises
+    ------
+    ValueError
+        If a band reaches beyond the aerosol's wavelengths, or the gas table.
     """
+    for band in bands:
+        check_aerosol(atmosphere, f"band {band.name}", *band.limits)
     nodes = nodes_of(bands)
     return band_means(scattering(atmosphere, nodes, sza, vza, raa), nodes, atmosphere, bands, sza, vza)
 

@@ -53,11 +53,13 @@ def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
     cosine = scattering_angle_cosine(sza, np.array(vza)[:, None], np.array(raa))
     albedo, moments, phase = _aerosol(atmosphere, at, cosine, polarized)
 
+    options = {"polarized": polarized, "vertical": aerosols.vertical(atmosphere.aerosol)}
+
     def reflectance(tau_aerosol):
-        return path_reflectance(tau_r, tau_aerosol, albedo, moments, phase, sza, vza, raa, polarized=polarized)
+        return path_reflectance(tau_r, tau_aerosol, albedo, moments, phase, sza, vza, raa, **options)
 
     def flux(tau_molecules, tau_aerosol):
-        return flux_transmittance(tau_molecules, tau_aerosol, albedo, moments, (sza, *vza), polarized=polarized)
+        return flux_transmittance(tau_molecules, tau_aerosol, albedo, moments, (sza, *vza), **options)
 
     total, spherical_albedo = flux(tau_r, tau_a)
     molecules, _ = flux(tau_r, 0.0)

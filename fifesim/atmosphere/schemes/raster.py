@@ -44,7 +44,8 @@ def spectrum(atmosphere=None, geometry=None):
     Raises
     ------
     ValueError
-        If sun or sensor stand too low, or vary, or if the engine is 6S, which knows bands only.
+        If sun or sensor stand too low, or vary, if the engine is 6S, which knows bands only, or if the aerosol is one's
+        own whose tables are shorter.
 
     See Also
     --------
@@ -55,6 +56,7 @@ def spectrum(atmosphere=None, geometry=None):
     for name in ("sza", "vza"):
         engines.check_zenith(name, getattr(geometry, name))
     wavelength = gases.table_wavelengths()
+    engines.check_aerosol(atmosphere, "the spectrum", wavelength[0], wavelength[-1])
     nodes = spectral_nodes(wavelength[0], wavelength[-1])
     views = np.array([geometry.vza]), np.array([geometry.raa])
     light = on_wavelengths(engines.scattering(atmosphere, nodes, geometry.sza, *views), nodes, wavelength)

@@ -70,22 +70,21 @@ def inputs_of(scenario):
         Size [byte] and time of the last change [ns] by path.
     """
     found = {}
-    for name in filter(os.path.isfile, scenario.files.values()):
-        for path in filter(os.path.isfile, _read_with(name)):
+    for (_, key), name in scenario.files.items():
+        for path in filter(os.path.isfile, _read_with(key, name) if os.path.isfile(name) else ()):
             status = os.stat(path)
             found[str(path)] = [status.st_size, status.st_mtime_ns]
     return found
 
 
-def _read_with(name):
-    suffix = Path(name).suffix.lower()
-    if suffix == ".toml":
+def _read_with(key, name):
+    if key == "instrument":
         responses = [band.srf for band in instrument(name).bands]
         return [name, *(Path(each.folder) / each.table for each in responses if hasattr(each, "table"))]
-    if suffix == ".csv":
-        return [name]
-    with raster_file(name).opened() as source:
-        return [name, *source.files]
+    if key in ("lai_file", "dem"):
+        with raster_file(name).opened() as source:
+            return [name, *source.files]
+    return [name]
 
 
 def begin(unfinished, identity):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fifesim.atmosphere.schemes.column import mixed_column
+from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
 
 TAU_MOLECULES, TAU_AEROSOL, ALBEDO = 0.15, 0.4, 0.9
 MU = np.array([0.2, 0.7, 1.0])
@@ -50,3 +51,43 @@ def test_mixing_of_intensity_is_the_mean_of_the_phase_functions(column):
     np.testing.assert_allclose(mixed, expected, rtol=1e-12)
     np.testing.assert_array_equal(column.mixing(0, 1)[..., 0, 0], column.mixing(0, 3)[..., 0, 0])
     np.testing.assert_array_equal(column.mixing(0, 3), column.mixing(0, 3).swapaxes(2, 3))
+
+
+@pytest.mark.parametrize("scale_height", [0.3, 3.0, 8.0])
+def test_aerosol_above_an_altitude_is_a_power_by_the_scale_heights(scale_height):
+    column = mixed_column(TAU_MOLECULES, TAU_AEROSOL, ALBEDO, 0.7 ** np.arange(40.0), 16, 50, scale_height)
+    molecules, aerosol = (np.cumsum(part) / part.sum() for part in (column.molecules, column.aerosol))
+    np.testing.assert_allclose(aerosol, molecules ** (8 / scale_height), rtol=1e-10, atol=1e-12)
+    assert column.aerosol_once.sum() * column.depth == pytest.approx(TAU_AEROSOL * ALBEDO, rel=1e-12)
+
+
+def test_even_layer_lies_between_its_edges():
+    """Molecules above 3 km are exp(-3/8), and all of the aerosol lies below; the layer that holds an edge has both."""
+    column = mixed_column(TAU_MOLECULES, TAU_AEROSOL, ALBEDO, 0.7 ** np.arange(40.0), 16, 400, (1.0, 3.0))
+    above = np.cumsum(column.molecules) / column.molecules.sum()
+    particles = np.cumsum(column.aerosol) / column.aerosol.sum()
+    altitude = -8 * np.log(above)
+    expected = np.clip((3 - altitude) / 2, 0, 1)
+    np.testing.assert_allclose(particles[altitude < 20], expected[altitude < 20], atol=1e-4)
+    assert column.aerosol_once.sum() * column.depth == pytest.approx(TAU_AEROSOL * ALBEDO, rel=1e-12)
+    extinction = column.molecules + column.aerosol_once / ALBEDO * (1 - ALBEDO * 0.7**16)
+    np.testing.assert_allclose(extinction, 1, rtol=1e-3)
+
+
+def test_soot_above_the_molecules_dims_their_light_and_below_it_does_not():
+    """
+    What absorbs and does not scatter multiplies what passes it: exact at all orders. Half a percent of the molecules
+    lie above 42 km.
+    """
+    soot = 0.3, 0.0, [1.0]
+    views = 40.0, [25.0], [60.0]
+    molecules = path_reflectance(0.3, 0.0, 0.0, [1.0], [[0.0]], *views)[0, 0]
+    mu_s, mu_v = np.cos(np.radians([40.0, 25.0]))
+    high, low = (
+        path_reflectance(0.3, *soot, [[1.0]], *views, vertical=layer)[0, 0] for layer in ((42.0, 50.0), (0.0, 0.01))
+    )
+    assert high == pytest.approx(molecules * np.exp(-0.3 * (1 / mu_s + 1 / mu_v)), rel=4e-3)
+    assert low == pytest.approx(molecules, rel=1e-3)
+    clear, _ = flux_transmittance(0.3, 0.0, 0.0, [1.0], [40.0])
+    dimmed, _ = flux_transmittance(0.3, *soot, [40.0], vertical=(42.0, 50.0))
+    assert dimmed[0] == pytest.approx(clear[0] * np.exp(-0.3 / mu_s), rel=4e-3)
