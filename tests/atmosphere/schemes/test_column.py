@@ -50,3 +50,14 @@ def test_mixing_of_intensity_is_the_mean_of_the_phase_functions(column):
     np.testing.assert_allclose(mixed, expected, rtol=1e-12)
     np.testing.assert_array_equal(column.mixing(0, 1)[..., 0, 0], column.mixing(0, 3)[..., 0, 0])
     np.testing.assert_array_equal(column.mixing(0, 3), column.mixing(0, 3).swapaxes(2, 3))
+
+
+def test_sunlight_on_both_ways_is_its_integral_over_the_depth(column):
+    tau = 50 * column.depth
+    up, down = (column.both_ways(0.7, MU, at_ground=at_ground).sum(axis=0) for at_ground in (False, True))
+    slant = 1 / 0.7 + 1 / MU
+    np.testing.assert_allclose(up, (1 - np.exp(-tau * slant)) / slant, rtol=1e-12)
+    slant = (1 / MU - 1 / 0.7)[[0, 2]]
+    expected = (np.exp(-tau / 0.7) - np.exp(-tau / MU[[0, 2]])) / slant
+    np.testing.assert_allclose(down[[0, 2]], expected, rtol=1e-12)
+    assert down[1] == pytest.approx(tau * np.exp(-tau / 0.7), rel=1e-12)
