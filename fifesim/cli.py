@@ -1,6 +1,7 @@
 """The command line. Everything slow to import is imported by the command that needs it, so that --help is instant."""
 
 import json
+import os
 from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
@@ -160,20 +161,29 @@ def sensors(
 @app.command()
 def verify():
     """Check this installation against independent results; exit code 1 where one deviates more than it may."""
+    # The matrices are small: threads of BLAS, loaded only now, would wait for each other longer than they work.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+
     from fifesim.experiments.verification.areas import deviations
-    from fifesim.experiments.verification.listing import HEADING, line, summary
+    from fifesim.experiments.verification.listing import HEADING, by_stage, summary
 
     found = []
     try:
         typer.echo(HEADING)
-        for deviation in deviations():
-            typer.echo(line(deviation))
-            found.append(deviation)
+        for text in by_stage(_kept(deviations(), found)):
+            typer.echo(text)
     except OSError as error:
         _stop(error, Exit.FAILURE)
     typer.echo(summary(found))
     if not all(deviation.within for deviation in found):
         raise typer.Exit(Exit.FAILURE)
+
+
+def _kept(items, kept):
+    """Items as they come, which go into a list too."""
+    for item in items:
+        kept.append(item)
+        yield item
 
 
 def _check_spelling(scenario):

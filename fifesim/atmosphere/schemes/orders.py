@@ -9,6 +9,7 @@ from numba import njit
 from fifesim.atmosphere.schemes.phase_expansion import stokes_basis, wigner
 
 MOST_ORDERS = 1000
+ONE_THREAD = 2**18  # products of so many terms or fewer are not worth a second thread to BLAS
 
 
 @lru_cache
@@ -128,7 +129,7 @@ def lit_from_below(column, *, polarized=True, streams, tolerance):
     direct[:, :streams] = column.layer_mean(nodes[:streams])[::-1]
     basis, mixing = stokes_basis(0, nodes, column.terms, components), column.mixing(0, components)
     shares = np.tile(weights / 2, components)
-    source = _scattered(direct * shares, basis, mixing) @ basis.T
+    source = _by_layers(_scattered(direct * shares, basis, mixing), basis.T)
     through, averaged = column.steps(nodes[:streams])
     field, _ = _sum_orders(source, _Mode(basis, shares, mixing, through, averaged), 0.0, tolerance)
     return _scattered((direct + field) * shares, basis, mixing)
@@ -216,7 +217,7 @@ def _rescattered(column, mode, components, mu_s, streams, least, tolerance):
     once = np.moveaxis(mixing[..., 0] * sun[:, None], 2, 1).reshape(len(beam), -1)
     through, averaged = column.steps(nodes[:streams])
     carried = _Mode(basis, weights, mixing, through, averaged)
-    field, size = _sum_orders(beam * once @ basis.T, carried, least, tolerance)
+    field, size = _sum_orders(_by_layers(beam * once, basis.T), carried, least, tolerance)
     return _scattered(field * weights, basis, mixing), size
 
 
@@ -228,6 +229,16 @@ class _Mode(NamedTuple):
     mixing: np.ndarray  # of `_Column.mixing` [1]
     through: np.ndarray  # of what enters a layer, shape (directions of a hemisphere,) [1]
     averaged: np.ndarray  # its mean over the layer [1]
+
+
+def _by_layers(light, matrix):
+    """
+    Product of two matrices, some layers at a time.
+
+    So little at once that BLAS does it in one thread: its threads would wait for each other longer than they work.
+    """
+    step = max(1, ONE_THREAD // matrix.size)
+    return np.concatenate([light[first : first + step] @ matrix for first in range(0, len(light), step)])
 
 
 @njit(nogil=True, cache=True)
