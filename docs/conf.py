@@ -11,8 +11,10 @@ import fifesim
 
 sys.path.insert(0, str(Path(__file__).parent))
 import make_api
+import make_bounds
 
 make_api.write()
+make_bounds.write()
 
 project = "fifesim"
 author = "the fifesim developers"
@@ -28,7 +30,7 @@ extensions = [
     "sphinx-mathjax-offline",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "gallery_src", "gallery/**/*.ipynb", "gallery/*.ipynb"]
+exclude_patterns = ["_build", "bounds.md", "gallery_src", "gallery/**/*.ipynb", "gallery/*.ipynb"]
 templates_path = ["_templates"]
 default_role = "py:obj"
 
