@@ -1,7 +1,10 @@
 """Sphinx configuration. Build with: sphinx-build -W -b html docs docs/_build/html"""
 
+import os
 import sys
 from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is loaded: its matrices here are small
 
 from docutils import nodes
 from sphinx.addnodes import pending_xref
