@@ -88,11 +88,17 @@ def _aerosol(atmosphere, wavelength, cosine, polarized):
     return float(albedo[0]), _moments(atmosphere.aerosol, float(wavelength[0]), polarized), phase
 
 
+@lru_cache
+def _quadrature():
+    """Once: its eigenvalues take longer than all else at a wavelength."""
+    return np.polynomial.legendre.leggauss(_COSINES)
+
+
 @lru_cache(maxsize=256)
 def _moments(aerosol, wavelength, polarized):
     if not polarized:
         return aerosols.phase_moments(aerosol, np.array([wavelength]), _MOMENTS)[0]
-    cosines, weights = np.polynomial.legendre.leggauss(_COSINES)
+    cosines, weights = _quadrature()
     phase = aerosols.aerosol_phase(aerosol, cosines, wavelength)
     polarization = aerosols.aerosol_polarization(aerosol, cosines, wavelength)
     return matrix_moments(phase, polarization, cosines, weights, _MOMENTS)
