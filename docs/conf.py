@@ -1,7 +1,10 @@
 """Sphinx configuration. Build with: sphinx-build -W -b html docs docs/_build/html"""
 
+import os
 import sys
 from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is loaded: its matrices here are small
 
 from docutils import nodes
 from sphinx.addnodes import pending_xref
@@ -11,8 +14,10 @@ import fifesim
 
 sys.path.insert(0, str(Path(__file__).parent))
 import make_api
+import make_bounds
 
 make_api.write()
+make_bounds.write()
 
 project = "fifesim"
 author = "the fifesim developers"
@@ -28,7 +33,7 @@ extensions = [
     "sphinx-mathjax-offline",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "gallery_src", "gallery/**/*.ipynb", "gallery/*.ipynb"]
+exclude_patterns = ["_build", "bounds.md", "gallery_src", "gallery/**/*.ipynb", "gallery/*.ipynb"]
 templates_path = ["_templates"]
 default_role = "py:obj"
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 LOSCHMIDT = 2.54743e25  # molecules per cubic metre at 288.15 K and 1013.25 hPa [m-3]
-DEPOLARIZATION = 0.0279  # Young (1980) [1]
+DEPOLARIZATION = 0.0279  # of air, Young (1980) [1]
 
 
 def refractive_index(wavelength):
@@ -35,7 +35,7 @@ def refractive_index(wavelength):
     return 1 + 1e-8 * (8342.13 + 2406030 / (130 - wavenumber_squared) + 15997 / (38.9 - wavenumber_squared))
 
 
-def rayleigh_cross_section(wavelength):
+def rayleigh_cross_section(wavelength, depolarization=DEPOLARIZATION):
     r"""
     Scattering cross section of one molecule of air.
 
@@ -47,6 +47,8 @@ def rayleigh_cross_section(wavelength):
     ----------
     wavelength : array
         [um]
+    depolarization : float, optional
+        Of light scattered through 90 degrees, :math:`\delta`. [1]
 
     Returns
     -------
@@ -70,12 +72,40 @@ def rayleigh_cross_section(wavelength):
     """
     index_squared = refractive_index(wavelength) ** 2
     polarizability = (index_squared - 1) / (index_squared + 2)
-    king_factor = (6 + 3 * DEPOLARIZATION) / (6 - 7 * DEPOLARIZATION)
+    king_factor = (6 + 3 * depolarization) / (6 - 7 * depolarization)
     metres = np.asarray(wavelength, float) * 1e-6
     return 24 * np.pi**3 * polarizability**2 * king_factor / (metres**4 * LOSCHMIDT**2)
 
 
-def rayleigh_phase(scattering_cosine):
+def rayleigh_anisotropy(depolarization=DEPOLARIZATION):
+    r"""
+    Share of the light that molecules scatter as dipoles do; the rest goes evenly everywhere.
+
+    .. math:: c = \frac{2 (1 - \delta)}{2 + \delta}
+
+    Parameters
+    ----------
+    depolarization : float, optional
+        Of light scattered through 90 degrees, :math:`\delta`. [1]
+
+    Returns
+    -------
+    anisotropy : float
+        [1]
+
+    References
+    ----------
+    [Young1980]_
+
+    Examples
+    --------
+    >>> rayleigh_anisotropy(0.0)
+    1.0
+    """
+    return 2 * (1 - depolarization) / (2 + depolarization)
+
+
+def rayleigh_phase(scattering_cosine, depolarization=DEPOLARIZATION):
     r"""
     Phase function of the molecules.
 
@@ -85,6 +115,8 @@ def rayleigh_phase(scattering_cosine):
     ----------
     scattering_cosine : array
         Cosine of the scattering angle. [1]
+    depolarization : float, optional
+        As in `rayleigh_anisotropy`. [1]
 
     Returns
     -------
@@ -100,5 +132,5 @@ def rayleigh_phase(scattering_cosine):
     >>> bool(rayleigh_phase(-1.0) == rayleigh_phase(1.0))
     True
     """
-    anisotropy = 2 * (1 - DEPOLARIZATION) / (2 + DEPOLARIZATION)
+    anisotropy = rayleigh_anisotropy(depolarization)
     return 0.75 * anisotropy * (1 + np.asarray(scattering_cosine, float) ** 2) + 1 - anisotropy

@@ -3,7 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import exprel
 
+from fifesim.atmosphere.air.molecules import DEPOLARIZATION
 from fifesim.atmosphere.air.own_aerosol import SCALE_HEIGHT
 from fifesim.atmosphere.schemes.phase_expansion import rayleigh_expansion, truncated_expansion
 
@@ -21,6 +23,11 @@ class Column(NamedTuple):
     aerosol_once: np.ndarray  # the same, of all that is scattered [1]
     molecules_expansion: np.ndarray  # shape (count, 4) [1]
     aerosol_expansion: np.ndarray
+
+    @property
+    def terms(self):
+        """Number of terms of the expansions."""
+        return len(self.molecules_expansion)
 
     def polarizes(self, mode):
         """
@@ -108,12 +115,45 @@ class Column(NamedTuple):
         through, _ = self.steps(cosine)
         return (self._from_top(cosine) * (1 - through)).T
 
+    def both_ways(self, mu_s, mu_v, at_ground=False):
+        """
+        Integral over each layer of the sunlight that reaches it and is not scattered again on its way out.
+
+        Parameters
+        ----------
+        mu_s : float
+        mu_v : array, shape (views,)
+            Cosines of the angles from the vertical of the sun and of the way out. [1]
+        at_ground : bool, optional
+            Out at the ground instead of at the top.
+
+        Returns
+        -------
+        light : array, shape (layers, views)
+            [1]
+        """
+        if not at_ground:
+            return self.layer_mean(1 / (1 / mu_s + 1 / mu_v)) * self.depth
+        layer = np.arange(len(self.molecules))[:, None]
+        reached = np.exp(-self.depth * (layer / mu_s + (layer[::-1] + 1) / mu_v))
+        return reached * self.depth * exprel(self.depth * (1 / mu_v - 1 / mu_s))
+
     def _from_top(self, cosine):
         """Transmittance from the top to each layer, shape (layers, directions)."""
         return np.exp(-np.arange(len(self.molecules))[:, None] * self.depth / cosine)
 
 
-def mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, count, layers, vertical=SCALE_HEIGHT):
+def mixed_column(
+    tau_molecules,
+    tau_aerosol,
+    single_scattering_albedo,
+    moments,
+    count,
+    layers,
+    *,
+    vertical=SCALE_HEIGHT,
+    depolarization=DEPOLARIZATION,
+):
     """
     Molecules whose density falls off exponentially, with a scale height of 8 km, and aerosol among them.
 
@@ -126,6 +166,8 @@ def mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, 
         Terms of the expansions, and number of layers.
     vertical : float or pair of float
         Scale height of the aerosol, or bottom and top of its even layer. [km]
+    depolarization : float, optional
+        Of the molecules. [1]
 
     Returns
     -------
@@ -150,7 +192,7 @@ def mixed_column(tau_molecules, tau_aerosol, single_scattering_albedo, moments, 
     air = tau_molecules * np.diff(air_edges) / depth
     particles = np.diff(particle_edges) / depth
     scattered = tau_aerosol * single_scattering_albedo * particles
-    return Column(depth, air, scattered * (1 - peak), scattered, rayleigh_expansion(count), expansion)
+    return Column(depth, air, scattered * (1 - peak), scattered, rayleigh_expansion(count, depolarization), expansion)
 
 
 def _edges(tau_molecules, tau_aerosol, layers, vertical):

@@ -6,6 +6,7 @@ import numpy as np
 
 from fifesim.atmosphere.air import aerosols
 from fifesim.atmosphere.schemes.phase_expansion import matrix_moments
+from fifesim.atmosphere.schemes.stokes import stokes_reflectance
 from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
 from fifesim.atmosphere.schemes.terms import Scattering
 from fifesim.base.geometry import scattering_angle_cosine
@@ -89,11 +90,63 @@ def _aerosol(atmosphere, wavelength, cosine, polarized):
     return float(albedo[0]), _moments(atmosphere.aerosol, float(wavelength[0]), polarized), phase
 
 
+@lru_cache
+def _quadrature():
+    """Once: its eigenvalues take longer than all else at a wavelength."""
+    return np.polynomial.legendre.leggauss(_COSINES)
+
+
 @lru_cache(maxsize=256)
 def _moments(aerosol, wavelength, polarized):
     if not polarized:
         return aerosols.phase_moments(aerosol, np.array([wavelength]), _MOMENTS)[0]
-    cosines, weights = np.polynomial.legendre.leggauss(_COSINES)
+    cosines, weights = _quadrature()
     phase = aerosols.aerosol_phase(aerosol, cosines, wavelength)
     polarization = aerosols.aerosol_polarization(aerosol, cosines, wavelength)
     return matrix_moments(phase, polarization, cosines, weights, _MOMENTS)
+
+
+def mixed_stokes(atmosphere, wavelength, sza, vza, raa, *, at_ground=False, ground=0.0):
+    """
+    Polarized light at the top of an atmosphere, or of its sky at the ground, without gases.
+
+    Parameters
+    ----------
+    atmosphere : models.Atmosphere
+    wavelength : array, shape (n,)
+        [um]
+    sza : float
+        [degree]
+    vza, raa : array, shape (V,) and (R,)
+        [degree]
+    at_ground : bool, optional
+    ground : float, optional
+        Reflectance of the ground. [1]
+
+    Returns
+    -------
+    stokes : array, shape (3, V, R, n)
+        I, Q and U, in the signs of `stokes.stokes_reflectance`. [1]
+
+    Examples
+    --------
+    >>> from fifesim.atmosphere.air.models import Atmosphere
+    >>> sky = mixed_stokes(Atmosphere(), np.array([0.45, 0.7]), 30.0, np.zeros(1), np.zeros(1), at_ground=True)
+    >>> bool(sky[0, 0, 0, 0] > sky[0, 0, 0, 1])
+    True
+    """
+    cosine = scattering_angle_cosine(sza, np.asarray(vza, float)[:, None], np.asarray(raa, float))
+    cosine = -cosine if at_ground else cosine
+    vertical = aerosols.vertical(atmosphere.aerosol)
+    options = {"at_ground": at_ground, "ground": ground, "vertical": vertical}
+    found = []
+    for at in np.asarray(wavelength, float)[:, None]:
+        depths = (
+            float(depth(at)[0]) for depth in (atmosphere.rayleigh_optical_depth, atmosphere.aerosol_optical_depth)
+        )
+        *aerosol, phase = _aerosol(atmosphere, at, cosine, True)
+        none = np.zeros(cosine.shape)
+        polarization = aerosols.aerosol_polarization(atmosphere.aerosol, cosine, at[0]) if atmosphere.aot else none
+        optics = *depths, *aerosol, phase, polarization
+        found.append(stokes_reflectance(*optics, sza, vza, raa, **options))
+    return np.stack(found, axis=-1)

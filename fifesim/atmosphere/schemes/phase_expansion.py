@@ -5,13 +5,13 @@ import math
 import numpy as np
 from numba import njit
 
-from fifesim.atmosphere.air.molecules import DEPOLARIZATION
+from fifesim.atmosphere.air.molecules import DEPOLARIZATION, rayleigh_anisotropy
 
 # Columns of an expansion: of F11 (the phase function), of F22 and F33 together, and of F12.
 INTENSITY, LINEAR, DIAGONAL, POLARIZING = range(4)
 
 
-def rayleigh_expansion(count):
+def rayleigh_expansion(count, depolarization=DEPOLARIZATION):
     r"""
     Expansion of the scattering matrix of the molecules.
 
@@ -24,6 +24,8 @@ def rayleigh_expansion(count):
     ----------
     count : int
         Number of terms, at least 3.
+    depolarization : float, optional
+        :math:`\delta`, as in `molecules.rayleigh_anisotropy`. [1]
 
     Returns
     -------
@@ -39,14 +41,13 @@ def rayleigh_expansion(count):
     >>> float(rayleigh_expansion(4)[0, 0])
     1.0
     """
-    anisotropy = 2 * (1 - DEPOLARIZATION) / (2 + DEPOLARIZATION)
     expansion = np.zeros((count, 4))
     expansion[0, INTENSITY] = 1
-    expansion[2] = anisotropy * np.array([0.5, 3, 0, math.sqrt(6) / 2])
+    expansion[2] = rayleigh_anisotropy(depolarization) * np.array([0.5, 3, 0, math.sqrt(6) / 2])
     return expansion
 
 
-def matrix_moments(phase, polarization, scattering_cosine, weights, count):
+def matrix_moments(phase, polarization, scattering_cosine, weights, count, diagonal=None):
     r"""
     Moments of the scattering matrix of spheres.
 
@@ -67,6 +68,8 @@ def matrix_moments(phase, polarization, scattering_cosine, weights, count):
         Cosines of the scattering angles, and weights of the integration over the cosine. [1]
     count : int
         Number of moments.
+    diagonal : array, shape (angles,), optional
+        :math:`F_{33} / F_{11}`, by default 1. [1]
 
     Returns
     -------
@@ -75,10 +78,10 @@ def matrix_moments(phase, polarization, scattering_cosine, weights, count):
 
     Notes
     -----
-    :math:`F_{22}` of spheres is :math:`F_{11}`. :math:`F_{33}` is taken as that, too: it carries only what is already
-    polarized. Beside the whole matrices of continental, maritime and urban aerosol, of optical depth up to 0.9 at
-    0.49 to 0.86 um, that moves the path reflectance by less than .06 %. 500 Gauss points carry the moments of dust and
-    sea salt to 1e-5; 200 do not, to 1e-3.
+    :math:`F_{22}` of spheres is :math:`F_{11}`. Where :math:`F_{33}` is not given it is taken as that, too: it carries
+    only what is already polarized. Beside the whole matrices of continental, maritime and urban aerosol, of optical
+    depth up to 0.9 at 0.49 to 0.86 um, that moves the path reflectance by less than .06 %; Q and U of IPRT A3 it moves
+    by up to 1e-3. 500 Gauss points carry the moments of dust and sea salt to 1e-5; 200 do not, to 1e-3.
 
     References
     ----------
@@ -93,7 +96,13 @@ def matrix_moments(phase, polarization, scattering_cosine, weights, count):
     amount = phase * weights / np.sum(phase * weights)
     linear = wigner(2, 2, scattering_cosine, count) @ amount
     polarizing = wigner(0, 2, scattering_cosine, count) @ (amount * polarization)
-    return np.stack([wigner(0, 0, scattering_cosine, count) @ amount, linear, linear, polarizing], axis=1)
+    intensity = wigner(0, 0, scattering_cosine, count) @ amount
+    if diagonal is None:
+        return np.stack([intensity, linear, linear, polarizing], axis=1)
+    # Half the sum of F22 and F33, and half their difference.
+    same = wigner(2, 2, scattering_cosine, count) @ (amount * (1 + diagonal) / 2)
+    other = wigner(2, -2, scattering_cosine, count) @ (amount * (1 - diagonal) / 2)
+    return np.stack([intensity, same + other, same - other, polarizing], axis=1)
 
 
 def truncated_expansion(moments, count):

@@ -1,20 +1,15 @@
 """Multiple scattering in the mixed atmosphere of molecules and aerosol, by successive orders."""
 
-from functools import lru_cache
-from typing import NamedTuple
-
 import numpy as np
-from numba import njit
 
-from fifesim.atmosphere.air.molecules import rayleigh_phase
+from fifesim.atmosphere.air.molecules import DEPOLARIZATION, rayleigh_phase
 from fifesim.atmosphere.air.own_aerosol import SCALE_HEIGHT
 from fifesim.atmosphere.schemes.column import mixed_column
-from fifesim.atmosphere.schemes.phase_expansion import stokes_basis, wigner
+from fifesim.atmosphere.schemes.orders import fluxes, lit_from_below, once_scattered, rescattered_light
 
 STREAMS = 16  # directions per hemisphere
 LAYERS = 60
 TOLERANCE = 1e-6  # of the field, for what is left out of the sums over orders and over Fourier modes [1]
-MOST_ORDERS = 1000
 
 
 def path_reflectance(
@@ -28,9 +23,11 @@ def path_reflectance(
     raa,
     *,
     polarized=True,
+    depolarization=DEPOLARIZATION,
     streams=STREAMS,
     layers=LAYERS,
     vertical=SCALE_HEIGHT,
+    tolerance=TOLERANCE,
 ):
     r"""
     Reflectance at the top of the atmosphere over a black surface.
@@ -61,10 +58,14 @@ def path_reflectance(
         0 has sun and sensor on the same side. [degree]
     polarized : bool
         With the Stokes parameters Q and U, or with the intensity alone.
+    depolarization : float
+        Of the molecules. [1]
     streams, layers : int
         Directions per hemisphere, and layers of equal optical depth.
     vertical : float or pair of float
         Scale height of the aerosol, or bottom and top of its even layer. [km]
+    tolerance : float
+        Of the field, for what is left out of the sums over orders and over Fourier modes. [1]
 
     Returns
     -------
@@ -96,25 +97,16 @@ def path_reflectance(
     >>> bool(abs(there - back) < 2e-5)
     True
     """
-    optics = tau_molecules, tau_aerosol, single_scattering_albedo, moments
-    column = mixed_column(*optics, 2 * streams, layers, vertical)
+    atmosphere = tau_molecules, tau_aerosol, single_scattering_albedo, moments
+    column = mixed_column(*atmosphere, 2 * streams, layers, vertical=vertical, depolarization=depolarization)
     mu_s, mu_v = np.cos(np.radians(float(sza))), np.cos(np.radians(np.asarray(vza, float)))
     azimuth = np.radians(np.asarray(raa, float))
-    nodes, _ = _quadrature(streams)
-    upward = np.concatenate([nodes[:streams], mu_v])
-    escape = column.escape(upward)
-    reflectance = _single_scattering(column, np.asarray(phase, float), mu_s, mu_v, azimuth)
-    field_size, largest, small = 0.0, 0.0, 0
-    for mode in range(2 * streams):
-        components = 3 if polarized and column.polarizes(mode) else 1
-        coefficients, size = _rescattered(column, mode, components, mu_s, streams, field_size)
-        radiance = (escape * (wigner(mode, 0, upward, 2 * streams)[mode:].T @ coefficients.T)).sum(axis=1)
-        reflectance += (-1) ** mode * np.cos(mode * azimuth) * radiance[streams:, None] / mu_s
-        strength = np.abs(radiance[:streams]).max()  # at the nodes: no view depends on the others asked for
-        field_size, largest = max(field_size, size), max(largest, strength)
-        small = small + 1 if strength <= TOLERANCE * largest else 0
-        if mode >= 2 and small >= 2:
-            break
+    sines = np.sqrt((1 - mu_s**2) * (1 - mu_v**2))[:, None]
+    molecules = rayleigh_phase(-mu_s * mu_v[:, None] - sines * np.cos(azimuth), depolarization)
+    reflectance = once_scattered(column, molecules, np.asarray(phase, float), mu_s, mu_v)
+    options = {"polarized": polarized, "streams": streams, "tolerance": tolerance}
+    for mode, (radiance,) in rescattered_light(column, mu_s, mu_v, **options):
+        reflectance += (-1) ** mode * np.cos(mode * azimuth) * radiance[:, None] / mu_s
     return reflectance
 
 
@@ -126,9 +118,11 @@ def flux_transmittance(
     zenith,
     *,
     polarized=True,
+    depolarization=DEPOLARIZATION,
     streams=STREAMS,
     layers=LAYERS,
     vertical=SCALE_HEIGHT,
+    tolerance=TOLERANCE,
 ):
     r"""
     Total transmittance, and spherical albedo seen from below.
@@ -144,7 +138,10 @@ def flux_transmittance(
     zenith : array, shape (n,)
         Of the sun or of the sensor. [degree]
     polarized : bool
-    streams, layers, vertical
+    depolarization : float
+    streams, layers : int
+    vertical : float or pair of float
+    tolerance : float
         As in `path_reflectance`.
 
     Returns
@@ -166,130 +163,7 @@ def flux_transmittance(
     >>> bool(1 > thin > thick), bool(0 < little < more)
     (True, True)
     """
-    optics = tau_molecules, tau_aerosol, single_scattering_albedo, moments
-    column = mixed_column(*optics, 2 * streams, layers, vertical)
-    count, components = 2 * streams, 3 if polarized else 1
-    nodes, weights = _quadrature(streams)
-    up, zenith_up = nodes[:streams], np.cos(np.radians(np.asarray(zenith, float)))
-    direct = np.zeros((layers, components * count))
-    direct[:, :streams] = column.layer_mean(up)[::-1]
-    basis, mixing = stokes_basis(0, nodes, count, components), column.mixing(0, components)
-    shares = np.tile(weights / 2, components)
-    source = _scattered(direct * shares, basis, mixing) @ basis.T
-    through, averaged = column.steps(up)
-    field, _ = _sum_orders(source, _Mode(basis, shares, mixing, through, averaged), 0.0)
-    coefficients = _scattered((direct + field) * shares, basis, mixing)[:, :count]
-    # Down from the surface, the layers come in the opposite order.
-    out = column.escape(zenith_up) * (wigner(0, 0, zenith_up, count).T @ coefficients.T)
-    back = column.escape(up) * (wigner(0, 0, -up, count).T @ coefficients[::-1].T)
-    transmittance = np.exp(-layers * column.depth / zenith_up) + out.sum(axis=1)
-    return transmittance, float(2 * (back.sum(axis=1) * up * weights[:streams]).sum())
-
-
-@lru_cache
-def _quadrature(streams):
-    """Cosines of the directions, upward ones first, and their weights: Gauss points of each hemisphere."""
-    points, weights = np.polynomial.legendre.leggauss(streams)
-    upward = (points + 1) / 2
-    return np.concatenate([upward, -upward]), np.concatenate([weights, weights]) / 2
-
-
-def _single_scattering(column, phase, mu_s, mu_v, azimuth):
-    """Reflectance of the light scattered once, shape (views, azimuths)."""
-    sines = np.sqrt((1 - mu_s**2) * (1 - mu_v**2))[:, None]
-    molecules = rayleigh_phase(-mu_s * mu_v[:, None] - sines * np.cos(azimuth))
-    slant = 1 / mu_s + 1 / mu_v
-    reached = column.layer_mean(1 / slant) * column.depth
-    by_molecules, by_aerosol = (reached.T @ column.molecules)[:, None], (reached.T @ column.aerosol_once)[:, None]
-    return (by_molecules * molecules + by_aerosol * phase) / (4 * mu_s * mu_v[:, None])
-
-
-def _rescattered(column, mode, components, mu_s, streams, least):
-    """
-    Source of the light scattered more than once, in one Fourier mode.
-
-    Returns its coefficients in the Legendre functions of the mode, shape (layers, degrees), and the size of the field.
-    """
-    count = 2 * streams
-    nodes, weights = _quadrature(streams)
-    basis = stokes_basis(mode, nodes, count, components)
-    weights = np.tile(weights / 2, components)
-    mixing = column.mixing(mode, components)
-    sun = wigner(mode, 0, np.array([-mu_s]), count)[mode:, 0]
-    beam = column.layer_mean(np.array([mu_s])) * (0.25 if mode == 0 else 0.5)
-    once = np.moveaxis(mixing[..., 0] * sun[:, None], 2, 1).reshape(len(beam), -1)
-    through, averaged = column.steps(nodes[:streams])
-    field, size = _sum_orders(beam * once @ basis.T, _Mode(basis, weights, mixing, through, averaged), least)
-    return _scattered(field * weights, basis, mixing)[:, : count - mode], size
-
-
-class _Mode(NamedTuple):
-    """What scatters and carries the light of one Fourier mode."""
-
-    basis: np.ndarray  # shape (components * directions, basis) [1]
-    weights: np.ndarray  # of the directions, for each component [1]
-    mixing: np.ndarray  # of `_Column.mixing` [1]
-    through: np.ndarray  # of what enters a layer, shape (directions of a hemisphere,) [1]
-    averaged: np.ndarray  # its mean over the layer [1]
-
-
-@njit(nogil=True, cache=True)
-def _scattered(weighted, basis, mixing):
-    """Coefficients of the source that a field, times its weights, makes by scattering: shape (layers, basis)."""
-    incident = np.dot(weighted, basis)
-    source = np.zeros_like(incident)
-    layers, degrees, components, _ = mixing.shape
-    for k in range(layers):
-        for to in range(components):
-            for of in range(components):
-                for degree in range(degrees):
-                    source[k, to * degrees + degree] += mixing[k, degree, to, of] * incident[k, of * degrees + degree]
-    return source
-
-
-@njit(nogil=True, cache=True)
-def _travel(source, through, averaged):
-    """Mean over each layer of the light that the even sources of all layers send, none entering from outside."""
-    layers, size = source.shape
-    streams = through.size
-    field = np.empty_like(source)
-    for first in range(0, size, 2 * streams):
-        for j in range(streams):
-            up, down = first + j, first + streams + j
-            rising, falling = 0.0, 0.0
-            for k in range(layers):
-                under = layers - 1 - k
-                field[k, down] = source[k, down] + (falling - source[k, down]) * averaged[j]
-                falling = source[k, down] + (falling - source[k, down]) * through[j]
-                field[under, up] = source[under, up] + (rising - source[under, up]) * averaged[j]
-                rising = source[under, up] + (rising - source[under, up]) * through[j]
-    return field
-
-
-@njit(nogil=True, cache=True)
-def _sum_orders(source, mode, least):
-    """
-    Light of all orders of scattering from the source of the first, the tail closed as a geometric series.
-
-    Returns the mean of each layer, shape (layers, components * directions), and its size: the weighted sum. The error
-    of the tail, were the ratio of successive orders to go on changing as it last did, is held below the tolerance
-    times the size, or times `least` where that is larger.
-    """
-    backward = np.ascontiguousarray(mode.basis.T)
-    total = np.zeros_like(source)
-    size, last, last_ratio = 0.0, 0.0, 2.0
-    for _ in range(MOST_ORDERS):
-        field = _travel(source, mode.through, mode.averaged)
-        total += field
-        strength = (np.abs(field) * mode.weights).sum()
-        size += strength
-        ratio = strength / last if last > 0 else 0.0
-        if last > 0 and ratio < 1:
-            left = strength * abs(ratio - last_ratio) / (1 - ratio) ** 2
-            if left <= TOLERANCE * max(size, least):
-                return total + field * (ratio / (1 - ratio)), size
-        if not strength > 0:
-            break
-        last, last_ratio = strength, ratio
-        source = np.dot(_scattered(field * mode.weights, mode.basis, mode.mixing), backward)
-    return total, size
+    atmosphere = tau_molecules, tau_aerosol, single_scattering_albedo, moments
+    column = mixed_column(*atmosphere, 2 * streams, layers, vertical=vertical, depolarization=depolarization)
+    source = lit_from_below(column, polarized=polarized, streams=streams, tolerance=tolerance)
+    return fluxes(column, source, np.cos(np.radians(np.asarray(zenith, float))), streams)

@@ -4,6 +4,7 @@ from fifesim.experiments.verification import (
     adjacency,
     analysis,
     atmosphere,
+    benchmarks,
     canopy,
     landscape,
     line_spread,
@@ -15,10 +16,10 @@ from fifesim.experiments.verification import (
 
 AREAS = {
     "random field": landscape.CHECKS,
-    "canopy": canopy.CHECKS,
+    "canopy": (*canopy.CHECKS, *benchmarks.CANOPY),
     "terrain": terrain.CHECKS,
+    "atmosphere": (*scattering.CHECKS, *benchmarks.CHECKS, *adjacency.CHECKS, *atmosphere.CHECKS),
     "sensor": (*sensor.CHECKS, *line_spread.CHECKS, *scan.CHECKS),
-    "atmosphere": (*scattering.CHECKS, *adjacency.CHECKS, *atmosphere.CHECKS),
     "analysis": analysis.CHECKS,
 }
 
@@ -36,7 +37,7 @@ def verify():
     Notes
     -----
     The results are limits that theory knows, quadratures, and tables by other codes in ``data/verification``. Half a
-    minute at most; ``fifesim verify`` prints the same.
+    minute at most; ``fifesim verify`` prints the same, stage by stage.
 
     References
     ----------

@@ -2,6 +2,44 @@
 
 HEADING = f"{'':13}{'compared':<48}{'largest':>10}{'bound':>10} {'unit':<8}with"
 
+# The stages of Figure 1 that the areas are of, in the order of the way of a pixel.
+STAGES = {
+    "random field": "Ground",
+    "canopy": "Ground",
+    "terrain": "Ground",
+    "atmosphere": "Atmosphere",
+    "sensor": "Sensor",
+    "analysis": "Analysis",
+}
+
+
+def by_stage(deviations):
+    """
+    Deviations line by line, below a heading for each stage.
+
+    Parameters
+    ----------
+    deviations : iterable of fifesim.experiments.verification.deviations.Deviation
+        Those of a stage one after the other.
+
+    Yields
+    ------
+    text : str
+        As soon as a deviation is known.
+
+    Examples
+    --------
+    >>> from fifesim.experiments.verification.deviations import Deviation
+    >>> [text.split()[0] for text in by_stage([Deviation("terrain", "slope", 0.1, 0.2, "degree", "plane")])]
+    ['Ground', 'terrain']
+    """
+    stage = None
+    for deviation in deviations:
+        if STAGES[deviation.area] != stage:
+            stage = STAGES[deviation.area]
+            yield f"\n{stage}"
+        yield line(deviation)
+
 
 def line(deviation):
     """

@@ -32,3 +32,9 @@ def test_cross_section_falls_with_the_fourth_power_times_that_of_the_index():
     ratio = rayleigh_cross_section(0.4) / rayleigh_cross_section(0.8)
     slope = ((refractive_index(0.4) - 1) / (refractive_index(0.8) - 1)) ** 2
     assert ratio == pytest.approx(16 * slope, rel=1e-4)
+
+
+def test_depolarization_of_zero_is_that_of_dipoles():
+    assert rayleigh_phase(0.0, depolarization=0.0) == 0.75
+    king = (6 + 3 * DEPOLARIZATION) / (6 - 7 * DEPOLARIZATION)
+    assert rayleigh_cross_section(0.5) == pytest.approx(king * rayleigh_cross_section(0.5, 0.0), rel=1e-12)

@@ -55,7 +55,7 @@ def test_mixing_of_intensity_is_the_mean_of_the_phase_functions(column):
 
 @pytest.mark.parametrize("scale_height", [0.3, 3.0, 8.0])
 def test_aerosol_above_an_altitude_is_a_power_by_the_scale_heights(scale_height):
-    column = mixed_column(TAU_MOLECULES, TAU_AEROSOL, ALBEDO, 0.7 ** np.arange(40.0), 16, 50, scale_height)
+    column = mixed_column(TAU_MOLECULES, TAU_AEROSOL, ALBEDO, 0.7 ** np.arange(40.0), 16, 50, vertical=scale_height)
     molecules, aerosol = (np.cumsum(part) / part.sum() for part in (column.molecules, column.aerosol))
     np.testing.assert_allclose(aerosol, molecules ** (8 / scale_height), rtol=1e-10, atol=1e-12)
     assert column.aerosol_once.sum() * column.depth == pytest.approx(TAU_AEROSOL * ALBEDO, rel=1e-12)
@@ -63,7 +63,7 @@ def test_aerosol_above_an_altitude_is_a_power_by_the_scale_heights(scale_height)
 
 def test_even_layer_lies_between_its_edges():
     """Molecules above 3 km are exp(-3/8), and all of the aerosol lies below; the layer that holds an edge has both."""
-    column = mixed_column(TAU_MOLECULES, TAU_AEROSOL, ALBEDO, 0.7 ** np.arange(40.0), 16, 400, (1.0, 3.0))
+    column = mixed_column(TAU_MOLECULES, TAU_AEROSOL, ALBEDO, 0.7 ** np.arange(40.0), 16, 400, vertical=(1.0, 3.0))
     above = np.cumsum(column.molecules) / column.molecules.sum()
     particles = np.cumsum(column.aerosol) / column.aerosol.sum()
     altitude = -8 * np.log(above)
@@ -91,3 +91,14 @@ def test_soot_above_the_molecules_dims_their_light_and_below_it_does_not():
     clear, _ = flux_transmittance(0.3, 0.0, 0.0, [1.0], [40.0])
     dimmed, _ = flux_transmittance(0.3, *soot, [40.0], vertical=(42.0, 50.0))
     assert dimmed[0] == pytest.approx(clear[0] * np.exp(-0.3 / mu_s), rel=4e-3)
+
+
+def test_sunlight_on_both_ways_is_its_integral_over_the_depth(column):
+    tau = 50 * column.depth
+    up, down = (column.both_ways(0.7, MU, at_ground=at_ground).sum(axis=0) for at_ground in (False, True))
+    slant = 1 / 0.7 + 1 / MU
+    np.testing.assert_allclose(up, (1 - np.exp(-tau * slant)) / slant, rtol=1e-12)
+    slant = (1 / MU - 1 / 0.7)[[0, 2]]
+    expected = (np.exp(-tau / 0.7) - np.exp(-tau / MU[[0, 2]])) / slant
+    np.testing.assert_allclose(down[[0, 2]], expected, rtol=1e-12)
+    assert down[1] == pytest.approx(tau * np.exp(-tau / 0.7), rel=1e-12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.mixed_air import mixed_scattering
+from fifesim.atmosphere.schemes.mixed_air import mixed_scattering, mixed_stokes
 
 WAVELENGTH = np.array([0.47, 0.86])
 SZA, VZA, RAA = 50.0, np.array([0.0, 35.0]), np.array([60.0])
@@ -49,3 +49,17 @@ def test_light_that_is_polarized_is_another(hazy):
     scalar = mixed_scattering(HAZE, WAVELENGTH, SZA, VZA, RAA, polarized=False)
     assert 0.003 < np.abs(scalar.reflectance / hazy.reflectance - 1).max() < 0.1
     np.testing.assert_array_equal(scalar.direct_transmittance_up, hazy.direct_transmittance_up)
+
+
+def test_polarized_light_is_that_of_the_terms():
+    """I at the top is the path reflectance, the ground adds what the fluxes say, and straight up the sky is even."""
+    air, at = Atmosphere(visibility=23), np.array([0.45, 0.86])
+    views = np.array([0.0, 40.0]), np.array([20.0, 130.0])
+    terms, black = mixed_scattering(air, at, 35.0, *views), mixed_stokes(air, at, 35.0, *views)
+    np.testing.assert_allclose(black[0], terms.reflectance, rtol=1e-9)
+    added = mixed_stokes(air, at, 35.0, *views, ground=0.3)[0] - black[0]
+    expected = 0.3 * terms.transmittance_down * terms.transmittance_up / (1 - 0.3 * terms.spherical_albedo)
+    np.testing.assert_allclose(added, np.broadcast_to(expected, added.shape), rtol=1e-8)
+    sky = mixed_stokes(air, at, 35.0, *views, at_ground=True)
+    np.testing.assert_allclose(sky[0, 0, 0], sky[0, 0, 1], rtol=1e-9)
+    assert (np.abs(sky[1:]) < sky[0]).all()

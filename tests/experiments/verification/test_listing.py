@@ -1,7 +1,7 @@
 """Deviations in words."""
 
 from fifesim.experiments.verification.deviations import Deviation
-from fifesim.experiments.verification.listing import HEADING, line, summary
+from fifesim.experiments.verification.listing import HEADING, by_stage, line, summary
 
 WITHIN = Deviation("terrain", "slope of planes", 1e-12, 1e-9, "degree", "plane")
 BEYOND = Deviation("canopy", "reciprocity", 0.2, 0.1, "1", "theory")
@@ -16,3 +16,10 @@ def test_numbers_stand_below_their_headings():
 def test_summary_names_what_is_beyond():
     assert summary([WITHIN, WITHIN]) == "2 checks, all within their bounds"
     assert summary([WITHIN, BEYOND]) == "2 checks, 1 beyond their bounds: canopy: reciprocity"
+
+
+def test_every_stage_has_one_heading():
+    sensor = Deviation("sensor", "counts", 0.0, 0.5, "count", "table")
+    lines = list(by_stage([BEYOND, WITHIN, sensor]))
+    assert [text.strip() for text in lines if text.startswith("\n")] == ["Ground", "Sensor"]
+    assert lines[1:3] == [line(BEYOND), line(WITHIN)] and lines[4:] == [line(sensor)]

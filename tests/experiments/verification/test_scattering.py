@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.schemes import phase_expansion, successive_orders
+from fifesim.atmosphere.schemes import orders, phase_expansion, successive_orders
 from fifesim.experiments.verification import scattering
 
 
@@ -41,16 +41,25 @@ def test_turned_polarization_is_noticed(monkeypatch, name, what):
     assert what in exceeded(scattering._expansions)
 
 
-@pytest.mark.parametrize("kernel", ["_scattered", "_sum_orders", "_single_scattering", "_rescattered"])
-def test_wrong_orders_are_noticed(monkeypatch, kernel):
+@pytest.mark.parametrize(
+    "owner, kernel",
+    [
+        (orders, "_scattered"),
+        (orders, "_sum_orders"),
+        (orders, "_rescattered"),
+        (orders, "leaving_light"),
+        (successive_orders, "once_scattered"),
+    ],
+)
+def test_wrong_orders_are_noticed(monkeypatch, owner, kernel):
     """By a percent."""
-    right = getattr(successive_orders, kernel)
+    right = getattr(owner, kernel)
 
-    def wrong(*given):
-        found = right(*given)
+    def wrong(*given, **options):
+        found = right(*given, **options)
         return (1.01 * found[0], found[1]) if isinstance(found, tuple) else 1.01 * found
 
-    monkeypatch.setattr(successive_orders, kernel, wrong)
+    monkeypatch.setattr(owner, kernel, wrong)
     assert exceeded(scattering._polarized)
 
 

@@ -1,0 +1,103 @@
+"""Benchmarks of others hold, and what breaks one of them is named."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from fifesim.atmosphere.air import molecules
+from fifesim.atmosphere.schemes import orders, phase_expansion, stokes
+from fifesim.base import datasets
+from fifesim.cli import app
+from fifesim.experiments.verification import areas, benchmarks
+
+
+def exceeded(check):
+    return [deviation.what for deviation in check() if not deviation.within]
+
+
+@pytest.mark.parametrize("check", [*benchmarks.CHECKS, *benchmarks.CANOPY])
+def test_all_is_well(check):
+    assert exceeded(check) == []
+
+
+def test_every_view_of_the_references_is_compared():
+    assert sum(len(benchmarks.iprt(case)[0]) for case in ("A1a", "A1b", "A1c", "A2", "A3", "B1")) == 295
+    table, found, converged = benchmarks.molecules()
+    assert found.shape == converged.shape == (3, len(table)) == (3, 252)
+    assert np.isfinite(found).all() and np.isfinite(converged).all()
+
+
+@pytest.mark.parametrize(
+    "name, column, row, factor, said",
+    [
+        ("iprt", "I", 3, 1.002, "IPRT A1a, intensity of air and sky"),
+        ("iprt", "U", 290, 1.01, "IPRT B1, Q and U"),
+        ("molecules_stokes", "I", 7, 1.00001, "I, Q and U of molecules, many layers"),
+        ("rami4atm", "reflectance", 80, 1.05, "white ground below molecules"),
+        ("rami4atm", "reflectance", 10, 1.1, "ground below aerosol and gases"),
+        ("rami4atm", "reflectance", -1, 1.1, "HOM45, toward the sun, 65 to 75 degrees"),
+    ],
+)
+def test_a_reference_changed_in_one_place_is_named(monkeypatch, name, column, row, factor, said):
+    right = datasets.table
+
+    def wrong(path):
+        table = right(path)
+        if path == f"verification/{name}.csv":
+            table = table.copy()
+            table.loc[table.index[row], column] *= factor
+        return table
+
+    monkeypatch.setattr(benchmarks.datasets, "table", wrong)
+    monkeypatch.setattr(areas, "AREAS", {"atmosphere": benchmarks.CHECKS, "canopy": benchmarks.CANOPY})
+    result = CliRunner().invoke(app, ["verify"])
+    assert result.exit_code == 1
+    assert said in result.stdout.splitlines()[-1]
+
+
+@pytest.mark.parametrize("component", [1, 2])
+def test_turned_polarization_is_noticed(monkeypatch, component):
+    """The plane of scattering, turned in one of two places: in what is scattered once."""
+    right = stokes._rotation
+    turned = np.array([1, -1] if component == 2 else [-1, 1])[:, None, None]
+    monkeypatch.setattr(stokes, "_rotation", lambda *given: right(*given) * turned)
+    assert "IPRT A1b, Q and U" in exceeded(benchmarks._iprt)
+
+
+def test_another_depolarization_is_noticed(monkeypatch):
+    right = stokes.mixed_column
+    monkeypatch.setattr(stokes, "mixed_column", lambda *given: right(*given[:-1], molecules.DEPOLARIZATION))
+    assert "IPRT A1c, Q and U" in exceeded(benchmarks._iprt)
+
+
+def test_matrix_of_spheres_needs_its_diagonal(monkeypatch):
+    right = phase_expansion.matrix_moments
+    monkeypatch.setattr(benchmarks, "matrix_moments", lambda *given: right(*given[:5]))
+    assert exceeded(benchmarks._iprt) == ["IPRT A3, Q and U"]
+
+
+@pytest.mark.parametrize("owner, kernel", [(stokes, "_from_ground"), (orders, "_rescattered"), (stokes, "fluxes")])
+def test_wrong_light_is_noticed(monkeypatch, owner, kernel):
+    """By a thousandth."""
+    right = getattr(owner, kernel)
+
+    def wrong(*given, **options):
+        found = right(*given, **options)
+        return (1.001 * found[0], found[1]) if isinstance(found, tuple) else 1.001 * found
+
+    monkeypatch.setattr(owner, kernel, wrong)
+    assert exceeded(benchmarks._molecules)
+
+
+def test_wrong_canopy_is_noticed(monkeypatch):
+    right = benchmarks.sail
+    monkeypatch.setattr(benchmarks, "sail", lambda *given, **o: right(*given, **{**o, "hotspot": o["hotspot"] / 2}))
+    assert "HOM45, from -30 to 60 degrees" in exceeded(benchmarks._canopy)
+    assert exceeded(benchmarks._flat_discs)
+
+
+def test_flat_discs_without_size_have_no_hot_spot():
+    """Beer's law both ways, and straight back the leaves seen are those lit."""
+    far, back = benchmarks.flat_discs(1e-6, 2.0, [0.0, 30.0])
+    assert far == pytest.approx((1 - np.exp(-4.0)) / 2, rel=1e-3)
+    assert back == pytest.approx(1 - np.exp(-2.0), rel=1e-6)
