@@ -65,8 +65,8 @@ def test_turned_polarization_is_noticed(monkeypatch, component):
 
 
 def test_another_depolarization_is_noticed(monkeypatch):
-    right = stokes.mixed_column
-    monkeypatch.setattr(stokes, "mixed_column", lambda *given: right(*given[:-1], molecules.DEPOLARIZATION))
+    right, own = stokes.mixed_column, {"depolarization": molecules.DEPOLARIZATION}
+    monkeypatch.setattr(stokes, "mixed_column", lambda *given, **options: right(*given, **options | own))
     assert "IPRT A1c, Q and U" in exceeded(benchmarks._iprt)
 
 
