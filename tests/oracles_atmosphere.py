@@ -3,6 +3,24 @@
 import numpy as np
 from scipy.integrate import quad, solve_bvp
 
+# Siewert (2000), problem IIA: beta, alpha, zeta and gamma of spheres.
+SIEWERT = np.array(
+    [
+        [1, 0, 0, 0],
+        [2.104031, 0, 0, 0],
+        [2.095158, 3.726079, 3.615946, -0.116688],
+        [1.414939, 2.202868, 2.240516, -0.209370],
+        [0.703593, 1.190694, 1.139473, -0.227137],
+        [0.235001, 0.391203, 0.365605, -0.144524],
+        [0.064039, 0.105556, 0.082779, -0.052640],
+        [0.012837, 0.020484, 0.013649, -0.012400],
+        [0.002010, 0.003097, 0.001721, -0.002093],
+        [0.000246, 0.000366, 0.000172, -0.000267],
+        [0.000024, 0.000035, 0.000014, -0.000027],
+        [0.000002, 0.000003, 0.000001, -0.000002],
+    ]
+)
+
 
 def eddington_intensities(tau, albedo, asymmetry, mu_s):
     """Mean J and net upward H diffuse intensity as functions of depth, sun of flux pi, black surface. [1]"""

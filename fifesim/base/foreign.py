@@ -109,7 +109,8 @@ def in_a_line(text, length=_LINE):
 
     Parameters
     ----------
-    text : str
+    text : str or object
+        What `str` makes of it.
     length : int, optional
         At most.
 
@@ -122,7 +123,7 @@ def in_a_line(text, length=_LINE):
     >>> print(in_a_line("no such file: a\nb"), in_a_line("a" * 50 + "z" * 50, 13))
     no such file: a\nb aaaaa...zzzzz
     """
-    line = "".join(character if character.isprintable() else repr(character)[1:-1] for character in text)
+    line = "".join(character if character.isprintable() else repr(character)[1:-1] for character in str(text))
     if len(line) <= length:
         return line
     half = (length - 3) // 2

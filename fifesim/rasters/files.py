@@ -20,11 +20,12 @@ import xarray as xr
 from dask.utils import SerializableLock
 from rasterio.windows import Window
 
+from fifesim.base.foreign import in_a_line
 from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
-from fifesim.rasters.opening import ErrorsOfGdal, raster_file, readable
+from fifesim.rasters.opening import ErrorsOfGdal, raster_file
 from fifesim.rasters.soundness import check_memory, check_raster, horizontal_crs
 from fifesim.rasters.tags import TAG, read_tag, tag_of
 
@@ -129,7 +130,7 @@ def open_image(path, chunks=None, *, allow_remote=False):
     try:
         grid = grids.geobox(plain)
     except ValueError as error:
-        raise ValueError(f"cannot place {file.name}: {readable(error, 250)}") from None
+        raise ValueError(f"cannot place {file.name}: {in_a_line(error, 250)}") from None
     array = xr.DataArray(plain.data, dims=("band", "y", "x"), name=description["name"])
     if not written_here:
         array = _physical(array, **storage)
@@ -313,6 +314,6 @@ def _wavelengths(source, file_name):
         return [float(value) for value in said] if all(said) else None
     except ValueError:
         raise ValueError(
-            f"{file_name} has wavelengths such as {readable(said[0], 40)!r}, not all numbers: open it with "
+            f"{file_name} has wavelengths such as {in_a_line(said[0], 40)!r}, not all numbers: open it with "
             "rioxarray.open_rasterio"
         ) from None

@@ -2,7 +2,6 @@
 
 import os
 import re
-import stat
 import warnings
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 import rasterio
 import rasterio.errors
 
+from fifesim.base.foreign import check_regular, in_a_line
 from fifesim.rasters import mosaics
 
 # Formats of one raster that hold its cells themselves. GDAL has others that describe servers or name other files.
@@ -20,6 +20,9 @@ FORMATS = (
 
 # File systems of GDAL that stay on this machine.
 _LOCAL_SYSTEMS = {"/vsizip", "/vsigzip", "/vsitar", "/vsimem"}
+
+# Of a path in a message. [character]
+_PATH = 150
 
 # Mosaics of mosaics.
 _DEEPEST = 8
@@ -53,7 +56,7 @@ class RasterFile:
     @property
     def name(self):
         """The path for a message: printable, on one line, of moderate length."""
-        return readable(self.path)
+        return in_a_line(self.path, _PATH)
 
     @property
     def state(self):
@@ -112,31 +115,7 @@ class ErrorsOfGdal:
 
     def __exit__(self, kind, error, traceback):
         if kind is not None and (kind.__module__.partition(".")[0] == "rasterio" or kind is UnicodeDecodeError):
-            raise OSError(f"{self._said}: {readable(error.__cause__ or error)}") from error
-
-
-def readable(text, most=150):
-    """
-    Text of foreign origin for a message: printable, on one line, without its middle if it is long.
-
-    Parameters
-    ----------
-    text : str or Exception
-    most : int
-        Characters.
-
-    Returns
-    -------
-    text : str
-
-    Examples
-    --------
-    >>> readable("lai\\x1b[2J.tif")
-    'lai?[2J.tif'
-    """
-    text = "".join(each if each.isprintable() else "?" for each in str(text))
-    half = (most - 5) // 2
-    return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
+            raise OSError(f"{self._said}: {in_a_line(error.__cause__ or error, _PATH)}") from error
 
 
 def _first_that_opens(path, formats):
@@ -153,7 +132,7 @@ def _first_that_opens(path, formats):
     # What is wrong with a format says more than that it is not another.
     reason = min(reasons, key=lambda said: "not recognized" in said)
     if "not recognized" in reason and formats == FORMATS:
-        reason = f"cannot read {readable(path)} as a raster of {', '.join(FORMATS)}; {_CURE}"
+        reason = f"cannot read {in_a_line(path, _PATH)} as a raster of {', '.join(FORMATS)}; {_CURE}"
     raise ValueError(reason)
 
 
@@ -163,12 +142,13 @@ def _formats(path, around=()):
         _check_virtual(path)
         return FORMATS
     if re.match(r"[\w+.-]{2,}:", path) or path.lstrip().startswith("<"):
-        raise ValueError(f"{readable(path)} is an address or a description, no file, and is not opened: {_CURE}")
+        said = in_a_line(path, _PATH)
+        raise ValueError(f"{said} is an address or a description, no file, and is not opened: {_CURE}")
     _check_regular(path, path)
     for beside in filter(os.path.exists, (f"{path}.msk", f"{path}.ovr")):
         _check_regular(beside, beside)
         if mosaics.is_description(beside):
-            raise ValueError(f"beside {readable(path)} lies a description that GDAL follows: {_CURE}")
+            raise ValueError(f"beside {in_a_line(path, _PATH)} lies a description that GDAL follows: {_CURE}")
     if not mosaics.is_mosaic(path):
         return FORMATS
     _check_mosaic(path, (*around, os.path.realpath(path)))
@@ -178,7 +158,7 @@ def _formats(path, around=()):
 def _check_virtual(path):
     systems = re.findall(r"/vsi\w*", path)
     if refused := [name for name in systems if name not in _LOCAL_SYSTEMS]:
-        raise ValueError(f"{readable(path)} lies in {readable(refused[0], 40)}, which is not opened: {_CURE}")
+        raise ValueError(f"{in_a_line(path, _PATH)} lies in {in_a_line(refused[0], 40)}, which is not opened: {_CURE}")
     # The archive is whichever part of the path is there.
     parts = path.rpartition(systems[-1])[2].removeprefix("/").split("/")
     for length in range(1, len(parts) + 1):
@@ -188,25 +168,17 @@ def _check_virtual(path):
 
 
 def _check_regular(path, said):
-    """Refuse what is no file, such as a pipe, which would be waited for without end."""
     try:
-        mode = os.stat(path).st_mode
-        if stat.S_ISREG(mode):
-            open(path, "rb").close()
-            return
-        reason = "it is a folder" if stat.S_ISDIR(mode) else "it is a pipe or a device"
-    except FileNotFoundError:
-        reason = "no raster file is there"
+        check_regular(path)
+        open(path, "rb").close()
     except OSError as error:
-        reason = error.strerror
-    except ValueError:
-        reason = "no path holds a null character"
-    raise ValueError(f"cannot read {readable(said)} as a raster: {reason}")
+        reason = "no raster file is there" if isinstance(error, FileNotFoundError) else error.strerror
+        raise ValueError(f"cannot read {in_a_line(said, _PATH)} as a raster: {reason}") from None
 
 
 def _check_mosaic(path, around):
     """Refuse a mosaic of anything but files of known formats; GDAL would open its sources by any format."""
-    said = f"{readable(path)} is a mosaic"
+    said = f"{in_a_line(path, _PATH)} is a mosaic"
     try:
         names = mosaics.named_files(path)
     except ValueError as error:
@@ -217,7 +189,7 @@ def _check_mosaic(path, around):
         try:
             formats = _formats(name, around)
             if formats is FORMATS and mosaics.is_description(name):
-                raise ValueError(f"{readable(name, 80)} is a description that may lead elsewhere: {_CURE}")
+                raise ValueError(f"{in_a_line(name, 80)} is a description that may lead elsewhere: {_CURE}")
             _first_that_opens(name, formats)
         except ValueError as error:
-            raise ValueError(f"{said} of a file that is not opened: {readable(error, 280)}") from None
+            raise ValueError(f"{said} of a file that is not opened: {in_a_line(error, 280)}") from None

@@ -7,8 +7,8 @@ import pyproj.exceptions
 import rasterio
 import rasterio.errors
 
+from fifesim.base.foreign import in_a_line
 from fifesim.rasters import projection
-from fifesim.rasters.opening import readable
 
 # Coordinates beyond are none of the Earth's in any unit. [m or degree]
 _FARTHEST = 1e9
@@ -92,9 +92,9 @@ def horizontal_crs(source, name):
         crs = crs.to_2d() if len(crs.axis_info) > 2 else crs
         if crs.is_projected or crs.is_geographic:
             return source.crs if crs is whole else rasterio.crs.CRS.from_wkt(crs.to_wkt())
-        reason = f"it is a {readable(crs.type_name, 40)}"
+        reason = f"it is a {in_a_line(crs.type_name, 40)}"
     except (pyproj.exceptions.ProjError, rasterio.errors.RasterioError, ValueError) as error:
-        reason = readable(error)
+        reason = in_a_line(error, 150)
     raise ValueError(
         f"the CRS of {name} is no projected nor geographic one ({reason}): "
         "give it one with gdal_edit.py -a_srs EPSG:26914"

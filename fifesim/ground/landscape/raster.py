@@ -5,6 +5,7 @@ from pathlib import Path
 import psutil
 import xarray as xr
 
+from fifesim.base.foreign import in_a_line
 from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.optics import check_lai
 from fifesim.ground.landscape.autoregression import check_arp
@@ -13,7 +14,6 @@ from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
 from fifesim.rasters import cf, places, warp
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-from fifesim.rasters.opening import readable
 
 FIELD_METHODS = ("streaming", "periodic")
 
@@ -100,7 +100,7 @@ def open_lai(path, grid, chunks=None, *, allow_remote=False):
         change of datum whose accuracy is unknown; and, when computed, if LAI is negative.
     """
     lai = chunking.pointwise(check_lai, warp.file_onto_grid(path, grid, chunks, allow_remote))
-    name = readable(Path(path).name)
+    name = in_a_line(Path(path).name, 150)
     return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
 
 

@@ -1,25 +1,13 @@
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss, legval
+from oracles_atmosphere import SIEWERT
 
 from fifesim.atmosphere.schemes.stokes import stokes_reflectance
 from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
 from fifesim.base.geometry import scattering_angle_cosine
 
-# Siewert (2000), problem IIA: beta, alpha, zeta and gamma of spheres.
-SPHERES = np.array(
-    [
-        [1, 0, 0, 0],
-        [2.104031, 0, 0, 0],
-        [2.095158, 3.726079, 3.615946, -0.116688],
-        [1.414939, 2.202868, 2.240516, -0.209370],
-        [0.703593, 1.190694, 1.139473, -0.227137],
-        [0.235001, 0.391203, 0.365605, -0.144524],
-        [0.064039, 0.105556, 0.082779, -0.052640],
-        [0.012837, 0.020484, 0.013649, -0.012400],
-        [0.002010, 0.003097, 0.001721, -0.002093],
-    ]
-)
+SPHERES = SIEWERT[:9]
 MOMENTS = SPHERES / (2 * np.arange(9) + 1)[:, None]
 SZA, VZA, RAA = 50.0, np.array([0.0, 30.0, 70.0]), np.array([-120.0, -30.0, 0.0, 30.0, 120.0, 180.0])
 

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.polynomial.legendre import leggauss, legval
+from oracles_atmosphere import SIEWERT
 
 from fifesim.atmosphere.air.aerosols import aerosol_phase, aerosol_polarization
 from fifesim.atmosphere.air.molecules import rayleigh_phase
@@ -17,23 +18,6 @@ ORDERS = 2 * np.arange(64) + 1
 
 # Rayleigh scattering without depolarization, given as an aerosol.
 PURE_RAYLEIGH = np.array([[1, 0, 0, 0], [0, 0, 0, 0], [0.1, 0.6, 0, np.sqrt(6) / 10]])
-# Siewert (2000), problem IIA: beta, alpha, zeta and gamma of spheres.
-SIEWERT = np.array(
-    [
-        [1, 0, 0, 0],
-        [2.104031, 0, 0, 0],
-        [2.095158, 3.726079, 3.615946, -0.116688],
-        [1.414939, 2.202868, 2.240516, -0.209370],
-        [0.703593, 1.190694, 1.139473, -0.227137],
-        [0.235001, 0.391203, 0.365605, -0.144524],
-        [0.064039, 0.105556, 0.082779, -0.052640],
-        [0.012837, 0.020484, 0.013649, -0.012400],
-        [0.002010, 0.003097, 0.001721, -0.002093],
-        [0.000246, 0.000366, 0.000172, -0.000267],
-        [0.000024, 0.000035, 0.000014, -0.000027],
-        [0.000002, 0.000003, 0.000001, -0.000002],
-    ]
-)
 
 
 def degrees(mu):

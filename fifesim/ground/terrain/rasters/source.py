@@ -12,10 +12,11 @@ import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
 
+from fifesim.base.foreign import in_a_line
 from fifesim.base.lattice import centres
 from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.rasters import projection
-from fifesim.rasters.opening import ErrorsOfGdal, RasterFile, raster_file, readable
+from fifesim.rasters.opening import ErrorsOfGdal, RasterFile, raster_file
 from fifesim.rasters.soundness import check_raster, horizontal_crs
 
 # Positions in another CRS are a polynomial through those at so many Chebyshev nodes along each axis of a tile.
@@ -116,12 +117,12 @@ def open_source(raster, vertical_units=None, allow_remote=False):
     if not isinstance(raster, str | Path):
         raise TypeError(f"an elevation model is a path or an xarray.DataArray, got {type(raster).__name__}")
     file = raster_file(raster, allow_remote)
-    name = readable(Path(file.path).name)
+    name = in_a_line(Path(file.path).name, 150)
     with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as opened:
         check_raster(opened, file.name)
         horizontal_crs(opened, file.name)
         source = Source(name, file, opened.shape, opened.transform, None, 1.0)
-        return _in_metres(source, opened.crs.to_wkt(), readable(opened.units[0] or "", 40), vertical_units)
+        return _in_metres(source, opened.crs.to_wkt(), in_a_line(opened.units[0] or "", 40), vertical_units)
 
 
 def _array_source(raster, vertical_units):
