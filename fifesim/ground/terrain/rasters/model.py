@@ -196,10 +196,11 @@ def model_under(grid, raster, fill, vertical_units, allow_remote=False):
         raise ValueError(f"fill is a distance from known elevation, above 0 m, got {fill!r}: give for instance fill=60")
     place = placement(open_source(raster, vertical_units, allow_remote), grid)
     sizes = place.cell_size()
-    if (fill or 0) > _MOST_FILLED * min(sizes):
+    most = round(_MOST_FILLED * min(sizes), 6)
+    if (fill or 0) > most:
         raise ValueError(
             f"fill={fill:g} is more than {_MOST_FILLED} cells of {place.source.name}, of {min(sizes):.3g} m: give at "
-            f"most fill={_MOST_FILLED * min(sizes):.3g}"
+            f"most fill={most:g}"
         )
     blocks = tuple(max(1, round(float(np.mean(grids.cell_size(grid))) / size)) for size in sizes)
     resolution = round(float(np.mean([count * size for count, size in zip(blocks, sizes, strict=True)])), 6)

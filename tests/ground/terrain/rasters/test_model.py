@@ -17,6 +17,20 @@ def test_fill_is_a_distance(path, fill):
         fifesim.fine_dem(path, grid(), fill=fill)
 
 
+def test_fill_goes_at_most_250_cells_of_the_source(path):
+    """Of 30 m."""
+    model_under(grid(), path, 7500, None)
+    with pytest.raises(ValueError, match=r"fill=7501 is more than 250 cells .* at most fill=7500"):
+        model_under(grid(), path, 7501, None)
+
+
+def test_a_window_too_fine_to_read_is_refused(path, monkeypatch):
+    fifesim.fine_dem(path, grid())
+    monkeypatch.setattr("fifesim.ground.terrain.rasters.source._MOST_CELLS", 100)
+    with pytest.raises(ValueError, match=r"far finer than the cells.*gdalwarp -r average"):
+        fifesim.fine_dem(path, grid(size=600.0))
+
+
 def test_filled_hole_is_the_same_in_any_chunks(tmp_path):
     where = with_hole(tmp_path)
     whole = fifesim.fine_dem(where, grid(), fill=90)
