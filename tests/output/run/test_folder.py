@@ -7,8 +7,11 @@ import pytest
 import rasterio
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
+import zarr
 
 import fifesim
+from fifesim.output.folders import UNFINISHED
+from fifesim.output.run import folder as run_folder
 from fifesim.output.run.folder import FILES, simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
 
@@ -150,3 +153,34 @@ def test_an_image_without_a_valid_pixel_is_an_error_that_says_why(tmp_path, valu
     with pytest.raises(ValueError, match=r"no pixel of the image has 0\.98.*sensor\.offset"):
         simulate_to_folder(parse_scenario(scenario), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
+    scenario = parse_scenario(lai_map(tmp_path / "lai.tif", 2.0))
+    write_files = run_folder._write_files
+
+    def while_another_writes(*given):
+        write_files(*given)
+        lai_map(tmp_path / "lai.tif", 3.0)
+
+    monkeypatch.setattr(run_folder, "_write_files", while_another_writes)
+    with pytest.raises(ValueError, match=r"lai\.tif changed while it was read"):
+        simulate_to_folder(scenario, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_shard_that_changed_is_made_again(tmp_path, monkeypatch):
+    simulate_to_folder(parse_scenario(SMALL), tmp_path / "whole", scene=True)
+
+    def full(*given):
+        raise OSError("disk full")
+
+    with monkeypatch.context() as broken, pytest.raises(OSError, match=r"disk full.*--resume"):
+        broken.setattr(run_folder, "_write_files", full)
+        simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True)
+    zarr.open_array(str(tmp_path / "out" / UNFINISHED / "scene.zarr"), path="lai")[3, 4] = 9.0
+    simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True, resume=True)
+    found, whole = (
+        xr.open_zarr(tmp_path / name / "scene.zarr", consolidated=False)["lai"].values for name in ("out", "whole")
+    )
+    np.testing.assert_array_equal(found, whole)
