@@ -41,12 +41,12 @@ from .chain.steps import kt as kt  # method
 from .atmosphere.air.models import Atmosphere as Atmosphere
 from .atmosphere.air.raster import read_aerosol as read_aerosol
 from .atmosphere.air.raster import aerosol_tables as aerosol_tables
-from .chain.steps import to_toa as to_toa  # method
-from .chain.steps import to_surface as to_surface  # method
+from .chain.steps import to_toa as to_toa  # method, of a Dataset too
+from .chain.steps import to_surface as to_surface  # method, of a Dataset too
 from .chain.engines import compare_engines as compare_engines
 
 # Sensor
-from .sensor.raster import sense as sense  # method
+from .sensor.raster import sense as sense  # method, of a Dataset too
 from .sensor.scan.rasters.view import scan_geometry as scan_geometry
 from .sensor.scan.track import Track as Track
 from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method
@@ -66,7 +66,7 @@ from .base.bands import Band as Band
 
 # Analysis
 from .analysis.rasters.means import aggregate as aggregate  # method
-from .chain.images import ndvi as ndvi  # method
+from .chain.images import ndvi as ndvi  # method, of a Dataset too
 from .analysis.rasters.regression import regress as regress  # method
 from .analysis.regression import Regression as Regression
 from .analysis.rasters.uncertainty import relative_equivalent_noise as relative_equivalent_noise  # method

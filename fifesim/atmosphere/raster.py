@@ -1,5 +1,6 @@
 """The atmosphere on labelled rasters: surface reflectance to the top of the atmosphere, and back."""
 
+import numpy as np
 import xarray as xr
 
 from fifesim.atmosphere.adjacency import raster as adjacency_raster
@@ -120,6 +121,8 @@ def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adja
         out = _uniform(verb, plain, atmosphere, bands, geometry)
     else:
         out = _varying(verb, plain, atmosphere, bands, geometry, elevation)
+    if reflectance.dtype == np.float32:
+        out = out.astype(np.float32)
     if "band" in reflectance.coords:
         out = out.assign_coords(band=reflectance["band"])
     out = directions.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)

@@ -32,6 +32,32 @@ GREEN = Window("green", 0.50, 0.60, 0.56)
 RED = Window("red", 0.60, 0.70, 0.66)
 NEAR_INFRARED = Window("near infrared", 0.75, 1.00, 0.84)
 
+# Common names of bands in catalogues of images, with the wavelengths between which they lie by the table of STAC's
+# extension for electro-optical data (its README, github.com/stac-extensions/eo), and where Landsat or Sentinel-2 has
+# them; rededge1 to 3 are Earth Search's names of the same. [um]
+COMMON_NAMES = {
+    name: Window(name, *limits)
+    for name, limits in {
+        "coastal": (0.40, 0.45, 0.443),
+        "blue": (0.45, 0.53, 0.48),
+        "green": (0.50, 0.60, 0.56),
+        "yellow": (0.58, 0.62, 0.60),
+        "red": (0.60, 0.70, 0.66),
+        "rededge071": (0.69, 0.73, 0.705),
+        "rededge075": (0.73, 0.76, 0.74),
+        "rededge078": (0.76, 0.80, 0.783),
+        "rededge1": (0.69, 0.73, 0.705),
+        "rededge2": (0.73, 0.76, 0.74),
+        "rededge3": (0.76, 0.80, 0.783),
+        "nir": (0.75, 1.00, 0.84),
+        "nir08": (0.75, 0.90, 0.865),
+        "nir09": (0.85, 1.05, 0.945),
+        "cirrus": (1.35, 1.40, 1.375),
+        "swir16": (1.55, 1.75, 1.61),
+        "swir22": (2.10, 2.30, 2.20),
+    }.items()
+}
+
 
 def nearest(wavelengths, window):
     """

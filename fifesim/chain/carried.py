@@ -4,41 +4,61 @@ import numpy as np
 
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.base.bands import Band
-from fifesim.rasters import directions
-from fifesim.sensor import raster as sensor
+from fifesim.base.warned import warn
+from fifesim.rasters import cf, directions
+from fifesim.rasters.own_rasters import incoming
+from fifesim.rasters.sites import is_fife
 from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.description.instruments import instrument_names
+from fifesim.sensor.description.rasters.carried import carried_instrument
+from fifesim.sensor.response.rasters.pixels import matching_bands
 
 # Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
 # tables. [um]
 _NARROW = 0.0025
 
 
-def given_air(atmosphere):
+def air_of(atmosphere, array):
     """
-    Refuse what is no atmosphere.
+    Atmosphere: as given, else as an array carries it, else midlatitude summer with continental aerosol.
 
     Parameters
     ----------
     atmosphere : fifesim.atmosphere.air.models.Atmosphere or None
+    array : xarray.DataArray
 
     Returns
     -------
-    atmosphere : fifesim.atmosphere.air.models.Atmosphere or None
+    atmosphere : fifesim.atmosphere.air.models.Atmosphere
+        The default of a raster that fifesim did not make on the FIFE site is a warning.
 
     Raises
     ------
+    ValueError
+        If the array was made for another atmosphere.
     TypeError
         If it is something else.
     """
     if atmosphere is not None and not isinstance(atmosphere, Atmosphere):
         raise TypeError(f"atmosphere must be a fifesim.Atmosphere, got {atmosphere!r}: see fifesim.Atmosphere")
-    return atmosphere
+    carried = array.attrs.get("atmosphere")
+    if carried is not None:
+        carried = Atmosphere.parse(carried)
+        if atmosphere is not None and atmosphere != carried:
+            raise ValueError(
+                f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
+                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
+            )
+    if atmosphere is None and carried is None and not is_fife(array):
+        warn(
+            f"nothing says what air lies over {array.name or 'the raster'}: {Atmosphere().text} is taken; give "
+            "atmosphere=fifesim.Atmosphere(...), with the altitude of its ground in km"
+        )
+    return atmosphere or carried or Atmosphere()
 
 
-def air_bands_and_geometry(array, atmosphere, geometry, instrument):
+def air_bands_and_geometry(array, atmosphere, geometry, instrument, time=None):
     """
-    Atmosphere, spectral bands and geometry: as given, else as the array carries them, else the paper's.
+    Atmosphere, spectral bands and geometry: as given, else as the array carries them.
 
     Parameters
     ----------
@@ -46,6 +66,8 @@ def air_bands_and_geometry(array, atmosphere, geometry, instrument):
     atmosphere : fifesim.atmosphere.air.models.Atmosphere or None
     geometry : fifesim.base.geometry.Geometry, xarray.Dataset or None
     instrument : str, fifesim.sensor.description.instruments.Instrument or None
+    time : str or datetime, optional
+        In the place of a geometry.
 
     Returns
     -------
@@ -56,32 +78,54 @@ def air_bands_and_geometry(array, atmosphere, geometry, instrument):
     Raises
     ------
     ValueError
-        If the array was made for another atmosphere, or its bands are not known.
+        If the array was made for another atmosphere, its bands are not known, or nothing says where the sun stands.
     """
-    atmosphere, carried = given_air(atmosphere), array.attrs.get("atmosphere")
-    if carried is not None:
-        carried = Atmosphere.parse(carried)
-        if atmosphere is not None and atmosphere != carried:
-            raise ValueError(
-                f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
-                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
-            )
-    geometry = directions.given_geometry(geometry, array)
-    return atmosphere or carried or Atmosphere(), _responses(array, instrument), geometry
+    geometry = directions.given_geometry(geometry, array, time)
+    return air_of(atmosphere, array), _responses(array, instrument), geometry
+
+
+def as_bands_of(raster, instrument, name):
+    """
+    A raster of reflectance as the chain takes it, its bands by their names in an instrument.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray, or xarray.Dataset of bands
+    instrument : str, fifesim.sensor.description.instruments.Instrument or None
+        By default that which it carries.
+    name : str
+        The reflectance that it is: a key of `fifesim.rasters.cf.QUANTITIES`.
+
+    Returns
+    -------
+    raster : xarray.DataArray, dims ([band], y, x)
+        With names and wavelengths of the instrument's bands, where it has no wavelengths of its own.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `fifesim.rasters.own_rasters.incoming`, or if the instrument has no such bands.
+    """
+    array = incoming(raster, name)
+    description = carried_instrument(array) if instrument is None else find_instrument(instrument)
+    if description is None or "wavelength" in array.coords or "band" not in array.coords:
+        return array
+    bands = matching_bands(array, description)
+    names, centres = [band.name for band in bands], [band.wavelength for band in bands]
+    along_band = cf.band_coordinates(band=names, wavelength=centres)
+    return array.assign_coords({key: each if array["band"].ndim else each[0] for key, each in along_band.items()})
 
 
 def _responses(array, instrument):
-    """Spectral responses of an instrument that is given, or carried by name and with the same wavelengths."""
-    carried = array.attrs.get("instrument")
-    if instrument is not None:
-        return tuple(band.response for band in sensor.matching_bands(array, find_instrument(instrument)))
-    if carried is not None:
-        bands = sensor.matching_bands(array, find_instrument(carried)) if carried in instrument_names() else ()
+    """Spectral responses of an instrument that is given, or carried with the same wavelengths."""
+    description = carried_instrument(array) if instrument is None else find_instrument(instrument)
+    if description is not None:
+        bands = matching_bands(array, description)
         centres = [band.wavelength for band in bands]
-        if not bands or ("wavelength" in array.coords and not np.allclose(array["wavelength"], centres, rtol=1e-6)):
+        if instrument is None and "wavelength" in array.coords and not np.allclose(array["wavelength"], centres, 1e-6):
             raise ValueError(
-                f"the raster was made for an instrument {carried!r} of your own, whose response it does not carry: "
-                "give it as instrument="
+                f"the raster says that it was made for {description.name} and has other wavelengths than its bands: "
+                "give instrument="
             )
         return tuple(band.response for band in bands)
     if "wavelength" not in array.coords:
@@ -90,6 +134,4 @@ def _responses(array, instrument):
             "'wavelength' [um] along band"
         )
     centres = np.atleast_1d(array["wavelength"].values).astype(float)
-    if np.max(centres) > 100:
-        raise ValueError(f"wavelengths are in um, got {np.max(centres):g}: divide nanometres by 1000")
     return tuple(Band(f"{at:g} um", (at - _NARROW, at, at + _NARROW), (0.0, 1.0, 0.0)) for at in centres)

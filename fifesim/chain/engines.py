@@ -14,7 +14,7 @@ from fifesim.base.geometry import fife_geometry
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
-from fifesim.rasters.sites import fife_site
+from fifesim.rasters.sites import fife_site, made_on_site
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 TYPICAL_LAI = 2.0  # of the surface that stands for all [m2 m-2]
@@ -139,7 +139,8 @@ def _surface(setup, air, reflectance, n_bands):
     """Reflectance of the surface in each band, shape (band,)."""
     if reflectance is None:
         # One cell, under the same light for all engines.
-        lai = grids.place(xr.DataArray([[TYPICAL_LAI]], dims=("y", "x")), fife_site(30, window=((0, 1), (0, 1))))
+        cell = fife_site(30, window=((0, 1), (0, 1)))
+        lai = grids.place(xr.DataArray([[TYPICAL_LAI]], dims=("y", "x"), attrs=made_on_site(cell)), cell)
         level = replace(setup, atmosphere=replace(air, engine="5S"), dem=None, horizon=None)
         return reflectance_of(level, lai).values.ravel()
     surface = np.asarray(reflectance, float)

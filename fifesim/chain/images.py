@@ -2,9 +2,12 @@
 
 from fifesim.analysis.rasters import indices
 from fifesim.rasters import cf
+from fifesim.rasters.dates import by_date
+from fifesim.rasters.own_rasters import incoming
 from fifesim.sensor import raster as sensor
 
 
+@by_date
 def ndvi(image):
     """
     Normalized difference vegetation index, from planetary reflectance as in the paper.
@@ -37,7 +40,7 @@ def planetary_reflectance(image):
 
     Parameters
     ----------
-    image : xarray.DataArray, dims (band, y, x)
+    image : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
 
     Returns
     -------
@@ -47,7 +50,9 @@ def planetary_reflectance(image):
     Raises
     ------
     ValueError
-        If it carries no calibration.
+        If it carries no calibration, or values cannot be a reflectance.
     """
     is_radiance = image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
-    return sensor.to_reflectance(image) if "gain" in image.coords or is_radiance else image
+    if "gain" in image.coords or is_radiance:
+        return sensor.to_reflectance(image)
+    return incoming(image, "toa_reflectance")

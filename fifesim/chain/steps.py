@@ -3,21 +3,24 @@
 import xarray as xr
 
 from fifesim.atmosphere import raster as atmosphere_raster
-from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import engines
-from fifesim.chain.carried import air_bands_and_geometry, given_air
+from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.canopy.spectra import Spectrum
 from fifesim.ground.terrain.rasters import light as terrain
 from fifesim.rasters import directions
+from fifesim.rasters.axes import north_up
+from fifesim.rasters.dates import by_date
 from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 
 
+@by_date
 def surface_reflectance(
     lai,
-    instrument="TM",
+    instrument=None,
     *,
     bands=None,
     dem=None,
@@ -25,6 +28,7 @@ def surface_reflectance(
     upwelling=True,
     atmosphere=None,
     geometry=None,
+    time=None,
     leaf_optics=None,
     background=None,
     leaf_angles="spherical",
@@ -39,7 +43,7 @@ def surface_reflectance(
     lai : xarray.DataArray, dims (y, x)
         Leaf area index. [m2 m-2]
     instrument : str or Instrument, optional
-        Whose bands are simulated.
+        Whose bands are simulated; by default TM for a scene on the FIFE site.
     bands : sequence of str, optional
         Names of its bands; all by default.
     dem : xarray.DataArray, dims (y, x), optional
@@ -51,9 +55,12 @@ def surface_reflectance(
         Whether with the view's cosine on slopes, Eq. 5.
     atmosphere : Atmosphere, optional
         Decides the share of skylight; by default midlatitude summer, continental aerosol, 45 km visibility, 0.4 km
-        above the sea. It travels on with the result.
+        above the sea, which is a warning for a map of one's own. It travels on with the result.
     geometry : Geometry, optional
-        Of sun and sensor; by default that of ``lai``, else the paper's.
+        Of sun and sensor; by default that of ``lai``, else of the sun at its time and place. A scene that was made on
+        the FIFE site has the paper's sun.
+    time : str or datetime, optional
+        In the place of ``geometry``: when the sun stood over the middle of the grid, below a nadir view.
     leaf_optics : Leaf, or mapping of str to (float, float), optional
         A leaf by what it is made of, or its reflectance and transmittance by band name; by default green tallgrass. [1]
     background : optional
@@ -76,7 +83,7 @@ def surface_reflectance(
     ------
     ValueError
         If an argument is out of its range; on lazy data, a negative LAI when it computes. If the dem is not in metres,
-        does not cover ``lai``, or lies on other cells.
+        does not cover ``lai``, or lies on other cells. If nothing says which instrument, or where the sun stands.
 
     References
     ----------
@@ -89,9 +96,10 @@ def surface_reflectance(
     """
     if dem is None and horizon is not None:
         raise ValueError("a horizon stands around a dem: give dem= too")
-    atmosphere = given_air(atmosphere) or Atmosphere()
-    geometry = directions.given_geometry(geometry, lai)
-    description = find_instrument(instrument)
+    lai = north_up(lai)
+    atmosphere = air_of(atmosphere, lai)
+    geometry = directions.given_geometry(geometry, lai, time)
+    description = given_instrument(instrument, lai)
     selected = description.select(bands)
     responses = tuple(band.response for band in selected)
     leaf_reflectance, leaf_transmittance = optics.leaf_optics(responses, leaf_optics)
@@ -108,7 +116,7 @@ def surface_reflectance(
         hotspot=hotspot,
         exact=exact,
         atmosphere=atmosphere.text,
-        instrument=description.name,
+        **attributes_of(description),
     )
     if dem is None:
         return level
@@ -116,7 +124,8 @@ def surface_reflectance(
     return terrain.terrain_reflectance(level, dem, upwelling=upwelling, horizon=horizon, **light)
 
 
-def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instrument=None):
+@by_date
+def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, time=None, instrument=None):
     """
     Topographic correction factor Kt: what terrain does to the irradiance in each band.
 
@@ -128,7 +137,7 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
         As in `surface_reflectance`. [m]
     horizon : xarray.DataArray, dims (direction, y, x), optional
         As in `surface_reflectance`. [degree]
-    atmosphere, geometry, instrument : optional
+    atmosphere, geometry, time, instrument : optional
         As in `to_toa`.
 
     Returns
@@ -149,24 +158,39 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, instru
     --------
     fifesim.ground.terrain.light.topographic_factor
     """
-    light = _sunlight(*air_bands_and_geometry(reflectance, atmosphere, geometry, instrument), "kt")
+    reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
+    light = _sunlight(*air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time), "kt")
     return terrain.kt_on_slopes(reflectance, dem, horizon=horizon, **light)
 
 
+@by_date
 def to_toa(
-    reflectance, atmosphere=None, *, geometry=None, instrument=None, elevation=None, adjacency=False, surroundings=None
+    reflectance,
+    atmosphere=None,
+    *,
+    geometry=None,
+    time=None,
+    instrument=None,
+    elevation=None,
+    adjacency=False,
+    surroundings=None,
 ):
     """
     Apparent reflectance at the top of the atmosphere.
 
     Parameters
     ----------
-    reflectance : xarray.DataArray, dims (band, y, x)
-        Surface reflectance factor, with band names of an instrument or a coordinate ``wavelength`` [um] along band. [1]
+    reflectance : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
+        Surface reflectance factor, with band names of an instrument or a coordinate ``wavelength`` [um] along band;
+        whole numbers say their scale by ``scale_factor``. [1]
     atmosphere : Atmosphere, optional
-        By default that which the array carries, else midlatitude summer, continental aerosol, 45 km visibility.
+        By default that which the array carries, else midlatitude summer, continental aerosol, 45 km visibility, 0.4 km
+        above the sea, which is a warning for a raster of one's own.
     geometry : Geometry, optional
-        Its angles are numbers or rasters; by default that which the array carries, else the paper's.
+        Its angles are numbers or rasters; by default that which the array carries, else of the sun at its time and
+        place.
+    time : str or datetime, optional
+        In the place of ``geometry``: when the sun stood over the middle of the grid, below a nadir view.
     instrument : str or Instrument, optional
         Whose spectral response the bands have; by default that which the array carries. Without one, each band is as
         narrow as the gas tables, 2.5 nm.
@@ -186,7 +210,8 @@ def to_toa(
     Raises
     ------
     ValueError
-        If the array was made for another atmosphere, or units, bands or angles are not usable.
+        If the array was made for another atmosphere, units, bands or angles are not usable, nothing says where the sun
+        stands, or values cannot be a reflectance.
 
     Notes
     -----
@@ -201,23 +226,32 @@ def to_toa(
     --------
     fifesim.atmosphere.schemes.coupling.apparent_reflectance
     """
-    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)
+    reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
+    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
-    toa = atmosphere_raster.to_toa(reflectance, *light, **scene)
-    return toa if instrument is None else toa.assign_attrs(instrument=find_instrument(instrument).name)
+    return _of(instrument, atmosphere_raster.to_toa(reflectance, *light, **scene))
 
 
+@by_date
 def to_surface(
-    reflectance, atmosphere=None, *, geometry=None, instrument=None, elevation=None, adjacency=False, surroundings=None
+    reflectance,
+    atmosphere=None,
+    *,
+    geometry=None,
+    time=None,
+    instrument=None,
+    elevation=None,
+    adjacency=False,
+    surroundings=None,
 ):
     """
     Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.
 
     Parameters
     ----------
-    reflectance : xarray.DataArray, dims (band, y, x)
+    reflectance : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
         Reflectance at the top of the atmosphere; radiance and digital numbers are converted first.
-    atmosphere, geometry, instrument, elevation, adjacency, surroundings : optional
+    atmosphere, geometry, time, instrument, elevation, adjacency, surroundings : optional
         As in `to_toa`.
 
     Returns
@@ -234,11 +268,18 @@ def to_surface(
     --------
     fifesim.atmosphere.schemes.coupling.corrected_reflectance
     """
-    reflectance = planetary_reflectance(reflectance)
-    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)
+    reflectance = as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance")
+    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
-    surface = atmosphere_raster.to_surface(reflectance, *light, **scene)
-    return surface if instrument is None else surface.assign_attrs(instrument=find_instrument(instrument).name)
+    return _of(instrument, atmosphere_raster.to_surface(reflectance, *light, **scene))
+
+
+def _of(instrument, array):
+    """Raster that carries the instrument which was given."""
+    if instrument is None:
+        return array
+    attrs = {key: value for key, value in array.attrs.items() if key != "instrument_description"}
+    return array.drop_attrs(deep=False).assign_attrs(attrs | attributes_of(find_instrument(instrument)))
 
 
 def _background(responses, given):

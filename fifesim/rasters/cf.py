@@ -75,6 +75,7 @@ QUANTITIES = {
 
 # What a result keeps of its inputs' attributes; everything else is replaced.
 PROVENANCE = (
+    "site",
     "rng_seed",
     "arp",
     "lai_distribution",
@@ -83,6 +84,7 @@ PROVENANCE = (
     "background",
     "atmosphere",
     "instrument",
+    "instrument_description",
     "references",
 )
 
@@ -133,7 +135,9 @@ def label(array, name, *, history, source=None, **provenance):
     """
     attrs = attributes(name)
     before = source.attrs if source is not None else {}
-    attrs |= {key: before[key] for key in PROVENANCE if key in before} | provenance
+    # A description belongs to the instrument that it comes with.
+    other = {"instrument_description"} if "instrument" in provenance else set()
+    attrs |= {key: before[key] for key in PROVENANCE if key in before and key not in other} | provenance
     cited = [*before.get("references", "").split("; "), *provenance.get("references", "").split("; ")]
     attrs |= {"references": "; ".join(dict.fromkeys(filter(None, cited)))} if any(cited) else {}
     attrs["history"] = "\n".join(filter(None, [before.get("history", ""), history]))

@@ -3,8 +3,10 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import ANGLES, Geometry, fife_geometry
-from fifesim.rasters import cf
+from fifesim.base.geometry import ANGLES, Geometry, fife_geometry, sun_position
+from fifesim.rasters import cf, projection
+from fifesim.rasters import grid as grids
+from fifesim.rasters.sites import is_fife
 
 _GEOMETRY = (*ANGLES, "earth_sun_distance")
 
@@ -51,26 +53,70 @@ def geometry_of(array):
     return checked_geometry(xr.Dataset(carried).set_coords(["spatial_ref"] if "spatial_ref" in carried else []))
 
 
-def given_geometry(given, array):
+def given_geometry(given, array, time=None):
     """
-    Directions of sun and sensor: as given, else as an array carries them, else the paper's.
+    Directions of sun and sensor: as given, else as an array carries them, else of the sun at its time and place.
 
     Parameters
     ----------
     given : fifesim.base.geometry.Geometry, xarray.Dataset or None
     array : xarray.DataArray
+        With a scalar coordinate ``time`` the sun is that over the middle of its grid, and the view nadir.
+    time : str or datetime, optional
+        Wins over what the array carries. UTC where it names no time zone.
 
     Returns
     -------
     geometry : Geometry or Dataset
-        As `checked_geometry` gives it.
+        As `checked_geometry` gives it; that of the paper for a scene made on the FIFE site which has no time.
 
     Raises
     ------
-    ValueError, TypeError
+    ValueError
+        If nothing says where the sun stands, both are given, or as in `checked_geometry`.
+    TypeError
         As in `checked_geometry`.
     """
-    return checked_geometry(given) if given is not None else geometry_of(array) or fife_geometry()
+    if given is not None and time is not None:
+        raise ValueError("geometry and time both say where the sun stands: give one of them")
+    if given is not None:
+        return checked_geometry(given)
+    carried = geometry_of(array)
+    if time is None and carried is not None:
+        return carried
+    if time is None and "time" in array.coords and array.coords["time"].ndim == 0:
+        time = array.coords["time"].values
+    if time is not None:
+        return sun_over(grids.geobox(array), time)
+    if is_fife(array):
+        return fife_geometry()
+    raise ValueError(
+        f"nothing says where the sun stands over {array.name or 'the raster'}, which has no sza and no time: type "
+        "time='2022-06-03T17:10Z', or geometry=fifesim.Geometry(sza, saa)"
+    )
+
+
+def sun_over(grid, time):
+    """
+    Sun over the middle of a grid, and a nadir view.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+    time : str or datetime
+        UTC where it names no time zone.
+
+    Returns
+    -------
+    geometry : fifesim.base.geometry.Geometry
+
+    Raises
+    ------
+    ValueError
+        If it is no time, or the sun is below the horizon then.
+    """
+    longitude, latitude = projection.middle(grid)
+    return sun_position(time, latitude, longitude)
 
 
 def checked_geometry(given):
@@ -79,19 +125,20 @@ def checked_geometry(given):
 
     Parameters
     ----------
-    given : fifesim.base.geometry.Geometry, or xarray.Dataset of ``sza`` and perhaps ``saa``, ``vza``, ``vaa``, \
+    given : fifesim.base.geometry.Geometry, or xarray.Dataset of ``sza``, ``saa`` and perhaps ``vza``, ``vaa``, \
             ``earth_sun_distance``
         In a Dataset an angle is a number or a raster over (y, x). [degree]
 
     Returns
     -------
     geometry : Geometry, or Dataset with all of these where an angle varies
-        Angles that a Dataset does not have are 0.
+        The view of a Dataset that has none is nadir.
 
     Raises
     ------
     ValueError
-        If a number is no direction, or units are not degrees; in a raster, when it is used.
+        If a number is no direction, units are not degrees, or there is no azimuth of the sun; in a raster, when it is
+        used.
     TypeError
         If it is neither.
     """
@@ -102,7 +149,12 @@ def checked_geometry(given):
             f"geometry must be a fifesim.Geometry, or an xarray.Dataset with sza, saa, vza and vaa, got {given!r}: "
             "see fifesim.Geometry"
         )
-    values = {"saa": 0.0} | {name: given[name] for name in _GEOMETRY if name in given.variables}
+    values = {name: given[name] for name in _GEOMETRY if name in given.variables}
+    if "saa" not in values:
+        raise ValueError(
+            "the sun has a zenith angle sza and no azimuth saa: add saa, in degrees clockwise from north, such as "
+            ".assign_coords(saa=150.0)"
+        )
     numbers = {name: float(value) for name, value in values.items() if np.ndim(value) == 0}
     rasters = {name: value for name, value in values.items() if name not in numbers}
     for name, raster in rasters.items():

@@ -10,6 +10,7 @@ from odc.geo.xr import xr_coords
 
 from fifesim.base.lattice import centres, whole_cells
 from fifesim.rasters import projection
+from fifesim.rasters.axes import check_axes
 
 _LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
 
@@ -108,9 +109,7 @@ def geobox(array):
     ValueError
         If there is no CRS, or the grid is not one that `check_grid` passes.
     """
-    missing = {"y", "x"} - set(array.dims)
-    if missing:
-        raise ValueError(f"a raster has dimensions y and x, got {array.dims}: rename its dimensions")
+    check_axes(array)
     if "spatial_ref" not in array.coords and array.odc.crs is None:
         raise ValueError(
             "the raster has no CRS: open its file with decode_coords='all', or import rioxarray and give it one with "

@@ -259,6 +259,24 @@ def degrees(grid):
     return to_degrees.transform_bounds(*grid.boundingbox.bbox)
 
 
+def middle(grid):
+    """
+    Where the middle of a grid lies.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    longitude, latitude : float
+        On the ellipsoid of its CRS. [degree]
+    """
+    crs = pyproj.CRS.from_wkt(grid.crs.to_wkt())
+    to_degrees = pyproj.Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
+    return to_degrees.transform(*transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2))
+
+
 def convergence(grid):
     """
     Angle from true north to the north of a grid, at its middle; positive where grid north lies east of true north.
@@ -273,9 +291,7 @@ def convergence(grid):
         [degree]
     """
     crs = pyproj.CRS.from_wkt(grid.crs.to_wkt())
-    x, y = transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)
-    to_degrees = pyproj.Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
-    return float(pyproj.Proj(crs).get_factors(*to_degrees.transform(x, y)).meridian_convergence)
+    return float(pyproj.Proj(crs).get_factors(*middle(grid)).meridian_convergence)
 
 
 def transform_points(affine, columns, rows):

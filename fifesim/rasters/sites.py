@@ -1,9 +1,12 @@
-"""Grids of study sites."""
+"""Study sites: their grids, and which scenes were made on them."""
 
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.base import fife
+from fifesim.rasters import projection
+
+_NAME = "FIFE"
 
 
 def fife_site(cell, window=None, datum="NAD83"):
@@ -43,6 +46,40 @@ def fife_site(cell, window=None, datum="NAD83"):
     size = int(fife.SIZE / cell + 1e-6)
     site = GeoBox((size, size), Affine(cell, 0.0, west, 0.0, -cell, north), crs)
     return site if window is None else _window(site, window)
+
+
+def made_on_site(grid):
+    """
+    Attributes of a scene that is made on a grid.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    attributes : dict of str
+        ``site`` where the middle of the grid lies on the FIFE site: a scene that is made there has the paper's sun by
+        default.
+    """
+    longitude, latitude = projection.middle(grid)
+    (west, east), (south, north) = fife.LONGITUDES, fife.LATITUDES
+    return {"site": _NAME} if west <= longitude <= east and south <= latitude <= north else {}
+
+
+def is_fife(array):
+    """
+    Whether a raster comes of a scene that was made on the FIFE site.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+
+    Returns
+    -------
+    made : bool
+    """
+    return array.attrs.get("site") == _NAME
 
 
 def _window(site, window):

@@ -6,7 +6,9 @@ import xarray as xr
 from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
-from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.rasters.dates import by_date
+from fifesim.rasters.own_rasters import incoming
+from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import check_kinds
 from fifesim.sensor.response.rasters.noise import noisy
@@ -17,9 +19,10 @@ from fifesim.sensor.response.rasters.pixels import directions_on, matching_bands
 MIN_VALID = 0.98
 
 
+@by_date
 def sense(
     toa,
-    instrument="TM",
+    instrument=None,
     *,
     onto=None,
     interval=None,
@@ -30,6 +33,7 @@ def sense(
     quantise=True,
     min_valid=MIN_VALID,
     geometry=None,
+    time=None,
 ):
     """
     Image that an instrument records: regularized onto its pixels, with its noise, and digitised.
@@ -40,6 +44,7 @@ def sense(
         Reflectance or radiance at the top of the atmosphere, by cells. Bands are those of the instrument that have the
         same name, or else whose response is there at their ``wavelength``. [1 or W m-2 sr-1 um-1]
     instrument : str or fifesim.sensor.description.instruments.Instrument, optional
+        By default that whose bands the array carries.
     onto : odc.geo.geobox.GeoBox, optional
         North-up grid of pixels in the CRS of the scene, of any size and offset. By default the instrument's gridded
         product, with the upper left corner of the scene.
@@ -60,7 +65,9 @@ def sense(
     min_valid : float, optional
         Share of its footprint that a pixel needs on valid cells; below it is no data. [1]
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
-        By default that which the array carries, else the paper's.
+        By default that which the array carries, else of the sun at its time and place.
+    time : str or datetime, optional
+        In the place of ``geometry``: when the sun stood over the scene.
 
     Returns
     -------
@@ -80,7 +87,7 @@ def sense(
     fifesim.sensor.response.calibration.radiance_to_dn
     """
     toa, description, bands = by_bands(toa, instrument)
-    geometry = directions.given_geometry(geometry, toa)
+    geometry = directions.given_geometry(geometry, toa, time)
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
     geometry = directions_on(pixels, geometry)
     scene = toa.drop_vars(ANGLES, errors="ignore")
@@ -113,8 +120,10 @@ def by_bands(toa, instrument):
     ValueError
         If the array is something else, or the instrument is unknown or has none of the bands.
     """
+    if toa.attrs.get("units") != cf.QUANTITIES["toa_radiance"].units:
+        toa = incoming(toa, "toa_reflectance")
     cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
-    description = find_instrument(instrument)
+    description = given_instrument(instrument, toa)
     toa = toa if "band" in toa.dims else toa.expand_dims("band")
     return toa, description, matching_bands(toa, description)
 
@@ -168,7 +177,7 @@ def labelled(image, toa, description, history):
     image : xarray.DataArray
     """
     name = "dn" if image.dtype.kind == "u" else "toa_radiance"
-    image = cf.label(image, name, source=toa, history=history, instrument=description.name)
+    image = cf.label(image, name, source=toa, history=history, **attributes_of(description))
     if name == "dn":
         image.attrs["_FillValue"] = image.dtype.type(0)
     return image
@@ -186,6 +195,7 @@ def _history(description, interval, offset, noise, seed, quantise):
     return ", ".join(filter(None, parts))
 
 
+@by_date
 def to_radiance(image):
     """
     Radiance of an image of digital numbers.
@@ -217,6 +227,7 @@ def to_radiance(image):
     return cf.label(out, "toa_radiance", source=image, history="to_radiance")
 
 
+@by_date
 def to_reflectance(image):
     """
     Planetary reflectance of an image.

@@ -1,6 +1,7 @@
 """What a raster carries of air, bands and directions, or is asked for."""
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ def test_different_atmosphere_raises(whole):
 
 
 TM34 = ["TM3", "TM4"]
+AIR = fifesim.Atmosphere()
 
 
 def user_raster(site, wavelengths):
@@ -34,8 +36,8 @@ def user_raster(site, wavelengths):
 
 
 def test_user_raster_with_only_wavelengths_goes_through(site):
-    """No band names, no instrument, no sun: the paper's sun, narrow bands, and the instrument's nearest ones."""
-    mine = user_raster(site, [0.665, 0.842])
+    """No band names and no instrument: narrow bands, and the instrument's nearest ones."""
+    mine = directions.with_geometry(user_raster(site, [0.665, 0.842]), fifesim.fife_geometry())
     toa = check_raster_function(fifesim.to_toa, mine, quantity="toa_reflectance")
     responses = tuple(
         fifesim.Band("narrow", (centre - 0.0025, centre, centre + 0.0025), (0.0, 1.0, 0.0)) for centre in (0.665, 0.842)
@@ -56,16 +58,49 @@ def test_user_raster_with_only_wavelengths_goes_through(site):
 
 
 def test_user_raster_may_name_the_instrument(site):
-    mine = user_raster(site, [0.66, 0.83])
-    as_tm = fifesim.to_toa(mine, instrument="TM")
-    named = fifesim.to_toa(mine.assign_coords(band=TM34), instrument="TM")
+    mine = directions.with_geometry(user_raster(site, [0.66, 0.83]), fifesim.fife_geometry())
+    as_tm = fifesim.to_toa(mine, AIR, instrument="TM")
+    named = fifesim.to_toa(mine.assign_coords(band=TM34), AIR, instrument="TM")
     np.testing.assert_array_equal(as_tm, named)
-    assert not np.array_equal(as_tm, fifesim.to_toa(mine))
+    assert not np.array_equal(as_tm, fifesim.to_toa(mine, AIR))
+
+
+@pytest.mark.parametrize("names", [[3, 4], ["B03", "B04"], ["red", "nir"], ["tm_3", "TM 4"]])
+def test_bands_by_the_names_that_people_have(site, names):
+    """They are the instrument's from here on, with its wavelengths."""
+    mine = directions.with_geometry(user_raster(site, [0.66, 0.83]).drop_vars("wavelength"), fifesim.fife_geometry())
+    toa = fifesim.to_toa(mine.assign_coords(band=names), AIR, instrument="Landsat 5")
+    assert toa["band"].values.tolist() == TM34
+    centres = [band.wavelength for band in instrument("TM").select(TM34)]
+    np.testing.assert_array_equal(toa["wavelength"], centres)
+    np.testing.assert_array_equal(toa, fifesim.to_toa(mine.assign_coords(band=TM34), AIR, instrument="TM"))
+    image = toa.fifesim.sense()
+    assert image.attrs["instrument"] == "TM" and np.isfinite(image.fifesim.ndvi()).all()
 
 
 def test_raster_without_bands_is_refused(site):
     with pytest.raises(ValueError, match=r"neither an instrument nor a wavelength: give instrument="):
-        fifesim.to_toa(user_raster(site, [0.66, 0.83]).drop_vars("wavelength"))
+        fifesim.to_toa(user_raster(site, [0.66, 0.83]).drop_vars("wavelength"), AIR, time="1987-06-06T16:35Z")
+
+
+def test_air_of_a_raster_of_ones_own_is_no_silent_assumption(site, lai):
+    mine = directions.with_geometry(user_raster(site, [0.66, 0.83]), fifesim.fife_geometry())
+    with pytest.warns(UserWarning, match=r"what air lies over mine: .*altitude=0\.4 km.*give atmosphere=") as said:
+        fifesim.to_toa(mine)
+    assert {each.filename for each in said if each.category is UserWarning} == {__file__}
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        rho = lai.fifesim.surface_reflectance()
+        assert rho.attrs["site"] == "FIFE" and rho.attrs["instrument"] == "TM"
+        rho.fifesim.to_toa()
+        fifesim.to_toa(mine, AIR).fifesim.to_surface()
+    theirs = lai.drop_attrs(deep=False)
+    with pytest.warns(UserWarning, match="what air lies over") as said:
+        theirs.fifesim.surface_reflectance("TM", time="1987-06-06T16:35Z")
+    assert said[0].filename == __file__
+    with pytest.raises(ValueError, match="which instrument looks at"):
+        theirs.fifesim.surface_reflectance(time="1987-06-06T16:35Z", atmosphere=AIR)
+    with pytest.raises(ValueError, match="where the sun stands over"):
+        theirs.fifesim.surface_reflectance("TM", atmosphere=AIR)
 
 
 def test_geometry_travels_with_the_raster(lai):
@@ -85,8 +120,21 @@ def own_instrument(name, tm3):
 
 
 @pytest.mark.parametrize("mine", [own_instrument("MINE", "TM3"), own_instrument("TM", "TM1")])
-def test_the_response_of_ones_own_instrument_is_never_guessed(lai, mine):
-    rho = fifesim.surface_reflectance(lai, mine, bands=["TM3", "TM4"])
-    with pytest.raises(ValueError, match="give it as instrument="):
-        fifesim.to_toa(rho)
-    fifesim.to_toa(rho, instrument=mine)
+def test_an_instrument_of_ones_own_travels_whole(lai, mine, tmp_path):
+    rho = fifesim.surface_reflectance(lai, mine, bands=TM34)
+    toa = fifesim.to_toa(rho)
+    np.testing.assert_array_equal(toa, fifesim.to_toa(rho, instrument=mine))
+    image = toa.fifesim.sense()
+    np.testing.assert_array_equal(image, toa.fifesim.sense(mine))
+    again = fifesim.open_image(image.fifesim.to_geotiff(tmp_path / "mine.tif"))
+    np.testing.assert_array_equal(again.fifesim.to_surface(), image.fifesim.to_surface(instrument=mine))
+    as_tm = fifesim.to_surface(again.drop_vars("wavelength"), instrument="TM")
+    assert np.array_equal(as_tm, again.fifesim.to_surface()) == (mine.name == "MINE"), "its TM3 is TM1"
+
+
+def test_the_instrument_that_a_raster_carries_is_the_default(lai):
+    toa = fifesim.surface_reflectance(lai, "MSI", bands=["MSI4", "MSI8"]).fifesim.to_toa()
+    assert toa.fifesim.sense().attrs["instrument"] == "MSI"
+    assert toa.fifesim.sense("TM").attrs["instrument"] == "TM"
+    with pytest.raises(ValueError, match="which instrument looks at"):
+        toa.drop_attrs(deep=False).fifesim.sense()

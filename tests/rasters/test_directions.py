@@ -5,8 +5,10 @@ import pytest
 import xarray as xr
 from lazy import in_chunks, no_compute
 
+import fifesim
 from fifesim.base.geometry import Geometry, fife_geometry
 from fifesim.rasters import cf, directions
+from fifesim.rasters import grid as grids
 
 SUN = Geometry(sza=28.5, saa=117.0, vza=3.0, vaa=-80.0, earth_sun_distance=1.0147)
 
@@ -23,8 +25,15 @@ def test_directions_travel_as_scalar_coordinates():
     assert directions.geometry_of(raster()) is None
 
 
+def test_a_sun_without_azimuth_is_refused():
+    """It would light the slopes from the north."""
+    for given in (raster().assign_coords(sza=30.0), raster().assign_coords(sza=(("y", "x"), np.full((2, 3), 30.0)))):
+        with pytest.raises(ValueError, match=r"zenith angle sza and no azimuth saa.*assign_coords\(saa="):
+            directions.geometry_of(given)
+
+
 def test_sun_alone_is_a_nadir_view():
-    assert directions.geometry_of(raster().assign_coords(sza=30.0)) == Geometry(30.0, 0.0)
+    assert directions.geometry_of(raster().assign_coords(sza=30.0, saa=20.0)) == Geometry(30.0, 20.0)
 
 
 def ramp(low, high):
@@ -46,14 +55,49 @@ def test_angles_by_cell_are_a_dataset_and_travel(scan):
 
 
 def test_a_dataset_of_numbers_is_a_geometry():
-    assert directions.checked_geometry(xr.Dataset({"sza": 40.0, "vza": 5.0})) == Geometry(40.0, 0.0, 5.0)
+    numbers = xr.Dataset({"sza": 40.0, "saa": 10.0, "vza": 5.0})
+    assert directions.checked_geometry(numbers) == Geometry(40.0, 10.0, 5.0)
 
 
-def test_given_wins_over_carried_and_that_over_the_papers(scan):
-    carried = directions.with_geometry(raster(), Geometry(30.0, 100.0))
+def test_given_wins_over_carried_and_that_over_the_papers():
+    carried = directions.with_geometry(raster(site="FIFE"), Geometry(30.0, 100.0))
     assert directions.given_geometry(Geometry(50.0, 90.0), carried) == Geometry(50.0, 90.0)
     assert directions.given_geometry(None, carried) == Geometry(30.0, 100.0)
-    assert directions.given_geometry(None, raster()) == fife_geometry()
+    assert directions.given_geometry(None, raster(site="FIFE")) == fife_geometry()
+
+
+CAPE = fifesim.grid_at("EPSG:32734", 261000.0, 6244000.0, 300.0, 300.0, 30.0)  # beside Cape Town
+NOON = "2022-12-21T10:45Z"
+
+
+def on_the_cape(**coordinates):
+    cells = xr.DataArray(np.ones(CAPE.shape), dims=("y", "x"), name="mine")
+    return grids.place(cells.assign_coords(coordinates), CAPE)
+
+
+def test_the_sun_is_that_of_time_and_place():
+    """Near noon of the solstice the sun stands as far from the zenith as the latitude and the tilt of the Earth."""
+    of_data = directions.given_geometry(None, on_the_cape(time=np.datetime64("2022-12-21T10:45")))
+    assert of_data.sza == pytest.approx(33.92 - 23.44, abs=0.15)
+    assert min(of_data.saa, 360 - of_data.saa) < 15, "the sun is in the north there"
+    assert of_data.earth_sun_distance == pytest.approx(0.9838, abs=2e-4)
+    assert directions.given_geometry(None, on_the_cape(), NOON) == of_data
+    assert directions.sun_over(CAPE, NOON) == of_data
+
+
+def test_a_time_that_is_given_wins_over_what_is_carried():
+    carried = directions.with_geometry(on_the_cape(time=np.datetime64("2022-06-01T10:45")), Geometry(30.0, 100.0))
+    assert directions.given_geometry(None, carried) == Geometry(30.0, 100.0)
+    assert directions.given_geometry(None, carried, NOON) == directions.sun_over(CAPE, NOON)
+    with pytest.raises(ValueError, match="geometry and time both say where the sun stands"):
+        directions.given_geometry(SUN, carried, NOON)
+
+
+def test_a_raster_of_ones_own_is_asked_for_its_sun():
+    with pytest.raises(ValueError, match=r"nothing says where the sun stands over mine.*time='2022.*or geometry="):
+        directions.given_geometry(None, on_the_cape())
+    with pytest.raises(ValueError, match="the sun is below the horizon"):
+        directions.given_geometry(None, on_the_cape(), "2022-12-21T22:00Z")
 
 
 @pytest.mark.parametrize(
@@ -61,8 +105,8 @@ def test_given_wins_over_carried_and_that_over_the_papers(scan):
     [
         (30.0, TypeError, "must be a fifesim.Geometry, or an xarray.Dataset with sza"),
         (xr.Dataset({"vza": 5.0}), TypeError, "xarray.Dataset with sza"),
-        (xr.Dataset({"sza": 95.0}), ValueError, "the sun is below the horizon"),
-        (xr.Dataset({"sza": ramp(0.5, 0.6).assign_attrs(units="radian")}), ValueError, "'radian'"),
+        (xr.Dataset({"sza": 95.0, "saa": 0.0}), ValueError, "the sun is below the horizon"),
+        (xr.Dataset({"sza": ramp(0.5, 0.6).assign_attrs(units="radian"), "saa": 1.0}), ValueError, "'radian'"),
     ],
 )
 def test_what_is_no_direction_is_refused(given, kind, said):
@@ -78,5 +122,5 @@ def test_one_direction_is_asked_for_where_it_is_needed(scan):
 
 def test_cosine_of_the_sun_is_a_number_or_by_cell():
     assert directions.mu_s(Geometry(60.0, 0.0)).item() == pytest.approx(0.5, abs=1e-15)
-    by_cell = directions.checked_geometry(xr.Dataset({"sza": ramp(0.0, 60.0)}))
+    by_cell = directions.checked_geometry(xr.Dataset({"sza": ramp(0.0, 60.0), "saa": 0.0}))
     np.testing.assert_allclose(directions.mu_s(by_cell)[0, [0, -1]], [1.0, 0.5], atol=1e-15)

@@ -163,7 +163,7 @@ def test_one_band_without_the_dimension_is_an_image_of_one_band(toa):
 )
 def test_what_cannot_be_sensed_is_refused(toa, change, options, message):
     with pytest.raises(ValueError, match=message):
-        fifesim.sense(change(toa), **options)
+        fifesim.sense(change(toa), **({"instrument": "TM"} | options))
 
 
 def test_onto_must_be_a_grid(toa):

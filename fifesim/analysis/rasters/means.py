@@ -2,9 +2,11 @@
 
 from fifesim.analysis.rasters.pairs import check_no_counts
 from fifesim.rasters import grid as grids
+from fifesim.rasters.dates import by_date
 from fifesim.rasters.regularization import areas, regularized
 
 
+@by_date
 def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     """
     Means over square blocks of ground: the truth that a pixel is compared with.

@@ -11,6 +11,7 @@ from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directio
 from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.dates import by_date
 
 
 def level_reflectance(
@@ -98,7 +99,8 @@ def level_reflectance(
     return cf.label(out, "surface_reflectance", source=lai, history=said, **provenance)
 
 
-def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPAR_INF):
+@by_date
+def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=absorption.FPAR_INF):
     """
     Fraction of photosynthetically active radiation that a canopy absorbs.
 
@@ -107,7 +109,9 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     lai : xarray.DataArray, dims (y, x)
         [m2 m-2]
     geometry : fifesim.base.geometry.Geometry, optional
-        The sun's; by default that which the array carries, else the paper's.
+        The sun's; by default that which the array carries, else at its time and place.
+    time : str or datetime, optional
+        In the place of ``geometry``.
     leaf_angles : optional
         As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
     fpar_inf : float, optional
@@ -133,7 +137,7 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     """
     if not 0 < fpar_inf <= 1:
         raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
-    geometry = directions.given_geometry(geometry, lai)
+    geometry = directions.given_geometry(geometry, lai, time)
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "fpar")
     extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))

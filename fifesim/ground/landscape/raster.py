@@ -14,6 +14,7 @@ from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
 from fifesim.rasters import cf, places, warp
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.sites import made_on_site
 
 FIELD_METHODS = ("streaming", "periodic")
 
@@ -70,6 +71,7 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     lai = make(grid, density, arp, seed, chunks)
     said = f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}"
     made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": _distribution_name(distribution)}
+    made |= made_on_site(grid)
     return cf.label(lai, "lai", history=said, **made, method=method, references=_REFERENCE)
 
 

@@ -9,7 +9,7 @@ from pydantic.dataclasses import dataclass
 
 from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
 from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
-from fifesim.sensor.description.names import lookup
+from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.performance import Scan
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
 
@@ -235,7 +235,7 @@ class Instrument:
         >>> [band.name for band in instrument("TM").select(["TM4", "tm3"])]
         ['TM4', 'TM3']
         """
-        known = {band.name.lower(): band for band in self.bands}
+        known = {key(band.name): band for band in self.bands}
         names = known if bands is None else [bands] if isinstance(bands, str) else bands
         found = tuple(lookup(name, known, f"band of {self.name}") for name in names)
         if not found or len(set(found)) < len(found):

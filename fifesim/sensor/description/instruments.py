@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from fifesim.base import datasets
 from fifesim.base.foreign import in_a_line, read_toml, shown
 from fifesim.sensor.description.instrument_file import Instrument
-from fifesim.sensor.description.names import lookup
+from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.plausibility import check_units
 
 # Keys whose value has several forms: what follows them in the place of an error is the form's name.
@@ -26,7 +26,7 @@ def instrument(name):
     Parameters
     ----------
     name : str, path-like or Instrument
-        Name or alias in any case, such as ``"TM"`` or ``"Landsat-8 OLI"``; or the path of a file, which ends in
+        Name or alias in any case, such as ``"TM"`` or ``"Landsat 8"``; or the path of a file, which ends in
         ``.toml``. An Instrument passes through.
 
     Returns
@@ -158,13 +158,12 @@ def _key_parts(places):
 
 @lru_cache
 def _catalogue():
-    """Instruments by names and aliases in lower case. The tests check the units of these files."""
+    """Instruments by names and aliases. The tests check the units of these files."""
     found = {}
     for item in map(_parse, sorted(datasets.path("instruments").glob("*.toml"))):
         for name in (item.name, *item.aliases):
-            if name.lower() in found:
-                raise ValueError(f"two instruments are called {name}: {found[name.lower()].name} and {item.name}")
-            found[name.lower()] = item
+            if found.setdefault(key(name), item) is not item:
+                raise ValueError(f"two instruments are called {name}: {found[key(name)].name} and {item.name}")
     return found
 
 

@@ -1,17 +1,38 @@
-"""Names of instruments and bands, in any case, with the nearest where there is none."""
+"""Names of instruments and bands, in any spelling, with the nearest where there is none."""
 
+import re
 from difflib import get_close_matches
+
+
+def key(name):
+    """
+    What spellings of a name have in common: small letters and digits.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    key : str
+
+    Examples
+    --------
+    >>> key("Landsat-8 OLI") == key("landsat 8 oli")
+    True
+    """
+    return re.sub(r"[^a-z0-9+]", "", name.lower())
 
 
 def lookup(name, known, kind):
     """
-    What a name means, in any case.
+    What a name means, in any case, with blanks, hyphens and underscores or without.
 
     Parameters
     ----------
     name : str
     known : dict
-        What there is, by names in lower case.
+        What there is, by the `key` of its names.
     kind : str
         What it is called in a message.
 
@@ -33,9 +54,9 @@ def lookup(name, known, kind):
     """
     if not isinstance(name, str):
         raise TypeError(f"{kind}: the name must be text, got {name!r}")
-    if name.lower() in known:
-        return known[name.lower()]
-    near = [known[key].name for key in get_close_matches(name.lower(), known, n=2, cutoff=0.4)]
+    if key(name) in known:
+        return known[key(name)]
+    near = [known[each].name for each in get_close_matches(key(name), known, n=2, cutoff=0.4)]
     hint = f"did you mean {' or '.join(dict.fromkeys(near))}? " if near else ""
     names = dict.fromkeys(value.name for value in known.values())
     raise ValueError(f"unknown {kind} {name!r}: {hint}There are {', '.join(names)}")

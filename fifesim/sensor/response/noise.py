@@ -217,7 +217,7 @@ def fixed_pattern(model, seed, band):
     return 1 + model.gain_spread * drawn[0], model.offset_spread * drawn[1]
 
 
-def line_noise(seed, band, line, column, size):
+def line_noise(seed, band, line, column, size, epoch=0):
     """
     Standard normal deviates of a piece of a scan line.
 
@@ -230,6 +230,8 @@ def line_noise(seed, band, line, column, size):
         Place of the first pixel, counted as `fifesim.rasters.grid.lattice_position` does; may be negative.
     size : int
         Number of pixels.
+    epoch : int, optional
+        Which of several images of one place.
 
     Returns
     -------
@@ -243,12 +245,14 @@ def line_noise(seed, band, line, column, size):
     True
     """
     first, last = column // _TILE, (column + size - 1) // _TILE
-    tiles = [_normals(seed, band, (0, 0, tile, line), _TILE) for tile in range(first, last + 1)]
+    # Beside that of the fixed pattern, 1.
+    image = epoch + (epoch > 0)
+    tiles = [_normals(seed, band, (0, image, tile, line), _TILE) for tile in range(first, last + 1)]
     start = column - first * _TILE
     return np.concatenate(tiles)[start : start + size]
 
 
-def add_noise(radiance, model, kinds, *, seed, band, row=0, column=0):
+def add_noise(radiance, model, kinds, *, seed, band, row=0, column=0, epoch=0):
     r"""
     Radiance as a noisy detector reads it.
 
@@ -268,6 +272,8 @@ def add_noise(radiance, model, kinds, *, seed, band, row=0, column=0):
         Number of the band in its instrument.
     row, column : int, optional
         Place of the first pixel in the lattice of pixels, which decides noise and detectors.
+    epoch : int, optional
+        Which of several images of one place: 0, or a number of seconds. The fixed pattern stays.
 
     Returns
     -------
@@ -291,7 +297,7 @@ def add_noise(radiance, model, kinds, *, seed, band, row=0, column=0):
     if "shot" in kinds or "thermal" in kinds:
         sigma = model.noise_equivalent_radiance(radiance, kinds)
         for i in range(rows):
-            out[i] += sigma[i] * line_noise(seed, band, row + i, column, columns)
+            out[i] += sigma[i] * line_noise(seed, band, row + i, column, columns, epoch)
     if "fixed-pattern" in kinds:
         gain, offset = fixed_pattern(model, seed, band)
         place = row + np.arange(rows)[:, None] if model.along == "rows" else column + np.arange(columns)

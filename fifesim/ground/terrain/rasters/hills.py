@@ -4,6 +4,7 @@ from fifesim.base.seeds import check_seed
 from fifesim.ground.terrain.flint_hills import elevation
 from fifesim.rasters import cf, places
 from fifesim.rasters import grid as grids
+from fifesim.rasters.sites import made_on_site
 
 # Chunks of "auto" are of some of these. [cell]
 _TILE = 504
@@ -57,5 +58,5 @@ def flint_hills(grid, seed=0, *, chunks=None):
         return elevation(seed, northing[row : row + shape[0]], easting[column : column + shape[1]])
 
     dem = places.tiles(cells, grid, chunks, tile=_TILE)
-    made = {"rng_seed": str(seed), "source_resolution": 30.0, "references": _REFERENCE}
+    made = {"rng_seed": str(seed), "source_resolution": 30.0, "references": _REFERENCE} | made_on_site(grid)
     return cf.label(dem, "dem", history=f"flint_hills: seed {seed}", **made)

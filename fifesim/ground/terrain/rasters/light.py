@@ -76,7 +76,7 @@ def terrain_view(dem, horizon=None):
     return _light(dem, horizon, None, "terrain_view", lambda light: skies.terrain_view(light.sky_view, light.cosine))
 
 
-def illumination(dem, geometry=None, horizon=None):
+def illumination(dem, geometry=None, horizon=None, *, time=None):
     """
     Cosine of the solar zenith angle on the slope, 0 where the slope or the land around hides the sun.
 
@@ -85,9 +85,11 @@ def illumination(dem, geometry=None, horizon=None):
     dem : xarray.DataArray, dims (y, x)
         [m]
     geometry : fifesim.base.geometry.Geometry, optional
-        By default that which the array carries, else the paper's.
+        By default that which the array carries, else of the sun at its time and place.
     horizon : xarray.DataArray, dims (direction, y, x), optional
         As in `sky_view`.
+    time : str or datetime, optional
+        In the place of ``geometry``.
 
     Returns
     -------
@@ -103,10 +105,10 @@ def illumination(dem, geometry=None, horizon=None):
     --------
     fifesim.ground.terrain.slope.along_normal, fifesim.ground.terrain.light.horizon_toward
     """
-    return _light(dem, horizon, _sun(dem, geometry), "illumination", lambda light: light.mu_s_local)
+    return _light(dem, horizon, _sun(dem, geometry, time), "illumination", lambda light: light.mu_s_local)
 
 
-def shadow(dem, geometry=None, horizon=None):
+def shadow(dem, geometry=None, horizon=None, *, time=None):
     """
     Cast and self shadow.
 
@@ -114,7 +116,7 @@ def shadow(dem, geometry=None, horizon=None):
     ----------
     dem : xarray.DataArray, dims (y, x)
         Elevation on a UTM grid. [m]
-    geometry, horizon
+    geometry, horizon, time
         As in `illumination`.
 
     Returns
@@ -127,7 +129,7 @@ def shadow(dem, geometry=None, horizon=None):
     ValueError
         As in `illumination`.
     """
-    return _light(dem, horizon, _sun(dem, geometry), "shadow", _shadow)
+    return _light(dem, horizon, _sun(dem, geometry, time), "shadow", _shadow)
 
 
 def kt_on_slopes(reflectance, dem, *, direct_transmittance, transmittance_down, geometry, horizon=None):
@@ -226,8 +228,8 @@ def _shadow(light):
     return np.where(np.isnan(light.mu_s_local), np.nan, light.mu_s_local == 0)
 
 
-def _sun(dem, geometry):
-    return directions.uniform_geometry(directions.given_geometry(geometry, dem), "a slope's light")
+def _sun(dem, geometry, time):
+    return directions.uniform_geometry(directions.given_geometry(geometry, dem, time), "a slope's light")
 
 
 def _light(dem, horizon, geometry, name, of_light):

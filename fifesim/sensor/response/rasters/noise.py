@@ -6,6 +6,7 @@ import numpy as np
 
 from fifesim.base.seeds import check_seed
 from fifesim.rasters import places
+from fifesim.rasters.dates import epoch
 from fifesim.sensor.response.noise import NoiseModel, add_noise, check_kinds
 
 
@@ -16,7 +17,7 @@ def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
     Parameters
     ----------
     radiance : xarray.DataArray, dims (band, y, x)
-        By pixels. [W m-2 sr-1 um-1]
+        By pixels; another scalar coordinate ``time`` is another draw. [W m-2 sr-1 um-1]
     instrument : fifesim.sensor.description.instruments.Instrument
     bands : sequence of fifesim.sensor.description.band.InstrumentBand
         One for each of the array.
@@ -52,11 +53,11 @@ def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
         given = {instrument.select(name)[0].name: model for name, model in given.items()}
     models = [_model(instrument, band, kinds, given) for band in bands]
     numbers = [instrument.bands.index(band) for band in bands]
-    first_row, first_column = first
+    (first_row, first_column), when = first, epoch(radiance)
 
     def kernel(block, starts):
         band, row, column = starts
-        place = {"seed": seed, "row": first_row + row, "column": first_column + column}
+        place = {"seed": seed, "row": first_row + row, "column": first_column + column, "epoch": when}
         noise = [add_noise(one, models[k], kinds, band=numbers[k], **place) for k, one in enumerate(block, band)]
         return np.stack(noise)
 

@@ -6,6 +6,7 @@ import xarray as xr
 from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
+from fifesim.sensor.description.band_names import band_called
 
 
 def matching_bands(array, instrument):
@@ -15,7 +16,8 @@ def matching_bands(array, instrument):
     Parameters
     ----------
     array : xarray.DataArray
-        With a coordinate ``band`` of the instrument's names, or ``wavelength`` [um].
+        With a coordinate ``band`` of the instrument's names, or ``wavelength`` [um]; else names that
+        `fifesim.sensor.description.band_names.band_called` knows.
     instrument : fifesim.sensor.description.instruments.Instrument
 
     Returns
@@ -35,7 +37,8 @@ def matching_bands(array, instrument):
         wavelengths = np.atleast_1d(array["wavelength"].values).astype(float)
         return instrument.select([_band_at(value, instrument).name for value in wavelengths])
     if names:
-        return instrument.select(names)
+        called = [(name, band_called(name, instrument)) for name in names]
+        return instrument.select([name if band is None else band.name for name, band in called])
     raise ValueError(
         f"the raster's bands have neither names of {instrument.name} ({', '.join(b.name for b in instrument.bands)}) "
         "nor a wavelength: assign a coordinate 'band' or 'wavelength' [um] along band"

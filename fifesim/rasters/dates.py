@@ -1,0 +1,100 @@
+"""Rasters over time: a step of one date, taken for each date by itself."""
+
+from functools import wraps
+
+import numpy as np
+import xarray as xr
+
+
+def by_date(step):
+    """
+    A step of a raster, made one of a raster with a dimension time too.
+
+    Parameters
+    ----------
+    step : callable
+        Takes a raster of one date first, and gives one.
+
+    Returns
+    -------
+    step : callable
+        Each date of its raster goes through by itself, with that date of every other raster that has the dimension, and
+        the results are joined along ``time``, which comes first. What is one number for each date, such as sza, is then
+        a coordinate along time.
+    """
+
+    @wraps(step)
+    def each_date(raster, *args, **options):
+        if "time" not in getattr(raster, "dims", ()):
+            return step(raster, *args, **options)
+        dates = []
+        for number in range(raster.sizes["time"]):
+            others = [_at(each, number, raster) for each in args]
+            named = {name: _at(each, number, raster) for name, each in options.items()}
+            dates.append(step(raster.isel(time=number), *others, **named))
+        return joined(dates)
+
+    return each_date
+
+
+def joined(dates):
+    """
+    Rasters of several dates as one.
+
+    Parameters
+    ----------
+    dates : sequence of xarray.DataArray
+        On one grid; with a scalar coordinate ``time`` each.
+
+    Returns
+    -------
+    raster : xarray.DataArray, dims (time, ...)
+        Lazy where they are. Coordinates that differ from date to date are along time.
+    """
+    first = dates[0]
+    bare = [date.drop_vars(set(date.coords) - set(date.dims)) for date in dates]
+    raster = xr.concat(bare, dim="time", join="override", combine_attrs="override").transpose("time", ...)
+    raster = raster.assign_coords(time=_along_time("time", dates))
+    for name, value in first.coords.items():
+        if name not in (*first.dims, "time"):
+            raster = raster.assign_coords({name: _along_time(name, dates) if _differs(name, dates) else value.variable})
+    return raster
+
+
+def epoch(raster):
+    """
+    Which draw of the noise a date has.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray
+
+    Returns
+    -------
+    epoch : int
+        Seconds from the year 1 to its scalar coordinate ``time``; 0 where it has none.
+    """
+    time = raster.coords.get("time")
+    if time is None or time.ndim or time.dtype.kind != "M":
+        return 0
+    return int((time.values - np.datetime64("0001-01-01")) / np.timedelta64(1, "s"))
+
+
+def _along_time(name, dates):
+    """A coordinate of all dates."""
+    return xr.Variable.concat([date.coords[name].variable for date in dates], dim="time")
+
+
+def _differs(name, dates):
+    """Whether a coordinate is another at another date; one by cell is not looked at, and counts as another."""
+    first, *others = (date.coords[name].variable for date in dates)
+    return {"y", "x"} <= set(first.dims) or not all(first.identical(other) for other in others)
+
+
+def _at(other, number, raster):
+    """That date of something which has the dimension too."""
+    if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
+        if not np.array_equal(other["time"].values, raster["time"].values):
+            raise ValueError(f"the times of {getattr(other, 'name', None) or 'a Dataset'} are not those of the raster")
+        return other.isel(time=number)
+    return other

@@ -1,0 +1,1 @@
+"""The response of an instrument on labelled rasters."""
