@@ -45,6 +45,13 @@ def test_whole_numbers_with_their_scale(fractions, no_data, array_type):
     assert surface["band"].values.tolist() == ["MSI4", "MSI8"]
 
 
+def test_an_offset_is_added(site):
+    """As Landsat's Collection 2 stores surface reflectance: 7273 is 0, 43636 is 1."""
+    whole = xr.DataArray(np.full((1, *site.shape), 10909, "uint16"), dims=("band", "y", "x"))
+    mine = grids.place(whole, site).assign_attrs(scale_factor=2.75e-5, add_offset=-0.2)
+    np.testing.assert_allclose(incoming(mine, "surface_reflectance"), 0.0999975, rtol=0, atol=1e-9)
+
+
 def test_raw_digital_numbers_are_no_reflectance(fractions):
     dn = (fractions * 400).astype("uint8")
     for verb in (fifesim.to_surface, fifesim.to_toa):
