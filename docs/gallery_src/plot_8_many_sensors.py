@@ -36,7 +36,7 @@ figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
 frequency = np.geomspace(1e-4, 0.1, 300)
 for name in names:
     red = str(images[name]["band"].values[0])
-    transfer = fifesim.mtf(name, red, frequency=frequency).sel(direction="across")
+    transfer = fifesim.mtf(name, red, frequency=frequency).sel(band=red, direction="across")
     (line,) = axis.semilogx(1000 * frequency, transfer, label=name)
     axis.axvline(1000 * float(transfer["nyquist"]), color=line.get_color(), linestyle=":", linewidth=1)
 axis.set(xlabel="spatial frequency [cycles km⁻¹]", ylabel="modulation transfer", title="Dotted: Nyquist frequency")

@@ -199,6 +199,7 @@ class SensorKeys(Section):
         min_length=2,
         max_length=2,
     )
+    response: str | None = text(None, "spatial: system, what is known of the instrument; detector; or paper, for TM")
     noise: list[str] = text([], "of the detectors: shot, thermal, fixed-pattern")
     seed: int = seed(0, "of the noise")
     min_valid: float = number(0.98, "1", "share of its footprint that a pixel needs on valid cells", ge=0, le=1)

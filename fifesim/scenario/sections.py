@@ -184,7 +184,7 @@ class Sensor(SensorKeys):
             If there is no such instrument, or its file is not right.
         """
         try:
-            return instrument(self.instrument)
+            return instrument(self.instrument, self.response)
         except OSError as error:
             raise ValueError(f"instrument = {shown(self.instrument)}: {error.strerror or error}") from None
 

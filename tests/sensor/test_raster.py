@@ -1,5 +1,7 @@
 """The sensor on labelled rasters."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -11,6 +13,7 @@ from fifesim.base.geometry import Geometry
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.spatial_response import GaussianResponse
 from fifesim.sensor.response import calibration
 
 TM = instrument("TM")
@@ -193,3 +196,19 @@ def test_two_lazy_scenes_share_nothing_but_their_bits(toa):
         image = fifesim.sense(in_chunks(toa, ODD_CHUNKS), "TM")
         check_place(image, grids.geobox(toa).crs)
     xr.testing.assert_identical(image[:, :3].compute(), fifesim.sense(toa, "TM")[:, :3])
+
+
+@pytest.mark.slow
+def test_blur_decides_what_a_line_on_ndvi_explains():
+    """Sentinel-2 with the detector alone, with a quarter at the Nyquist frequency, and as it was measured."""
+    grid = fifesim.fife_site(10 / 9, window=((0, 1800), (0, 1800)))
+    msi = instrument("MSI")
+    quarter = GaussianResponse(kind="gaussian", mtf_at_nyquist=0.25)
+    soft = replace(msi, lsf=quarter, bands=tuple(replace(band, lsf=None) for band in msi.bands))
+    known = {0.05: (0.964, 0.650, 0.66), 0.15: (0.980, 0.722, 0.73), 0.24: (0.980, 0.860, 0.87)}
+    for arp, expected in known.items():
+        lai = fifesim.lai_scene(grid, arp=arp, seed=1)
+        toa = lai.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"]).fifesim.to_toa()
+        images = (toa.fifesim.sense(each) for each in (msi.with_response("detector"), soft, msi))
+        found = [fifesim.regress(lai.fifesim.aggregate(10), image.fifesim.ndvi()).r2 for image in images]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=0.02)

@@ -19,7 +19,7 @@ from fifesim.sensor.description.plausibility import check_units
 _FORMS = ("srf", "lsf", "interval", "ifov")
 
 
-def instrument(name):
+def instrument(name, response=None):
     """
     Description of an instrument by its name, or from a file.
 
@@ -28,6 +28,8 @@ def instrument(name):
     name : str, path-like or Instrument
         Name or alias in any case, such as ``"TM"`` or ``"Landsat 8"``; or the path of a file, which ends in
         ``.toml``. An Instrument passes through.
+    response : {"system", "detector", "paper"}, optional
+        Spatial response, as `Instrument.with_response` takes it; by default what the file has.
 
     Returns
     -------
@@ -46,8 +48,11 @@ def instrument(name):
     >>> tm.name, round(tm.line_spread.width, 2), round(tm.ground_interval, 3)
     ('TM', 30.32, 30.315)
     """
-    if isinstance(name, Instrument):
-        return name
+    found = name if isinstance(name, Instrument) else _found(name)
+    return found if response is None else found.with_response(response)
+
+
+def _found(name):
     if isinstance(name, Path) or (isinstance(name, str) and Path(name).suffix.lower() == ".toml"):
         path = Path(name).absolute()
         # A file that has changed is read again; one that is not there is an error of reading.

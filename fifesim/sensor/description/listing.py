@@ -89,6 +89,10 @@ def _sampling(instrument):
             f"    line spread {' x '.join(part.kind for part in kinds)}, modulation transfer at the Nyquist frequency "
             f"of the own interval {_pair(mtf, '.2f')}",
         ]
+        if not instrument.knows_blur(bands[0]):
+            lines.append(
+                "    that of the detector alone: images are sharper than the instrument's, whose blur is not known"
+            )
     return lines
 
 
@@ -96,6 +100,40 @@ def _pair(values, form):
     """Two values, along and across the track, or one where they are equal."""
     along, across = values
     return f"{along:{form}}" if along == across else f"{along:{form}} along x {across:{form}} across"
+
+
+def blur_in_words(instrument, bands):
+    """
+    What is known of the spatial response of some bands, in a line.
+
+    Parameters
+    ----------
+    instrument : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of str
+
+    Returns
+    -------
+    text : str
+
+    Examples
+    --------
+    >>> from fifesim.sensor.description.instruments import instrument
+    >>> blur_in_words(instrument("TM"), ["TM3", "TM4"])
+    'modulation transfer at the Nyquist frequency .65'
+    """
+    chosen = instrument.select(bands)
+    found = []
+    for band in chosen:
+        pairs = zip(instrument.line_spreads(band), instrument.ground_intervals(band), strict=True)
+        found.append(_pair([float(spread.mtf(0.5 / step)) for spread, step in pairs], ".2f"))
+    each = (
+        found[:1] if len(set(found)) == 1 else [f"{band.name} {text}" for band, text in zip(chosen, found, strict=True)]
+    )
+    text = f"modulation transfer at the Nyquist frequency {', '.join(each)}"
+    unknown = [band.name for band in chosen if not instrument.knows_blur(band)]
+    if unknown:
+        text += f"; of {', '.join(unknown)} the detector alone is known: the image is sharper than the instrument's"
+    return text
 
 
 def _radiometry(instrument):

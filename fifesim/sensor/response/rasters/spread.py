@@ -38,7 +38,8 @@ def psf(instrument="TM", band=None, *, spacing=None):
     --------
     fifesim.sensor.response.spatial, fifesim.sensor.response.transfer
     """
-    description, band = _find(instrument, band)
+    description = find_instrument(instrument)
+    band = description.bands[0] if band is None else description.select(band)[0]
     along, across = description.line_spreads(band)
     if spacing is None:
         spacing = 2 * max(along.half_width, across.half_width) / _SAMPLES
@@ -59,24 +60,26 @@ def psf(instrument="TM", band=None, *, spacing=None):
     )
 
 
-def mtf(instrument="TM", band=None, *, frequency=None):
+def mtf(instrument="TM", bands=None, *, frequency=None):
     """
     Modulation transfer function of an instrument on the ground at nadir.
 
     Parameters
     ----------
     instrument : str or fifesim.sensor.description.instruments.Instrument, optional
-    band : str, optional
-        Name of a band; the first by default.
+    bands : str or sequence of str, optional
+        Names of bands; all by default.
     frequency : array, optional
-        Spatial frequencies; by default from 0 to that of the instrument's samples, twice the Nyquist frequency.
+        Spatial frequencies; by default from 0 to that of the closest samples, twice the Nyquist frequency.
         [cycles m-1]
 
     Returns
     -------
-    mtf : xarray.DataArray, dims (direction, frequency)
-        ``direction`` is "along" or "across" the track. Negative where bright and dark change places. ``nyquist`` is a
-        coordinate along direction. [1]
+    mtf : xarray.DataArray, dims (band, direction, frequency)
+        ``direction`` is "along" or "across" the track. Negative where bright and dark change places. Coordinates along
+        band and direction are the Nyquist frequency of the band's own interval, ``nyquist``, and the transfer there,
+        ``at_nyquist``; those of the pixels of the gridded product are ``product_nyquist`` and ``at_product_nyquist``.
+        [1]
 
     Raises
     ------
@@ -87,27 +90,38 @@ def mtf(instrument="TM", band=None, *, frequency=None):
     --------
     fifesim.sensor.response.spatial, fifesim.sensor.response.transfer
     """
-    description, band = _find(instrument, band)
-    nyquist = np.array([0.5 / interval for interval in description.ground_intervals(band)])
-    frequency = np.linspace(0, 2 * nyquist.max(), 201) if frequency is None else np.atleast_1d(frequency).astype(float)
-    units = {"units": "cycles m-1"}
+    description = find_instrument(instrument)
+    selected = description.select(bands)
+    spreads = [description.line_spreads(band) for band in selected]
+    own = np.array([[0.5 / interval for interval in description.ground_intervals(band)] for band in selected])
+    product = np.array([0.5 / description.pixel(band) for band in selected])
+    frequency = np.linspace(0, 2 * own.max(), 201) if frequency is None else np.atleast_1d(frequency).astype(float)
+    both, units = ("band", "direction"), {"units": "cycles m-1"}
     return xr.DataArray(
-        np.stack([spread.mtf(frequency) for spread in description.line_spreads(band)]),
-        dims=("direction", "frequency"),
+        np.array([[spread.mtf(frequency) for spread in pair] for pair in spreads]),
+        dims=(*both, "frequency"),
         coords={
+            "band": [band.name for band in selected],
             "direction": ["along", "across"],
             "frequency": ("frequency", frequency, {"long_name": "spatial frequency"} | units),
-            "nyquist": ("direction", nyquist, {"long_name": "Nyquist frequency of the own interval"} | units),
-            "band": band.name,
+            "nyquist": (both, own, {"long_name": "Nyquist frequency of the own interval"} | units),
+            "at_nyquist": (both, _at(spreads, own), {"long_name": "transfer at the Nyquist frequency", "units": "1"}),
+            "product_nyquist": ("band", product, {"long_name": "Nyquist frequency of the gridded product"} | units),
+            "at_product_nyquist": (
+                both,
+                _at(spreads, np.stack([product, product], axis=1)),
+                {"long_name": "transfer at the Nyquist frequency of the gridded product", "units": "1"},
+            ),
         },
         name="mtf",
         attrs={"long_name": "modulation transfer function", "units": "1", "instrument": description.name},
     )
 
 
-def _find(instrument, band):
-    description = find_instrument(instrument)
-    return description, description.bands[0] if band is None else description.select(band)[0]
+def _at(spreads, frequencies):
+    """Transfer of each band along and across at frequencies of its own, shape (band, direction)."""
+    pairs = zip(spreads, frequencies, strict=True)
+    return np.array([[float(one.mtf(at)) for one, at in zip(spread, own, strict=True)] for spread, own in pairs])
 
 
 def _line(spread, spacing):
