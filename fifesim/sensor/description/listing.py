@@ -119,16 +119,15 @@ def blur_in_words(instrument, bands):
     --------
     >>> from fifesim.sensor.description.instruments import instrument
     >>> blur_in_words(instrument("TM"), ["TM3", "TM4"])
-    'modulation transfer at the Nyquist frequency .65'
+    'modulation transfer at the Nyquist frequency 0.65'
     """
     chosen = instrument.select(bands)
     found = []
     for band in chosen:
         pairs = zip(instrument.line_spreads(band), instrument.ground_intervals(band), strict=True)
         found.append(_pair([float(spread.mtf(0.5 / step)) for spread, step in pairs], ".2f"))
-    each = (
-        found[:1] if len(set(found)) == 1 else [f"{band.name} {text}" for band, text in zip(chosen, found, strict=True)]
-    )
+    named = [f"{band.name} {passed}" for band, passed in zip(chosen, found, strict=True)]
+    each = found[:1] if len(set(found)) == 1 else named
     text = f"modulation transfer at the Nyquist frequency {', '.join(each)}"
     unknown = [band.name for band in chosen if not instrument.knows_blur(band)]
     if unknown:
