@@ -119,7 +119,7 @@ def blur_in_words(instrument, bands):
     --------
     >>> from fifesim.sensor.description.instruments import instrument
     >>> blur_in_words(instrument("TM"), ["TM3", "TM4"])
-    'modulation transfer at the Nyquist frequency 0.65'
+    'modulation transfer at the Nyquist frequency 0.69'
     """
     chosen = instrument.select(bands)
     found = []
