@@ -46,6 +46,8 @@ class Instrument:
     detectors : int, optional
         Detectors of a band, which take turns at its lines (whiskbroom) or stand side by side (pushbroom).
     scan : Scan, optional
+    geolocation : float, optional
+        Error of the gridded product's place, root mean square along each axis. [m]
     aliases : tuple of str, optional
         Other names.
 
@@ -69,6 +71,7 @@ class Instrument:
     ifov: Angle | None = None
     detectors: Count | None = None
     scan: Scan | None = None
+    geolocation: Positive | None = None
     aliases: tuple[Name, ...] = ()
 
     def __post_init__(self):
