@@ -46,6 +46,13 @@ def test_same_crs_needs_no_operation():
     assert projection.operation("EPSG:26914", pyproj.CRS("EPSG:26914").to_wkt()) == (None, 0.0)
 
 
+def test_the_middle_of_a_grid_is_that_of_its_box():
+    """4 km south and 3 km east of the corner, in degrees of the same ellipsoid."""
+    grid = grid_at("EPSG:26914", 704970, 4334220, 6000, 8000, 10)
+    known = pyproj.Proj("EPSG:26914")(704970 + 3000, 4334220 - 4000, inverse=True)
+    np.testing.assert_allclose(projection.middle(grid), known, rtol=0, atol=1e-9)
+
+
 def test_convergence_of_a_utm_zone_is_positive_east_of_its_meridian():
     """Sine of the latitude times the distance from the central meridian."""
     expected = np.sin(np.radians(39.06)) * (99 - 96.54)
