@@ -36,7 +36,7 @@ def given_air(atmosphere):
     return atmosphere
 
 
-def air_bands_and_geometry(array, atmosphere, geometry, instrument):
+def air_bands_and_geometry(array, atmosphere, geometry, instrument, assume=False):
     """
     Atmosphere, spectral bands and geometry: as given, else as the array carries them, else the paper's.
 
@@ -46,6 +46,8 @@ def air_bands_and_geometry(array, atmosphere, geometry, instrument):
     atmosphere : fifesim.atmosphere.air.models.Atmosphere or None
     geometry : fifesim.base.geometry.Geometry, xarray.Dataset or None
     instrument : str, fifesim.sensor.description.instruments.Instrument or None
+    assume : bool, optional
+        Whether the atmosphere given counts, whatever the array carries.
 
     Returns
     -------
@@ -59,12 +61,15 @@ def air_bands_and_geometry(array, atmosphere, geometry, instrument):
         If the array was made for another atmosphere, or its bands are not known.
     """
     atmosphere, carried = given_air(atmosphere), array.attrs.get("atmosphere")
-    if carried is not None:
+    if assume and atmosphere is None:
+        raise ValueError("assume=True needs the atmosphere to assume: give it too, such as fifesim.Atmosphere(...)")
+    if carried is not None and not assume:
         carried = Atmosphere.parse(carried)
         if atmosphere is not None and atmosphere != carried:
             raise ValueError(
                 f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
-                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
+                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...); or, to correct with the wrong "
+                "air on purpose, to_surface(..., assume=True)"
             )
     geometry = directions.given_geometry(geometry, array)
     return atmosphere or carried or Atmosphere(), _responses(array, instrument), geometry

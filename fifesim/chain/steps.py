@@ -208,7 +208,15 @@ def to_toa(
 
 
 def to_surface(
-    reflectance, atmosphere=None, *, geometry=None, instrument=None, elevation=None, adjacency=False, surroundings=None
+    reflectance,
+    atmosphere=None,
+    *,
+    assume=False,
+    geometry=None,
+    instrument=None,
+    elevation=None,
+    adjacency=False,
+    surroundings=None,
 ):
     """
     Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.
@@ -217,7 +225,12 @@ def to_surface(
     ----------
     reflectance : xarray.DataArray, dims (band, y, x)
         Reflectance at the top of the atmosphere; radiance and digital numbers are converted first.
-    atmosphere, geometry, instrument, elevation, adjacency, surroundings : optional
+    atmosphere : Atmosphere, optional
+        As in `to_toa`; another than that which the array carries is an error, unless it is assumed.
+    assume : bool, optional
+        Whether to correct for the atmosphere given, whatever air the image was taken through: what a wrong haze costs.
+        The result carries the assumed one.
+    geometry, instrument, elevation, adjacency, surroundings : optional
         As in `to_toa`.
 
     Returns
@@ -235,7 +248,7 @@ def to_surface(
     fifesim.atmosphere.schemes.coupling.corrected_reflectance
     """
     reflectance = planetary_reflectance(reflectance)
-    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument)
+    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, assume)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
     surface = atmosphere_raster.to_surface(reflectance, *light, **scene)
     return surface if instrument is None else surface.assign_attrs(instrument=find_instrument(instrument).name)

@@ -111,10 +111,10 @@ def geobox(array):
     missing = {"y", "x"} - set(array.dims)
     if missing:
         raise ValueError(f"a raster has dimensions y and x, got {array.dims}: rename its dimensions")
-    if "spatial_ref" not in array.coords and array.odc.crs is None:
+    if not ("spatial_ref" in array.coords and array.coords["spatial_ref"].attrs) and array.odc.crs is None:
         raise ValueError(
             "the raster has no CRS: open its file with decode_coords='all', or import rioxarray and give it one with "
-            ".rio.write_crs('EPSG:26914')"
+            ".rio.write_crs('EPSG:26914'); xr.where drops it, .where of a raster keeps it"
         )
     found = array.odc.geobox
     if found is None:
