@@ -40,7 +40,7 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     ValueError
         If the rasters differ in grid, or in a scalar coordinate such as sza.
     """
-    arrays = _aligned(arrays)
+    arrays = aligned(arrays)
     core = {}
     if bands is not None:
         core = {
@@ -260,8 +260,24 @@ def _with_crs(arrays):
     return [with_crs_of(array, known[0]) if _is_raster(array) else array for array in arrays]
 
 
-def _aligned(arrays):
-    """The same with the coordinates of one raster on all; they must share their cells and their scalar coordinates."""
+def aligned(arrays):
+    """
+    Rasters with the coordinates of one on all.
+
+    Parameters
+    ----------
+    arrays : sequence of xarray.DataArray
+        Those without dimensions y and x stay as they are; one that has lost its CRS takes that of the others.
+
+    Returns
+    -------
+    arrays : list of xarray.DataArray
+
+    Raises
+    ------
+    ValueError
+        If they do not share their cells, or a scalar coordinate such as sza differs.
+    """
     arrays = _with_crs(arrays)
     rasters = [array for array in arrays if _is_raster(array)]
     for one, other in combinations(rasters, 2):

@@ -47,13 +47,13 @@ def test_every_combination_of_rasters_takes_one(lai):
     rho = lai.fifesim.surface_reflectance(bands=TM34)
 
     def steps(of):
-        sza = of(30 + lai.drop_attrs())
+        sza = of(30 + lai.drop_attrs(deep=False))
         yield lai.fifesim.surface_reflectance(bands=TM34, background=of(soil))
-        yield lai.fifesim.surface_reflectance(bands=TM34, dem=of(dem.drop_attrs()))
+        yield lai.fifesim.surface_reflectance(bands=TM34, dem=of(dem.drop_attrs(deep=False)))
         yield lai.fifesim.surface_reflectance(bands=TM34, geometry=xr.Dataset({"sza": sza, "saa": 100.0}))
-        yield rho.fifesim.kt(of(dem.drop_attrs()))
-        yield rho.fifesim.to_toa(elevation=of(dem.drop_attrs()))
-        yield rho.fifesim.to_toa(adjacency=True, surroundings=of(rho.drop_attrs()))
+        yield rho.fifesim.kt(of(dem.drop_attrs(deep=False)))
+        yield rho.fifesim.to_toa(elevation=of(dem.drop_attrs(deep=False)))
+        yield rho.fifesim.to_toa(adjacency=True, surroundings=of(rho.drop_attrs(deep=False)))
         yield xr.DataArray(fifesim.regress(lai, of(soil)).slope)
         yield xr.DataArray(fifesim.regress(of(soil), lai).slope)
 
