@@ -3,6 +3,7 @@
 import numpy as np
 
 from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.base.arguments import described
 from fifesim.base.bands import Band
 from fifesim.rasters import directions
 from fifesim.sensor import raster as sensor
@@ -32,7 +33,7 @@ def given_air(atmosphere):
         If it is something else.
     """
     if atmosphere is not None and not isinstance(atmosphere, Atmosphere):
-        raise TypeError(f"atmosphere must be a fifesim.Atmosphere, got {atmosphere!r}: see fifesim.Atmosphere")
+        raise TypeError(f"atmosphere must be a fifesim.Atmosphere, got {described(atmosphere)}: see fifesim.Atmosphere")
     return atmosphere
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import exp1
 
 from fifesim.base import datasets
+from fifesim.base.arguments import described
 
 CONTENTS = {
     "chlorophyll": ("ug cm-2", 200.0),
@@ -149,7 +150,7 @@ def _number(name, value):
     try:
         return float(value)
     except (TypeError, ValueError):
-        raise TypeError(f"Leaf: {name} must be a number, or a raster of numbers, got {value!r}") from None
+        raise TypeError(f"Leaf: {name} must be a number, or a raster, got {described(value)}") from None
 
 
 def _column(value):

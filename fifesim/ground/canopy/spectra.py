@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from fifesim.base import datasets
+from fifesim.base.arguments import described
 from fifesim.base.bands import solar_spectrum
 
 SHADE = "shade"
@@ -84,7 +85,7 @@ class Background:
 
     def __post_init__(self):
         if not isinstance(self.fractions, Mapping):
-            raise TypeError(f"Background takes {{spectrum: fraction}}, got {self.fractions!r}")
+            raise TypeError(f"Background takes fractions as {{spectrum: fraction}}, got {described(self.fractions)}")
         fractions = {str(name): _share(name, value) for name, value in self.fractions.items()}
         names = spectrum_names()
         for name, value in fractions.items():
@@ -274,8 +275,8 @@ def _share(name, value):
         return float(value)
     except (TypeError, ValueError):
         raise TypeError(
-            f"Background: the fraction of {name!r} must be a number, got {type(value).__name__}: rasters of fractions "
-            "are background={spectrum: raster, ...}"
+            f"Background: the fraction of {name!r} must be a number, got {described(value)}: rasters of fractions are "
+            "background={spectrum: raster, ...}"
         ) from None
 
 

@@ -41,7 +41,7 @@ def background(bands, given, lai):
     fifesim.ground.canopy.optics.background
     """
     if isinstance(given, xr.DataArray):
-        return given
+        return given.rename("background")
     if isinstance(given, xr.Dataset):
         missing = {"wavelength", "reflectance"} - set(given.variables)
         if missing:

@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 
+from fifesim.base.arguments import described
 from fifesim.rasters import directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
@@ -188,7 +189,9 @@ def means_by_band(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_va
     fifesim.base.footprints.regularize
     """
     if not hasattr(offset, "__len__") or len(offset) != 2:
-        raise ValueError(f"offset must be two, of rows and of columns in pixels, such as (0.5, 0.0), got {offset!r}")
+        raise ValueError(
+            f"offset must be two, of rows and of columns in pixels, such as (0.5, 0.0), got {described(offset)}"
+        )
     down, across = grids.cell_size(pixels)
     shifts = _shift(offset[0], pixels.shape.y, down, "rows"), _shift(offset[1], pixels.shape.x, across, "columns")
 

@@ -67,5 +67,8 @@ def test_what_cannot_be_is_one_line(lai, share, background, message):
 
 
 def test_background_of_numbers_says_where_rasters_go(share):
-    with pytest.raises(TypeError, match=r"the fraction of 'soil_dry' must be a number, got DataArray: rasters .* are"):
+    with pytest.raises(
+        TypeError,
+        match=r"fraction of 'soil_dry' must be a number, .*: rasters of fractions are backgr",
+    ):
         fifesim.Background({"soil_dry": share, "shade": 1 - share})
