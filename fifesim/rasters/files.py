@@ -64,12 +64,6 @@ def to_geotiff(raster, path):
     Bands have names, units, scale and offset, and ``CENTRAL_WAVELENGTH_UM`` in the ``IMAGERY`` domain where there is a
     wavelength; attributes and the sun are tags. Angles that vary over the cells are not written, which is a warning.
     """
-    if isinstance(raster, xr.DataTree):
-        nodes = [node.path for node in raster.subtree if node.data_vars]
-        raise TypeError(
-            f"a GeoTIFF holds one grid, got a DataTree of {', '.join(nodes)}: write each by itself, such as "
-            f"fifesim.to_geotiff(tree[{nodes[0] if nodes else '/10m'!r}].to_dataset()['dn'], 'image.tif')"
-        )
     path = Path(path)
     array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
     if not set(array.dims) <= {"band", "y", "x"}:

@@ -229,9 +229,9 @@ class TestSeveralResolutions:
 
     def test_a_file_is_one_node(self, toa, tmp_path):
         tree = fifesim.sense(toa, "MSI")
-        with pytest.raises(TypeError, match=r"one grid, got a DataTree of /10m, /20m: write each by itself"):
+        with pytest.raises(TypeError, match=r"got an xarray.DataTree of 10m, 20m: take one of its arrays, such as"):
             fifesim.to_geotiff(tree, tmp_path / "image.tif")
-        path = fifesim.to_geotiff(tree["/10m"].to_dataset()["dn"], tmp_path / "image_10m.tif")
+        path = fifesim.to_geotiff(tree["10m/dn"], tmp_path / "image_10m.tif")
         np.testing.assert_array_equal(fifesim.open_image(path), tree["10m/dn"])
 
 
