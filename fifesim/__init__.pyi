@@ -10,7 +10,7 @@ from .rasters.sites import fife_site as fife_site
 from .rasters.grid import grid_at as grid_at
 from .base.geometry import Geometry as Geometry
 from .base.geometry import fife_geometry as fife_geometry
-from .base.geometry import sun_position as sun_position
+from .rasters.sun import sun_position as sun_position
 
 # Ground
 from .ground.landscape.raster import lai_scene as lai_scene

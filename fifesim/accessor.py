@@ -1,12 +1,16 @@
 """Public names, found when they are first used, and the ``.fifesim`` accessor, whose methods are some of them."""
 
 import re
+from functools import cache
 from importlib import import_module
+from inspect import isfunction
 from pathlib import Path
 from types import MethodType
 from typing import NamedTuple
 
 import xarray as xr
+
+from fifesim.base.arguments import checked
 
 # One line of the table: where a name lives, and whether it is a method of a DataArray, or of a Dataset too.
 _LINE = re.compile(r"from \.([\w.]+) import (\w+) as \2(  # method(, of a Dataset too)?)?")
@@ -36,9 +40,10 @@ def _table():
 PUBLIC = _table()
 
 
+@cache
 def find(name):
     """
-    A public name.
+    A public name; a function looks at its arguments first.
 
     Parameters
     ----------
@@ -49,7 +54,13 @@ def find(name):
     -------
     found : object
     """
-    return getattr(import_module(PUBLIC[name].module), name)
+    found = getattr(import_module(PUBLIC[name].module), name)
+    if not isfunction(found):
+        return found
+    function = checked(found, PUBLIC[name].methods_of)
+    # Pickle looks a function up where it says that it lives.
+    function.__module__, function.__qualname__ = "fifesim", name
+    return function
 
 
 class _Method:

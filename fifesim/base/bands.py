@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pvlib
 
+from fifesim.base.arguments import described
+
 
 class Window(NamedTuple):
     """
@@ -109,8 +111,7 @@ class Band:
     response: tuple = field(repr=False)
 
     def __post_init__(self):
-        wavelength = tuple(float(each) for each in self.wavelength)
-        response = tuple(float(each) for each in self.response)
+        wavelength, response = (_numbers(self, name) for name in ("wavelength", "response"))
         if len(wavelength) < 2 or len(wavelength) != len(response) or np.any(np.diff(wavelength) <= 0):
             raise ValueError(f"band {self.name}: wavelengths must increase, one for each response")
         if min(response) < 0 or max(response) == 0:
@@ -171,6 +172,17 @@ class Band:
         own = [w for w in self.wavelength if low <= w <= high]
         nodes = np.union1d(inside, own)
         return nodes, np.interp(nodes, self.wavelength, self.response)
+
+
+def _numbers(band, name):
+    value = getattr(band, name)
+    try:
+        numbers = np.asarray(value, float)
+    except (TypeError, ValueError):
+        numbers = None
+    if numbers is None or numbers.ndim != 1:
+        raise TypeError(f"band {band.name}: {name} must be a list of numbers, got {described(value)}")
+    return tuple(numbers.tolist())
 
 
 @lru_cache

@@ -27,7 +27,8 @@ def compare(lai, instruments, setup=None, *, bands=None):
     Returns
     -------
     images : xarray.DataTree
-        A node for each instrument by its name, with ``dn`` (or ``toa_radiance``), dims (band, y, x).
+        A node for each instrument by its name, with ``dn`` (or ``toa_radiance``), dims (band, y, x); below it, of bands
+        of several resolutions, a node for each, such as ``/MSI/10m``.
 
     Raises
     ------
@@ -53,7 +54,8 @@ def compare(lai, instruments, setup=None, *, bands=None):
     for description in descriptions:
         selected = tuple(band.name for band in _bands(description, bands.get(description.name)))
         own = replace(setup, instrument=description, bands=selected)
-        nodes[f"/{description.name}"] = image_of(own, reflectance_of(own, lai)).to_dataset()
+        image = image_of(own, reflectance_of(own, lai))
+        nodes[f"/{description.name}"] = image if isinstance(image, xr.DataTree) else image.to_dataset()
     return xr.DataTree.from_dict(nodes)
 
 

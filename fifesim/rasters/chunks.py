@@ -9,6 +9,7 @@ import xarray as xr
 from dask.base import tokenize
 
 from fifesim.rasters import grid as grids
+from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.windows import array_from_windows, gather, slices
 
 
@@ -39,7 +40,7 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     ValueError
         If the rasters differ in grid, or in a scalar coordinate such as sza.
     """
-    arrays = _aligned(arrays)
+    arrays = aligned(arrays)
     core = {}
     if bands is not None:
         core = {
@@ -246,9 +247,39 @@ def runs(cells, chunks):
     return tuple(np.diff([*starts, len(chunk)]).tolist())
 
 
-def _aligned(arrays):
-    """The same with the coordinates of one raster on all; they must share their cells and their scalar coordinates."""
-    rasters = [array for array in arrays if isinstance(array, xr.DataArray) and {"y", "x"} <= set(array.dims)]
+def _is_raster(array):
+    return isinstance(array, xr.DataArray) and {"y", "x"} <= set(array.dims)
+
+
+def _with_crs(arrays):
+    """The same, where rasters without a CRS lie on the cells of one that has it."""
+    rasters = [array for array in arrays if _is_raster(array)]
+    known = [array for array in rasters if array.odc.crs is not None] if rasters[1:] else []
+    if len(known) in (0, len(rasters)):
+        return arrays
+    return [with_crs_of(array, known[0]) if _is_raster(array) else array for array in arrays]
+
+
+def aligned(arrays):
+    """
+    Rasters with the coordinates of one on all.
+
+    Parameters
+    ----------
+    arrays : sequence of xarray.DataArray
+        Those without dimensions y and x stay as they are; one that has lost its CRS takes that of the others.
+
+    Returns
+    -------
+    arrays : list of xarray.DataArray
+
+    Raises
+    ------
+    ValueError
+        If they do not share their cells, or a scalar coordinate such as sza differs.
+    """
+    arrays = _with_crs(arrays)
+    rasters = [array for array in arrays if _is_raster(array)]
     for one, other in combinations(rasters, 2):
         if not grids.same_grid(grids.geobox(one), grids.geobox(other)):
             raise ValueError(

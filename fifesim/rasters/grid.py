@@ -110,10 +110,10 @@ def geobox(array):
         If there is no CRS, or the grid is not one that `check_grid` passes.
     """
     check_axes(array)
-    if "spatial_ref" not in array.coords and array.odc.crs is None:
+    if not ("spatial_ref" in array.coords and array.coords["spatial_ref"].attrs) and array.odc.crs is None:
         raise ValueError(
             "the raster has no CRS: open its file with decode_coords='all', or import rioxarray and give it one with "
-            ".rio.write_crs('EPSG:26914')"
+            ".rio.write_crs('EPSG:26914'); xr.where drops it, .where of a raster keeps it"
         )
     found = array.odc.geobox
     if found is None:

@@ -4,6 +4,7 @@ from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.base import fife
+from fifesim.base.arguments import described
 from fifesim.rasters import projection
 
 _NAME = "FIFE"
@@ -87,7 +88,7 @@ def _window(site, window):
         (top, bottom), (left, right) = window
     except (TypeError, ValueError):
         raise ValueError(
-            f"window must be ((first row, last row), (first column, last column)), got {window!r}"
+            f"window must be ((first row, last row), (first column, last column)), got {described(window)}"
         ) from None
     rows, columns = site.shape
     if not (0 <= top < bottom <= rows and 0 <= left < right <= columns):

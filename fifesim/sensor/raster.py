@@ -12,7 +12,13 @@ from fifesim.sensor.description.rasters.carried import attributes_of, given_inst
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import check_kinds
 from fifesim.sensor.response.rasters.noise import noisy
-from fifesim.sensor.response.rasters.pixels import directions_on, matching_bands, means_by_band, pixel_grid
+from fifesim.sensor.response.rasters.pixels import (
+    bands_by_grid,
+    directions_on,
+    matching_bands,
+    means_by_band,
+    pixel_grid,
+)
 
 # Share of its footprint's weight that a pixel needs on valid cells. The paper's footprint of 30.32 m leaves a
 # scene of whole 30 m pixels by 0.16 m.
@@ -73,13 +79,15 @@ def sense(
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
         Digital numbers from 1; 0 is no data. ``gain``, ``offset``, ``wavelength`` and ``solar_irradiance`` are
-        coordinates along band. Without ``quantise``, radiance with the latter two. [1 or W m-2 sr-1 um-1]
+        coordinates along band. Without ``quantise``, radiance with the latter two. Of bands of several resolutions, an
+        `xarray.DataTree` with a node for each, such as ``/10m`` and ``/20m``, that holds its ``dn``, or
+        ``toa_radiance``. [1 or W m-2 sr-1 um-1]
 
     Raises
     ------
     ValueError
-        If the instrument is unknown, has none of the bands or no such noise, bands lie on different grids, ``onto`` is
-        no grid of the scene's CRS, or a point spread is wider than the scene.
+        If the instrument is unknown, has none of the bands or no such noise, ``onto`` is no grid of the scene's CRS, or
+        a point spread is wider than the scene.
 
     See Also
     --------
@@ -88,6 +96,12 @@ def sense(
     """
     toa, description, bands = by_bands(toa, instrument)
     geometry = directions.given_geometry(geometry, toa, time)
+    groups = bands_by_grid(description, bands, onto, interval)
+    if len(groups) > 1:
+        options = {"offset": offset, "noise": noise, "seed": seed, "noise_models": noise_models, "geometry": geometry}
+        options |= {"interval": interval, "quantise": quantise, "min_valid": min_valid}
+        images = {size: sense(toa.isel(band=numbers), description, **options) for size, numbers in groups.items()}
+        return xr.DataTree.from_dict({f"/{size}": image.to_dataset() for size, image in images.items()})
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
     geometry = directions_on(pixels, geometry)
     scene = toa.drop_vars(ANGLES, errors="ignore")

@@ -103,3 +103,9 @@ def test_a_band_beyond_the_spectra_is_named(lai):
         ValueError, match=r"spectrum for band far, 2\.4 to 2\.6 um: .*give leaf_optics= and background="
     ):
         fifesim.compare(lai, [replace(tm, bands=(*tm.bands, far))], bands={"TM": ["far"]})
+
+
+def test_bands_of_several_resolutions_are_nodes_below(lai):
+    images = fifesim.compare(lai, ["MSI", "TM"], bands={"MSI": ["MSI4", "MSI11"]})
+    assert sorted(node.path for node in images.leaves) == ["/MSI/10m", "/MSI/20m", "/TM"]
+    assert images["MSI/20m/dn"]["band"].values.tolist() == ["MSI11"]

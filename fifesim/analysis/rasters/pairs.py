@@ -3,6 +3,7 @@
 import numpy as np
 
 from fifesim.rasters import grid as grids
+from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.reductions import computed
 
 PAIRINGS = ("coordinates", "index")
@@ -80,6 +81,7 @@ def _common_index(y, x):
 
 def _common_place(y, x):
     """Both cut to the ground that they share."""
+    y, x = with_crs_of(y, x), with_crs_of(x, y)
     one, two = grids.geobox(y), grids.geobox(x)
     try:
         rows, columns = grids.lattice_offset(one, two)

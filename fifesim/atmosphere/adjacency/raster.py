@@ -13,6 +13,7 @@ from fifesim.atmosphere.adjacency import environment as adjacency
 from fifesim.atmosphere.schemes import coupling
 from fifesim.rasters import chunks, passes
 from fifesim.rasters import grid as grids
+from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.regularization import areas, regularized
 
 # How far from the scene a raster of its surroundings counts at its place. Beyond it lies 3e-4 of what molecules scatter
@@ -267,6 +268,7 @@ def _surroundings(surroundings, array, along):
 
 def _outer(surroundings, array, along):
     """Margin of blocks, and the means of a raster on them and the scene's."""
+    surroundings = with_crs_of(surroundings, array)
     there, here = grids.geobox(surroundings), grids.geobox(array)
     if there.crs != here.crs:
         raise ValueError(

@@ -52,7 +52,7 @@ def leaf_optics(bands, given=None):
     elif isinstance(given, Leaf):
         given = _leaf_means(_responses(bands, "Leaf"), given)
     if isinstance(given, Mapping):
-        given = np.reshape([_of_band(given, band, "leaf optics") for band in _names(bands)], (-1, 2)).T
+        given = np.reshape([of_band(given, band, "leaf optics") for band in _names(bands)], (-1, 2)).T
     reflectance, transmittance = (_for_bands(values, bands, "leaf optics") for values in given)
     check_leaf_optics(reflectance, transmittance)
     return reflectance, transmittance
@@ -96,7 +96,7 @@ def background(bands, given=None):
     elif isinstance(given, Background | Spectrum):
         given = _background_means(_responses(bands, type(given).__name__), given)
     if isinstance(given, Mapping):
-        given = [_of_band(given, band, "background") for band in _names(bands)]
+        given = [of_band(given, band, "background") for band in _names(bands)]
     reflectance = _for_bands(given, bands, "background")
     check_background(reflectance)
     return reflectance
@@ -134,7 +134,33 @@ def _background_means(bands, mixture):
     return dict(zip(_names(bands), background_means(bands, mixture).tolist(), strict=True))
 
 
-def _of_band(given, band, what):
+def _for_bands(values, bands, what):
+    values = np.asarray(values, float)
+    if values.shape not in ((), (1,), (len(bands),)):
+        raise ValueError(f"{what} of shape {values.shape} for {len(bands)} bands: give one value for each band")
+    return np.broadcast_to(values, len(bands)).copy()
+
+
+def of_band(given, band, what):
+    """
+    What a mapping has for a band.
+
+    Parameters
+    ----------
+    given : mapping
+    band : str
+    what : str
+        "leaf optics" or "background".
+
+    Returns
+    -------
+    value : object
+
+    Raises
+    ------
+    ValueError
+        If it has nothing.
+    """
     if band in given:
         return given[band]
     typed = "(reflectance, transmittance)" if what == "leaf optics" else "reflectance"
@@ -144,16 +170,9 @@ def _of_band(given, band, what):
     )
 
 
-def _for_bands(values, bands, what):
-    values = np.asarray(values, float)
-    if values.shape not in ((), (1,), (len(bands),)):
-        raise ValueError(f"{what} of shape {values.shape} for {len(bands)} bands: give one value for each band")
-    return np.broadcast_to(values, len(bands)).copy()
-
-
 def check_leaf_optics(reflectance, transmittance):
     """
-    Refuse leaf optics that no leaf can have.
+    Refuse leaf optics that no leaf can have; there may be none.
 
     Parameters
     ----------
@@ -171,7 +190,7 @@ def check_leaf_optics(reflectance, transmittance):
     """
     for name, values in (("reflectance", reflectance), ("transmittance", transmittance)):
         _check_fraction(f"leaf {name}", values)
-    total = np.max(np.add(reflectance, transmittance))
+    total = np.max(np.add(reflectance, transmittance), initial=0.0)
     # Decimal fractions that add up to 1 may exceed it by rounding.
     if not total <= 1 + 1e-12:
         raise ValueError(

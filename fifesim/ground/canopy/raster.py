@@ -40,8 +40,8 @@ def level_reflectance(
         Names.
     wavelengths : sequence of float, shape (band,)
         [um]
-    leaf_reflectance, leaf_transmittance : sequence of float, shape (band,)
-        [1]
+    leaf_reflectance, leaf_transmittance : sequence of float, shape (band,), or xarray.DataArray, dims (band, y, x)
+        Where they are rasters, SAIL is evaluated at every cell. [1]
     background : sequence of float, shape (band,), or xarray.DataArray, dims ([band], y, x)
         Reflectance below the canopy. [1]
     diffuse_fraction : sequence of float, shape (band,), or xarray.DataArray, dims (band, y, x)
@@ -74,21 +74,19 @@ def level_reflectance(
     if not 0 <= hotspot < np.inf:
         raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
     angles = leaf_angle_classes(leaf_angles)
-    parameters = {
-        "leaf_reflectance": tuple(map(float, leaf_reflectance)),
-        "leaf_transmittance": tuple(map(float, leaf_transmittance)),
-        "leaf_angles": angles,
-        "hotspot": float(hotspot),
-    }
+    parameters = {"leaf_angles": angles, "hotspot": float(hotspot)}
     _check_scene(lai)
     described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
     if described == "raster":
         cf.check_units(background, "surface_reflectance")
         background = _background_bands(background, bands)
     background = _per_band(background)
-    if directions.varying(geometry):
-        out = _in_directions(lai, background, diffuse_fraction, geometry, parameters)
+    leaves = leaf_reflectance, leaf_transmittance
+    if directions.varying(geometry) or any(isinstance(each, xr.DataArray) for each in leaves):
+        out = _by_cell(lai, background, diffuse_fraction, leaves, geometry, parameters)
     else:
+        names = "leaf_reflectance", "leaf_transmittance"
+        parameters |= {name: tuple(map(float, values)) for name, values in zip(names, leaves, strict=True)}
         parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
         parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
         out = chunking.pointwise(_reflectance, lai, background, bands=len(bands), **parameters)
@@ -165,16 +163,17 @@ def _reflectance(lai, background, **parameters):
     return canopy_reflectance(lai, background=np.moveaxis(background, -1, 0), **parameters)
 
 
-def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
-    """Reflectance where the directions of sun or sensor vary over the scene."""
+def _by_cell(lai, background, diffuse_fraction, leaves, geometry, parameters):
+    """Reflectance where the directions of sun or sensor, or the leaves, vary over the scene."""
 
-    def kernel(cells, ground, sky, sza, saa, vza, vaa):
+    def kernel(cells, ground, sky, reflectance, transmittance, sza, saa, vza, vaa):
         directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
-        return directional_reflectance(cells, background=ground, diffuse_fraction=sky, **directions, **parameters)
+        light = {"background": ground, "diffuse_fraction": sky, **directions}
+        return directional_reflectance(cells, reflectance, transmittance, **light, **parameters)
 
     plain = lai.drop_vars(ANGLES, errors="ignore")
-    angles, bands = directions.angles(geometry), len(parameters["leaf_reflectance"])
-    return chunking.pointwise(kernel, plain, background, _per_band(diffuse_fraction), *angles, bands=bands)
+    by_band = [_per_band(each) for each in (background, diffuse_fraction, *leaves)]
+    return chunking.pointwise(kernel, plain, *by_band, *directions.angles(geometry), bands=len(by_band[2]["band"]))
 
 
 def _directions(geometry):

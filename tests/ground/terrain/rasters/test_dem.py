@@ -34,7 +34,7 @@ def test_a_dem_of_integers_is_an_elevation_and_an_undeclared_mark_is_not(dem):
     np.testing.assert_array_equal(fifesim.slope(whole), fifesim.slope(whole.astype(float).assign_attrs(dem.attrs)))
     with pytest.raises(ValueError, match="masked=True"):
         fifesim.slope(dem.rio.write_nodata(-9999.0))
-    with pytest.raises(TypeError, match="fine_dem"):
+    with pytest.raises(TypeError, match=r"dem must be an xarray.DataArray .* fine_dem"):
         fifesim.slope("hill.tif")
 
 
