@@ -3,8 +3,8 @@
 import numpy as np
 
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.base.arguments import described
 from fifesim.base.bands import Band
+from fifesim.base.kinds import described
 from fifesim.rasters import directions
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import instrument as find_instrument
