@@ -53,7 +53,7 @@ def _of(kind, names):
 KINDS = (
     _of(NUMBER, "arp height width west north altitude hotspot fpar_inf min_valid nadir_offset heading level increment")
     | _of(NUMBER, "bandwidth points reach extinction latitude longitude margin fill resolution directions min_count")
-    | _of(NUMBER, "cell scale_height sza saa vza vaa earth_sun_distance thermal shot detectors gain_spread seed slope")
+    | _of(NUMBER, "cell scale_height sza saa vza vaa earth_sun_distance thermal shot detectors gain_spread slope")
     | _of(NUMBER, "visibility aot h2o o3 residual_deviation realisations spacing offset_spread")
     | _of(NUMBERS, "radiance")
     | _of(LIST, "frequency")
@@ -102,6 +102,9 @@ OF_FUNCTION = {
     "budget": _of(NUMBER, "cells"),
 }
 """The same of single functions, where it is another."""
+
+
+_ANY_DIMENSIONS = {"density", "share_kept", "to_bands"}
 
 
 def check(name, value, kind):
@@ -164,7 +167,7 @@ def checked(function, methods_of=()):
         for name, kind in kinds.items():
             if name in given and given[name] is not signature.parameters[name].default:
                 check(name, given[name], kind)
-                if methods_of and name == first:
+                if methods_of and name == first and function.__name__ not in _ANY_DIMENSIONS:
                     _check_cells(name, given[name])
         return function(*args, **options)
 
@@ -197,7 +200,7 @@ def _check_cells(name, raster):
     """Refuse a raster without cells, or without rows and columns; what else they are called is told later."""
     if not is_a(raster, "DataArray"):
         return
-    if raster.ndim < 2 and "wavelength" not in raster.dims:
+    if raster.ndim < 2:
         dims = ", ".join(map(str, raster.dims))
         raise ValueError(f"{name} must have dimensions y and x, got ({dims}): select with .isel(x=[0]), not .isel(x=0)")
     if not raster.size:
