@@ -104,6 +104,7 @@ OF_FUNCTION = {
 """The same of single functions, where it is another."""
 
 
+# Take values along any dimensions.
 _ANY_DIMENSIONS = {"density", "share_kept", "to_bands"}
 
 
@@ -167,8 +168,8 @@ def checked(function, methods_of=()):
         for name, kind in kinds.items():
             if name in given and given[name] is not signature.parameters[name].default:
                 check(name, given[name], kind)
-                if methods_of and name == first and function.__name__ not in _ANY_DIMENSIONS:
-                    _check_cells(name, given[name])
+                if methods_of and name == first:
+                    _check_cells(name, given[name], 0 if function.__name__ in _ANY_DIMENSIONS else 2)
         return function(*args, **options)
 
     return checking
@@ -196,11 +197,11 @@ def check_fields(description, *names):
             check(name, value, KINDS[name])
 
 
-def _check_cells(name, raster):
+def _check_cells(name, raster, dimensions=2):
     """Refuse a raster without cells, or without rows and columns; what else they are called is told later."""
     if not is_a(raster, "DataArray"):
         return
-    if raster.ndim < 2:
+    if raster.ndim < dimensions:
         dims = ", ".join(map(str, raster.dims))
         raise ValueError(f"{name} must have dimensions y and x, got ({dims}): select with .isel(x=[0]), not .isel(x=0)")
     if not raster.size:
