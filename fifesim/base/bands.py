@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pvlib
 
-from fifesim.base.arguments import described
+from fifesim.base.kinds import described
 
 
 class Window(NamedTuple):

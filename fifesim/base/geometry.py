@@ -8,7 +8,8 @@ import pandas as pd
 import pvlib
 
 from fifesim.base import fife
-from fifesim.base.arguments import check_fields, described, is_a
+from fifesim.base.arguments import check_fields
+from fifesim.base.kinds import described, is_a
 
 ANGLES = ("sza", "saa", "vza", "vaa")
 

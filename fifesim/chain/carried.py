@@ -3,8 +3,8 @@
 import numpy as np
 
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.base.arguments import described
 from fifesim.base.bands import Band
+from fifesim.base.kinds import described
 from fifesim.base.warned import warn
 from fifesim.rasters import cf, directions
 from fifesim.rasters.own_rasters import incoming

@@ -9,9 +9,9 @@ from fifesim.analysis.indices import normalized_difference
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import coupling
 from fifesim.atmosphere.schemes import engines as schemes
-from fifesim.base.arguments import described
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.base.geometry import fife_geometry
+from fifesim.base.kinds import described
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids

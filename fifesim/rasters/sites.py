@@ -4,7 +4,7 @@ from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.base import fife
-from fifesim.base.arguments import described
+from fifesim.base.kinds import described
 from fifesim.rasters import projection
 
 _NAME = "FIFE"

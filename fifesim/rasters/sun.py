@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base import geometry
-from fifesim.base.arguments import described
+from fifesim.base.kinds import described
 from fifesim.rasters import cf
 
 

@@ -10,7 +10,8 @@ from fifesim.atmosphere.air import aerosols, mixtures, molecules
 from fifesim.atmosphere.air.own_aerosol import Aerosol, known_aerosol
 from fifesim.atmosphere.air.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
 from fifesim.atmosphere.air.summary import atmosphere_in_words
-from fifesim.base.arguments import check_fields, described
+from fifesim.base.arguments import check_fields
+from fifesim.base.kinds import described
 
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import exp1
 
 from fifesim.base import datasets
-from fifesim.base.arguments import described
+from fifesim.base.kinds import described
 
 CONTENTS = {
     "chlorophyll": ("ug cm-2", 200.0),

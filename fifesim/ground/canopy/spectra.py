@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from fifesim.base import datasets
-from fifesim.base.arguments import described
 from fifesim.base.bands import solar_spectrum
+from fifesim.base.kinds import described
 
 SHADE = "shade"
 """Part of a mixture that reflects nothing."""

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.base.arguments import described
+from fifesim.base.kinds import described
 from fifesim.rasters import directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
