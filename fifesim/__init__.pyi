@@ -47,6 +47,7 @@ from .chain.engines import compare_engines as compare_engines
 
 # Sensor
 from .sensor.raster import sense as sense  # method
+from .sensor.response.rasters.bands import to_bands as to_bands  # method
 from .sensor.scan.rasters.view import scan_geometry as scan_geometry
 from .sensor.scan.track import Track as Track
 from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method
