@@ -28,13 +28,14 @@ def combined(array, dim, weights, name="band"):
     Notes
     -----
     Sums run along the chunks of ``dim`` one after the other, so that a task holds one chunk of the array and one
-    sum. A cube in a chunk for each band is never gathered.
+    sum. A cube with a chunk for each band is never gathered, and has a chunk for each band again.
     """
     weights = np.asarray(weights, float)
     first = array.transpose(dim, ...)
     dtype = np.result_type(array.dtype, np.float32)
     if isinstance(first.data, da.Array):
-        data = da.stack([_lazy_sum(first.data, row) for row in weights]).rechunk({0: -1}).astype(dtype)
+        data = da.stack([_lazy_sum(first.data, row).astype(dtype) for row in weights])
+        data = data.rechunk({0: -1}) if first.data.numblocks[0] == 1 else data
     else:
         data = np.stack([_add(row, first.data) for row in weights]).astype(dtype)
     coords = {key: value.variable for key, value in array.coords.items() if dim not in value.dims}
