@@ -3,6 +3,8 @@
 import dask.array as da
 import numpy as np
 import xarray as xr
+from numba import vectorize
+from scipy.sparse.csgraph import connected_components
 
 
 def combined(array, dim, weights, name="band"):
@@ -34,10 +36,9 @@ def combined(array, dim, weights, name="band"):
     first = array.transpose(dim, ...)
     dtype = np.result_type(array.dtype, np.float32)
     if isinstance(first.data, da.Array):
-        data = da.stack([_lazy_sum(first.data, row).astype(dtype) for row in weights])
-        data = data.rechunk({0: -1}) if first.data.numblocks[0] == 1 else data
+        data = _lazy_sums(first.data, weights).astype(dtype)
     else:
-        data = np.stack([_add(row, first.data) for row in weights]).astype(dtype)
+        data = _add(weights, first.data).astype(dtype)
     coords = {key: value.variable for key, value in array.coords.items() if dim not in value.dims}
     sums = xr.DataArray(data, dims=(name, *first.dims[1:]), coords=coords, name=array.name)
     place = ("y", "x") if {"y", "x"} <= set(array.dims) else ()
@@ -45,25 +46,46 @@ def combined(array, dim, weights, name="band"):
     return sums.transpose(*others, *place)
 
 
-def _lazy_sum(data, weights):
-    """The sum of a row of weights along the first axis, from one chunk of it after the other."""
-    total, edges = None, np.cumsum([0, *data.chunks[0]])
+def _lazy_sums(data, weights):
+    """Weighted sums along the first axis. Rows of weights that read the same chunks go together."""
+    edges = np.cumsum([0, *data.chunks[0]])
+    read = np.add.reduceat(weights != 0, edges[:-1], axis=1) > 0
+    groups = _sharing(read)
+    parts = [_chain(data, weights[rows], edges, np.flatnonzero(read[rows].any(axis=0))) for rows in groups]
+    order = np.argsort(np.concatenate(groups))
+    together = da.concatenate(parts)
+    return together if np.all(np.diff(order) == 1) else together[order]
+
+
+def _sharing(read):
+    """Groups of rows of which each shares a chunk with another of its group; rows that read nothing go together."""
+    _, labels = connected_components(read.astype(int) @ read.T.astype(int))
+    return [np.flatnonzero(labels == label) for label in range(labels.max() + 1)]
+
+
+def _chain(data, weights, edges, numbers):
+    """The sums of one group, from one chunk after the other: each is read by one task, and may go then."""
     rest = tuple(range(1, data.ndim))
-    for number, (start, stop) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
-        part = weights[start:stop]
-        if not np.any(part) and (total is not None or number < len(edges) - 2):
-            continue
-        before = () if total is None else (total, rest)
-        arguments = (part, None, data.blocks[number], (0, *rest), *before)
-        total = da.blockwise(
-            _add, rest, *arguments, concatenate=True, dtype=float, meta=np.empty((0,) * len(rest))
-        )
-    return total
+    sums, rows = (data.ndim, *rest), {data.ndim: len(weights)}
+    total = ()
+    for number in numbers if len(numbers) else [0]:
+        part = weights[:, edges[number] : edges[number + 1]]
+        arguments = (part, None, data.blocks[number], (0, *rest), *total)
+        meta = np.empty((0,) * data.ndim)
+        made = da.blockwise(_add, sums, *arguments, concatenate=True, new_axes=rows, dtype=float, meta=meta)
+        total, rows = (made, sums), None
+    return made
 
 
 def _add(weights, values, total=None):
-    """Add weighted values along their first axis to a sum, one after the other: the bits do not depend on chunks."""
-    total = np.zeros(values.shape[1:]) if total is None else np.array(total, float)
-    for number in np.flatnonzero(weights):
-        total += np.multiply(values[number], weights[number], dtype=float)
-    return total
+    """Add weighted values along their first axis to sums, one after the other: the bits do not depend on chunks."""
+    sums = np.zeros((len(weights), *values.shape[1:])) if total is None else total.copy()
+    for row, number in np.argwhere(weights):
+        _add_product(sums[row], values[number], weights[row, number], out=sums[row, ...])
+    return sums
+
+
+@vectorize(["float64(float64, float32, float64)", "float64(float64, float64, float64)"], cache=True)
+def _add_product(total, value, weight):
+    """In one pass and in double precision: a plane of a cube leaves no room for products by the side."""
+    return total + weight * value
