@@ -143,7 +143,8 @@ def as_seen_by(
     surface = adjust_bands(reflectance, description, bands=bands, source=source, uncertainty=uncertainty)
     toa = to_toa(surface, atmosphere, geometry=geometry, instrument=description)
     image = sensor.sense(toa, description, onto=onto, noise=noise, seed=seed, geometry=geometry)
-    return image.assign_coords(adjustment_error=surface["adjustment_error"])
+    # As a variable: a DataArray would bring the sun that it had with it.
+    return image.assign_coords(adjustment_error=surface["adjustment_error"].variable)
 
 
 def spectral_adjustment(source, target, *, bands=None):
@@ -247,8 +248,8 @@ def _weights(responses):
         if each.coverage < MIN_COVERAGE:
             low, high = band.limits
             raise ValueError(
-                f"band {band.name}, {low:g} to {high:g} um, reaches out of the library of spectra, {wavelength[0]:g} to "
-                f"{wavelength[-1]:g} um: leave it out"
+                f"band {band.name}, {low:g} to {high:g} um, reaches out of the library of spectra, "
+                f"{wavelength[0]:g} to {wavelength[-1]:g} um: leave it out"
             )
     return np.stack([each.weights for each in found])
 

@@ -26,7 +26,7 @@ _DRY_MATTER = (0.002, 0.018)
 _ANTHOCYANINS = 4.0  # at most, in three of ten leaves
 
 # Mean of the leaf area index, which is exponential and cut off; and ranges of sun and sky.
-_MEAN_LAI, _COVERED = 2.0, 0.97
+_MEAN_LAI, _COVERED = 1.5, 0.97
 _SZA = (20.0, 60.0)
 _SKYLIGHT = 0.3
 _LEAF_ANGLES = ("planophile", "spherical", "erectophile", "plagiophile")
@@ -52,10 +52,10 @@ def library_spectra():
 
     Notes
     -----
-    Leaf contents are uniform in wide ranges, brown pigments mostly few. Leaf area is exponential with mean 2: a third
-    of the spectra is more than half soil. Ground is mixed of all spectra of ``data/ground_spectra.csv``, from 0.3 to 1.1
-    times as bright. The view is from nadir, the sun at 20 to 60 degrees, up to 0.3 of its light from the sky. The
-    spectra are the same in every session.
+    Leaf contents are uniform in wide ranges, brown pigments mostly few. Leaf area is exponential with mean 1.5: a
+    quarter of the spectra has an NDVI below 0.5. Ground is mixed of all spectra of ``data/ground_spectra.csv``, from
+    0.3 to 1.1 times as bright. The view is from nadir, the sun at 20 to 60 degrees, up to 0.3 of its light from the
+    sky. The spectra are the same in every session.
 
     Examples
     --------

@@ -7,8 +7,8 @@ import numpy as np
 # How real spectra differ from those of a library: by a smooth factor of this standard deviation [1] and
 # correlation length [um]. Held out soils and canopies decided it: more costs what the library knows of water, less
 # follows the library into bands far away.
-DEVIATION = 0.01
-CORRELATION = 0.1
+DEVIATION = 0.005
+CORRELATION = 0.05
 
 
 class Estimate(NamedTuple):
@@ -34,7 +34,7 @@ def band_moments(weights, wavelength, spectra):
     .. math:: C = W \, (M \circ (1 + K)) \, W^T, \quad M = \frac{1}{N} \sum_n \rho_n \rho_n^T, \quad
         K_{ij} = s^2 \exp\left(-\frac{(\lambda_i - \lambda_j)^2}{2 \ell^2}\right)
 
-    with :math:`s = 0.01` and :math:`\ell = 0.1` um.
+    with :math:`s = 0.005` and :math:`\ell = 0.05` um.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def band_moments(weights, wavelength, spectra):
     Examples
     --------
     >>> band_moments([[1.0, 0.0]], [0.5, 0.6], [[0.2, 0.4]]).round(8).tolist()
-    [[0.040004]]
+    [[0.040001]]
     """
     weights, spectra = np.asarray(weights, float), np.asarray(spectra, float)
     apart = np.subtract.outer(np.asarray(wavelength, float), np.asarray(wavelength, float))

@@ -113,8 +113,7 @@ def _check_coverage(found, bands, description, axis, min_coverage):
     if none:
         others = [band.name for band, each in zip(bands, found, strict=True) if each.coverage >= min_coverage]
         raise ValueError(
-            f"{reach} and hold nothing of {_some(none)} of {description.name}: pick bands, "
-            f"bands={others or '[...]'}"
+            f"{reach} and hold nothing of {_some(none)} of {description.name}: pick bands, bands={others or '[...]'}"
         )
     told = [f"{band.name} {each.coverage:.1%}, without {_ranges(each.missing)} um" for band, each in lacking]
     raise ValueError(

@@ -73,7 +73,9 @@ def _per_micrometre(coordinate, name):
             f"set cube[{name!r}].attrs['units'] = 'nm'"
         )
     if name == "wavelength" and largest / scale < 0.1:
-        raise ValueError(f"wavelength reaches only {largest:g} {said}: if these are um, set its attribute units to 'um'")
+        raise ValueError(
+            f"wavelength reaches only {largest:g} {said}: if these are um, set its attribute units to 'um'"
+        )
     return scale
 
 

@@ -96,7 +96,11 @@ def without(leaf, low, high):
 @pytest.mark.parametrize(
     ("change", "options", "said"),
     [
-        (lambda leaf: without(leaf, 1.58, 1.61), {}, r"OLI6 [\d.]+%, without 1\.579 to 1\.611 um: pick others with bands="),
+        (
+            lambda leaf: without(leaf, 1.58, 1.61),
+            {},
+            r"OLI6 [\d.]+%, without 1\.579 to 1\.611 um: pick others with bands=",
+        ),
         (lambda leaf: without(leaf, 2.2, 9.0), {}, r"to 2\.199 um, and cover less than 0\.99 of OLI7 \d"),
         (lambda leaf: without(leaf, 1.0, 9.0), {}, r"hold nothing of OLI6, OLI7, OLI9 of OLI: pick bands, .*'OLI8'\]"),
         (lambda leaf: (leaf * 1e4).astype(np.int16), {}, "whole numbers"),
