@@ -110,9 +110,13 @@ def as_seen_by(
 
     Parameters
     ----------
-    reflectance, instrument, bands, source, uncertainty : optional
-        As in `adjust_bands`. Pixels of the raster are the cells that the other instrument sees: let them be smaller
-        than its own.
+    reflectance : xarray.DataArray, dims (band, y, x)
+        As in `adjust_bands`. Its pixels are the cells that the other instrument sees: let them be smaller than its own.
+        [1]
+    instrument : str or Instrument
+        The other instrument.
+    bands, source, uncertainty : optional
+        As in `adjust_bands`.
     atmosphere : Atmosphere, optional
         As in `to_toa`.
     time : str or datetime, optional
