@@ -41,14 +41,14 @@ def main():
     parser.add_argument("--chunks", type=int, nargs=3, default=(426, 250, 250), help="bands, rows, columns")
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
     with tempfile.TemporaryDirectory() as folder, dask.config.set(num_workers=arguments.workers):
         clock, processor = time.perf_counter(), time.process_time()
         bands = cube(arguments.size, tuple(arguments.chunks)).fifesim.to_bands("OLI")
         graph = time.perf_counter() - clock
         bands.to_dataset(name="reflectance").to_zarr(folder, mode="w")
         clock, processor = time.perf_counter() - clock, time.process_time() - processor
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
     print(f"{BANDS} x {arguments.size} x {arguments.size}, chunks {tuple(arguments.chunks)}")
     print(f"graph {graph:.1f} s, all {clock:.0f} s, processor {processor:.0f} s")
     print(f"peak memory {peak:.2f} GB, of which {before:.2f} GB before the cube")

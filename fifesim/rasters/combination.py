@@ -6,6 +6,9 @@ import xarray as xr
 from numba import vectorize
 from scipy.sparse.csgraph import connected_components
 
+# Bytes of the sums that one task makes, from which bands are summed by themselves.
+_LARGEST_SUM = 2**26
+
 
 def combined(array, dim, weights, name="band"):
     """
@@ -49,8 +52,10 @@ def combined(array, dim, weights, name="band"):
 def _lazy_sums(data, weights):
     """Weighted sums along the first axis. Rows of weights that read the same chunks go together."""
     edges = np.cumsum([0, *data.chunks[0]])
+    cells = np.prod([max(sizes) for sizes in data.chunks[1:]])
+    largest = max(int(_LARGEST_SUM // (8 * cells)), 1)
     read = np.add.reduceat(weights != 0, edges[:-1], axis=1) > 0
-    groups = _sharing(read)
+    groups = [part for rows in _sharing(read) for part in _split(rows, largest)]
     parts = [_chain(data, weights[rows], edges, np.flatnonzero(read[rows].any(axis=0))) for rows in groups]
     order = np.argsort(np.concatenate(groups))
     together = da.concatenate(parts)
@@ -61,6 +66,10 @@ def _sharing(read):
     """Groups of rows of which each shares a chunk with another of its group; rows that read nothing go together."""
     _, labels = connected_components(read.astype(int) @ read.T.astype(int))
     return [np.flatnonzero(labels == label) for label in range(labels.max() + 1)]
+
+
+def _split(rows, largest):
+    return [rows[first : first + largest] for first in range(0, len(rows), largest)]
 
 
 def _chain(data, weights, edges, numbers):

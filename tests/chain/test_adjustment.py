@@ -157,6 +157,8 @@ def test_the_sun_of_another_time_lights_it(msi):
     assert float(seen["earth_sun_distance"]) == pytest.approx(sun.earth_sun_distance, abs=1e-6)
     given = msi.fifesim.as_seen_by("TM", bands=["TM3", "TM4"], geometry=sun)
     assert int(np.max(np.abs(given.astype(int) - seen.astype(int)))) <= 1
+    oblique = msi.assign_coords(vza=7.0, vaa=100.0).fifesim.as_seen_by("TM", bands=["TM3", "TM4"], time=when)
+    assert (float(oblique["vza"]), float(oblique["vaa"])) == (7.0, 100.0)
     with pytest.raises(ValueError, match="give one of them"):
         msi.fifesim.as_seen_by("TM", time=when, geometry=fifesim.Geometry(30, 120))
 
