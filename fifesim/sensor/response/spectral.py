@@ -89,7 +89,7 @@ def band_weights(band, wavelength, covered, *, sun=True):
     >>> from fifesim.base.bands import Band
     >>> found = band_weights(Band("a", (0.5, 0.6, 0.7), (0, 1, 0)), [0.4, 0.6, 0.8], [True, True], sun=False)
     >>> found.weights.round(6).tolist(), found.coverage
-    ([0.166667, 0.666667, 0.166667], 1.0)
+    ([0.083333, 0.833333, 0.083333], 1.0)
     """
     wavelength, covered = np.asarray(wavelength, float), np.asarray(covered, bool)
     low, high = band.limits
