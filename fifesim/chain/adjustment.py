@@ -63,8 +63,8 @@ def adjust_bands(reflectance, instrument, *, bands=None, source=None, uncertaint
 
     Notes
     -----
-    The library holds leaves, litter and soil. Snow, water, clouds and roofs are none of these, and the error does not
-    hold for them. The directions of sun and view stay those of the raster.
+    The library holds leaves, litter and soil. Snow and water are none of these, and the error does not hold for them;
+    what is grey stays about grey. The directions of sun and view stay those of the raster.
 
     See Also
     --------

@@ -10,6 +10,11 @@ import numpy as np
 DEVIATION = 0.005
 CORRELATION = 0.05
 
+# Share [1] and reflectance [1] of grey surfaces beside a library of land: roads, roofs and clouds stay about what they
+# are. A tenth of it would leave a road of 0.2 at 0.196 in TM5.
+GREY_SHARE = 0.01
+GREY = 0.3
+
 
 class Estimate(NamedTuple):
     """A linear estimate of the bands of one instrument from those of another."""
@@ -31,10 +36,11 @@ def band_moments(weights, wavelength, spectra):
     r"""
     Second moments of band means over a library of spectra, each of which may deviate by a smooth factor.
 
-    .. math:: C = W \, (M \circ (1 + K)) \, W^T, \quad M = \frac{1}{N} \sum_n \rho_n \rho_n^T, \quad
+    .. math:: C = W \, (M \circ (1 + K)) \, W^T, \quad M = \frac{1}{N} \sum_n \rho_n \rho_n^T + g \rho_g^2, \quad
         K_{ij} = s^2 \exp\left(-\frac{(\lambda_i - \lambda_j)^2}{2 \ell^2}\right)
 
-    with :math:`s = 0.005` and :math:`\ell = 0.05` um.
+    with :math:`s = 0.005` and :math:`\ell = 0.05` um, and a share :math:`g = 0.01` of grey surfaces of
+    :math:`\rho_g = 0.3`.
 
     Parameters
     ----------
@@ -52,13 +58,14 @@ def band_moments(weights, wavelength, spectra):
 
     Examples
     --------
-    >>> band_moments([[1.0, 0.0]], [0.5, 0.6], [[0.2, 0.4]]).round(8).tolist()
-    [[0.040001]]
+    >>> band_moments([[1.0, 0.0]], [0.5, 0.6], [[0.2, 0.4]]).round(6).tolist()
+    [[0.040901]]
     """
     weights, spectra = np.asarray(weights, float), np.asarray(spectra, float)
     apart = np.subtract.outer(np.asarray(wavelength, float), np.asarray(wavelength, float))
     deviation = DEVIATION**2 * np.exp(-(apart**2) / (2 * CORRELATION**2))
-    return weights @ (spectra.T @ spectra / len(spectra) * (1 + deviation)) @ weights.T
+    land = spectra.T @ spectra / len(spectra) + GREY_SHARE * GREY**2
+    return weights @ (land * (1 + deviation)) @ weights.T
 
 
 def best_linear(moments, sources, uncertainty):

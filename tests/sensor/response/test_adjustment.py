@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from fifesim.sensor.response.adjustment import CORRELATION, DEVIATION, band_moments, best_linear, line_between
+from fifesim.sensor.response.adjustment import (
+    CORRELATION,
+    DEVIATION,
+    GREY,
+    GREY_SHARE,
+    band_moments,
+    best_linear,
+    line_between,
+)
 
 
 @pytest.fixture
@@ -47,7 +55,8 @@ def test_moments_are_those_of_spectra_with_smooth_factors():
     weights = np.array([[0.5, 0.5, 0, 0, 0], [0, 0, 0.2, 0.3, 0.5]])
     means = (factors * mean) @ weights.T
     straight = weights @ np.outer(mean, mean) @ weights.T
-    found = band_moments(weights, wavelength, mean[None]) - straight
+    grey = GREY_SHARE * GREY**2 * weights @ (1 + covariance) @ weights.T
+    found = band_moments(weights, wavelength, mean[None]) - straight - grey
     np.testing.assert_allclose(found, np.cov(means.T), rtol=0, atol=0.01 * found.max())
 
 
