@@ -1,8 +1,9 @@
 """
 Seeds, and random numbers that are a function of a seed and of a place.
 
-Each stage draws from streams of its own, so that one seed serves them all: 1 is the periodic field, 16 and up are the
-synthetic hills, 2**40 and up the bands of a sensor. The streaming field has its own generator.
+Each stage draws from streams of its own, so that one seed serves them all: 1 is the periodic field, 2 the library of
+spectra, 16 and up are the synthetic hills, 2**40 and up the bands of a sensor. The streaming field has its own
+generator.
 """
 
 import numpy as np

@@ -69,6 +69,7 @@ QUANTITIES = {
     "solar_irradiance": Quantity(
         "W m-2 um-1", "solar_irradiance_per_unit_wavelength", "extraterrestrial solar irradiance of the band at 1 AU"
     ),
+    "adjustment_error": Quantity("1", "", "standard error of the surface reflectance from another instrument's bands"),
     "gain": Quantity("W m-2 sr-1 um-1", "", "radiance of one digital count"),
     "offset": Quantity("W m-2 sr-1 um-1", "", "radiance of digital number 0"),
 }
