@@ -9,24 +9,27 @@ import pandas as pd
 import xarray as xr
 
 from fifesim.base import datasets
-from fifesim.base.geometry import sun_position
+from fifesim.chain.carried import as_bands_of
 from fifesim.chain.steps import to_toa
 from fifesim.ground.canopy.library import library_spectra
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
 from fifesim.rasters.combination import combined
+from fifesim.rasters.dates import by_date
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.description.rasters.carried import attributes_of, carried_instrument
 from fifesim.sensor.description.spectral_response import half_peak
 from fifesim.sensor.response.adjustment import band_moments, best_linear, line_between
 from fifesim.sensor.response.rasters.bands import MIN_COVERAGE
+from fifesim.sensor.response.rasters.pixels import matching_bands
 from fifesim.sensor.response.spectral import band_weights, covered_steps
-from fifesim.sensor.scan.rasters.view import degrees
 
 UNCERTAINTY = 0.0005
 """Standard error of the reflectance that an adjustment allows for by default [1]."""
 
 
+@by_date
 def adjust_bands(reflectance, instrument, *, bands=None, source=None, uncertainty=UNCERTAINTY):
     """
     Surface reflectance in the bands of another instrument, by spectra that fit each pixel.
@@ -70,6 +73,8 @@ def adjust_bands(reflectance, instrument, *, bands=None, source=None, uncertaint
     --------
     fifesim.sensor.response.adjustment.best_linear, fifesim.ground.canopy.library.library_spectra
     """
+    if {"y", "x"} <= set(reflectance.dims):  # and not spectra of the field
+        reflectance = as_bands_of(reflectance, source, "surface_reflectance")
     cf.check_quantity(reflectance, "surface_reflectance")
     if not (math.isfinite(uncertainty) and uncertainty > 0):
         raise ValueError(f"uncertainty must be above 0, got {uncertainty:g}: it is in reflectance, such as 0.005")
@@ -84,9 +89,10 @@ def adjust_bands(reflectance, instrument, *, bands=None, source=None, uncertaint
     out.encoding = {"grid_mapping": "spatial_ref"} if "spatial_ref" in out.coords else {}
     names = " ".join(band.name for band in from_bands)
     history = f"adjust_bands: {description.name} from {names}, uncertainty {uncertainty:g}"
-    return cf.label(out, "surface_reflectance", source=reflectance, history=history, instrument=description.name)
+    return cf.label(out, "surface_reflectance", source=reflectance, history=history, **attributes_of(description))
 
 
+@by_date
 def as_seen_by(
     reflectance,
     instrument,
@@ -143,6 +149,7 @@ def as_seen_by(
     adjust_bands, fifesim.chain.steps.to_toa, fifesim.sensor.raster.sense
     """
     description = find_instrument(instrument)
+    reflectance = as_bands_of(reflectance, source, "surface_reflectance")
     geometry = _geometry(reflectance, time, geometry)
     surface = adjust_bands(reflectance, description, bands=bands, source=source, uncertainty=uncertainty)
     toa = to_toa(surface, atmosphere, geometry=geometry, instrument=description)
@@ -199,14 +206,14 @@ def spectral_adjustment(source, target, *, bands=None):
 
 def _source_bands(array, source):
     """Bands that a raster has, of the instrument given or carried."""
-    carried = array.attrs.get("instrument")
-    if source is None and carried is None:
+    description = carried_instrument(array) if source is None else find_instrument(source)
+    if description is None:
         raise ValueError(
             "the raster does not say which instrument's bands it has: give it as source=, such as source='MSI'"
         )
     if "band" not in array.dims:
         raise ValueError(f"the raster needs a dimension band, got {array.dims}: keep all of its bands")
-    return sensor.matching_bands(array, find_instrument(carried if source is None else source))
+    return matching_bands(array, description)
 
 
 def _geometry(array, time, geometry):
@@ -215,9 +222,7 @@ def _geometry(array, time, geometry):
         return geometry
     if geometry is not None:
         raise ValueError("time and geometry both say where the sun is: give one of them")
-    grid = grids.geobox(array)
-    latitude, longitude = degrees(grid, grid.shape.y / 2, grid.shape.x / 2)
-    sun = sun_position(time, float(latitude), float(longitude))
+    sun = directions.sun_over(grids.geobox(array), time)
     own = directions.uniform_geometry(directions.geometry_of(array) or sun, "as_seen_by with a time")
     return replace(sun, vza=own.vza, vaa=own.vaa)
 

@@ -5,6 +5,7 @@ import numpy as np
 from fifesim.rasters import cf
 from fifesim.rasters.combination import combined
 from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.description.rasters.carried import attributes_of
 from fifesim.sensor.response.rasters.wavelengths import spectral_axis
 from fifesim.sensor.response.spectral import band_weights, covered_steps
 
@@ -82,7 +83,7 @@ def to_bands(spectra, instrument, *, bands=None, min_coverage=MIN_COVERAGE):
     image.encoding = {"grid_mapping": "spatial_ref"} if "spatial_ref" in image.coords else {}
     weighted = "response" if quantity == "toa_radiance" else "response and sun"
     history = f"to_bands: {description.name}, {axis.wavelength.size} wavelengths weighted by {weighted}"
-    return cf.label(image, quantity, source=spectra, history=history, instrument=description.name)
+    return cf.label(image, quantity, source=spectra, history=history, **attributes_of(description))
 
 
 def _quantity(spectra):
