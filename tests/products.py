@@ -11,7 +11,10 @@ import re
 
 import numpy as np
 import rasterio
+import xarray as xr
 from affine import Affine
+
+from fifesim.rasters import grid as grids
 
 SHAPE = 12, 18
 
@@ -210,7 +213,8 @@ def landsat(folder, kind, level=1, form="txt", groups=None):
     quality = np.full(SHAPE, 21824, np.uint16)
     quality[0, 0], quality[3, 4] = 1, 22280
     saturated = np.zeros(SHAPE, np.uint16)
-    saturated[5, 6], saturated[5, 7] = 1 << 2, 1 << 3
+    # Bands 3, 4 and 5.
+    saturated[5, 6:9] = 1 << 2, 1 << 3, 1 << 4
     files["quality"] = write(folder / contents["FILE_NAME_QUALITY_L1_PIXEL"], quality, **place)
     files["saturated"] = write(folder / contents["FILE_NAME_QUALITY_L1_RADIOMETRIC_SATURATION"], saturated, **place)
     rows, columns = np.indices(SHAPE)
@@ -261,7 +265,7 @@ def safe_files(level):
     found = {}
     for size in (10, 20, 60):
         aside = {"B10"} if size == 10 else {"B10", "B8"}
-        here = [band for band in own if own[band] <= size and band not in aside]
+        here = [band for band in own if (own[band] <= size or (band, size) == ("B1", 20)) and band not in aside]
         for band in (*here, *(["SCL"] if size > 10 else [])):
             name = band if band == "SCL" else _file_name(band)
             found[band, size] = f"GRANULE/{granule}/IMG_DATA/R{size}m/{image}_{name}_{size}m"
@@ -357,7 +361,21 @@ def _values(grid):
     return f"{steps}<Values_List>\n{rows}</Values_List>\n"
 
 
-MEAN_VIEWS = {"3": (9.21309289311719, 289.672012506847), "7": (9.16802328443828, 289.152280231504)}
+MEAN_VIEWS = {
+    "1": (9.15788418738189, 288.982250210564),
+    "0": (9.32691441309293, 290.548502307998),
+    "2": (9.18042027119417, 289.322659181282),
+    "11": (9.2518326546145, 289.925196797726),
+    "8": (9.29720722278376, 290.404528980152),
+    "12": (9.31372831482695, 290.387034371828),
+    "4": (9.23175466895102, 289.841086423314),
+    "7": (9.16802328443828, 289.152280231504),
+    "5": (9.25275280222894, 290.023792446257),
+    "6": (9.27186704990764, 290.220346776653),
+    "9": (9.35169900667466, 290.738701553191),
+    "3": (9.21309289311719, 289.672012506847),
+    "10": (9.19979381184165, 289.494893154363),
+}
 
 
 def tile_xml(level):
@@ -426,3 +444,9 @@ def sentinel2(folder, level=1, baseline="04.00", width=120, **options):
     metadata.write_text(product_xml(level, baseline, **options), encoding="utf-8")
     (path / "GRANULE" / SENTINEL2[level][1] / "MTD_TL.xml").write_text(tile_xml(level), encoding="utf-8")
     return path, files
+
+
+def labelled(values, grid, bands, geometry):
+    """Reflectance at the top of the atmosphere on a grid."""
+    array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": bands, **geometry}, name="toa_reflectance")
+    return grids.place(array, grid)

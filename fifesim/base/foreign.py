@@ -6,15 +6,12 @@ import reprlib
 import stat
 import tomllib
 from pathlib import Path
-from xml.etree import ElementTree
 
 # Larger than any scenario or instrument file, and read in a second. [byte]
 _LARGEST = 1_000_000
 # Tables within tables in one dotted key, for which tomllib takes the square of their number in time. The dots of a path
 # lie beside slashes.
 _DEEPEST = 100
-# Larger than the metadata of any image. [byte]
-_LARGEST_METADATA = 20_000_000
 _DOT_OF_KEY = re.compile(r"[\w\"'-][ \t]*\.(?=[ \t]*[\w\"'-])")
 
 _KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
@@ -77,66 +74,6 @@ def read_toml(path):
         raise ValueError(f"{name} nests its tables too deeply: a key lies in a section, section.key") from None
     except ValueError as error:
         raise ValueError(in_a_line(f"{name} is not valid TOML: {error}")) from None
-
-
-def read_metadata(path):
-    """
-    Text of a file of metadata.
-
-    Parameters
-    ----------
-    path : str or path
-
-    Returns
-    -------
-    text : str
-
-    Raises
-    ------
-    ValueError
-        If it is no regular file, too large, or no text in UTF-8.
-    OSError
-        If it is missing, or cannot be read.
-    """
-    path = Path(path)
-    check_regular(path)
-    name, size = in_a_line(path.name), path.stat().st_size
-    if size > _LARGEST_METADATA:
-        raise ValueError(f"{name} has {size} bytes: metadata has at most {_LARGEST_METADATA}; is it another file?")
-    try:
-        return path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise ValueError(f"{name} is no text: is it another file?") from None
-
-
-def read_xml(path):
-    """
-    Root of an XML file of metadata, which names no other file and defines no entity.
-
-    Parameters
-    ----------
-    path : str or path
-
-    Returns
-    -------
-    root : xml.etree.ElementTree.Element
-
-    Raises
-    ------
-    ValueError
-        As in `read_metadata`; if it declares a document type, or is no XML.
-    OSError
-        If it is missing, or cannot be read.
-    """
-    text, name = read_metadata(path), in_a_line(Path(path).name)
-    # Entities, which may name files or grow without end, are declared in a document type. In UTF-8, which is what it
-    # is read as here, nothing else begins so.
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ValueError(f"{name} declares a document type, which metadata of images do not: it is not read")
-    try:
-        return ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError, RecursionError) as error:
-        raise ValueError(in_a_line(f"{name} is not valid XML: {error}")) from None
 
 
 def shown(value):

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fifesim.base.foreign import in_a_line, read_metadata, read_xml, shown
+from fifesim.base.foreign import in_a_line, shown
+from fifesim.base.metadata import read_metadata, read_xml, utc_time
 from fifesim.sensor.products.scaling import ProductBand
 
 _ROOT = "LANDSAT_METADATA_FILE"
@@ -243,11 +244,8 @@ def _irradiance(groups, number, distance):
 
 
 def _time(image):
-    text = f"{_value(image, 'DATE_ACQUIRED')}T{_value(image, 'SCENE_CENTER_TIME').removesuffix('Z')}"
-    try:
-        return np.datetime64(text, "ns")
-    except ValueError:
-        raise ValueError(f"DATE_ACQUIRED and SCENE_CENTER_TIME are no time: {shown(text)}") from None
+    text = f"{_value(image, 'DATE_ACQUIRED')}T{_value(image, 'SCENE_CENTER_TIME')}"
+    return utc_time(text, "DATE_ACQUIRED and SCENE_CENTER_TIME")
 
 
 def _group(groups, name):

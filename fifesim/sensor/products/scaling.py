@@ -110,8 +110,8 @@ def counts(dn, nodata, largest):
     wrong = (kept < 0) | (kept > largest) | (kept != np.rint(kept))
     if np.any(wrong):
         raise ValueError(
-            f"a digital number of {kept[wrong].flat[0]:g}: whole ones from 0 to {largest} are recorded. Say nodata=, or "
-            "gain= and offset= of numbers that a product scales; agencies' products open with fifesim.open_landsat and "
+            f"a digital number of {kept[wrong].flat[0]:g}: whole ones from 0 to {largest} are recorded. Say nodata=, "
+            "or gain= and offset= of scaled numbers; agencies' products open with fifesim.open_landsat and "
             "fifesim.open_sentinel2"
         )
     return kept.astype(np.uint8 if largest < 256 else np.uint16)

@@ -6,7 +6,8 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from fifesim.base.foreign import in_a_line, read_xml, shown
+from fifesim.base.foreign import in_a_line, shown
+from fifesim.base.metadata import read_xml, utc_time
 from fifesim.sensor.products.scaling import ProductBand
 
 _INSTRUMENTS = {"Sentinel-2A": "MSI", "Sentinel-2B": "MSI-B"}
@@ -205,13 +206,8 @@ def sentinel2_tile(path):
     grids = {}
     for each in root.findall(".//Viewing_Incidence_Angles_Grids"):
         grids.setdefault(each.get("bandId"), []).append(_grid(each))
-    time = _text(root, ".//SENSING_TIME").removesuffix("Z")
-    try:
-        time = np.datetime64(time, "ns")
-    except ValueError:
-        raise ValueError(f"SENSING_TIME is no time: {shown(time)}") from None
     return Sentinel2Tile(
-        time=time,
+        time=utc_time(_text(root, ".//SENSING_TIME"), "SENSING_TIME"),
         sza=_number(root, ".//Mean_Sun_Angle/ZENITH_ANGLE"),
         saa=_number(root, ".//Mean_Sun_Angle/AZIMUTH_ANGLE") % 360.0,
         views=views,
