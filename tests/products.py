@@ -143,7 +143,12 @@ def landsat_groups(kind, level=1):
                 "REFLECTANCE_ADD": "-0.2",
             }.items()
         }
-    groups["LEVEL1_PROCESSING_RECORD"] = {"LANDSAT_PRODUCT_ID": kind["product"], "PROCESSING_LEVEL": "L1TP"} | angles
+    groups["LEVEL1_PROCESSING_RECORD"] = {
+        "LANDSAT_PRODUCT_ID": kind["product"],
+        "PROCESSING_LEVEL": "L1TP",
+        "FILE_NAME_QUALITY_L1_PIXEL": f"{kind['product']}_QA_PIXEL.TIF",
+        "FILE_NAME_QUALITY_L1_RADIOMETRIC_SATURATION": f"{kind['product']}_QA_RADSAT.TIF",
+    } | angles
     return groups | _level1_scales(kind)
 
 

@@ -224,9 +224,15 @@ def _band(groups, level, letters, number, distance):
         offset=_number(scales, f"REFLECTANCE_ADD_BAND_{number}"),
         largest=int(_number(counts, f"QUANTIZE_CAL_MAX_BAND_{number}")),
         solar_irradiance=_irradiance(groups, number, distance),
-        # QA_RADSAT has bit 0 for band 1 up to bit 6 for band 7, and bit 8 for band 9.
-        flag=0 if number == "8" else 1 << (int(number) - 1),
+        flag=_flag(letters, number),
     )
+
+
+def _flag(letters, number):
+    """Bits of QA_RADSAT: 0 for band 1 up to 6 for band 7, 8 for OLI's band 9; 9 where TM and ETM+ have no value."""
+    if number == "8":
+        return 0
+    return 1 << (int(number) - 1) | (0 if letters == "OLI" else 1 << 9)
 
 
 def _irradiance(groups, number, distance):

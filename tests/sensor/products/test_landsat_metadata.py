@@ -26,11 +26,13 @@ def test_scale_sun_and_time_are_those_of_the_metadata():
     assert (scene.instrument, scene.level, scene.off_nadir) == ("TM", 1, False)
     assert [band.name for band in scene.bands] == ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
     band = scene.bands[2]
-    assert (band.gain, band.offset, band.largest, band.flag) == (2.1735e-3, -0.004609, 255, 0b100)
-    assert scene.bands[-1].flag == 0b1000000
+    assert (band.gain, band.offset, band.largest, band.flag) == (2.1735e-3, -0.004609, 255, 0b1000000100)
+    assert scene.bands[-1].flag == 0b1001000000
     assert scene.sza == pytest.approx(69.50031513, abs=1e-9)
     assert (scene.saa, scene.earth_sun_distance) == (165.60131631, 0.9936974)
     assert scene.time == np.datetime64("2011-03-12T19:54:32.695056")
+    # The names of Level 1 stand twice, those of the product itself count.
+    assert scene.quality == "LT05_L1TP_058014_20110312_20200823_02_T1_QA_PIXEL.TIF"
     assert scene.angles["vza"] == "LT05_L1TP_058014_20110312_20200823_02_T1_VZA.TIF"
 
 
@@ -41,6 +43,12 @@ def test_level_2_has_a_scale_of_its_own_beside_that_of_level_1():
     assert {(band.gain, band.offset, band.largest) for band in scene.bands} == {(2.75e-5, -0.2, 65535)}
     assert [band.name for band in scene.bands] == [f"OLI{number}" for number in range(1, 8)]
     assert scene.bands[0].file.endswith("_SR_B1.TIF")
+    assert [band.flag for band in scene.bands] == [1, 2, 4, 8, 16, 32, 64]
+
+
+def test_panchromatic_and_cirrus_have_their_flags():
+    flags = {band.name: band.flag for band in landsat_scene(products.landsat_groups(products.OLI)).bands}
+    assert (flags["OLI8"], flags["OLI9"]) == (0, 256)
 
 
 def test_solar_irradiance_is_that_behind_the_two_scales():

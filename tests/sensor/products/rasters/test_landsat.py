@@ -25,6 +25,12 @@ def folders(tmp_path_factory):
     return found
 
 
+@pytest.fixture
+def copy(folders, tmp_path):
+    shutil.copytree(folders["TM", 1][0], tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
 def by_hand(name, files, sza=None):
     """Reflectance of red and near infrared by the formula of the handbook, in double precision."""
     numbers = {"TM": ("3", "4"), "OLI": ("4", "5")}[name]
@@ -96,6 +102,15 @@ def test_a_scene_goes_through_to_a_file(folders, name, tmp_path):
     assert again["time"].values == np.datetime64(
         {"TM": "2011-03-12T19:54:32.695056", "OLI": "2020-12-04T19:02:11.194486"}[name]
     )
+
+
+def test_a_pixel_that_no_detector_saw_is_nan(copy):
+    path = copy / "LT05_L1TP_058014_20110312_20200823_02_T1_QA_RADSAT.TIF"
+    with rasterio.open(path, "r+") as file:
+        flags = file.read(1)
+        flags[7, 8] = 1 << 9
+        file.write(flags, 1)
+    assert np.isnan(fifesim.open_landsat(copy)[:, 7, 8]).all()
 
 
 def test_labels_are_those_of_the_packages_own_images(folders):
@@ -188,12 +203,6 @@ def test_a_scene_is_seen_by_another_instrument(folders):
     image = scene.fifesim.sense("MODIS", onto=fifesim.grid_at("EPSG:32610", 353700.0, 5374200.0, 540.0, 360.0, 90.0))
     assert image.shape == (2, 4, 6) and "quality" not in image.coords
     assert scene.fifesim.aggregate(90.0).shape == (2, 4, 6)
-
-
-@pytest.fixture
-def copy(folders, tmp_path):
-    shutil.copytree(folders["TM", 1][0], tmp_path, dirs_exist_ok=True)
-    return tmp_path
 
 
 def test_without_quality_two_files_less_are_needed(copy, folders):
