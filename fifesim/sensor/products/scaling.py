@@ -268,10 +268,9 @@ def between_nodes(vectors, rows, columns):
     """
     i, down = _nodes(rows, vectors.shape[1])
     j, right = _nodes(columns, vectors.shape[2])
-    down, right = down[:, None], right[None, :]
-    upper = vectors[:, i][:, :, j] * (1 - right) + vectors[:, i][:, :, j + 1] * right
-    lower = vectors[:, i + 1][:, :, j] * (1 - right) + vectors[:, i + 1][:, :, j + 1] * right
-    return direction_angles(upper * (1 - down) + lower * down)
+    across = vectors[:, :, j] * (1 - right) + vectors[:, :, j + 1] * right
+    down = down[:, None]
+    return direction_angles([part[i] * (1 - down) + part[i + 1] * down for part in across])
 
 
 def _nodes(places, count):

@@ -21,11 +21,11 @@ def test_mistakes_in_noise_and_scan_name_key_and_remedy(changed, replacements, m
 
 
 PRODUCT = "[product]\ngain = 2e-5\noffset = -0.1\nbits = 16\nsun_corrected = false\n\n[lsf]"
-SOURCE = '[sources]\nproduct = "Chander2009"'
+SOURCE = '\n[sources]\nproduct = "Chander2009"'
 
 
 def test_the_scale_of_a_product_has_a_source(changed):
-    product = changed("[lsf]", PRODUCT, "[sources]", SOURCE).product
+    product = changed("[lsf]", PRODUCT, "\n[sources]", SOURCE).product
     assert (product.gain, product.offset, product.bits, product.sun_corrected) == (2e-5, -0.1, 16, False)
     with pytest.raises(ValueError, match=r"mine\.toml: sources\.product: must be one of"):
         changed("[lsf]", PRODUCT)
@@ -42,7 +42,7 @@ def test_the_scale_of_a_product_has_a_source(changed):
 )
 def test_mistakes_in_a_product_name_the_key(changed, old, new, said):
     with pytest.raises(ValueError, match=said):
-        changed("[lsf]", PRODUCT.replace(old, new), "[sources]", SOURCE)
+        changed("[lsf]", PRODUCT.replace(old, new), "\n[sources]", SOURCE)
 
 
 def test_noise_by_its_ratio_and_by_its_radiance_is_the_same():

@@ -60,6 +60,12 @@ def test_solar_irradiance_is_that_behind_the_two_scales():
     np.testing.assert_allclose(list(found.values()), [own[name] for name in found], rtol=1e-4)
 
 
+def test_without_the_scales_of_level_1_the_irradiance_is_not_said():
+    groups = products.landsat_groups(products.OLI, level=2)
+    del groups["LEVEL1_MIN_MAX_RADIANCE"]
+    assert {band.solar_irradiance for band in landsat_scene(groups).bands} == {None}
+
+
 @pytest.mark.parametrize(
     ("spacecraft", "sensor", "name"),
     [
@@ -72,6 +78,8 @@ def test_solar_irradiance_is_that_behind_the_two_scales():
 def test_spacecraft_and_sensor_name_the_instrument(spacecraft, sensor, name):
     groups = products.landsat_groups(products.OLI if "OLI" in sensor else products.TM)
     groups["IMAGE_ATTRIBUTES"] |= {"SPACECRAFT_ID": spacecraft, "SENSOR_ID": sensor}
+    if sensor == "ETM":
+        groups["PRODUCT_CONTENTS"]["FILE_NAME_BAND_6_VCID_1"] = "LE07_B6_VCID_1.TIF"
     scene = landsat_scene(groups)
     assert scene.instrument == name
     assert {band.name for band in scene.bands} <= {band.name for band in instrument(name).bands}

@@ -169,7 +169,8 @@ def _between(vectors, number, tile, beside, sizes):
     grid = grids.geobox(beside)
     kernel = partial(_angle_of_cells, vectors, number, tile.corner, tile.step, tuple(grid.affine)[:6])
     if sizes is None:
-        return places.tiles(kernel, grid, tile=CHUNK)
+        # By parts: vectors of the whole tile would take three times its memory.
+        return places.tiles(kernel, grid, {"y": CHUNK, "x": CHUNK}, tile=CHUNK).compute()
     down, across = beside.chunks
     return places.tiles(kernel, grid, {"y": down, "x": across}, tile=CHUNK)
 

@@ -244,6 +244,14 @@ def test_missing_angles_are_named(copy):
         fifesim.open_landsat(copy, angles="pixel")
 
 
+def test_an_irradiance_that_is_not_said_is_the_instruments(tmp_path):
+    groups = products.landsat_groups(products.OLI, level=2)
+    del groups["LEVEL1_MIN_MAX_RADIANCE"]
+    products.landsat(tmp_path, products.OLI, 2, groups=groups)
+    scene = fifesim.open_landsat(tmp_path, bands="OLI4")
+    assert float(scene["solar_irradiance"][0]) == 1569.35
+
+
 def altered(folder, group, **values):
     groups = products.landsat_groups(products.OLI)
     groups[group] |= values
