@@ -88,12 +88,13 @@ def digital_numbers(kind, number, shape=SHAPE):
 
 
 def write(path, values, crs, corner, pixel, driver="GTiff", **options):
-    """A raster of one band."""
+    """A raster, of one band or of several."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    profile = {"driver": driver, "count": 1, "height": values.shape[0], "width": values.shape[1], "crs": crs}
+    bands = values.reshape(-1, *values.shape[-2:])
+    profile = {"driver": driver, "count": len(bands), "height": bands.shape[1], "width": bands.shape[2], "crs": crs}
     profile |= {"dtype": values.dtype, "transform": Affine(pixel, 0, corner[0], 0, -pixel, corner[1])}
     with rasterio.open(path, "w", **profile, **options) as sink:
-        sink.write(values, 1)
+        sink.write(bands)
     return values
 
 
@@ -445,6 +446,10 @@ def sentinel2(folder, level=1, baseline="04.00", width=120, **options):
             dn = random.integers(1200, 5000, shape).astype(np.uint16)
             dn[0, 0], dn[-1, -1] = 0, 65535
         files[band, size] = write(path / f"{file}.jp2", dn, UTM, CORNER, float(size), driver="JP2OpenJPEG", **lossless)
+    if level == 1 and baseline >= "04.00":
+        masks = np.random.default_rng(9).integers(0, 2, (3, width // 60, width // 60)).astype(np.uint8)
+        file = path / "GRANULE" / SENTINEL2[1][1] / "QI_DATA" / "MSK_CLASSI_B00.jp2"
+        files["masks"] = write(file, masks, UTM, CORNER, 60.0, driver="JP2OpenJPEG", **lossless)
     metadata = path / ("MTD_MSIL1C.xml" if level == 1 else "MTD_MSIL2A.xml")
     metadata.write_text(product_xml(level, baseline, **options), encoding="utf-8")
     (path / "GRANULE" / SENTINEL2[level][1] / "MTD_TL.xml").write_text(tile_xml(level), encoding="utf-8")

@@ -117,6 +117,27 @@ def counts(dn, nodata, largest):
     return kept.astype(np.uint8 if largest < 256 else np.uint16)
 
 
+def mask_bits(*masks):
+    """
+    Masks as the bits of one number, the first one as bit 0.
+
+    Parameters
+    ----------
+    *masks : array of integers
+        Not 0 where a mask holds.
+
+    Returns
+    -------
+    bits : array of uint8
+
+    Examples
+    --------
+    >>> mask_bits([0, 1, 0], [0, 1, 0], [0, 0, 1]).tolist()
+    [0, 3, 4]
+    """
+    return sum((np.asarray(mask) != 0).astype(np.uint8) << bit for bit, mask in enumerate(masks)).astype(np.uint8)
+
+
 def hundredths(angle, fill, turns=False):
     """
     Angle from whole hundredths of a degree.

@@ -15,7 +15,7 @@ _INSTRUMENTS = {"Sentinel-2A": "MSI", "Sentinel-2B": "MSI-B"}
 # By level: quantification value, list of offsets, and its key for the number of a band.
 _SCALES = {1: ("QUANTIFICATION_VALUE", "RADIO_ADD_OFFSET"), 2: ("BOA_QUANTIFICATION_VALUE", "BOA_ADD_OFFSET")}
 
-# The first processing baseline with offsets.
+# The first processing baseline with offsets, and with masks that are rasters. Before, they were polygons.
 _WITH_OFFSETS = 4.0
 
 # Shows no ground.
@@ -42,6 +42,8 @@ class Sentinel2Product:
         Names of those that are opened only when they are named.
     classes : dict of int to str
         Files of the scene classification, by the size of their pixels. [m]
+    clouds : str or None
+        File of Level-1C's masks of clouds and snow, of 60 m, where it is a raster.
     tile : str
         File of the metadata of the tile.
     earth_sun_distance : float
@@ -57,6 +59,7 @@ class Sentinel2Product:
     numbers: dict[str, str]
     aside: tuple[str, ...]
     classes: dict[int, str]
+    clouds: str | None
     tile: str
     earth_sun_distance: float
 
@@ -164,6 +167,8 @@ def sentinel2_product(path):
         )
     spacecraft = _text(root, ".//SPACECRAFT_NAME")
     numbers, sizes = _spectral(root)
+    granule = PurePosixPath(*PurePosixPath(files[0]).parts[:2])
+    with_masks = level == 1 and _number(root, ".//PROCESSING_BASELINE") >= _WITH_OFFSETS
     return Sentinel2Product(
         product=_text(root, ".//PRODUCT_URI"),
         spacecraft=spacecraft,
@@ -174,7 +179,8 @@ def sentinel2_product(path):
         numbers=numbers,
         aside=(_CIRRUS,),
         classes=_classes(files),
-        tile=str(PurePosixPath(*PurePosixPath(files[0]).parts[:2], "MTD_TL.xml")),
+        clouds=str(granule / "QI_DATA" / "MSK_CLASSI_B00.jp2") if with_masks else None,
+        tile=str(granule / "MTD_TL.xml"),
         earth_sun_distance=_number(root, ".//Reflectance_Conversion/U") ** -0.5,
     )
 

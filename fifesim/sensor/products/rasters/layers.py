@@ -32,7 +32,7 @@ def chunk_sizes(given):
     return {"y": CHUNK, "x": CHUNK} if given == "auto" else given
 
 
-def open_layer(folder, name, chunks, cure):
+def open_layer(folder, name, chunks, cure, count=None):
     """
     A file of a product.
 
@@ -45,10 +45,12 @@ def open_layer(folder, name, chunks, cure):
         Makes it lazy.
     cure : str
         What to do where it is missing.
+    count : int, optional
+        Number of its bands, where it has several.
 
     Returns
     -------
-    layer : xarray.DataArray of integers, dims (y, x)
+    layer : xarray.DataArray of integers, dims (y, x), or (band, y, x) with a count
 
     Raises
     ------
@@ -63,16 +65,17 @@ def open_layer(folder, name, chunks, cure):
         with file.opened() as source:
             check_raster(source, file.name, north_up=True)
             crs = horizontal_crs(source, file.name)
-            if source.count != 1 or np.dtype(source.dtypes[0]).kind not in "iu":
+            if source.count != (count or 1) or np.dtype(source.dtypes[0]).kind not in "iu":
                 raise ValueError(
-                    f"{file.name} has {source.count} bands of {source.dtypes[0]}, and a product's file one of whole "
-                    "numbers: is it another file?"
+                    f"{file.name} has {source.count} bands of {source.dtypes[0]}, where a product has {count or 1} of "
+                    "whole numbers: is it another file?"
                 )
             if chunks is None:
-                size = source.height * source.width
+                size = source.count * source.height * source.width
                 check_memory(size, 12, f"all of {file.name}", "leave chunks out, which reads it by parts")
         plain = stored_cells(file, crs, chunks)
-    layer = xr.DataArray(plain.data[0], dims=("y", "x"), name=file.name)
+    layer = xr.DataArray(plain.data, dims=("band", "y", "x"), name=file.name)
+    layer = layer if count else layer.isel(band=0)
     return grids.place(layer, grids.geobox(plain))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import Geometry
+from fifesim.rasters import chunks as chunks_of
 from fifesim.rasters import directions, places
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument as find_instrument
@@ -23,6 +24,12 @@ from fifesim.sensor.products.rasters.layers import (
 from fifesim.sensor.products.sentinel2_metadata import band_name, metadata_file, sentinel2_product, sentinel2_tile
 
 _SIZES = (10, 20, 60)
+
+_CLOUDS = {
+    "long_name": "cloud and snow masks",
+    "units": "1",
+    "comment": "bits: 1 opaque cloud, 2 cirrus, 4 snow or ice",
+}
 
 _CLASSES = {
     "long_name": "scene classification",
@@ -53,8 +60,8 @@ def open_sentinel2(path, resolution=10, *, bands=None, angles="centre", quality=
         The metadata's means of sun and view over the tile, the view's over the bands: every step takes them. Or by
         pixel, between the nodes of the metadata's grids of 5 km; the view is the mean of the bands and their detectors.
     quality : bool, optional
-        Whether with the scene classification of Level-2A as coordinate ``quality`` over (y, x), for 10 m that of 20 m.
-        Level-1C has none.
+        Whether with a coordinate ``quality`` over (y, x): the scene classification of Level-2A, for 10 m that of 20 m;
+        of Level-1C since baseline 04.00 its masks of 60 m, bit 1 for opaque clouds, 2 for cirrus, 4 for snow.
     chunks : mapping or int or "auto", optional
         The image is lazy; "auto" are 2048 x 2048 pixels of a band. None reads all of it at once.
     instrument : str or Instrument, optional
@@ -74,7 +81,8 @@ def open_sentinel2(path, resolution=10, *, bands=None, angles="centre", quality=
 
     Notes
     -----
-    Keep clear land with ``scene.where(scene.quality.isin([4, 5]))``.
+    Of Level-2A keep clear land with ``scene.where(scene.quality.isin([4, 5]))``, of Level-1C what is clear with
+    ``scene.where(scene.quality & 0b11 == 0)``.
 
     References
     ----------
@@ -111,7 +119,7 @@ def open_sentinel2(path, resolution=10, *, bands=None, angles="centre", quality=
         level=product.level,
         time=tile.time,
         geometry=geometry,
-        quality=_classes(product, folder, sizes, resolution, layers[0]) if quality else None,
+        quality=_quality(product, folder, sizes, resolution, layers[0]) if quality else None,
         history=f"open_sentinel2: {product.product}, baseline {product.baseline}",
         reference=f"ESA, {product.product}",
     )
@@ -182,21 +190,31 @@ def _angle_of_cells(vectors, number, corner, step, affine, row, column, shape):
     return scaling.between_nodes(vectors, rows, columns)[number]
 
 
-def _classes(product, folder, sizes, resolution, beside):
-    """Scene classification on the grid of the image; pixels of 10 m have that of the 20 m that they lie in."""
-    if product.level == 1:
-        return None
+def _quality(product, folder, sizes, resolution, beside):
+    """Scene classification, or masks of clouds, on the grid of the image; a pixel has what the one it lies in has."""
     cure = "fetch it, or open the product without it, quality=False"
-    own = resolution if resolution in product.classes else 20
-    if own not in product.classes:
-        raise ValueError(f"{product.product} names no scene classification: open it without, quality=False")
-    layer, times = open_layer(folder, product.classes[own], sizes, cure), own // resolution
-    if times > 1:
-        repeat = da.repeat if isinstance(layer.data, da.Array) else np.repeat
-        fine = grids.aligned(grids.geobox(layer), resolution)
-        data = repeat(repeat(layer.data, times, axis=0), times, axis=1)
-        layer = grids.place(xr.DataArray(data, dims=("y", "x"), name=layer.name), fine)
+    if product.level == 1:
+        if product.clouds is None:
+            return None
+        own, attrs = 60, _CLOUDS
+        masks = open_layer(folder, product.clouds, sizes, cure, count=3)
+        layer = grids.place(chunks_of.pointwise(scaling.mask_bits, *masks, dtype=np.uint8), grids.geobox(masks))
+    else:
+        own, attrs = resolution if resolution in product.classes else 20, _CLASSES
+        if own not in product.classes:
+            raise ValueError(f"{product.product} names no scene classification: open it without, quality=False")
+        layer = open_layer(folder, product.classes[own], sizes, cure)
+    layer = _repeated(layer, own // resolution, resolution)
     check_same_grid(layer, beside)
     if beside.chunks is not None:
         layer = layer.chunk(dict(zip(("y", "x"), beside.chunks, strict=True)))
-    return layer.assign_attrs(_CLASSES)
+    return layer.drop_attrs().assign_attrs(attrs)
+
+
+def _repeated(layer, times, resolution):
+    if times == 1:
+        return layer
+    repeat = da.repeat if isinstance(layer.data, da.Array) else np.repeat
+    data = repeat(repeat(layer.data, times, axis=0), times, axis=1)
+    fine = grids.aligned(grids.geobox(layer), resolution)
+    return grids.place(xr.DataArray(data, dims=("y", "x"), name=layer.name), fine)

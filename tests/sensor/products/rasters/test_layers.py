@@ -38,7 +38,7 @@ def test_what_is_no_layer_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"cannot read .*a\.tif as a raster"):
         layers.open_layer(tmp_path, "a.tif", None, "")
     products.write(tmp_path / "b.tif", np.ones((6, 9), np.float32), **PLACE)
-    with pytest.raises(ValueError, match=r"b\.tif has 1 bands of float32, and a product's file one of whole numbers"):
+    with pytest.raises(ValueError, match=r"b\.tif has 1 bands of float32, where a product has 1 of whole numbers"):
         layers.open_layer(tmp_path, "b.tif", None, "")
 
 

@@ -89,7 +89,6 @@ def test_labels_are_those_of_the_packages_own_images(folders):
     assert (float(scene["sza"]), float(scene["saa"])) == (57.820574357679, 172.840206897213)
     vza, vaa = np.mean([products.MEAN_VIEWS[number] for number in ("1", "2", "3", "7")], axis=0)
     np.testing.assert_allclose([scene["vza"], scene["vaa"]], [vza, vaa], rtol=0, atol=1e-3)
-    assert "quality" not in scene.coords
     assert "S2A_MSIL1C" in scene.attrs["history"] and "baseline 04.00" in scene.attrs["history"]
 
 
@@ -109,6 +108,17 @@ def test_pixels_of_10_m_have_the_class_of_those_of_20(folders, chunks):
     np.testing.assert_array_equal(scene["quality"], files["SCL", 20].repeat(2, axis=0).repeat(2, axis=1))
     land = scene.where(scene["quality"].isin([4, 5]))
     assert 0 < int(np.isfinite(land[0]).sum()) < 144
+
+
+@pytest.mark.parametrize(("size", "times"), [(10, 6), (20, 3), (60, 1)])
+def test_level_1c_has_masks_of_clouds_since_04_00(folders, size, times):
+    path, files = folders[1, "04.00"]
+    opaque, cirrus, snow = files["masks"].astype(int)
+    expected = (opaque + 2 * cirrus + 4 * snow).repeat(times, axis=0).repeat(times, axis=1)
+    quality = fifesim.open_sentinel2(path, size)["quality"]
+    np.testing.assert_array_equal(quality, expected)
+    assert quality.dtype == np.uint8 and "cirrus" in quality.attrs["comment"]
+    assert "quality" not in fifesim.open_sentinel2(folders[1, "03.01"][0], size).coords
 
 
 @pytest.mark.parametrize("chunks", [None, {"y": 5, "x": 7}])
@@ -167,6 +177,11 @@ def test_missing_files_are_named(tmp_path):
     with pytest.raises(ValueError, match=r"SCL_20m\.jp2 is missing in .*quality=False"):
         fifesim.open_sentinel2(path)
     assert "quality" not in fifesim.open_sentinel2(path, quality=False).coords
+    first, _ = products.sentinel2(tmp_path, 1)
+    (mask,) = first.rglob("MSK_CLASSI_B00.jp2")
+    mask.unlink()
+    with pytest.raises(ValueError, match=r"MSK_CLASSI_B00\.jp2 is missing in .*quality=False"):
+        fifesim.open_sentinel2(first)
     (file,) = path.rglob("*_B04_10m.jp2")
     file.unlink()
     with pytest.raises(ValueError, match=r"B04_10m\.jp2 is missing in "):
