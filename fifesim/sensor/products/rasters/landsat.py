@@ -67,7 +67,7 @@ def open_landsat(path, *, bands=None, angles="centre", quality=True, chunks="aut
     -----
     Level 1 is scaled by reflectance without the sun's cosine, which is divided out here, with ``angles="pixel"`` by
     that of each pixel. Its solar irradiance follows from its scales of radiance and of reflectance, and differs from
-    the instrument's description by up to 4 % for TM. Mask clouds with ``scene.where(scene.quality & 0b11000 == 0)``:
+    the instrument's description by up to 5 % for TM. Mask clouds with ``scene.where(scene.quality & 0b11000 == 0)``:
     bit 3 is cloud, bit 4 its shadow. A GeoTIFF keeps neither quality nor angles by pixel.
 
     References
