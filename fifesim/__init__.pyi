@@ -86,6 +86,11 @@ from .analysis.rasters.lags import autocovariance as autocovariance  # method
 from .analysis.rasters.lags import variogram as variogram  # method
 from .analysis.rasters.lags import regularized_variance as regularized_variance  # method
 
+# Images of one's own
+from .sensor.products.rasters.landsat import open_landsat as open_landsat
+from .sensor.products.rasters.sentinel2 import open_sentinel2 as open_sentinel2
+from .sensor.products.rasters.calibrated import calibrate as calibrate  # method
+
 # Files and runs
 from .rasters.files import to_geotiff as to_geotiff  # method, of a Dataset too
 from .rasters.files import open_image as open_image

@@ -126,7 +126,7 @@ def open_image(path, chunks=None, *, allow_remote=False):
             written_here = description is not None
             if not written_here:
                 description, storage = _gdal_description(source, file.name)
-        plain = _cells(file, crs, chunks)
+        plain = stored_cells(file, crs, chunks)
     try:
         grid = grids.geobox(plain)
     except ValueError as error:
@@ -141,8 +141,26 @@ def open_image(path, chunks=None, *, allow_remote=False):
     return array if "band" in description["dims"] else array.isel(band=0, drop=True)
 
 
-def _cells(file, crs, chunks):
-    """Cells of a file as they are stored, with coordinates."""
+def stored_cells(file, crs, chunks):
+    """
+    Cells of a file as they are stored, with coordinates.
+
+    Parameters
+    ----------
+    file : fifesim.rasters.opening.RasterFile
+    crs : rasterio.crs.CRS
+    chunks : mapping or int or None
+        Makes the result lazy.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims (band, y, x)
+
+    Raises
+    ------
+    ValueError
+        If it holds several rasters.
+    """
     with warnings.catch_warnings():
         # rioxarray has one scale and offset for all bands; here they are coordinates along band.
         warnings.filterwarnings("ignore", "(Scales|Offsets) differ across bands")

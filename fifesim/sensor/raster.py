@@ -11,6 +11,7 @@ from fifesim.rasters.own_rasters import incoming
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import check_kinds
+from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import (
     bands_by_grid,
@@ -37,6 +38,7 @@ def sense(
     seed=0,
     noise_models=None,
     quantise=True,
+    scaling="detector",
     min_valid=MIN_VALID,
     geometry=None,
     time=None,
@@ -68,6 +70,10 @@ def sense(
         Size of the noise for every band, or by name of a band, where the description lacks it or is not to count.
     quantise : bool, optional
         Whether to digitise; radiance otherwise.
+    scaling : "detector" or "product", optional
+        What a digital number is: a count of the instrument's own, spread over its radiances; or one of the agency's
+        Level-1 product, which is scaled by reflectance (OLI, OLI2; MSI and MSI-B with the offset of processing baseline
+        04.00). Those are finer than the detector's, whose steps are not in them.
     min_valid : float, optional
         Share of its footprint that a pixel needs on valid cells; below it is no data. [1]
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
@@ -86,20 +92,21 @@ def sense(
     Raises
     ------
     ValueError
-        If the instrument is unknown, has none of the bands or no such noise, ``onto`` is no grid of the scene's CRS, or
-        a point spread is wider than the scene.
+        If the instrument is unknown, has none of the bands, no such noise or no such scaling, ``onto`` is no grid of the
+        scene's CRS, or a point spread is wider than the scene.
 
     See Also
     --------
     fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise,
-    fifesim.sensor.response.calibration.radiance_to_dn
+    fifesim.sensor.response.calibration.radiance_to_dn, fifesim.sensor.response.product_scaling
     """
     toa, description, bands = by_bands(toa, instrument)
+    digital_numbers.check_scaling(scaling, description, quantise)
     geometry = directions.given_geometry(geometry, toa, time)
     groups = bands_by_grid(description, bands, onto, interval)
     if len(groups) > 1:
         options = {"offset": offset, "noise": noise, "seed": seed, "noise_models": noise_models, "geometry": geometry}
-        options |= {"interval": interval, "quantise": quantise, "min_valid": min_valid}
+        options |= {"interval": interval, "quantise": quantise, "scaling": scaling, "min_valid": min_valid}
         images = {size: sense(toa.isel(band=numbers), description, **options) for size, numbers in groups.items()}
         return xr.DataTree.from_dict({f"/{size}": image.to_dataset() for size, image in images.items()})
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
@@ -109,8 +116,9 @@ def sense(
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
-    image = directions.with_geometry(grids.place(recorded(radiance, description, bands, quantise), pixels), geometry)
-    return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise))
+    image = recorded(radiance, description, bands, quantise, geometry if scaling == "product" else None)
+    image = directions.with_geometry(grids.place(image, pixels), geometry)
+    return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise, scaling))
 
 
 def by_bands(toa, instrument):
@@ -142,7 +150,7 @@ def by_bands(toa, instrument):
     return toa, description, matching_bands(toa, description)
 
 
-def recorded(radiance, description, bands, quantise):
+def recorded(radiance, description, bands, quantise, product_geometry=None):
     """
     What an instrument records of a radiance, with the coordinates of its bands.
 
@@ -155,6 +163,8 @@ def recorded(radiance, description, bands, quantise):
         One for each of the array.
     quantise : bool
         Whether as digital numbers.
+    product_geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
+        Sun by which the agency's product scales them; the detector's own counts without.
 
     Returns
     -------
@@ -163,9 +173,8 @@ def recorded(radiance, description, bands, quantise):
     """
     along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
     if quantise:
-        full_scale, lowest = [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands]
-        gain, offset = calibration.gain_offset(full_scale, lowest, description.bits)
-        scales, bits = [xr.DataArray(each, dims="band") for each in (gain, offset)], description.bits
+        gain, offset, bits = digital_numbers.scale(description, bands, product_geometry)
+        scales = [xr.DataArray(each, dims="band") for each in (gain, offset)]
         dtype = np.uint8 if bits <= 8 else np.uint16
         radiance = chunks.pointwise(calibration.radiance_to_dn, radiance, *scales, dtype=dtype, bits=bits)
         along_band |= {"gain": gain, "offset": offset}
@@ -197,11 +206,13 @@ def labelled(image, toa, description, history):
     return image
 
 
-def _history(description, interval, offset, noise, seed, quantise):
+def _history(description, interval, offset, noise, seed, quantise, scaling):
     """What was done, beside the defaults."""
     kinds = check_kinds(noise)
+    bits = description.bits if scaling == "detector" else description.product.bits
     parts = [
-        f"sense: {description.name}, {description.bits} bits" if quantise else f"sense: {description.name}, radiance",
+        f"sense: {description.name}, {bits} bits" if quantise else f"sense: {description.name}, radiance",
+        f"scaling {scaling}" if scaling != "detector" else "",
         f"interval {interval}" if interval is not None else "",
         "offset" if any(np.any(np.asarray(each) != 0) for each in offset) else "",
         f"noise {' '.join(kinds)}, seed {seed}" if kinds else "",

@@ -14,7 +14,7 @@ from fifesim.sensor.description.spectral_response import SpectralResponse
 # Numbers that must be there and those that may; each that is there has a source.
 INSTRUMENT_NUMBERS = ("altitude", "gsd", "interval", "bits", "lsf")
 BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance")
-OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "noise", "gains", "limits")
+OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "product", "noise", "gains", "limits")
 
 # Publications by number.
 Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]

@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
 from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
 from fifesim.sensor.description.names import key, lookup
-from fifesim.sensor.description.performance import Scan
+from fifesim.sensor.description.performance import Product, Scan
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
 
 
@@ -43,6 +43,8 @@ class Instrument:
     detectors : int, optional
         Detectors of a band, which take turns at its lines (whiskbroom) or stand side by side (pushbroom).
     scan : Scan, optional
+    product : Product, optional
+        Scale of the agency's product.
     aliases : tuple of str, optional
         Other names.
 
@@ -66,6 +68,7 @@ class Instrument:
     ifov: Angle | None = None
     detectors: Count | None = None
     scan: Scan | None = None
+    product: Product | None = None
     aliases: tuple[Name, ...] = ()
 
     def __post_init__(self):
