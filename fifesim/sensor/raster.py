@@ -92,8 +92,8 @@ def sense(
     Raises
     ------
     ValueError
-        If the instrument is unknown, has none of the bands, no such noise or no such scaling, ``onto`` is no grid of the
-        scene's CRS, or a point spread is wider than the scene.
+        If the instrument is unknown, has none of the bands, no such noise or no such scaling, ``onto`` is no grid of
+        the scene's CRS, or a point spread is wider than the scene.
 
     See Also
     --------

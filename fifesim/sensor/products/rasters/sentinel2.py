@@ -42,7 +42,7 @@ _CLASSES = {
 }
 
 
-def open_sentinel2(path, resolution=10, *, bands=None, angles="centre", quality=True, chunks="auto", instrument=None):
+def open_sentinel2(path, resolution=None, *, bands=None, angles="centre", quality=True, chunks="auto", instrument=None):
     """
     Open a Sentinel-2 product: Level-1C as reflectance at the top of the atmosphere, Level-2A of the surface.
 
@@ -54,7 +54,8 @@ def open_sentinel2(path, resolution=10, *, bands=None, angles="centre", quality=
     path : str or path
         Of the unpacked ``.SAFE`` folder, or of its ``MTD_MSIL1C.xml`` or ``MTD_MSIL2A.xml``.
     resolution : 10, 20 or 60, optional
-        Size of the pixels. Level-1C has each band at its own size; Level-2A has most bands at 20 and 60 too. [m]
+        Size of the pixels. Level-1C has each band at its own size, and those of 10 are opened by default; Level-2A has
+        all but the broad near infrared one at 20, which is its default. [m]
     bands : str or sequence of str, optional
         Such as ``["MSI4", "MSI8"]``, ``["B04", "B08"]`` or ``["red", "nir"]``; by default all of that size but the
         cirrus band.
@@ -104,6 +105,8 @@ def open_sentinel2(path, resolution=10, *, bands=None, angles="centre", quality=
             "'MSI-B' or your own, and its responses are taken"
         )
     description = find_instrument(product.instrument if instrument is None else instrument)
+    if resolution is None:
+        resolution = 20 if product.level == 2 and 20 in product.bands else 10
     selected = _selected(product, description, resolution, bands)
     if not (folder / product.tile).is_file():
         raise ValueError(f"{product.tile} is missing in the product: is it unpacked whole?")

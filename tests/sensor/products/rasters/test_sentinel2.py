@@ -29,7 +29,7 @@ def by_hand(files, names, size, offset):
 @pytest.mark.parametrize("level", [1, 2])
 def test_reflectance_is_that_of_the_baseline(folders, level, baseline):
     path, files = folders[level, baseline]
-    scene = fifesim.open_sentinel2(path)
+    scene = fifesim.open_sentinel2(path, 10)
     expected = by_hand(files, ["B2", "B3", "B4", "B8"], 10, BASELINES[baseline])
     np.testing.assert_allclose(scene, expected, rtol=0, atol=5e-8)
     assert scene["band"].values.tolist() == ["MSI2", "MSI3", "MSI4", "MSI8"]
@@ -43,7 +43,7 @@ def test_a_scene_goes_through_to_a_file(folders, baseline, tmp_path):
     path, files = folders[1, baseline]
     toa = by_hand(files, ["B4", "B8"], 10, BASELINES[baseline])
     air = fifesim.Atmosphere(visibility=40.0)
-    scene = fifesim.open_sentinel2(path, bands=["B04", "B08"])
+    scene = fifesim.open_sentinel2(path, 10, bands=["B04", "B08"])
     surface = scene.fifesim.to_surface(air)
     responses = tuple(band.response for band in fifesim.instrument("MSI").select(["MSI4", "MSI8"]))
     vza, vaa = (np.mean([products.MEAN_VIEWS[band][k] for band in ("3", "7")]) for k in (0, 1))
@@ -70,7 +70,7 @@ def test_a_scene_goes_through_to_a_file(folders, baseline, tmp_path):
 def test_level_2a_gives_ndvi_of_the_surface(folders):
     path, files = folders[2, "04.00"]
     red, nir = by_hand(files, ["B4", "B8"], 10, -1000)
-    found = fifesim.open_sentinel2(path).fifesim.ndvi()
+    found = fifesim.open_sentinel2(path, 10).fifesim.ndvi()
     np.testing.assert_allclose(found, (nir - red) / (nir + red), rtol=0, atol=1e-6)
 
 
@@ -104,7 +104,7 @@ def test_level_2a_opens_at_each_size(folders, size, bands):
 @pytest.mark.parametrize("chunks", ["auto", None, {"y": 5, "x": 7}])
 def test_pixels_of_10_m_have_the_class_of_those_of_20(folders, chunks):
     path, files = folders[2, "04.00"]
-    scene = fifesim.open_sentinel2(path, chunks=chunks)
+    scene = fifesim.open_sentinel2(path, 10, chunks=chunks)
     np.testing.assert_array_equal(scene["quality"], files["SCL", 20].repeat(2, axis=0).repeat(2, axis=1))
     land = scene.where(scene["quality"].isin([4, 5]))
     assert 0 < int(np.isfinite(land[0]).sum()) < 144
@@ -126,8 +126,8 @@ def test_level_1c_has_masks_of_clouds_since_04_00(folders, size, times):
 def test_any_chunks_give_the_same(folders, chunks, angles):
     path, _ = folders[2, "03.01"]
     options = {"angles": angles, "bands": ["MSI4", "MSI8"]}
-    expected = fifesim.open_sentinel2(path, **options).compute()
-    found = fifesim.open_sentinel2(path, chunks=chunks, **options)
+    expected = fifesim.open_sentinel2(path, 10, **options).compute()
+    found = fifesim.open_sentinel2(path, 10, chunks=chunks, **options)
     assert (found.chunks is None) == (chunks is None)
     assert found.compute().identical(expected)
 
@@ -154,7 +154,7 @@ def test_a_band_at_another_size_says_where_it_is(folders):
     assert fifesim.open_sentinel2(path, 60)["band"].values.tolist() == ["MSI1", "MSI9"]
     assert fifesim.open_sentinel2(path, 60, bands="B10")["band"].values.tolist() == ["MSI10"]
     with pytest.raises(ValueError, match="has no MSI11 of 10 m: it has it at 20 m, give resolution="):
-        fifesim.open_sentinel2(path, bands=["B04", "B11"])
+        fifesim.open_sentinel2(path, 10, bands=["B04", "B11"])
 
 
 @pytest.mark.parametrize(
@@ -175,8 +175,8 @@ def test_missing_files_are_named(tmp_path):
     (file,) = path.rglob("*_SCL_20m.jp2")
     file.unlink()
     with pytest.raises(ValueError, match=r"SCL_20m\.jp2 is missing in .*quality=False"):
-        fifesim.open_sentinel2(path)
-    assert "quality" not in fifesim.open_sentinel2(path, quality=False).coords
+        fifesim.open_sentinel2(path, 10)
+    assert "quality" not in fifesim.open_sentinel2(path, 10, quality=False).coords
     first, _ = products.sentinel2(tmp_path, 1)
     (mask,) = first.rglob("MSK_CLASSI_B00.jp2")
     mask.unlink()
@@ -185,17 +185,17 @@ def test_missing_files_are_named(tmp_path):
     (file,) = path.rglob("*_B04_10m.jp2")
     file.unlink()
     with pytest.raises(ValueError, match=r"B04_10m\.jp2 is missing in "):
-        fifesim.open_sentinel2(path, quality=False)
+        fifesim.open_sentinel2(path, 10, quality=False)
     (file,) = path.rglob("MTD_TL.xml")
     file.unlink()
     with pytest.raises(ValueError, match=r"MTD_TL\.xml is missing in the product"):
-        fifesim.open_sentinel2(path, quality=False)
+        fifesim.open_sentinel2(path, 10, quality=False)
 
 
 def test_two_granules_are_refused(tmp_path):
     path, _ = products.sentinel2(tmp_path, 1, granules=2)
     with pytest.raises(ValueError, match="holds 2 granules: products of one tile are read"):
-        fifesim.open_sentinel2(path)
+        fifesim.open_sentinel2(path, 10)
 
 
 def test_a_band_whose_view_is_not_known_is_refused(tmp_path):
@@ -204,8 +204,8 @@ def test_a_band_whose_view_is_not_known_is_refused(tmp_path):
     text = tile.read_text(encoding="utf-8")
     tile.write_text(text.replace(str(products.MEAN_VIEWS["1"][0]), "NaN"), encoding="utf-8")
     with pytest.raises(ValueError, match="no mean view of these bands: give angles='pixel'"):
-        fifesim.open_sentinel2(path, bands="B02")
-    both = fifesim.open_sentinel2(path, bands=["B02", "B03"])
+        fifesim.open_sentinel2(path, 10, bands="B02")
+    both = fifesim.open_sentinel2(path, 10, bands=["B02", "B03"])
     assert float(both["vza"]) == pytest.approx(products.MEAN_VIEWS["2"][0], abs=1e-9)
 
 
@@ -214,5 +214,16 @@ def test_another_spacecraft_takes_the_responses_that_are_given(tmp_path):
     with pytest.raises(
         ValueError, match="is of Sentinel-2C, whose responses fifesim does not have: give instrument='MSI'"
     ):
-        fifesim.open_sentinel2(path)
-    assert fifesim.open_sentinel2(path, instrument="MSI-B").attrs["instrument"] == "MSI-B"
+        fifesim.open_sentinel2(path, 10)
+    assert fifesim.open_sentinel2(path, 10, instrument="MSI-B").attrs["instrument"] == "MSI-B"
+
+
+def test_a_whole_level_2a_scene_is_what_landsat_5_would_have_seen(tmp_path):
+    """Without a word on bands and sizes: 20 m holds a band beside each of TM's."""
+    path, _ = products.sentinel2(tmp_path, 2, "04.00")
+    scene = fifesim.open_sentinel2(path, quality=False)
+    assert scene["band"].size == 10 and scene.odc.geobox.affine.a == 20
+    scene = scene.where(scene.notnull().all("band"), 0.2).clip(0.02, 0.6)
+    tm = scene.fifesim.as_seen_by("TM", atmosphere=fifesim.Atmosphere(visibility=30))
+    assert tm["band"].values.tolist() == ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
+    assert float(tm["sza"]) == float(scene["sza"]) and (tm > 0).any()
