@@ -50,6 +50,7 @@ from .sensor.raster import sense as sense  # method
 from .sensor.scan.rasters.view import scan_geometry as scan_geometry
 from .sensor.scan.track import Track as Track
 from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method
+from .rasters.swaths import grid_swath as grid_swath  # method
 from .chain.comparison import compare as compare  # method
 from .sensor.response.rasters.spread import psf as psf
 from .sensor.response.rasters.spread import mtf as mtf
@@ -67,6 +68,7 @@ from .base.bands import Band as Band
 # Analysis
 from .analysis.rasters.means import aggregate as aggregate  # method
 from .chain.images import ndvi as ndvi  # method
+from .chain.images import index as index  # method
 from .analysis.rasters.regression import regress as regress  # method
 from .analysis.regression import Regression as Regression
 from .analysis.rasters.uncertainty import relative_equivalent_noise as relative_equivalent_noise  # method

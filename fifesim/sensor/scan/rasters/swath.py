@@ -13,6 +13,7 @@ from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled, re
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import by_line_spread, common_size
 from fifesim.sensor.scan import track as scan
+from fifesim.sensor.scan.rasters.light import at_pixels, seen_alike
 from fifesim.sensor.scan.rasters.view import find_track, scan_nodes, transformer
 from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_operator
 
@@ -36,6 +37,7 @@ def sense_swath(
     quantise=True,
     min_valid=MIN_VALID,
     geometry=None,
+    view_tolerance=1.0,
 ):
     """
     Image of a scan as the instrument takes it: by line and sample, at its own interval, and never resampled.
@@ -51,6 +53,9 @@ def sense_swath(
         As in `fifesim.sensor.scan.rasters.view.scan_geometry`.
     noise, seed, noise_models, quantise, min_valid, geometry : optional
         As in `fifesim.sensor.raster.sense`.
+    view_tolerance : float, optional
+        How far the view that the light was computed for may be from that of the scan; 180 takes light that does not
+        depend on it. [degree]
 
     Returns
     -------
@@ -61,7 +66,8 @@ def sense_swath(
     Raises
     ------
     ValueError
-        As in `fifesim.sensor.raster.sense`, and if no pixel of the scan lies in the scene.
+        As in `fifesim.sensor.raster.sense`, if no pixel of the scan lies in the scene, and, where angles are lazy when
+        it computes, if the light was computed for another view.
 
     Notes
     -----
@@ -73,14 +79,18 @@ def sense_swath(
     fifesim.sensor.scan.swath.footprint_operator, fifesim.sensor.scan.track
     """
     toa, description, bands = by_bands(toa, instrument)
-    geometry = directions.given_geometry(geometry, toa.drop_vars(["vza", "vaa"], errors="ignore"))
-    geometry = directions.uniform_geometry(geometry, "sense_swath")
+    geometry = directions.given_geometry(geometry, toa)
     scene = grids.geobox(toa)
     track = find_track(scene, track, nadir_offset, heading)
     pixels = _pixels(scene, description, bands, track)
+    coordinates = _coordinates(scene, pixels, description)
+    geometry = at_pixels(geometry, pixels.row, pixels.column)
     means = _means(toa.transpose("band", "y", "x"), description, bands, pixels, min_valid)
+    view = coordinates["vza"][1], coordinates["vaa"][1]
+    said = f"fifesim.Track({track.latitude:.4f}, {track.longitude:.4f}, {track.heading:.2f})"
+    means = seen_alike(means, geometry, view, view_tolerance, f"{description.name!r}, grid, {said}")
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, pixels.first, noise_models)
-    image = recorded(radiance, description, bands, quantise).assign_coords(_coordinates(scene, pixels, description))
+    image = recorded(radiance, description, bands, quantise).assign_coords(coordinates)
     history = f"sense_swath: {description.name}, track {track.heading:.2f} degrees"
     image = directions.with_geometry(image, geometry, ("sza", "saa", "earth_sun_distance"))
     image = labelled(image, toa, description, history)
