@@ -1,11 +1,10 @@
-"""Vegetation indices of labelled reflectance."""
+"""Spectral indices of labelled reflectance."""
 
 import numpy as np
 
 from fifesim.analysis import indices
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED, nearest
 from fifesim.rasters import cf, chunks, swaths
-
 
 # The kernel of each index, and the bands that it takes. Names are those of the spyndex catalogue.
 INDICES = {
@@ -117,7 +116,7 @@ def _bands(reflectance, windows, what):
 
 def _nearest_band(reflectance, window, what):
     if "band" not in reflectance.dims:
-        raise ValueError(f"{what} needs several bands along a dimension band, got a raster of one band")
+        raise ValueError(f"{what} needs a {window.name} and other bands along band, got a raster of one band")
     if "wavelength" not in reflectance.coords:
         raise ValueError("the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords")
     wavelengths = np.atleast_1d(reflectance["wavelength"].values)
