@@ -52,6 +52,7 @@ from .sensor.scan.track import Track as Track
 from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method
 from .rasters.swaths import grid_swath as grid_swath  # method
 from .chain.comparison import compare as compare  # method
+from .chain.comparison import comparison_table as comparison_table  # method of a DataTree
 from .sensor.response.rasters.spread import psf as psf
 from .sensor.response.rasters.spread import mtf as mtf
 from .sensor.response.noise import NoiseModel as NoiseModel
@@ -83,6 +84,12 @@ from .analysis.rasters.scaling import fpar_bias as fpar_bias  # method
 from .analysis.rasters.lags import autocovariance as autocovariance  # method
 from .analysis.rasters.lags import variogram as variogram  # method
 from .analysis.rasters.lags import regularized_variance as regularized_variance  # method
+
+# Pictures
+from .output.pictures import plot as plot  # method
+from .output.composites import rgb as rgb  # method
+from .output.pictures import plot_fit as plot_fit
+from .output.pictures import plot_comparison as plot_comparison  # method of a DataTree
 
 # Files and runs
 from .rasters.files import to_geotiff as to_geotiff  # method, of a Dataset too

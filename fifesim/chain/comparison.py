@@ -2,10 +2,17 @@
 
 from dataclasses import replace
 
+import pandas as pd
 import xarray as xr
 
+from fifesim.analysis.rasters.regression import regress
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
+from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
+from fifesim.rasters import grid as grids
+from fifesim.rasters.reductions import computed
+from fifesim.rasters.regularization import areas, regularized
+from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 
@@ -55,6 +62,74 @@ def compare(lai, instruments, setup=None, *, bands=None):
         own = replace(setup, instrument=description, bands=selected)
         nodes[f"/{description.name}"] = image_of(own, reflectance_of(own, lai)).to_dataset()
     return xr.DataTree.from_dict(nodes)
+
+
+def comparison_table(images, truth=None):
+    """
+    What each of some images of one scene shows, a row for each instrument; computes.
+
+    Parameters
+    ----------
+    images : xarray.DataTree
+        From `compare`.
+    truth : xarray.DataArray, dims (y, x), optional
+        On cells, such as leaf area index; its means over the pixels of each image are compared with the NDVI.
+
+    Returns
+    -------
+    table : pandas.DataFrame
+        By instrument: ``pixel`` [m], ``rows``, ``columns``, ``bands``, ``ndvi_mean``, ``ndvi_sd``, and with a truth
+        ``slope``, ``intercept`` and ``r2`` of it on the NDVI, with the ``n`` pixels that both have.
+
+    Raises
+    ------
+    ValueError
+        If an image has no red or no near infrared band, or the truth does not lie on its ground.
+
+    See Also
+    --------
+    fifesim.analysis.rasters.regression.regress
+    """
+    rows = {}
+    for name, node in images.children.items():
+        image = recorded_image(node)
+        grid = grids.geobox(image)
+        # Once, for the mean, the deviation and the regression.
+        shown = computed(ndvi(image))[0]
+        row = {"pixel": grids.cell_size(grid)[0], "rows": grid.shape.y, "columns": grid.shape.x}
+        row |= {"bands": ", ".join(map(str, image["band"].values))}
+        row |= {"ndvi_mean": float(shown.mean()), "ndvi_sd": float(shown.std(ddof=1))}
+        if truth is not None:
+            means = regularized(truth, areas(grid), grid, min_valid=sensor.MIN_VALID)
+            fit = regress(means, shown)
+            row |= {"slope": fit.slope, "intercept": fit.intercept, "r2": fit.r2, "n": fit.n}
+        rows[name] = row
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("instrument")
+
+
+def recorded_image(node):
+    """
+    What an instrument recorded, as `compare` keeps it.
+
+    Parameters
+    ----------
+    node : xarray.DataTree
+        Of one instrument.
+
+    Returns
+    -------
+    image : xarray.DataArray, dims (band, y, x)
+
+    Raises
+    ------
+    ValueError
+        If it holds neither digital numbers nor radiance.
+    """
+    for name in ("dn", "toa_radiance"):
+        if name in node.data_vars:
+            return node[name]
+    holds = ", ".join(map(str, node.data_vars)) or "nothing"
+    raise ValueError(f"{node.name or 'the tree'} holds no dn and no toa_radiance, but {holds}: give that of compare")
 
 
 def _bands(description, names):
