@@ -3,6 +3,9 @@
 import numpy as np
 from numba import njit
 
+# Corners that a quadrilateral may have once it is cut along four lines: each cut doubles them at most.
+_MOST = 64
+
 
 def corners(row, column):
     """
@@ -144,19 +147,17 @@ def covered_means(values, row, column, rows, columns):
     """
     shape = values.shape[0], rows[1] - rows[0], columns[1] - columns[0]
     total, covered = np.zeros(shape), np.zeros(shape)
+    pixel, cut, other = np.empty((4, 2)), np.empty((_MOST, 2)), np.empty((_MOST, 2))
     for line in range(values.shape[1]):
         for sample in range(values.shape[2]):
-            around = np.array([[line, sample], [line, sample + 1], [line + 1, sample + 1], [line + 1, sample]])
-            shaped = np.empty((4, 2))
             for k in range(4):
-                shaped[k, 0], shaped[k, 1] = row[around[k, 0], around[k, 1]], column[around[k, 0], around[k, 1]]
-            middle = shaped[:, 0].min() / 2 + shaped[:, 0].max() / 2
-            top, bottom = _between_cells(middle, shaped[:, 0].max() - middle, rows)
-            middle = shaped[:, 1].min() / 2 + shaped[:, 1].max() / 2
-            left, right = _between_cells(middle, shaped[:, 1].max() - middle, columns)
+                down, right = line + k // 2, sample + (k + 1) // 2 % 2
+                pixel[k, 0], pixel[k, 1] = row[down, right], column[down, right]
+            top, bottom = _touched(pixel[:, 0], rows)
+            left, right = _touched(pixel[:, 1], columns)
             for i in range(top, bottom):
                 for j in range(left, right):
-                    area = _area_in_cell(shaped, i, j)
+                    area = _area_in_cell(pixel, i, j, cut, other)
                     for band in range(values.shape[0]):
                         value = values[band, line, sample]
                         if area > 0 and np.isfinite(value):
@@ -166,34 +167,42 @@ def covered_means(values, row, column, rows, columns):
 
 
 @njit(nogil=True, cache=True)
-def _area_in_cell(corners, i, j):
-    """Area of a polygon inside the cell of row i and column j: cut along its four sides, then the shoelace formula."""
-    polygon = corners
-    for axis, limit, side in ((0, i, 1.0), (0, i + 1, -1.0), (1, j, 1.0), (1, j + 1, -1.0)):
-        polygon = _cut(polygon, axis, float(limit), side)
-        if polygon.shape[0] < 3:
-            return 0.0
+def _touched(places, limits):
+    """Cells of an axis that a polygon touches, as far as they lie in a window."""
+    low, high = places.min(), places.max()
+    return _between_cells((low + high) / 2, (high - low) / 2, limits)
+
+
+@njit(nogil=True, cache=True)
+def _area_in_cell(pixel, i, j, cut, other):
+    """Area of a pixel inside the cell of row i and column j: cut along its four sides, then the shoelace formula."""
+    count = _cut(pixel, 4, cut, 0, i, 1.0)
+    count = _cut(cut, count, other, 0, i + 1.0, -1.0)
+    count = _cut(other, count, cut, 1, j, 1.0)
+    count = _cut(cut, count, other, 1, j + 1.0, -1.0)
     area = 0.0
-    for k in range(polygon.shape[0]):
-        here, there = polygon[k] - polygon[0], polygon[k - 1] - polygon[0]
-        area += there[0] * here[1] - there[1] * here[0]
+    # From its first corner, which keeps the digits of what lies far from the origin.
+    for k in range(2, count):
+        down, right = other[k - 1, 0] - other[0, 0], other[k - 1, 1] - other[0, 1]
+        area += down * (other[k, 1] - other[0, 1]) - right * (other[k, 0] - other[0, 0])
     return abs(area) / 2
 
 
 @njit(nogil=True, cache=True)
-def _cut(polygon, axis, limit, side):
-    """The part of a polygon on one side of a line along an axis."""
-    kept = np.empty((polygon.shape[0] * 2, 2))
-    count = 0
-    for k in range(polygon.shape[0]):
-        here, before = polygon[k], polygon[k - 1]
-        inside, was_inside = side * (here[axis] - limit), side * (before[axis] - limit)
+def _cut(polygon, corners, kept, axis, limit, side):
+    """Put the part of a polygon on one side of a line along an axis into an array; the number of its corners."""
+    count, before = 0, corners - 1
+    for here in range(corners):
+        inside, was_inside = side * (polygon[here, axis] - limit), side * (polygon[before, axis] - limit)
         if (inside >= 0) != (was_inside >= 0):
             share = was_inside / (was_inside - inside)
-            kept[count] = before + share * (here - before)
+            kept[count, 1 - axis] = polygon[before, 1 - axis] + share * (
+                polygon[here, 1 - axis] - polygon[before, 1 - axis]
+            )
             kept[count, axis] = limit
             count += 1
         if inside >= 0:
-            kept[count] = here
+            kept[count, 0], kept[count, 1] = polygon[here, 0], polygon[here, 1]
             count += 1
-    return kept[:count]
+        before = here
+    return count

@@ -91,6 +91,7 @@ def grid_swath(image, grid, method="nearest", *, min_valid=0.5):
     along = {name: value for name, value in image.coords.items() if not {*DIMS} & set(value.dims)}
     out = xr.DataArray(data, dims=(*image.dims[:-2], "y", "x"), coords=along, attrs=dict(image.attrs), name=image.name)
     own = {name: each for name, each in image.coords.items() if name not in _PLACES and set(each.dims) == {*DIMS}}
+    own = {name: each for name, each in own.items() if each.dtype.kind in "fiu"}
     lazy = isinstance(image.data, da.Array)
     for name, value in own.items():
         values = value.transpose(*DIMS).astype(float).data
