@@ -36,11 +36,16 @@ _COLOURS = {
     "kt": ("RdBu_r", 1.0),
 }
 
+# Pixels that are drawn along the longer side at most.
+_SIZE = 1500
+
 # Above this a map has its axes in kilometres. [m]
 _KILOMETRES = 3000.0
 
 
-def plot(raster, *, band=None, composite="false colour", stretch=(2, 98), cmap=None, limits=None, axes=None, size=1500):
+def plot(
+    raster, *, band=None, composite="false colour", stretch=(2, 98), cmap=None, limits=None, axes=None, size=_SIZE
+):
     """
     Draw a raster as a map: an image in colours, one band or quantity by its colour map.
 
@@ -101,7 +106,7 @@ def plot_fit(fit, y=None, x=None, *, pair="coordinates", level=0.95, axes=None):
     ----------
     fit : fifesim.analysis.regression.Regression
     y, x : xarray.DataArray, dims (y, x), optional
-        What was given to `fifesim.regress`; computed.
+        What was given to `fifesim.regress`; large ones are thinned before they are computed.
     pair : {"coordinates", "index"}, optional
         As there.
     level : float, optional
@@ -127,7 +132,7 @@ def plot_fit(fit, y=None, x=None, *, pair="coordinates", level=0.95, axes=None):
     span = fit.x_mean - spread, fit.x_mean + spread
     if y is not None:
         labels = tuple(" ".join(filter(None, [_first_capital(long_name(each)), unit(each)])) for each in (y, x))
-        pairs = computed(*matched(y, x, pair))
+        pairs = computed(*(thinned(each, _SIZE) for each in matched(y, x, pair)))
         ordinate, abscissa = (np.asarray(each, float).ravel() for each in pairs)
         both = np.isfinite(ordinate) & np.isfinite(abscissa)
         span = abscissa[both].min(), abscissa[both].max()

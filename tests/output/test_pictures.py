@@ -125,6 +125,14 @@ def test_a_fit_is_drawn_with_its_pixels(whole):
     assert pixels.sum() == fit.n
 
 
+def test_a_fit_is_drawn_of_a_part_of_many_pixels():
+    grid = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 90000.0, 60.0, 30.0)
+    x = grids.place(xr.DataArray(np.random.default_rng(1).uniform(0, 1, (2, 3000)), dims=("y", "x"), name="x"), grid)
+    y = (2 * x + 1).rename("y")
+    axes = fifesim.regress(y, x).plot(y, x)
+    assert axes.collections[0].get_array().sum() == 1500
+
+
 def test_a_fit_alone_is_a_line_about_the_mean(whole):
     fit = fifesim.regress(whole["truth"], whole["ndvi"])
     axes = fit.plot(level=0.9)

@@ -8,6 +8,7 @@ import xarray as xr
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
 import fifesim
+from fifesim.analysis.regression import Regression
 from fifesim.base.geometry import Geometry
 from fifesim.rasters import cf, directions, projection
 from fifesim.rasters import grid as grids
@@ -179,6 +180,25 @@ def test_a_scan_goes_back_to_the_ground_that_it_was_made_of():
     by_hand = (planetary[1] - planetary[0]) / (planetary[1] + planetary[0])
     assert ndvi.dims == ("line", "sample")
     np.testing.assert_array_equal(ndvi, by_hand)
+
+
+def test_verbs_of_a_lazy_scan_are_lazy_and_the_same():
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", **away)
+    fit = Regression(3.0, -0.5, 0.9, 100, 0.1, 0.5, 10.0)
+    for verb in (fifesim.to_radiance, fifesim.to_surface, lambda array: fifesim.index(array, "EVI2"),
+                 lambda array: fifesim.invert(fifesim.ndvi(array), fit)["lai"]):  # fmt: skip
+        with no_compute():
+            lazy = verb(in_chunks(image, {"line": 2, "sample": 3}))
+        assert lazy.chunks is not None and lazy.dims[-2:] == ("line", "sample")
+        xr.testing.assert_identical(lazy.compute(), verb(image))
+
+
+@pytest.mark.parametrize("verb", [fifesim.aggregate, lambda array: fifesim.regress(array, array)])
+def test_what_takes_maps_names_the_way_to_one(verb):
+    toa, away = lit()
+    with pytest.raises(ValueError, match=r"\.fifesim\.grid_swath\(grid\)"):
+        verb(fifesim.sense_swath(toa, "TM", **away).fifesim.ndvi())
 
 
 def test_sun_that_varies_over_the_scene_is_that_of_each_pixel():
