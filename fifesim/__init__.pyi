@@ -69,7 +69,6 @@ from .base.bands import Band as Band
 # Analysis
 from .analysis.rasters.means import aggregate as aggregate  # method
 from .chain.images import ndvi as ndvi  # method
-from .chain.images import index as index  # method
 from .analysis.rasters.regression import regress as regress  # method
 from .analysis.regression import Regression as Regression
 from .analysis.rasters.uncertainty import relative_equivalent_noise as relative_equivalent_noise  # method
@@ -84,6 +83,7 @@ from .analysis.rasters.scaling import fpar_bias as fpar_bias  # method
 from .analysis.rasters.lags import autocovariance as autocovariance  # method
 from .analysis.rasters.lags import variogram as variogram  # method
 from .analysis.rasters.lags import regularized_variance as regularized_variance  # method
+from .chain.images import index as index  # method
 
 # Pictures
 from .output.pictures import plot as plot  # method

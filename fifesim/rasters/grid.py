@@ -110,8 +110,7 @@ def geobox(array):
     """
     missing = {"y", "x"} - set(array.dims)
     if missing:
-        cure = "put it onto a map with .fifesim.grid_swath(grid)" if "line" in array.dims else "rename its dimensions"
-        raise ValueError(f"a raster has dimensions y and x, got {array.dims}: {cure}")
+        raise ValueError(f"a raster has dimensions y and x, got {array.dims}: rename its dimensions")
     if "spatial_ref" not in array.coords and array.odc.crs is None:
         raise ValueError(
             "the raster has no CRS: open its file with decode_coords='all', or import rioxarray and give it one with "
