@@ -16,7 +16,8 @@ AWAY = {"nadir_offset": -60e3, "heading": 193.6}
 def light(site, geometry):
     lai = xr.DataArray(np.full(site.shape, 2.0), dims=("y", "x")).odc.assign_crs(site.crs)
     lai = lai.assign_coords(fifesim.rasters.grid.coordinates(site))
-    return lai.fifesim.surface_reflectance("TM", bands=["TM3"], geometry=geometry).fifesim.to_toa()
+    air = fifesim.Atmosphere()
+    return lai.fifesim.surface_reflectance("TM", bands=["TM3"], geometry=geometry, atmosphere=air).fifesim.to_toa()
 
 
 def test_light_at_nadir_is_not_seen_from_the_side(site):
