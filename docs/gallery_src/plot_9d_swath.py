@@ -15,13 +15,13 @@ grid = fifesim.grid_at("EPSG:26914", 100e3, 4440e3, 1000e3, 60e3, 500.0)
 away = {"nadir_offset": 500e3, "heading": 0.0}
 lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.248, seed=7)
 view = fifesim.scan_geometry("AVHRR", grid, **away).assign(sza=40.0, saa=150.0)
-rho = lai.fifesim.surface_reflectance("AVHRR", geometry=view)
+rho = lai.fifesim.surface_reflectance("AVHRR", geometry=view, atmosphere=fifesim.Atmosphere(visibility=30))
 image = rho.fifesim.to_toa().fifesim.sense_swath("AVHRR", **away)
 ndvi = image.fifesim.ndvi()
 
 # %%
-# **Pixels where they lie**, in two parts of 60 km. At 55° a footprint is 2.8 times as wide as at nadir, and 1.6 times as
-# long: lines, which follow each other as at nadir, overlap.
+# **Pixels where they lie**, in two parts of 60 km. At 55° a footprint is 2.8 times as wide as at nadir, and 1.6 times
+# as long: lines, which follow each other as at nadir, overlap.
 
 ends = (110, 1030)
 figure, axes = plt.subplots(1, 2, figsize=(12, 4.6), layout="constrained")
