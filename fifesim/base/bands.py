@@ -29,7 +29,7 @@ class Window(NamedTuple):
 
 # The absorption of all pigments, the green peak and the red absorption of chlorophyll, the plateau of leaves in the
 # near infrared, and the window between two absorption bands of water vapour, where that of leaves absorbs too.
-BLUE = Window("blue", 0.45, 0.515, 0.48)
+BLUE = Window("blue", 0.45, 0.52, 0.48)
 GREEN = Window("green", 0.50, 0.60, 0.56)
 RED = Window("red", 0.60, 0.70, 0.66)
 NEAR_INFRARED = Window("near infrared", 0.75, 1.00, 0.84)

@@ -79,57 +79,79 @@ def comparison_table(images, truth=None):
     -------
     table : pandas.DataFrame
         By instrument: ``pixel`` [m], ``rows``, ``columns``, ``bands``, ``ndvi_mean``, ``ndvi_sd``, and with a truth
-        ``slope``, ``intercept`` and ``r2`` of it on the NDVI, with the ``n`` pixels that both have.
+        ``slope``, ``intercept`` and ``r2`` of it on the NDVI, with the ``n`` pixels that both have. NaN where the bands
+        make no NDVI.
 
     Raises
     ------
     ValueError
-        If an image has no red or no near infrared band, or the truth does not lie on its ground.
+        If the tree holds something else, or the truth does not lie on its ground.
 
     See Also
     --------
     fifesim.analysis.rasters.regression.regress
     """
     rows = {}
-    for name, node in images.children.items():
-        image = recorded_image(node)
+    for name, image in recorded_images(images).items():
         grid = grids.geobox(image)
+        row = {"pixel": grids.cell_size(grid)[0], "rows": grid.shape.y, "columns": grid.shape.x}
+        rows[name] = row | {"bands": ", ".join(map(str, image["band"].values))}
+        if not shows_ndvi(image):
+            continue
         # Once, for the mean, the deviation and the regression.
         shown = computed(ndvi(image))[0]
-        row = {"pixel": grids.cell_size(grid)[0], "rows": grid.shape.y, "columns": grid.shape.x}
-        row |= {"bands": ", ".join(map(str, image["band"].values))}
-        row |= {"ndvi_mean": float(shown.mean()), "ndvi_sd": float(shown.std(ddof=1))}
+        row = {"ndvi_mean": float(shown.mean()), "ndvi_sd": float(shown.std(ddof=1))}
         if truth is not None:
             means = regularized(truth, areas(grid), grid, min_valid=sensor.MIN_VALID)
             fit = regress(means, shown)
             row |= {"slope": fit.slope, "intercept": fit.intercept, "r2": fit.r2, "n": fit.n}
-        rows[name] = row
+        rows[name] |= row
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("instrument")
 
 
-def recorded_image(node):
+def recorded_images(images):
     """
-    What an instrument recorded, as `compare` keeps it.
+    What instruments recorded, as `compare` keeps it.
 
     Parameters
     ----------
-    node : xarray.DataTree
-        Of one instrument.
+    images : xarray.DataTree
 
     Returns
     -------
-    image : xarray.DataArray, dims (band, y, x)
+    images : dict of str to xarray.DataArray, dims (band, y, x)
+        By the name of the instrument, with its pixel where it has several.
 
     Raises
     ------
     ValueError
-        If it holds neither digital numbers nor radiance.
+        If a node holds neither digital numbers nor radiance.
     """
-    for name in ("dn", "toa_radiance"):
-        if name in node.data_vars:
-            return node[name]
-    holds = ", ".join(map(str, node.data_vars)) or "nothing"
-    raise ValueError(f"{node.name or 'the tree'} holds no dn and no toa_radiance, but {holds}: give that of compare")
+    found = {}
+    for node in images.leaves:
+        name = node.path.strip("/") or "the tree"
+        variables = [each for each in ("dn", "toa_radiance") if each in node.data_vars]
+        if not variables:
+            holds = ", ".join(map(str, node.data_vars)) or "nothing"
+            raise ValueError(f"{name} holds no dn and no toa_radiance, but {holds}: give that of compare")
+        found[name] = node[variables[0]]
+    return found
+
+
+def shows_ndvi(image):
+    """
+    Whether an image has a red and a near infrared band.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+        With a coordinate ``wavelength``. [um]
+
+    Returns
+    -------
+    shows : bool
+    """
+    return all(nearest(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))
 
 
 def _bands(description, names):

@@ -8,7 +8,7 @@ from matplotlib.colors import ListedColormap
 
 from fifesim.analysis.rasters.pairs import matched
 from fifesim.base.scan_pixels import corners
-from fifesim.chain.comparison import recorded_image as image_of
+from fifesim.chain.comparison import recorded_images, shows_ndvi
 from fifesim.chain.images import ndvi
 from fifesim.output.composites import composite_bands, rgb, thinned, valid
 from fifesim.output.words import long_name, short_name, subject, unit
@@ -174,9 +174,18 @@ def plot_comparison(images, *, limits=None):
     Raises
     ------
     ValueError
-        If an image has no red or no near infrared band.
+        If no image has a red and a near infrared band.
+
+    Notes
+    -----
+    Large images are thinned; mean and deviation are of the pixels drawn.
     """
-    found = {name: ndvi(thinned(image_of(node), 800)) for name, node in images.children.items()}
+    recorded = {name: image for name, image in recorded_images(images).items() if shows_ndvi(image)}
+    if not recorded:
+        raise ValueError(
+            "no image has a red and a near infrared band: compare them with bands={instrument: [red, nir]}"
+        )
+    found = {name: ndvi(thinned(image, 800)) for name, image in recorded.items()}
     maps = dict(zip(found, computed(*found.values()), strict=True))
     if limits is None:
         values = np.concatenate([each.values[np.isfinite(each.values)] for each in maps.values()])
@@ -191,7 +200,7 @@ def plot_comparison(images, *, limits=None):
     for axes, (name, array) in zip(panels.ravel(), maps.items(), strict=False):
         axes.set_facecolor(_NO_DATA)
         drawn = _draw(axes, array, cmap="YlGn", vmin=limits[0], vmax=limits[1])
-        pixel = grids.cell_size(grids.geobox(image_of(images[name])))[0]
+        pixel = grids.cell_size(grids.geobox(recorded[name]))[0]
         mean, deviation = float(array.mean()), float(array.std())
         axes.set_title(f"{name}, {pixel:g} m\nmean {mean:.3f}, sd {deviation:.3f}", fontsize="medium")
     for axes in panels[:, 1:].ravel():
@@ -226,6 +235,11 @@ def _checked(raster, band):
 def _draw(axes, array, colours=None, **style):
     """A raster as a map with the same scale along both axes, in metres or kilometres."""
     values = array.values if colours is None else colours
+    if "line" in array.dims and "x" not in array.coords:
+        latitude, longitude = corners(array["latitude"].values, array["longitude"].values)
+        drawn = axes.pcolormesh(longitude, latitude, values, **style)
+        axes.set(xlabel="Longitude [°]", ylabel="Latitude [°]", aspect=1 / np.cos(np.radians(latitude.mean())))
+        return drawn
     if "line" in array.dims:
         y, x = corners(array["y"].values, array["x"].values)
         unit_size, name = _length(np.ptp(x), np.ptp(y))
@@ -249,7 +263,8 @@ def _length(width, height):
 def _ratio(array):
     """Height of a map over its width."""
     if "line" in array.dims:
-        return float(np.ptp(array["y"].values) / max(np.ptp(array["x"].values), 1.0))
+        up, right = ("y", "x") if "x" in array.coords else ("latitude", "longitude")
+        return float(np.ptp(array[up].values) / max(np.ptp(array[right].values), 1e-6))
     down, across = grids.cell_size(grids.geobox(array))
     return array.sizes["y"] * down / (array.sizes["x"] * across)
 

@@ -48,7 +48,7 @@ def test_index_without_a_denominator_or_a_root_is_missing():
 
 
 def test_windows_of_bands_do_not_overlap():
-    """But for the blue and the green, of which a band at 0.5 to 0.515 um shows both."""
+    """But for the blue and the green, of which a band at 0.5 to 0.52 um shows both."""
     windows = (BLUE, GREEN, RED, NEAR_INFRARED, SHORTWAVE_INFRARED)
     assert all(each.low < each.best < each.high for each in windows)
     assert all(one.high <= other.low for one, other in pairwise(windows[1:]))

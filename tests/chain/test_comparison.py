@@ -120,6 +120,15 @@ def test_table_has_a_row_for_each_instrument(lai):
     assert "r2" not in images.fifesim.comparison_table()
 
 
+def test_images_of_an_instrument_s_other_pixels_have_rows_of_their_own(lai):
+    """Bands without a red and a near infrared have no NDVI."""
+    image = fifesim.compare(lai, ["TM"])["TM"]
+    tree = xr.DataTree.from_dict({"/TM/30m": image.to_dataset(), "/TM/red": image["dn"].isel(band=[0]).to_dataset()})
+    table = tree.fifesim.comparison_table()
+    assert table.index.tolist() == ["TM/30m", "TM/red"]
+    assert np.isnan(table.loc["TM/red", "ndvi_mean"]) and table.loc["TM/red", "bands"] == "TM3"
+
+
 def test_table_of_something_else_is_refused(lai):
     with pytest.raises(ValueError, match="TM holds no dn and no toa_radiance, but lai"):
         xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")}).fifesim.comparison_table()

@@ -102,6 +102,14 @@ def test_a_scan_is_drawn_where_its_pixels_lie(site):
         np.testing.assert_allclose(inside, [image["x"].mean(), image["y"].mean()], rtol=0, atol=1e-2)
 
 
+def test_a_scan_that_knows_degrees_alone_is_drawn_in_them():
+    line, sample = np.mgrid[0:4, 0:5]
+    places = {"latitude": (("line", "sample"), 60 - line * 0.01), "longitude": (("line", "sample"), 9 + sample * 0.02)}
+    axes = xr.DataArray(line + 0.0, dims=("line", "sample"), coords=places, name="ndvi").fifesim.plot()
+    assert axes.get_ylabel() == "Latitude [°]" and axes.get_aspect() == pytest.approx(2, rel=1e-2)
+    np.testing.assert_allclose(drawn(axes).get_coordinates()[0, 0], [8.99, 60.005])
+
+
 def test_what_is_no_map_is_named(whole):
     with pytest.raises(ValueError, match=r"there is no band 'TM1': the raster has TM3, TM4"):
         whole["image"].fifesim.plot(band="TM1")
@@ -151,3 +159,5 @@ def test_instruments_stand_side_by_side_in_the_same_colours(lai):
     assert panels[0].images[0].get_clim() == panels[1].images[0].get_clim()
     mean = float(images["TM"]["dn"].fifesim.ndvi().mean())
     assert f"mean {mean:.3f}" in panels[1].get_title() and "30 m" in panels[1].get_title()
+    with pytest.raises(ValueError, match="no image has a red and a near infrared band"):
+        xr.DataTree.from_dict({"/TM": images["TM/dn"].isel(band=[0]).to_dataset()}).fifesim.plot_comparison()

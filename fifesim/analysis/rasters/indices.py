@@ -26,7 +26,7 @@ def index(reflectance, name):
     Parameters
     ----------
     reflectance : xarray.DataArray, dims (band, y, x)
-        With a coordinate ``wavelength`` along band, which tells blue (0.45-0.515 um), green (0.50-0.60 um), red
+        With a coordinate ``wavelength`` along band, which tells blue (0.45-0.52 um), green (0.50-0.60 um), red
         (0.60-0.70 um), near infrared (0.75-1.00 um) and shortwave infrared (1.53-1.75 um).
     name : str
         A key of `INDICES`.
