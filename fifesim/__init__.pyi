@@ -51,10 +51,12 @@ from .sensor.response.rasters.bands import to_bands as to_bands  # method
 from .sensor.scan.rasters.view import scan_geometry as scan_geometry
 from .sensor.scan.track import Track as Track
 from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method
+from .rasters.swaths import grid_swath as grid_swath  # method
 from .chain.comparison import compare as compare  # method
 from .chain.adjustment import as_seen_by as as_seen_by  # method, of a Dataset too
 from .chain.adjustment import adjust_bands as adjust_bands  # method, of a Dataset too
 from .chain.adjustment import spectral_adjustment as spectral_adjustment
+from .chain.comparison import comparison_table as comparison_table  # method of a DataTree
 from .sensor.response.rasters.spread import psf as psf
 from .sensor.response.rasters.spread import mtf as mtf
 from .sensor.response.noise import NoiseModel as NoiseModel
@@ -85,6 +87,13 @@ from .analysis.rasters.scaling import fpar_bias as fpar_bias  # method
 from .analysis.rasters.lags import autocovariance as autocovariance  # method
 from .analysis.rasters.lags import variogram as variogram  # method
 from .analysis.rasters.lags import regularized_variance as regularized_variance  # method
+from .chain.images import index as index  # method
+
+# Pictures
+from .output.pictures import plot as plot  # method
+from .output.composites import rgb as rgb  # method
+from .output.pictures import plot_fit as plot_fit
+from .output.pictures import plot_comparison as plot_comparison  # method of a DataTree
 
 # Images of one's own
 from .sensor.products.rasters.landsat import open_landsat as open_landsat

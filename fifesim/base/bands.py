@@ -29,10 +29,13 @@ class Window(NamedTuple):
     best: float
 
 
-# The green peak and the red absorption of chlorophyll, and the plateau of leaves in the near infrared.
+# The absorption of all pigments, the green peak and the red absorption of chlorophyll, the plateau of leaves in the
+# near infrared, and the window between two absorption bands of water vapour, where that of leaves absorbs too.
+BLUE = Window("blue", 0.45, 0.52, 0.48)
 GREEN = Window("green", 0.50, 0.60, 0.56)
 RED = Window("red", 0.60, 0.70, 0.66)
 NEAR_INFRARED = Window("near infrared", 0.75, 1.00, 0.84)
+SHORTWAVE_INFRARED = Window("shortwave infrared", 1.53, 1.75, 1.62)
 
 # Common names of bands in catalogues of images, with the wavelengths between which they lie by the table of STAC's
 # extension for electro-optical data (its README, github.com/stac-extensions/eo), and where Landsat or Sentinel-2 has

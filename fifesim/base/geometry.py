@@ -254,3 +254,31 @@ def fife_geometry():
         sza 28.5, saa 117.0, vza 0, vaa 0. [degree]
     """
     return sun_position(fife.TIME, fife.LATITUDE, fife.LONGITUDE, fife.ALTITUDE)
+
+
+def angle_between(zenith, azimuth, other_zenith, other_azimuth):
+    r"""
+    Angle between two directions.
+
+    .. math:: \cos \gamma = \cos \theta \cos \theta' + \sin \theta \sin \theta' \cos(\varphi - \varphi')
+
+    Parameters
+    ----------
+    zenith, azimuth, other_zenith, other_azimuth : array
+        [degree]
+
+    Returns
+    -------
+    angle : array, shape of the broadcast inputs
+        [degree]
+
+    Examples
+    --------
+    >>> [round(float(angle_between(20.0, 90.0, *other)), 9) for other in ((50.0, 90.0), (50.0, 270.0), (0.0, 17.0))]
+    [30.0, 70.0, 20.0]
+    """
+    theta, other = np.radians(zenith), np.radians(other_zenith)
+    # By half angles, which keep their digits where the two agree.
+    turn = np.radians(np.subtract(azimuth, other_azimuth)) / 2
+    square = np.sin((theta - other) / 2) ** 2 + np.sin(theta) * np.sin(other) * np.sin(turn) ** 2
+    return np.degrees(2 * np.arcsin(np.sqrt(np.clip(square, 0, 1))))

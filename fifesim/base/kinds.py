@@ -151,7 +151,9 @@ INSTRUMENTS = Kind(
 )
 CHUNKS = Kind(
     "a number of cells, 'auto', '64MB', None or a mapping such as {'y': 1024, 'x': 1024}",
-    lambda value: value is None or _is_number(value) or isinstance(value, tuple) or _is_mapping(value) or _is_size(value),
+    lambda value: (
+        value is None or _is_number(value) or isinstance(value, tuple) or _is_mapping(value) or _is_size(value)
+    ),
 )
 GEOMETRY = Kind(
     "a fifesim.Geometry, or an xarray.Dataset of sza, saa, vza and vaa",

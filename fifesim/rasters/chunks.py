@@ -155,7 +155,7 @@ def windows(kernel, reads, shape, chunks=None, dtype=float):
     return array_from_windows(kernel, arrays, chunks, ask, token=token, leading=leading, dtype=dtype)
 
 
-def in_blocks(kernel, reads, shape, size):
+def in_blocks(kernel, reads, shape, size, dtype=float):
     """
     Array that is made by fixed blocks, however it is read.
 
@@ -165,6 +165,8 @@ def in_blocks(kernel, reads, shape, size):
         As in `windows`.
     size : int
         Rows and columns of a block, counted from the first cell.
+    dtype : dtype, optional
+        Of the result.
 
     Returns
     -------
@@ -173,8 +175,8 @@ def in_blocks(kernel, reads, shape, size):
     """
     sizes = tuple(tuple(np.diff([*range(0, length, size), length]).tolist()) for length in shape[-2:])
     if any(isinstance(each.array, da.Array) for each in reads):
-        return windows(kernel, reads, shape, sizes)
-    out = np.empty(shape)
+        return windows(kernel, reads, shape, sizes, dtype)
+    out = np.empty(shape, dtype)
     for block in product(*map(slices, sizes)):
         out[(..., *block)] = kernel(*block, *(gather(each.array, each.window(*block)) for each in reads))
     return out

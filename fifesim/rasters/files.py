@@ -66,6 +66,10 @@ def to_geotiff(raster, path):
     """
     path = Path(path)
     array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
+    if "line" in array.dims:
+        raise ValueError(
+            "a GeoTIFF holds a map, and this is by line and sample: put it onto one with .grid_swath(grid)"
+        )
     if not set(array.dims) <= {"band", "y", "x"}:
         raise ValueError(f"a GeoTIFF holds dimensions (band, y, x), got {array.dims}: select or rename")
     array = array if "band" in array.dims else array.expand_dims("band")

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.rasters import cf, chunks
-from fifesim.rasters.axes import check_axes, north_up
+from fifesim.rasters.axes import check_axes, is_scan, north_up
 
 # A reflectance factor beyond these is none: glint, snow and slopes in low sun stay within. [1]
 LOWEST, HIGHEST = -0.5, 5.0
@@ -126,7 +126,8 @@ def check_reflectance(values):
 def _bands_as_one(raster, name):
     """Variables of a Dataset as bands."""
     if not isinstance(raster, xr.Dataset):
-        check_axes(raster)
+        if not is_scan(raster):
+            check_axes(raster)
         return raster
     bands = [key for key, value in raster.data_vars.items() if value.ndim >= 2]
     if not bands:

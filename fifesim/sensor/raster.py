@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import ANGLES
-from fifesim.rasters import cf, chunks, directions
+from fifesim.rasters import cf, chunks, directions, swaths
 from fifesim.rasters import grid as grids
 from fifesim.rasters.dates import by_date
 from fifesim.rasters.own_rasters import incoming
@@ -248,7 +248,7 @@ def to_radiance(image):
     if missing:
         raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
     out = chunks.pointwise(calibration.dn_to_radiance, image, _along_band(image, "gain"), _along_band(image, "offset"))
-    out = _placed_as(out.drop_vars(["gain", "offset"]), image)
+    out = swaths.placed_as(out.drop_vars(["gain", "offset"]), image)
     return cf.label(out, "toa_radiance", source=image, history="to_radiance")
 
 
@@ -283,13 +283,8 @@ def to_reflectance(image):
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
     out = _by_sun(calibration.radiance_to_reflectance, radiance, _along_band(image, "solar_irradiance"), geometry)
-    out = _placed_as(out, image)
+    out = swaths.placed_as(out, image)
     return cf.label(out, "toa_reflectance", source=radiance, history="to_reflectance")
-
-
-def _placed_as(array, image):
-    """On the grid of an image; the pixels of a scan have none, and keep their coordinates."""
-    return grids.place(array, grids.geobox(image)) if {"y", "x"} <= set(image.dims) else array
 
 
 def as_radiance(array, bands, geometry):

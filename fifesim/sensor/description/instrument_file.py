@@ -81,6 +81,12 @@ class Instrument:
             for number in (*BAND_NUMBERS, *_given(band)):
                 self.source(number, band)
 
+    def __repr__(self):
+        return (
+            f"Instrument {self.name}: {self.title}, {self.gsd:g} m pixels from {self.altitude / 1000:g} km, "
+            f"{self.bits} bits\n  bands {', '.join(band.name for band in self.bands)}"
+        )
+
     @property
     def max_angle(self):
         """Largest scan angle from nadir, infinite where the file has no scan [degree]."""

@@ -98,3 +98,10 @@ def test_bands_are_asked_for_once():
         instrument("TM").select(["TM3", "tm3"])
     with pytest.raises(ValueError, match="at least one, each once, got none"):
         instrument("TM").select([])
+
+
+def test_instrument_is_told_in_two_lines():
+    assert repr(instrument("TM")) == (
+        "Instrument TM: Landsat-5 Thematic Mapper, 30 m pixels from 705 km, 8 bits\n"
+        "  bands TM1, TM2, TM3, TM4, TM5, TM7"
+    )
