@@ -1,9 +1,11 @@
 """Grids of study sites."""
 
+import pyproj
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.base import fife
+from fifesim.rasters import whereabouts
 
 
 def fife_site(cell, window=None, datum="NAD83"):
@@ -43,6 +45,32 @@ def fife_site(cell, window=None, datum="NAD83"):
     size = int(fife.SIZE / cell + 1e-6)
     site = GeoBox((size, size), Affine(cell, 0.0, west, 0.0, -cell, north), crs)
     return site if window is None else _window(site, window)
+
+
+def on_fife_site(grid):
+    """
+    Whether the middle of a grid lies on the FIFE site, where the paper's sun and air hold.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    answer : bool
+
+    Examples
+    --------
+    >>> on_fife_site(fife_site(300.0)), on_fife_site(fife_site(300.0).pad(50)[:50, :50])
+    (True, False)
+    """
+    longitude, latitude = whereabouts.middle(grid)
+    if max(abs(longitude - fife.LONGITUDE), abs(latitude - fife.LATITUDE)) > 1:
+        return False
+    crs, west, north = fife.CORNERS["NAD83"]
+    x, y = pyproj.Transformer.from_crs(4326, crs, always_xy=True).transform(longitude, latitude)
+    # The corner of one datum is 9 m from that of the other.
+    return max(abs(x - west - fife.SIZE / 2), abs(y - north + fife.SIZE / 2)) <= fife.SIZE / 2 + 10
 
 
 def _window(site, window):

@@ -21,6 +21,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters import places, projection
 from fifesim.rasters.opening import ErrorsOfGdal, raster_file
 from fifesim.rasters.soundness import check_raster, horizontal_crs
+from fifesim.rasters.whereabouts import lies_in_words
 
 # Cells are made in fixed tiles of this size, so that the warper's rounding is the same under any chunking.
 _TILE = 512
@@ -76,7 +77,11 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False):
         pipeline, _ = projection.operation(crs, grid.crs.to_wkt(), area)
         back, _ = projection.operation(grid.crs.to_wkt(), crs, area)
         if _source_window(source, crs, grid, back) is None:
-            raise ValueError(f"{file.name} does not overlap the grid, which spans {grids.extent(grid)}")
+            lies = lies_in_words(source.transform, source.shape, crs)
+            raise ValueError(
+                f"{file.name} does not overlap the grid, which spans {grids.extent(grid)} in "
+                f"{projection.name_of(grid.crs.proj)}: the file spans {lies}"
+            )
     # A file that has changed is another file to the cache.
     make_tile = partial(_warp_tile, file, file.state, grid, pipeline, back)
     row, column = grids.lattice_position(grid)
@@ -87,7 +92,7 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False):
     return places.tiles(kernel, grid, chunks, tile=_TILE)
 
 
-def covering_grid(path, cell, pixel):
+def covering_grid(path, cell, pixel, crs=None):
     """
     Grid that covers a raster file, from and to whole pixels of its CRS.
 
@@ -98,27 +103,37 @@ def covering_grid(path, cell, pixel):
         [m]
     pixel : float
         Size that the corners are multiples of. [m]
+    crs : str, optional
+        Of the grid; by default the file's where that is projected, else its UTM zone.
 
     Returns
     -------
     grid : odc.geo.geobox.GeoBox
-        In the file's CRS where that is projected, else in its UTM zone.
 
     Raises
     ------
     ValueError
-        If the file is missing, has no CRS, or lies in a CRS that is not in metres.
+        If the file is missing, has no CRS, or the grid's CRS is not in metres or not known to reach it.
     """
-    with _checked(raster_file(path)) as (source, crs):
-        crs = pyproj.CRS.from_user_input(crs)
+    file = raster_file(path)
+    with _checked(file) as (source, own):
+        own = pyproj.CRS.from_user_input(own)
         outline = [np.linspace(0, size, 17) for size in (source.width, source.height)]
         columns, rows = (values.ravel() for values in np.meshgrid(*outline))
         x, y = projection.transform_points(source.transform, columns, rows)
-    if crs.is_geographic:
-        target = _utm(crs, x, y)
-        pipeline, _ = projection.operation(crs, target, (x.min(), y.min(), x.max(), y.max()))
-        x, y = projection.carry(pipeline, crs, target, x, y)
-        crs = target
+        lies = lies_in_words(source.transform, source.shape, own)
+    to_degrees = pyproj.Transformer.from_crs(own, 4326, always_xy=True)
+    area = to_degrees.transform_bounds(x.min(), y.min(), x.max(), y.max()) if crs or own.is_geographic else None
+    if crs is not None:
+        crs = pyproj.CRS.from_user_input(projection.horizontal(crs))
+    else:
+        crs = _utm(own, x, y) if own.is_geographic else own
+    if crs != own:
+        pipeline, _ = projection.operation(own, crs, area)
+        x, y = projection.carry(pipeline, own, crs, x, y)
+        if not np.isfinite([x, y]).all():
+            raise ValueError(f"{projection.name_of(crs)} does not reach {file.name}: it spans {lies}")
+        projection.check_metres(crs, (x.min(), y.min(), x.max(), y.max()))
     west, north = np.floor(np.min(x) / pixel) * pixel, np.ceil(np.max(y) / pixel) * pixel
     width, height = np.ceil((np.max(x) - west) / pixel) * pixel, np.ceil((north - np.min(y)) / pixel) * pixel
     name = f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else crs.to_wkt()

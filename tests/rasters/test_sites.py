@@ -5,6 +5,7 @@ import odc.geo.xr  # noqa: F401  registers .odc
 import pytest
 
 import fifesim
+from fifesim.rasters.sites import on_fife_site
 
 CELL = 30 / 9
 
@@ -48,3 +49,12 @@ def test_only_whole_cells_are_kept():
 def test_site_refuses_what_makes_no_grid(options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.fife_site(**options)
+
+
+@pytest.mark.parametrize("datum", ["NAD83", "NAD27"])
+def test_the_site_is_the_site_in_any_reference_system(datum):
+    corner = fifesim.fife_site(30, datum=datum)[:2, :2]
+    assert on_fife_site(corner) and not on_fife_site(corner.pad(20)[:3, :3])
+    geodetic = fifesim.grid_at("EPSG:5070", -50000.0, 1788000.0, 300.0, 300.0, 30)
+    assert on_fife_site(geodetic)
+    assert not on_fife_site(fifesim.grid_at("EPSG:32735", 712000.0, 4327000.0 + 1e6, 300.0, 300.0, 30))

@@ -5,6 +5,7 @@ import tomllib
 from dataclasses import fields
 
 import numpy as np
+import pyproj
 import pytest
 import rasterio
 from affine import Affine
@@ -12,7 +13,7 @@ from affine import Affine
 import fifesim
 from fifesim.atmosphere.schemes import six_s
 from fifesim.base import fife
-from fifesim.base.geometry import earth_sun_distance
+from fifesim.base.geometry import earth_sun_distance, sun_position
 from fifesim.rasters import grid as grids
 from fifesim.scenario.scenario import Scenario, parse_scenario
 from fifesim.scenario.sections import Ground
@@ -188,6 +189,39 @@ def test_scene_of_a_map_covers_the_map(tmp_path):
     assert covering.left <= 709003 < covering.left + 30 and covering.top - 30 < 4332001 <= covering.top
     given = parse_scenario(SMALL | {"ground": {"lai_file": str(path)}}).geobox()
     assert given == parse_scenario(SMALL).geobox()
+    in_cone = parse_scenario({"grid": {"crs": "EPSG:5070"}, "ground": {"lai_file": str(path)}}).geobox()
+    to_cone = pyproj.Transformer.from_crs(26914, 5070, always_xy=True)
+    west, south, east, north = to_cone.transform_bounds(709003, 4331671, 709443, 4332001)
+    box = in_cone.boundingbox
+    assert in_cone.crs.epsg == 5070
+    assert box.left <= west < box.left + 30 and box.top - 30 < north <= box.top
+    assert box.right - 30 < east <= box.right and box.bottom <= south < box.bottom + 30
+
+
+SOUTH = {"crs": "EPSG:32735", "west": 620000.0, "north": 7220000.0, "width": 300.0, "height": 300.0, "cell": 10.0}
+
+
+def test_place_of_a_grid_is_its_own_and_what_holds_for_fife_is_asked_for():
+    with pytest.raises(ValueError) as caught:
+        parse_scenario({"grid": SOUTH}).complete()
+    said = str(caught.value)
+    assert said.startswith("grid: its middle, latitude -25.13, longitude 28.19, is not on the site of FIFE: give ")
+    assert "geometry.time" in said and "geometry.sza and saa" in said and "atmosphere.altitude" in said
+    with pytest.raises(ValueError, match=r"FIFE: give geometry.time, such as [^;]*$"):
+        parse_scenario({"grid": SOUTH, "atmosphere": {"altitude": 1.3}}).complete()
+    air = {"atmosphere": {"altitude": 1.3}}
+    overpass = parse_scenario({"grid": SOUTH, "geometry": {"time": "2022-06-01T08:05Z"}} | air).complete()
+    longitude, latitude = pyproj.Transformer.from_crs(32735, 4326, always_xy=True).transform(620150, 7219850)
+    sun = sun_position("2022-06-01T08:05Z", latitude, longitude, 1300)
+    assert (overpass.sun_and_view().sza, overpass.sun_and_view().saa) == pytest.approx((sun.sza, sun.saa), abs=1e-9)
+    assert sun.saa < 90  # north of east, as below the equator in winter
+    given = parse_scenario({"grid": SOUTH, "geometry": {"sza": 50, "saa": 40}} | air).complete()
+    assert given.geometry.time is None and given.sun_and_view().earth_sun_distance == 1.0
+
+
+def test_crs_alone_has_no_corner():
+    with pytest.raises(ValueError, match=r"grid.crs = 'EPSG:32614' is given without west and north: type the upper"):
+        parse_scenario({"grid": {"crs": "EPSG:32614"}}).geobox()
 
 
 def test_scenario_is_frozen():
