@@ -185,11 +185,11 @@ class SensorKeys(Section):
     """The instrument."""
 
     instrument: str = file("TM", "see: fifesim sensors", suffix=".toml")
-    bands: list[str] = text(["TM3", "TM4"], "names of bands")
+    bands: list[str] = text(["TM3", "TM4"], "names of bands; by default red and near infrared")
     pixel: float | None = number(
         None,
         "m",
-        "size of a pixel; by default the instrument's gridded product; the footprint stays the instrument's",
+        "size of a pixel; by default the bands' gridded product; the footprint stays the instrument's",
         gt=0,
     )
     interval: str | float = Field(

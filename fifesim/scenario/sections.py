@@ -1,6 +1,7 @@
 """What the values of a scenario mean, section by section, and what physics refuses of them."""
 
 from dataclasses import asdict, fields
+from pathlib import Path
 
 from pydantic import field_validator, model_validator
 
@@ -161,6 +162,17 @@ class Air(AirKeys):
 class Sensor(SensorKeys):
     """The instrument."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _own_bands(cls, values):
+        """Without names the red and near infrared band are meant, which scenes of vegetation are seen in."""
+        if not isinstance(values, dict) or "bands" in values or not isinstance(values.get("instrument"), str):
+            return values
+        if cls.names_a_file("instrument", values["instrument"]) and not Path(values["instrument"]).is_file():
+            return values
+        bands = instrument(values["instrument"]).red_and_near_infrared()
+        return values | {"bands": [band.name for band in bands]}
+
     @field_validator("noise")
     @classmethod
     def _known_noise(cls, value):
@@ -171,6 +183,8 @@ class Sensor(SensorKeys):
         for band in self.description.select(self.bands):
             if self.noise:
                 self.description.noise_model(band)
+        if self.pixel is None:
+            _shared_pixel(self.description, self.bands)
         return self
 
     @property
@@ -190,5 +204,18 @@ class Sensor(SensorKeys):
 
     @property
     def size(self):
-        """Size of a pixel: as given, else that of the instrument's gridded product. [m]"""
-        return self.pixel or self.description.gsd
+        """Size of a pixel: as given, else that of the bands' gridded product. [m]"""
+        return self.pixel or _shared_pixel(self.description, self.bands)
+
+
+def _shared_pixel(description, names):
+    """Pixel of the gridded product of some bands, which must share one. [m]"""
+    sizes = {}
+    for band in description.select(names):
+        sizes.setdefault(description.pixel(band), []).append(band.name)
+    if len(sizes) > 1:
+        groups = "; ".join(f"{size:g} m: {', '.join(each)}" for size, each in sizes.items())
+        raise ValueError(
+            f"bands of {description.name} lie on different grids ({groups}): name those of one, or give pixel"
+        )
+    return next(iter(sizes))
