@@ -7,7 +7,8 @@ from fifesim.atmosphere.schemes.engines import check_zenith
 from fifesim.base import fife, geometry
 from fifesim.base.foreign import shown
 from fifesim.rasters import grid as grids
-from fifesim.rasters import warp, whereabouts
+from fifesim.rasters import whereabouts
+from fifesim.rasters.covering import covering_grid
 from fifesim.rasters.sites import on_fife_site
 from fifesim.scenario.keys import EXTENT, GridKeys, Keys
 from fifesim.scenario.sections import Air, Ground, Sensor, Terrain
@@ -35,12 +36,24 @@ class Scenario(Keys):
     sensor: Sensor = Sensor()
 
     def geobox(self):
-        """Grid of the ground cells, an `odc.geo.geobox.GeoBox`."""
+        """
+        Grid of the ground cells.
+
+        Returns
+        -------
+        grid : odc.geo.geobox.GeoBox
+            That of the keys; without corner and size, that which covers the LAI file.
+
+        Raises
+        ------
+        ValueError
+            If there is no such grid, or a CRS of one's own comes without the corner.
+        """
         grid, own = self.grid, self.grid.model_fields_set
         lacking = [key for key in EXTENT if key not in own]
         if self.ground.lai_file and len(lacking) == len(EXTENT):
             crs = grid.crs if "crs" in own else None
-            return warp.covering_grid(self.ground.lai_file, grid.cell, self.sensor.size, crs)
+            return covering_grid(self.ground.lai_file, grid.cell, self.sensor.size, crs)
         box = grids.grid_at(grid.crs, grid.west, grid.north, grid.width, grid.height, grid.cell)
         corner = [key for key in ("west", "north") if key in lacking]
         if "crs" in own and corner and box.crs != fife.CORNERS["NAD83"][0]:

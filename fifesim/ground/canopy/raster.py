@@ -6,11 +6,12 @@ import xarray as xr
 from fifesim.base.geometry import ANGLES, relative_azimuth
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.optics import check_lai
+from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
 from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.packed import unpacked
 
 
 def level_reflectance(
@@ -79,7 +80,7 @@ def level_reflectance(
         "leaf_angles": angles,
         "hotspot": float(hotspot),
     }
-    _check_scene(lai)
+    lai = _checked_scene(lai)
     described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
     if described == "raster":
         cf.check_units(background, "surface_reflectance")
@@ -137,16 +138,21 @@ def fpar(lai, *, geometry=None, leaf_angles="spherical", fpar_inf=absorption.FPA
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "fpar")
     extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))
-    _check_scene(lai)
+    lai = _checked_scene(lai)
     out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
     out = grids.place(out, grids.geobox(lai))
     return cf.label(out, "fpar", source=lai, history=f"fpar: Beer's law, K {extinction:.4f}, limit {fpar_inf:g}")
 
 
-def _check_scene(lai):
+def _checked_scene(lai):
+    """Leaf area of a scene, in its unit; of what is in memory, with data."""
     cf.check_quantity(lai, "lai")
     if set(lai.dims) != {"y", "x"}:
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
+    lai = unpacked(lai)
+    if lai.chunks is None and lai.size and not np.isfinite(lai.values).any():
+        raise ValueError("all cells of the leaf area index are NaN: look at the nodata value and the place of its map")
+    return lai
 
 
 def _per_band(values):
@@ -158,7 +164,7 @@ def _per_band(values):
 
 def _reflectance(lai, background, **parameters):
     # apply_ufunc hands the bands over as the last axis.
-    return canopy_reflectance(lai, background=np.moveaxis(background, -1, 0), **parameters)
+    return canopy_reflectance(check_map(lai), background=np.moveaxis(background, -1, 0), **parameters)
 
 
 def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
@@ -166,7 +172,9 @@ def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
 
     def kernel(cells, ground, sky, sza, saa, vza, vaa):
         directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
-        return directional_reflectance(cells, background=ground, diffuse_fraction=sky, **directions, **parameters)
+        return directional_reflectance(
+            check_map(cells), background=ground, diffuse_fraction=sky, **directions, **parameters
+        )
 
     plain = lai.drop_vars(ANGLES, errors="ignore")
     angles, bands = directions.angles(geometry), len(parameters["leaf_reflectance"])
@@ -182,7 +190,7 @@ def _directions(geometry):
 
 
 def _fpar(lai, **parameters):
-    return absorption.fpar(check_lai(lai), **parameters)
+    return absorption.fpar(check_map(lai), **parameters)
 
 
 def _background_bands(background, bands):
