@@ -11,6 +11,7 @@ from fifesim.ground.canopy import optics
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.canopy.spectra import Spectrum
 from fifesim.ground.terrain.rasters import light as terrain
+from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.rasters import directions
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
@@ -112,6 +113,7 @@ def surface_reflectance(
     )
     if dem is None:
         return level
+    dem = beside_altitude(dem, atmosphere.altitude)
     light = _sunlight(atmosphere, responses, geometry, "surface_reflectance on slopes")
     return terrain.terrain_reflectance(level, dem, upwelling=upwelling, horizon=horizon, **light)
 
