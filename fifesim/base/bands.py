@@ -27,7 +27,8 @@ class Window(NamedTuple):
     best: float
 
 
-# The green peak and the red absorption of chlorophyll, and the plateau of leaves in the near infrared.
+# Blue and red absorption of chlorophyll, the green peak between, and the plateau of leaves in the near infrared.
+BLUE = Window("blue", 0.45, 0.52, 0.48)
 GREEN = Window("green", 0.50, 0.60, 0.56)
 RED = Window("red", 0.60, 0.70, 0.66)
 NEAR_INFRARED = Window("near infrared", 0.75, 1.00, 0.84)

@@ -25,6 +25,7 @@ from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
+from fifesim.rasters.gis import colours, tags_of
 from fifesim.rasters.opening import ErrorsOfGdal, raster_file
 from fifesim.rasters.soundness import check_memory, check_raster, horizontal_crs
 from fifesim.rasters.tags import TAG, read_tag, tag_of
@@ -34,9 +35,11 @@ _BLOCK = 512
 
 _TILED = {"driver": "GTiff", "tiled": True, "blockxsize": _BLOCK, "blockysize": _BLOCK, "bigtiff": "if_safer"}
 _COG = {"driver": "COG", "compress": "deflate", "predictor": "yes", "overview_resampling": "average"}
+# Without it GDAL leaves behind what the whole file has in IMAGERY.
+_COG |= {"copy_src_mdd": "yes"}
 
 
-def to_geotiff(raster, path):
+def to_geotiff(raster, path, *, overwrite=False):
     """
     Write a raster as a cloud-optimised GeoTIFF.
 
@@ -47,6 +50,8 @@ def to_geotiff(raster, path):
     raster : xarray.DataArray, dims ([band], y, x), or xarray.Dataset of variables over (y, x)
         The variables of a dataset become bands.
     path : str or path
+    overwrite : bool, optional
+        Replace a file of that name.
 
     Returns
     -------
@@ -56,15 +61,24 @@ def to_geotiff(raster, path):
     ------
     ValueError
         If the raster has no projected grid or other dimensions.
+    FileExistsError
+        If there is such a file, and ``overwrite`` is not given.
     OSError
         If the file cannot be written.
 
     Notes
     -----
     Bands have names, units, scale and offset, and ``CENTRAL_WAVELENGTH_UM`` in the ``IMAGERY`` domain where there is a
-    wavelength; attributes and the sun are tags. Angles that vary over the cells are not written, which is a warning.
+    wavelength; attributes and the sun are tags, the latter also as Landsat's metadata spell them (``SUN_ELEVATION``), a
+    coordinate ``time`` is ``TIFFTAG_DATETIME`` and ``ACQUISITIONDATETIME``. Red, green, blue and near infrared are
+    what the wavelengths say, not the order of the bands. Angles that vary over the cells are not written, which is a
+    warning.
     """
     path = Path(path)
+    if path.exists() and not overwrite:
+        raise FileExistsError(
+            f"there is a file {in_a_line(path, 150)}: type overwrite=True to replace it, or another name"
+        )
     array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
     if not set(array.dims) <= {"band", "y", "x"}:
         raise ValueError(f"a GeoTIFF holds dimensions (band, y, x), got {array.dims}: select or rename")
@@ -224,6 +238,7 @@ def _stream(array, grid, path, described):
         "width": grid.shape.x,
         "crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
         "transform": grid.affine,
+        "photometric": "minisblack",  # three bytes a pixel would be red, green and blue
         "nodata": 0 if dtype.kind == "u" else np.nan if dtype.kind == "f" else None,
     }
     with rasterio.open(path, "w", **_TILED, **profile) as sink:
@@ -260,7 +275,10 @@ def _describe(sink, array, described):
     kept = tag_of(array, described.dims if isinstance(described, xr.DataArray) else array.dims)
     scalars = {name: item["values"] for name, item in kept["coords"].items() if not item["dims"]}
     readable = {key: str(value) for key, value in (kept["attrs"] | scalars).items()}
-    sink.update_tags(**readable, **{TAG: json.dumps(kept)}, AREA_OR_POINT="Area")
+    tags, imagery = tags_of(array)
+    sink.update_tags(**tags | readable, **{TAG: json.dumps(kept)}, AREA_OR_POINT="Area")
+    sink.update_tags(ns="IMAGERY", **imagery)
+    sink.colorinterp = colours(array)
     names = [str(name) for name in array["band"].values] if "band" in array.coords else [str(array.name)]
     for number, name in enumerate(names, 1):
         sink.set_band_description(number, name)
