@@ -205,6 +205,11 @@ class SensorKeys(Section):
         max_length=2,
     )
     noise: list[str] = text([], "of the detectors: shot, thermal, fixed-pattern")
+    noise_model: _ByName = text(
+        {},
+        "of every band, instead of the instrument's: thermal [W m-2 sr-1 um-1], shot [W m-2 sr-1 um-1], detectors, "
+        "gain_spread [1], offset_spread [W m-2 sr-1 um-1]",
+    )
     seed: int = seed(0, "of the noise")
     min_valid: float = number(0.98, "1", "share of its footprint that a pixel needs on valid cells", ge=0, le=1)
 

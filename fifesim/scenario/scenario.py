@@ -2,6 +2,8 @@
 
 import os
 
+from pydantic import ValidationError
+
 from fifesim.atmosphere.schemes import six_s
 from fifesim.atmosphere.schemes.engines import check_zenith
 from fifesim.base import fife, geometry
@@ -12,7 +14,7 @@ from fifesim.rasters.covering import covering_grid
 from fifesim.rasters.sites import on_fife_site
 from fifesim.scenario.keys import EXTENT, GridKeys, Keys
 from fifesim.scenario.sections import Air, Ground, Sensor, Terrain
-from fifesim.scenario.toml import load_values, validated
+from fifesim.scenario.toml import load_values, mistakes
 
 
 class Scenario(Keys):
@@ -26,14 +28,20 @@ class Scenario(Keys):
 
     Raises
     ------
-    pydantic.ValidationError
-        If a key is unknown or a value not allowed; `read_scenario` turns it into one line a mistake.
+    ValueError
+        If a key is unknown or a value not allowed: one line a mistake.
     """
 
     ground: Ground = Ground()
     terrain: Terrain = Terrain()
     atmosphere: Air = Air()
     sensor: Sensor = Sensor()
+
+    def __init__(self, /, **sections):
+        try:
+            super().__init__(**sections)
+        except ValidationError as error:
+            raise ValueError(mistakes(error)) from None
 
     def geobox(self):
         """
@@ -212,7 +220,7 @@ def parse_scenario(values):
     >>> parse_scenario({"atmosphere": {"visibility": "23 km"}}).atmosphere.visibility
     23.0
     """
-    return validated(Scenario, values)
+    return Scenario(**values)
 
 
 def read_scenario(path):

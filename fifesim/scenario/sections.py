@@ -17,8 +17,8 @@ from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.scenario.keys import AirKeys, GroundKeys, SensorKeys, TerrainKeys
 from fifesim.scenario.section import nearest
-from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.response.noise import check_kinds
+from fifesim.sensor.description.instruments import instrument, noise_of
+from fifesim.sensor.response.noise import NoiseModel, check_kinds
 
 _BY_BAND = ("leaf_reflectance", "leaf_transmittance")
 
@@ -181,11 +181,33 @@ class Sensor(SensorKeys):
     @model_validator(mode="after")
     def _known_bands(self):
         for band in self.description.select(self.bands):
-            if self.noise:
-                self.description.noise_model(band)
+            if self.noise and not self.noise_model:
+                noise_of(self.description, band)
         if self.pixel is None:
             _shared_pixel(self.description, self.bands)
         return self
+
+    @field_validator("noise_model")
+    @classmethod
+    def _known_noise_model(cls, value):
+        known = [each.name for each in fields(NoiseModel) if each.name != "along"]
+        for name in value:
+            if name not in known:
+                raise ValueError(f"unknown key {name!r}: {nearest(name, known)}allowed are {', '.join(known)}")
+        if value:
+            NoiseModel(**{"thermal": 0.0, "shot": 0.0} | value)
+        if value.get("detectors", 1) % 1:
+            raise ValueError(f"detectors must be a whole number, got {value['detectors']:g}")
+        return value
+
+    def given_noise(self):
+        """The noise that the keys describe, a `fifesim.sensor.response.noise.NoiseModel`; None for the instrument's."""
+        if not self.noise_model:
+            return None
+        scan = self.description.scan
+        keys = {"thermal": 0.0, "shot": 0.0, "along": "columns" if scan and scan.kind == "pushbroom" else "rows"}
+        keys |= self.noise_model
+        return NoiseModel(**keys | {"detectors": int(keys.get("detectors", 1))})
 
     @property
     def description(self):

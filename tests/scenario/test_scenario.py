@@ -101,13 +101,27 @@ def test_number_may_carry_its_unit(tmp_path, written, value):
     assert read_text(tmp_path, f"[atmosphere]\nvisibility = {written}").atmosphere.visibility == value
 
 
+def test_lengths_are_taken_in_any_of_their_units():
+    """In decimals as they are written."""
+    lengths = {"width": "3 km", "height": "1.1km", "cell": "333 cm", "west": "709.0 km"}
+    grid = parse_scenario({"grid": lengths}).grid
+    assert (grid.width, grid.height, grid.cell, grid.west) == (3000.0, 1100.0, 3.33, 709000.0)
+    air = parse_scenario({"atmosphere": {"altitude": "412 m", "visibility": "23000m"}}).atmosphere
+    assert (air.altitude, air.visibility) == (0.412, 23.0)
+
+
 @pytest.mark.parametrize(
     "text, message",
     [
         ("[atmosphere]\nvisibilty = 45", "atmosphere.visibilty = 45: did you mean 'visibility'? allowed are profile, "),
         ("[ground]\nARP = 0.1", "unknown key ground.ARP = 0.1"),
         ("[atmosfere]\nvisibility = 45", "did you mean 'atmosphere'? allowed are grid, ground"),
-        ("[atmosphere]\nvisibility = '45000 m'", "visibility = '45000 m': visibility is in km; write a number, or a "),
+        (
+            "[atmosphere]\nvisibility = '45 mi'",
+            "visibility = '45 mi': visibility is in km; write a number, or a number",
+        ),
+        ("[grid]\nwidth = '3 degree'", "width is in m; write a number, or a number and 'km' or 'm' or 'cm'"),
+        ("[geometry]\nsza = '30 m'", "sza is in degree; write a number, or a number and 'degree'"),
         ("[grid]\ncell = '3 px'", "cell = '3 px': cell is in m"),
         ("[atmosphere]\nvisibility = 2", "atmosphere.visibility = 2"),
         ("[atmosphere]\nvisibility = nan", "atmosphere.visibility = nan"),
@@ -134,7 +148,7 @@ def test_number_may_carry_its_unit(tmp_path, written, value):
         ("[sensor]\nbands = ['TM9']", "TM9"),
         ("[sensor]\nbands = []", "name at least one band"),
         ("[sensor]\ninterval = 'natve'", "interval = 'natve': must be product or native, or metres above 0"),
-        ("[sensor]\ninterval = '30 km'", "interval is in m"),
+        ("[sensor]\ninterval = '30 degree'", "interval is in m"),
         ("[sensor]\ninterval = -3", "sensor.interval = -3"),
         ("[sensor]\noffset = [1.0]", "sensor.offset"),
         ("[sensor]\noffset = [nan, 0.0]", "two finite numbers"),
@@ -156,6 +170,26 @@ def test_every_mistake_is_told_at_once(tmp_path):
         read_text(tmp_path, "[atmosphere]\nvisibility = 2\naltitude = -1\n[ground]\narp = 0.3")
     lines = str(caught.value).splitlines()
     assert [line.split(" = ")[0] for line in lines] == ["ground.arp", "atmosphere.visibility", "atmosphere.altitude"]
+
+
+@pytest.mark.parametrize(
+    ("sections", "said"),
+    [
+        ({"ground": {"ARP": 0.1}}, "unknown key ground.ARP = 0.1: allowed are distribution, "),
+        ({"atmosphere": {"visibility": 2}}, "atmosphere.visibility = 2: "),
+        ({"atmosfere": {}}, "unknown key atmosfere = {}: did you mean 'atmosphere'?"),
+        ({"sensor": {"instrument": "TN"}}, "unknown instrument 'TN'"),
+        ({"grid": 3}, "grid = 3: expected a table of keys, got 3"),
+    ],
+)
+def test_mistake_in_python_is_the_line_of_a_file(sections, said):
+    with pytest.raises(ValueError) as caught:
+        Scenario(**sections)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value) and "http" not in str(caught.value)
+    with pytest.raises(ValueError) as parsed:
+        parse_scenario(sections)
+    assert str(parsed.value) == str(caught.value)
 
 
 def test_missing_scenario_is_named(tmp_path):
