@@ -43,7 +43,9 @@ def elevation_grid(dem):
         If it is no DataArray.
     """
     if not isinstance(dem, xr.DataArray):
-        raise TypeError(f"a dem is an xarray.DataArray, got {dem!r}: bring it onto the grid with fifesim.fine_dem")
+        raise TypeError(
+            f"a dem is an xarray.DataArray, got {type(dem).__name__}: bring it onto the grid with fifesim.fine_dem"
+        )
     cf.check_units(dem, "dem")
     grid = grids.geobox(dem)
     nodata = dem.rio.nodata

@@ -78,3 +78,10 @@ def test_elevations_of_another_place_than_the_air_are_told(site, low, high, alti
             lazy = beside_altitude(dem.chunk(), altitude)
         with expected:
             np.testing.assert_array_equal(lazy.compute(scheduler="synchronous"), cells)
+
+
+def test_masked_elevation_is_refused_in_a_line(dem):
+    with pytest.raises(TypeError, match=r"^a dem is an xarray.DataArray, got MaskedArray: .*fine_dem$"):
+        fifesim.slope(np.ma.masked_less(dem.values, 0))
+    with pytest.raises(ValueError, match=r"^the dem marks missing cells as -9999, .*masked=True"):
+        fifesim.slope(dem.assign_attrs(_FillValue=-9999.0))
