@@ -149,6 +149,7 @@ def _checked_scene(lai):
     cf.check_quantity(lai, "lai")
     if set(lai.dims) != {"y", "x"}:
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
+    grids.geobox(lai)
     lai = unpacked(lai)
     if lai.chunks is None and lai.size and not np.isfinite(lai.values).any():
         raise ValueError("all cells of the leaf area index are NaN: look at the nodata value and the place of its map")

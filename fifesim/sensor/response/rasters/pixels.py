@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.rasters import directions
+from fifesim.rasters import directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
 
@@ -83,7 +83,11 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
             raise ValueError("onto and interval both say where pixels lie: give one of them")
         pixels = grids.check_grid(onto)
         if pixels.crs != scene.crs:
-            raise ValueError(f"onto must be in the CRS of the scene, {scene.crs}, got {pixels.crs}")
+            wanted, got = (projection.name_of(grid.crs.proj) for grid in (scene, pixels))
+            raise ValueError(
+                f"onto must be in the CRS of the scene, {wanted}, got {got}: make it there, such as "
+                f"fifesim.grid_at({wanted!r}, west, north, width, height, cell)"
+            )
         return pixels
     if interval is None:
         return grids.aligned(scene, common_size(instrument, bands, lambda band: (instrument.pixel(band),) * 2))
