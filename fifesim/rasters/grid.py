@@ -108,8 +108,7 @@ def geobox(array):
     ValueError
         If there is no CRS, or the grid is not one that `check_grid` passes.
     """
-    missing = {"y", "x"} - set(array.dims)
-    if missing:
+    if {"y", "x"} - set(array.dims):
         raise ValueError(f"a raster has dimensions y and x, got {array.dims}: rename its dimensions")
     if 0 in array.shape:
         raise ValueError(f"the raster has no cells, shape {array.shape}: look at how it was selected")
@@ -120,7 +119,7 @@ def geobox(array):
         )
     found = array.odc.geobox
     if found is None:
-        cure = ": one row does not tell it, give .rio.write_transform(...)" if 1 in (array.y.size, array.x.size) else ""
+        cure = ": one row tells no cell, give .rio.write_transform(...)" if 1 in (array.y.size, array.x.size) else ""
         raise ValueError(f"the raster's x and y are not the centres of a regular grid{cure}")
     a = found.affine
     (west, cell_x), (north, cell_y) = _axis(array, "x", a.c, a.a), _axis(array, "y", a.f, a.e)

@@ -200,7 +200,7 @@ def test_a_part_of_one_cell_or_row_lies_where_it_was_cut(lai):
     for rows, columns in ((slice(5, 6), slice(7, 8)), (slice(5, 6), slice(3, 9)), (slice(2, 7), slice(7, 8))):
         assert grids.same_grid(grids.geobox(lai[rows, columns]), whole[rows, columns])
     plain = lai[5:6].drop_vars("spatial_ref").rio.write_crs(26914)
-    with pytest.raises(ValueError, match=r"regular grid: one row does not tell it, .*write_transform"):
+    with pytest.raises(ValueError, match=r"regular grid: one row tells no cell, .*write_transform"):
         grids.geobox(plain)
     assert fifesim.surface_reflectance(lai[5:6, 7:8], bands=["TM3"]).shape == (1, 1, 1)
 
