@@ -73,6 +73,7 @@ from .base.bands import Band as Band
 # Analysis
 from .analysis.rasters.means import aggregate as aggregate  # method
 from .chain.images import ndvi as ndvi  # method, of a Dataset too
+from .analysis.rasters.composites import composite as composite  # method
 from .analysis.rasters.regression import regress as regress  # method
 from .analysis.regression import Regression as Regression
 from .analysis.rasters.uncertainty import relative_equivalent_noise as relative_equivalent_noise  # method

@@ -59,8 +59,9 @@ def compare(lai, instruments, setup=None, *, bands=None):
         raise ValueError(f"bands are given for {', '.join(set(bands) - set(names))}, which is not compared")
     nodes = {}
     for description in descriptions:
-        selected = tuple(band.name for band in _bands(description, bands.get(description.name)))
-        own = replace(setup, instrument=description, bands=selected)
+        given = bands.get(description.name)
+        selected = description.red_and_near_infrared() if given is None else description.select(given)
+        own = replace(setup, instrument=description, bands=tuple(band.name for band in selected))
         image = image_of(own, reflectance_of(own, lai))
         nodes[f"/{description.name}"] = image if isinstance(image, xr.DataTree) else image.to_dataset()
     return xr.DataTree.from_dict(nodes)
@@ -154,19 +155,3 @@ def shows_ndvi(image):
     shows : bool
     """
     return all(nearest(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))
-
-
-def _bands(description, names):
-    """Bands by name, or the red and the near infrared one."""
-    if names is not None:
-        return description.select(names)
-    found = []
-    for window in (RED, NEAR_INFRARED):
-        number = nearest([band.wavelength for band in description.bands], window)
-        if number is None:
-            raise ValueError(
-                f"{description.name} has no {window.name} band, {window.low:g} to {window.high:g} um: give "
-                f"bands={{{description.name!r}: ...}}"
-            )
-        found.append(description.bands[number])
-    return tuple(found)

@@ -7,6 +7,7 @@ from fifesim.chain.images import planetary_reflectance
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.canopy.rasters import leaves, soils
 from fifesim.ground.terrain.rasters import light as terrain
+from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.rasters import directions
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
@@ -120,6 +121,7 @@ def surface_reflectance(
     )
     if dem is None:
         return level
+    dem = beside_altitude(dem, atmosphere.altitude)
     light = _sunlight(atmosphere, responses, geometry, "surface_reflectance on slopes")
     return terrain.terrain_reflectance(level, dem, upwelling=upwelling, horizon=horizon, **light)
 

@@ -130,6 +130,7 @@ def setup_of(scenario):
         offset=tuple(own.offset),
         min_valid=own.min_valid,
         noise=tuple(own.noise),
+        noise_models=own.given_noise(),
         seed=own.seed,
     )
 

@@ -55,7 +55,7 @@ def calls(tmp_path_factory):
         "sun_position": {"time": "1987-06-06T16:35Z", "latitude": 39.0, "longitude": -96.0, "altitude": 0.0},
         "lai_scene": {"grid": grid, "distribution": "burned-grazed", "arp": 0.1, "seed": 1, "method": "streaming",
                       "chunks": None},
-        "open_lai": {"path": file, "grid": grid, "chunks": None, "allow_remote": False},
+        "open_lai": {"path_or_raster": file, "grid": grid, "chunks": None, "allow_remote": False},
         "lai_distribution": {"source": "burned-grazed"},
         "correlation_length": {"arp": 0.1, "cell": 1.0},
         "arp_for_length": {"length": 3.0, "cell": 1.0},

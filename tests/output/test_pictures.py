@@ -115,7 +115,7 @@ def test_what_is_no_map_is_named(whole):
         whole["image"].fifesim.plot(band="TM1")
     with pytest.raises(ValueError, match=r"a map has dimensions \(\[band\], y, x\)"):
         whole["image"].expand_dims("scene").fifesim.plot()
-    with pytest.raises(TypeError, match="must be an xarray.DataArray"):
+    with pytest.raises(TypeError, match=r"must be an xarray\.DataArray"):
         fifesim.plot(whole["image"].to_dataset())
 
 

@@ -10,6 +10,8 @@ from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
 from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, did_you_mean, is_mixture
 
 LARGEST_LAI = 100.0
+# Of measured canopies, and a little more: a map beyond is in another scale. [m2 m-2]
+LARGEST_OF_MAPS = 20.0
 """Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
 
 # What the tables of the TM bands were modelled with; see data/README.md.
@@ -254,6 +256,50 @@ def check_lai(lai):
         raise ValueError(
             f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
             f"{wrong.sum()} of {cells.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
+        )
+    return lai
+
+
+def check_map(lai):
+    """
+    Refuse a map of leaf area index whose numbers look like those of another scale; NaN passes.
+
+    Parameters
+    ----------
+    lai : array
+        [m2 m-2]
+
+    Returns
+    -------
+    lai : array
+        What was given.
+
+    Raises
+    ------
+    ValueError
+        As `check_lai`, or if one is above 20.
+
+    Notes
+    -----
+    The largest of some 1000 measured values is 18, once outliers are removed.
+
+    References
+    ----------
+    Asner, G.P., Scurlock, J.M.O., Hicke, J.A. (2003), Global synthesis of leaf area index observations. Global Ecology
+    and Biogeography 12, 191-205
+
+    Examples
+    --------
+    >>> check_map(2.5)
+    2.5
+    """
+    cells = np.asarray(check_lai(lai), float)
+    largest = np.fmax.reduce(cells, axis=None, initial=0.0)
+    if largest > LARGEST_OF_MAPS:
+        raise ValueError(
+            f"leaf area index up to {largest:g}, canopies have at most {LARGEST_OF_MAPS:g}: where the numbers are "
+            "scaled, as MODIS by 0.1, type lai * 0.1, or gdal_edit.py -a_scale 0.1 for a file; set cells without data "
+            "to NaN"
         )
     return lai
 

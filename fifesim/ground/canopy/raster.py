@@ -6,12 +6,13 @@ import xarray as xr
 from fifesim.base.geometry import ANGLES, relative_azimuth
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.optics import check_lai
+from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
 from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.packed import unpacked
 
 
 def level_reflectance(
@@ -75,7 +76,7 @@ def level_reflectance(
         raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
     angles = leaf_angle_classes(leaf_angles)
     parameters = {"leaf_angles": angles, "hotspot": float(hotspot)}
-    _check_scene(lai)
+    lai = _checked_scene(lai)
     described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
     if described == "raster":
         cf.check_units(background, "surface_reflectance")
@@ -139,16 +140,22 @@ def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=abs
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "fpar")
     extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))
-    _check_scene(lai)
+    lai = _checked_scene(lai)
     out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
     out = grids.place(out, grids.geobox(lai))
     return cf.label(out, "fpar", source=lai, history=f"fpar: Beer's law, K {extinction:.4f}, limit {fpar_inf:g}")
 
 
-def _check_scene(lai):
+def _checked_scene(lai):
+    """Leaf area of a scene, in its unit; of what is in memory, with data."""
     cf.check_quantity(lai, "lai")
     if set(lai.dims) != {"y", "x"}:
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
+    grids.geobox(lai)
+    lai = unpacked(lai)
+    if lai.chunks is None and lai.size and not np.isfinite(lai.values).any():
+        raise ValueError("all cells of the leaf area index are NaN: look at the nodata value and the place of its map")
+    return lai
 
 
 def _per_band(values):
@@ -160,7 +167,7 @@ def _per_band(values):
 
 def _reflectance(lai, background, **parameters):
     # apply_ufunc hands the bands over as the last axis.
-    return canopy_reflectance(lai, background=np.moveaxis(background, -1, 0), **parameters)
+    return canopy_reflectance(check_map(lai), background=np.moveaxis(background, -1, 0), **parameters)
 
 
 def _by_cell(lai, background, diffuse_fraction, leaves, geometry, parameters):
@@ -169,7 +176,7 @@ def _by_cell(lai, background, diffuse_fraction, leaves, geometry, parameters):
     def kernel(cells, ground, sky, reflectance, transmittance, sza, saa, vza, vaa):
         directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
         light = {"background": ground, "diffuse_fraction": sky, **directions}
-        return directional_reflectance(cells, reflectance, transmittance, **light, **parameters)
+        return directional_reflectance(check_map(cells), reflectance, transmittance, **light, **parameters)
 
     plain = lai.drop_vars(ANGLES, errors="ignore")
     by_band = [_per_band(each) for each in (background, diffuse_fraction, *leaves)]
@@ -185,7 +192,7 @@ def _directions(geometry):
 
 
 def _fpar(lai, **parameters):
-    return absorption.fpar(check_lai(lai), **parameters)
+    return absorption.fpar(check_map(lai), **parameters)
 
 
 def _background_bands(background, bands):

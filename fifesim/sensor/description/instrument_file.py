@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
 from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
 from fifesim.sensor.description.names import key, lookup
@@ -252,6 +253,30 @@ class Instrument:
                 f"bands of {self.name} must be at least one, each once, got {', '.join(map(str, names)) or 'none'}"
             )
         return found
+
+    def red_and_near_infrared(self):
+        """
+        The bands of vegetation indices.
+
+        Returns
+        -------
+        bands : (InstrumentBand, InstrumentBand)
+
+        Raises
+        ------
+        ValueError
+            If the instrument lacks one of them.
+        """
+        found = []
+        for window in (RED, NEAR_INFRARED):
+            number = nearest([band.wavelength for band in self.bands], window)
+            if number is None:
+                raise ValueError(
+                    f"{self.name} has no {window.name} band, {window.low:g} to {window.high:g} um: say which of its "
+                    f"bands are meant: {', '.join(band.name for band in self.bands)}"
+                )
+            found.append(self.bands[number])
+        return tuple(found)
 
     def source(self, number, band=None):
         """

@@ -6,8 +6,7 @@ import xarray as xr
 from fifesim.base.foreign import in_a_line
 from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
-from fifesim.rasters.files import stored_cells
-from fifesim.rasters.opening import ErrorsOfGdal, raster_file
+from fifesim.rasters.opening import ErrorsOfGdal, raster_file, stored_cells
 from fifesim.rasters.soundness import check_memory, check_raster, horizontal_crs
 from fifesim.sensor.description.rasters.carried import attributes_of
 from fifesim.sensor.products.scaling import product_reflectance

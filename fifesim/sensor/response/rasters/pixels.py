@@ -87,9 +87,10 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
             raise ValueError("onto and interval both say where pixels lie: give one of them")
         pixels = grids.check_grid(onto)
         if pixels.crs != scene.crs:
+            wanted, got = (projection.name_of(grid.crs.proj) for grid in (scene, pixels))
             raise ValueError(
-                f"onto must be in the CRS of the scene, {projection.name_of(scene.crs.proj)}, got "
-                f"{projection.name_of(pixels.crs.proj)}: make it there, or bring the scene there with .rio.reproject"
+                f"onto must be in the CRS of the scene, {wanted}, got {got}: make it there, such as "
+                f"fifesim.grid_at({wanted!r}, west, north, width, height, cell)"
             )
         return pixels
     if interval is None:
