@@ -36,6 +36,7 @@ from fifesim.base.kinds import (
     SCENARIO,
     SETUP,
     SPREAD,
+    SURROUNDINGS,
     TABLES,
     TEXT,
     TRACK,
@@ -59,7 +60,8 @@ KINDS = (
     | _of(LIST, "frequency")
     | _of(NUMBER, "pixel")
     | _of(INTERVAL, "interval")
-    | _of(ANYTHING, "background surroundings")
+    | _of(ANYTHING, "background")
+    | _of(SURROUNDINGS, "surroundings")
     | _of(LEAF, "leaf_optics")
     | _of(HORIZON, "horizon")
     | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote")
@@ -131,7 +133,9 @@ def check(name, value, kind):
     """
     if not kind.fits(value):
         raise TypeError(f"{name} must be {kind.words}, got {described(value)}{_cure(value, kind)}")
-    if kind in (RASTER, FILE_OR_RASTER) or (kind is ANYTHING and is_a(value, "DataArray") and value.ndim > 1):
+    if kind in (RASTER, FILE_OR_RASTER) or (
+        kind in (ANYTHING, SURROUNDINGS) and is_a(value, "DataArray") and value.ndim > 1
+    ):
         _check_cells(name, value)
 
 

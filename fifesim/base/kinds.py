@@ -189,11 +189,12 @@ DISTRIBUTION = Kind(
     lambda value: is_path(value) or hasattr(value, "ppf"),
 )
 LEAF_ANGLES = Kind(
-    "a name such as 'planophile', or the fractions of classes such as {30: 0.5, 60: 0.5}",
-    lambda value: _is_plain(value) or (isinstance(value, np.ndarray) and value.ndim == 1),
+    "a name such as 'planophile', classes such as '30: 0.5, 60: 0.5', or a list of fractions",
+    lambda value: not _is_mapping(value) and (_is_plain(value) or (isinstance(value, np.ndarray) and value.ndim == 1)),
 )
 OFFSET = Kind("two numbers, or two lists of them, such as (0.5, 0.0)", _is_offset)
 CRS = Kind("a CRS, such as 'EPSG:26914'", _is_crs)
+SURROUNDINGS = Kind("a reflectance, one for each band, or a raster", _are_numbers)
 LIST = Kind("a number, or a list of them", lambda value: _are_numbers(value) and np.ndim(value) < 2)
 TABLES = Kind("the path of a file, or an xarray.Dataset", lambda value: is_path(value) or is_a(value, "Dataset"))
 MAPPING = Kind("a mapping of names", _is_mapping)

@@ -206,6 +206,8 @@ def test_what_a_user_typed(calls):
         (lambda: lai.fifesim.aggregate(grid), "pixel must be a number, got GeoBox"),
         (lambda: lai.fifesim.aggregate("30"), "pixel must be a number, got '30'"),
         (lambda: lai[:0].fifesim.fpar(), "lai has no cells, its sizes are y: 0, x: 12"),
+        (lambda: rho.fifesim.to_toa(surroundings="lake", adjacency=True), "surroundings must be a reflectance.*'lake'"),
+        (lambda: lai.fifesim.fpar(leaf_angles={30: 0.5, 60: 0.5}), "leaf_angles must be a name .*got a dict of 2"),
         (lambda: fifesim.psf("TM", ["TM3"]), "band must be a name, got a list of 1"),
         (lambda: fifesim.regress(np.ones(3), lai), "y must be an xarray.DataArray over"),
         (lambda: lai.fifesim.regress(np.ones(3)), "x must be an xarray.DataArray over"),
