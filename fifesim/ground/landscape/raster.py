@@ -106,17 +106,40 @@ def open_lai(path_or_raster, grid, chunks=None, *, allow_remote=False):
         change of datum whose accuracy is unknown; if it has no data on the grid, known at once where the result is in
         memory; and, when computed, if LAI is negative or above what canopies have, where it lacks its scale.
     """
+    lai = lai_window(path_or_raster, grid, chunks, allow_remote=allow_remote)
+    if lai.chunks is None and not np.isfinite(lai.values).any():
+        raise ValueError(
+            f"{lai.attrs['lai_distribution']} has no data on the grid, which spans {grids.extent(grid)}: all of it is "
+            "marked as no data; look at its nodata value with gdalinfo -stats"
+        )
+    return lai
+
+
+def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
+    """
+    A map of leaf area index on a grid where it may have no data, such as in one of many windows.
+
+    Parameters
+    ----------
+    path_or_raster, grid, chunks, allow_remote
+        As in `open_lai`.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+
+    Raises
+    ------
+    ValueError
+        As in `open_lai`, but not for want of data.
+    """
     if isinstance(path_or_raster, xr.DataArray):
         name = in_a_line(str(path_or_raster.name or "raster"), 150)
         found = raster_onto_grid(_one_layer(unpacked(path_or_raster)), grid, chunks)
     else:
         name = in_a_line(Path(path_or_raster).name, 150)
         found = file_onto_grid(path_or_raster, grid, chunks, allow_remote)
-    if found.chunks is None and not np.isfinite(found.values).any():
-        raise ValueError(
-            f"{name} has no data on the grid, which spans {grids.extent(grid)}: all of it is marked as no data; look "
-            "at its nodata value with gdalinfo -stats"
-        )
     lai = chunking.pointwise(check_map, found)
     return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
 
