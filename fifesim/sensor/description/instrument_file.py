@@ -7,10 +7,11 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
 from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
 from fifesim.sensor.description.names import key, lookup
-from fifesim.sensor.description.performance import Scan
+from fifesim.sensor.description.performance import Product, Scan
 from fifesim.sensor.description.spatial_response import BoxcarResponse, SpatialResponse, View
 
 RESPONSES = ("system", "detector", "paper")
@@ -48,6 +49,8 @@ class Instrument:
     scan : Scan, optional
     geolocation : float, optional
         Error of the gridded product's place, root mean square along each axis. [m]
+    product : Product, optional
+        Scale of the agency's product.
     aliases : tuple of str, optional
         Other names.
 
@@ -72,6 +75,7 @@ class Instrument:
     detectors: Count | None = None
     scan: Scan | None = None
     geolocation: Positive | None = None
+    product: Product | None = None
     aliases: tuple[Name, ...] = ()
 
     def __post_init__(self):
@@ -83,6 +87,12 @@ class Instrument:
         for band in self.bands:
             for number in (*BAND_NUMBERS, *_given(band)):
                 self.source(number, band)
+
+    def __repr__(self):
+        return (
+            f"Instrument {self.name}: {self.title}, {self.gsd:g} m pixels from {self.altitude / 1000:g} km, "
+            f"{self.bits} bits\n  bands {', '.join(band.name for band in self.bands)}"
+        )
 
     @property
     def max_angle(self):
@@ -308,6 +318,30 @@ class Instrument:
                 f"bands of {self.name} must be at least one, each once, got {', '.join(map(str, names)) or 'none'}"
             )
         return found
+
+    def red_and_near_infrared(self):
+        """
+        The bands of vegetation indices.
+
+        Returns
+        -------
+        bands : (InstrumentBand, InstrumentBand)
+
+        Raises
+        ------
+        ValueError
+            If the instrument lacks one of them.
+        """
+        found = []
+        for window in (RED, NEAR_INFRARED):
+            number = nearest([band.wavelength for band in self.bands], window)
+            if number is None:
+                raise ValueError(
+                    f"{self.name} has no {window.name} band, {window.low:g} to {window.high:g} um: say which of its "
+                    f"bands are meant: {', '.join(band.name for band in self.bands)}"
+                )
+            found.append(self.bands[number])
+        return tuple(found)
 
     def source(self, number, band=None):
         """

@@ -14,6 +14,7 @@ from fifesim.base.foreign import in_a_line, read_toml, shown
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.plausibility import check_units
+from fifesim.sensor.description.short_file import completed
 
 # Keys whose value has several forms: what follows them in the place of an error is the form's name.
 _FORMS = ("srf", "lsf", "interval", "ifov")
@@ -109,11 +110,43 @@ def read_instrument(path):
     return found
 
 
+def noise_of(description, band):
+    """
+    Noise of a band of an instrument at every radiance.
+
+    Parameters
+    ----------
+    description : Instrument
+    band : fifesim.sensor.description.band.InstrumentBand
+
+    Returns
+    -------
+    model : fifesim.sensor.response.noise.NoiseModel
+
+    Raises
+    ------
+    ValueError
+        If the instrument's file has none; the message says whose have.
+    """
+    if band.noise is None:
+        known = [name for name in instrument_names() if any(each.noise for each in instrument(name).bands)]
+        raise ValueError(
+            f"the description of {description.name} has no noise for {band.name}: leave noise out, give "
+            "noise_models=fifesim.NoiseModel(...), in a scenario [sensor.noise_model], or take an instrument that has "
+            f"it, such as {', '.join(known)}"
+        )
+    return description.noise_model(band)
+
+
 def _parse(path):
     try:
         content = read_toml(path)
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no instrument file {in_a_line(str(path))}") from None
+    try:
+        content = completed(content, path)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from None
     try:
         return TypeAdapter(Instrument).validate_python(_with_folder(content, path.parent))
     except ValidationError as error:
