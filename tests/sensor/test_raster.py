@@ -209,7 +209,7 @@ def test_blur_decides_what_a_line_on_ndvi_explains():
     for arp, expected in known.items():
         lai = fifesim.lai_scene(grid, arp=arp, seed=1)
         toa = lai.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"]).fifesim.to_toa()
-        images = (toa.fifesim.sense(each) for each in (msi.with_response("detector"), soft, msi))
+        images = (toa.fifesim.sense(each) for each in (instrument("MSI", "detector"), soft, msi))
         found = [fifesim.regress(lai.fifesim.aggregate(10), image.fifesim.ndvi()).r2 for image in images]
         np.testing.assert_allclose(found, expected, rtol=0, atol=0.02)
 

@@ -12,10 +12,7 @@ from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OP
 from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
 from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.performance import Product, Scan
-from fifesim.sensor.description.spatial_response import BoxcarResponse, SpatialResponse, View
-
-RESPONSES = ("system", "detector", "paper")
-DETECTOR = BoxcarResponse(kind="boxcar")
+from fifesim.sensor.description.spatial_response import SpatialResponse, View
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -199,65 +196,6 @@ class Instrument:
             )
         pushed = self.scan is not None and self.scan.kind == "pushbroom"
         return band.noise.model(band.detectors or self.detectors or 1, "columns" if pushed else "rows")
-
-    def knows_blur(self, band):
-        """
-        Whether the file knows more of a band's spatial response than its detector.
-
-        Parameters
-        ----------
-        band : InstrumentBand
-
-        Returns
-        -------
-        known : bool
-            Where it does not, images are sharper than the instrument's.
-        """
-        return not all(part.kind == "boxcar" for part in by_axes(band.lsf or self.lsf))
-
-    def with_response(self, response):
-        """
-        The instrument with another spatial response.
-
-        Parameters
-        ----------
-        response : {"system", "detector", "paper"}
-            What the file knows of the whole system, the detector alone, or the cosine of the paper's Table 1.
-
-        Returns
-        -------
-        instrument : Instrument
-            Detectors are as wide as the instantaneous field of view, or as the interval where the file has none.
-
-        Raises
-        ------
-        ValueError
-            If there is no such response, or the file has none of that kind.
-        """
-        if response not in RESPONSES:
-            raise ValueError(f"response must be one of {', '.join(RESPONSES)}, got {response!r}")
-        if response == "detector":
-            return replace(self, lsf=DETECTOR, bands=tuple(map(self._with_detector, self.bands)))
-        if not any(self._has(band, response) for band in self.bands):
-            raise ValueError(
-                f"the description of {self.name} has no {response!r} response: type response='detector', or give an "
-                "instrument whose file has it"
-            )
-        return self
-
-    def _has(self, band, response):
-        kinds = {part.kind for part in by_axes(band.lsf or self.lsf)}
-        return kinds == {"cosine"} if response == "paper" else self.knows_blur(band)
-
-    def _with_detector(self, band):
-        """A band with its field of view, and none of its own response."""
-        sources = {key: value for key, value in band.sources.items() if key != "lsf"}
-        ifov = band.ifov or self.ifov or band.interval or self.interval
-        sources |= {"ifov": self._key("ifov" if band.ifov or self.ifov else "interval", band)}
-        return replace(band, lsf=None, ifov=ifov, sources=sources)
-
-    def _key(self, number, band):
-        return band.sources.get(number) or self.sources[number]
 
     def with_gain(self, gain):
         """

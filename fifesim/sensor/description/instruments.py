@@ -14,6 +14,7 @@ from fifesim.base.foreign import in_a_line, read_toml, shown
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.plausibility import check_units
+from fifesim.sensor.description.responses import with_response
 from fifesim.sensor.description.short_file import completed
 
 # Keys whose value has several forms: what follows them in the place of an error is the form's name.
@@ -30,7 +31,7 @@ def instrument(name, response=None):
         Name or alias in any case, such as ``"TM"`` or ``"Landsat 8"``; or the path of a file, which ends in
         ``.toml``. An Instrument passes through.
     response : {"system", "detector", "paper"}, optional
-        Spatial response, as `Instrument.with_response` takes it; by default what the file has.
+        Spatial response, as `fifesim.sensor.description.responses.with_response` takes it; by default what the file has.
 
     Returns
     -------
@@ -50,7 +51,7 @@ def instrument(name, response=None):
     ('TM', 30.32, 30.315)
     """
     found = name if isinstance(name, Instrument) else _found(name)
-    return found if response is None else found.with_response(response)
+    return found if response is None else with_response(found, response)
 
 
 def _found(name):

@@ -1,6 +1,7 @@
 """Instruments as text, for people to read."""
 
 from fifesim.sensor.description.fields import TwoAxes, by_axes
+from fifesim.sensor.description.responses import knows_blur
 from fifesim.sensor.description.spectral_response import half_peak
 
 
@@ -98,7 +99,7 @@ def _sampling(instrument):
             f"    line spread {' x '.join(part.kind for part in kinds)}, modulation transfer at the Nyquist frequency "
             f"of the own interval {_pair(mtf, '.2f')}",
         ]
-        if not instrument.knows_blur(bands[0]):
+        if not knows_blur(instrument, bands[0]):
             lines.append(
                 "    that of the detector alone: images are sharper than the instrument's, whose blur is not known"
             )
@@ -138,7 +139,7 @@ def blur_in_words(instrument, bands):
     named = [f"{band.name} {passed}" for band, passed in zip(chosen, found, strict=True)]
     each = found[:1] if len(set(found)) == 1 else named
     text = f"modulation transfer at the Nyquist frequency {', '.join(each)}"
-    unknown = [band.name for band in chosen if not instrument.knows_blur(band)]
+    unknown = [band.name for band in chosen if not knows_blur(instrument, band)]
     if unknown:
         text += f"; of {', '.join(unknown)} the detector alone is known: the image is sharper than the instrument's"
     return text

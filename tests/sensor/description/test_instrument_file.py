@@ -100,33 +100,6 @@ def test_bands_are_asked_for_once():
         instrument("TM").select([])
 
 
-def test_responses_that_can_be_asked_for():
-    tm, msi = instrument("TM"), instrument("MSI")
-    assert instrument("TM", "paper") == tm
-    assert instrument("MSI", "system") == msi
-    for description in (tm, msi):
-        sharp = description.with_response("detector")
-        for band, own in zip(sharp.bands, description.bands, strict=True):
-            fields, intervals = description.ground_fields(own), description.ground_intervals(own)
-            widths = fields if fields.along else intervals
-            assert [spread.width for spread in sharp.line_spreads(band)] == list(widths)
-            assert not sharp.knows_blur(band)
-    assert [band.name for band in msi.bands if not msi.knows_blur(band)] == ["MSI10"]
-
-
-@pytest.mark.parametrize(
-    ("name", "response", "said"),
-    [
-        ("OLI", "system", "OLI has no 'system' response: type response='detector'"),
-        ("MSI", "paper", "MSI has no 'paper' response"),
-        ("TM", "sharp", "response must be one of system, detector, paper, got 'sharp'"),
-    ],
-)
-def test_responses_that_no_file_has(name, response, said):
-    with pytest.raises(ValueError, match=said):
-        instrument(name, response)
-
-
 def test_instrument_is_told_in_two_lines():
     assert repr(instrument("TM")) == (
         "Instrument TM: Landsat-5 Thematic Mapper, 30 m pixels from 705 km, 8 bits\n"

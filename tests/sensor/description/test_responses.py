@@ -1,0 +1,33 @@
+"""Spatial responses that may be asked for, and what is known of an instrument's own."""
+
+import pytest
+
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.responses import knows_blur, with_response
+
+
+def test_responses_that_can_be_asked_for():
+    tm, msi = instrument("TM"), instrument("MSI")
+    assert instrument("TM", "paper") == tm
+    assert instrument("MSI", "system") == msi
+    for description in (tm, msi):
+        sharp = with_response(description, "detector")
+        for band, own in zip(sharp.bands, description.bands, strict=True):
+            fields, intervals = description.ground_fields(own), description.ground_intervals(own)
+            widths = fields if fields.along else intervals
+            assert [spread.width for spread in sharp.line_spreads(band)] == list(widths)
+            assert not knows_blur(sharp, band)
+    assert [band.name for band in msi.bands if not knows_blur(msi, band)] == ["MSI10"]
+
+
+@pytest.mark.parametrize(
+    ("name", "response", "said"),
+    [
+        ("OLI", "system", "OLI has no 'system' response: type response='detector'"),
+        ("MSI", "paper", "MSI has no 'paper' response"),
+        ("TM", "sharp", "response must be one of system, detector, paper, got 'sharp'"),
+    ],
+)
+def test_responses_that_no_file_has(name, response, said):
+    with pytest.raises(ValueError, match=said):
+        instrument(name, response)
