@@ -2,9 +2,9 @@
 A season and its composite
 ==========================
 
-Ten dates through the whole chain: grassland with a field of wheat in a corner, each date with its own sun and clouds. The
-maximum value composite (Holben 1986) keeps the greenest date of each pixel. It is free of clouds, and it is no image of
-any one day: wheat and grass are seen at different times, and the error of every date raises what is kept.
+Ten dates through the whole chain: grassland with a field of wheat in a corner, each date with its own sun and clouds.
+The maximum value composite (Holben 1986) keeps the greenest date of each pixel. It is free of clouds, and it is no
+image of any one day: wheat and grass are seen at different times, and the error of every date raises what is kept.
 """
 
 import matplotlib.pyplot as plt

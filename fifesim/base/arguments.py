@@ -24,6 +24,7 @@ from fifesim.base.kinds import (
     LEAF_ANGLES,
     LIST,
     MAPPING,
+    METRES,
     NAMES,
     NUMBER,
     NUMBERS,
@@ -58,7 +59,7 @@ KINDS = (
     | _of(NUMBER, "visibility aot h2o o3 residual_deviation realisations spacing offset_spread")
     | _of(NUMBERS, "radiance")
     | _of(LIST, "frequency")
-    | _of(NUMBER, "pixel")
+    | _of(METRES, "pixel")
     | _of(INTERVAL, "interval")
     | _of(ANYTHING, "background")
     | _of(SURROUNDINGS, "surroundings")

@@ -132,6 +132,7 @@ def _is_raster(value):
 
 
 NUMBER = Kind("a number", _is_number)
+METRES = Kind("a size in metres, such as 30.0", _is_number)
 NUMBERS = Kind("a number, or an array of them", _are_numbers)
 PAIR = Kind("a number, or two: down and across", _is_pair)
 FLAG = Kind("True or False", lambda value: isinstance(value, bool | np.bool_))

@@ -1,7 +1,5 @@
 """True means of labelled rasters over blocks of ground."""
 
-from numbers import Real
-
 from fifesim.analysis.rasters.pairs import check_no_counts
 from fifesim.rasters import grid as grids
 from fifesim.rasters.dates import by_date
@@ -40,11 +38,6 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     --------
     fifesim.base.footprints.regularize
     """
-    if not isinstance(pixel, Real):
-        raise TypeError(
-            f"aggregate takes the size of a block in metres, such as 30.0, got {type(pixel).__name__}: blocks lie from "
-            "the upper left corner of the raster"
-        )
     check_no_counts(array)
     blocks = grids.aligned(grids.geobox(array), pixel)
     spreads = areas(blocks) if lsf is None else (lsf, lsf)

@@ -69,7 +69,7 @@ def product_reflectance(dn, gain, offset, largest, flag=0, flags=0, mu_s=1.0):
 
     Examples
     --------
-    >>> product_reflectance([0, 10000, 65535], 2e-5, -0.1, 65535, mu_s=0.5).round(6).tolist()
+    >>> product_reflectance([0, 10000, 65535], 2e-5, -0.1, 65535, mu_s=0.5).astype(float).round(6).tolist()
     [nan, 0.2, nan]
     """
     dn = np.asarray(dn)

@@ -70,5 +70,5 @@ def test_aggregates_of_bands_keep_them(lai):
 
 
 def test_a_block_is_a_size_in_metres(lai):
-    with pytest.raises(TypeError, match=r"^aggregate takes the size of a block in metres, such as 30.0, got GeoBox: "):
+    with pytest.raises(TypeError, match=r"^pixel must be a size in metres, such as 30\.0, got GeoBox"):
         fifesim.aggregate(lai, grids.geobox(lai))
