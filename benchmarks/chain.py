@@ -21,6 +21,7 @@ from scipy import fft
 import fifesim
 
 BANDS = ["TM3", "TM4"]
+CASE = {"geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere()}  # wherever a large scene reaches
 
 
 def floor(cells, threads):
@@ -33,18 +34,18 @@ def floor(cells, threads):
 def chain(cells, chunks="auto"):
     grid = fifesim.fife_site(30 / 9, window=((0, cells), (0, cells)))
     lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7, chunks=chunks)
-    return lai.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM")
+    return lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE).fifesim.to_toa().fifesim.sense("TM")
 
 
 def stages(cells):
     """Each stage alone on one array in memory, as calls without arguments."""
     grid = fifesim.fife_site(30 / 9, window=((0, cells), (0, cells)))
     lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
-    rho = lai.fifesim.surface_reflectance("TM", bands=BANDS)
+    rho = lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE)
     toa = rho.fifesim.to_toa()
     return {
         "field and LAI": lambda: fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7),
-        "reflectance (SAIL)": lambda: lai.fifesim.surface_reflectance("TM", bands=BANDS),
+        "reflectance (SAIL)": lambda: lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE),
         "atmosphere (5S)": lambda: rho.fifesim.to_toa(),
         "sensor": lambda: toa.fifesim.sense("TM"),
         "30 m truth": lambda: lai.fifesim.aggregate(30),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import dask
 import numpy as np
-from chain import BANDS, floor
+from chain import BANDS, CASE, floor
 
 import fifesim
 from fifesim.output.run.folder import simulate_to_folder
@@ -18,6 +18,7 @@ from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
 CELL = 30 / 9
+WHEN = {"geometry": {"time": "1987-06-06T16:35:00Z"}, "atmosphere": {"altitude": 0.4}}  # wherever it reaches
 WEST, NORTH = 704970.0, 4334220.0
 
 # A landscape of its own for each call: the last tiles of one are kept.
@@ -30,7 +31,7 @@ def grid_of(side):
 
 def scenario_of(side, dem="flat"):
     size = side // 9 * 9 * CELL
-    return parse_scenario({"grid": {"width": size, "height": size}, "terrain": {"dem": dem}}).complete()
+    return parse_scenario({"grid": {"width": size, "height": size}, "terrain": {"dem": dem}} | WHEN).complete()
 
 
 def lai_of(side):
@@ -45,16 +46,16 @@ def field(side):
 
 def canopy(side):
     lai = lai_of(side)
-    return lambda: _run(lai.fifesim.surface_reflectance("TM", bands=BANDS).data)
+    return lambda: _run(lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE).data)
 
 
 def atmosphere(side):
-    rho = lai_of(side).fifesim.surface_reflectance("TM", bands=BANDS).persist()
+    rho = lai_of(side).fifesim.surface_reflectance("TM", bands=BANDS, **CASE).persist()
     return lambda: _run(rho.fifesim.to_toa().data)
 
 
 def sensor(side):
-    toa = lai_of(side).fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().persist()
+    toa = lai_of(side).fifesim.surface_reflectance("TM", bands=BANDS, **CASE).fifesim.to_toa().persist()
     return lambda: toa.fifesim.sense("TM").compute()
 
 
@@ -86,7 +87,7 @@ def floor_of(side):
 
 def chain_on(side):
     lai = fifesim.lai_scene(grid_of(side), "burned-grazed", arp=0.15, seed=next(SEEDS), chunks="auto")
-    return lai.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM")
+    return lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE).fifesim.to_toa().fifesim.sense("TM")
 
 
 def _to_folder(scenario):

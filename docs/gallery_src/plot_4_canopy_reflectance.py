@@ -14,6 +14,7 @@ import fifesim
 grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=121 * 10, height=10, cell=10)
 leaf_area = np.linspace(0, 6, 121)
 lai = wrap_xr(leaf_area[None], grid)
+sun, air = fifesim.fife_geometry(), fifesim.Atmosphere()  # the paper's case
 
 # %%
 # Red light falls and near infrared light rises with leaf area, until more leaves change nothing. Flat (planophile)
@@ -21,11 +22,11 @@ lai = wrap_xr(leaf_area[None], grid)
 
 figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
 for leaves, style in (("planophile", "--"), ("spherical", "-"), ("erectophile", ":")):
-    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], leaf_angles=leaves)
+    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], geometry=sun, atmosphere=air, leaf_angles=leaves)
     for band, color in (("TM3", "#b2182b"), ("TM4", "#542788")):
         axes[0].plot(leaf_area, rho.sel(band=band).squeeze(), style, color=color, label=f"{band}, {leaves}")
     axes[1].plot(leaf_area, rho.fifesim.ndvi().squeeze(), style, color="#1b7837", label=f"NDVI, {leaves}")
-axes[1].plot(leaf_area, lai.fifesim.fpar().squeeze(), color="0.4", label="FPAR, spherical")
+axes[1].plot(leaf_area, lai.fifesim.fpar(geometry=sun).squeeze(), color="0.4", label="FPAR, spherical")
 axes[0].set(ylabel="reflectance factor", title="Surface reflectance, sun at 28.5°, nadir", ylim=(0, 0.6))
 axes[1].set(ylabel="NDVI at the surface, FPAR", title="NDVI and FPAR", ylim=(0, 1))
 for axis in axes:
@@ -36,7 +37,6 @@ for axis in axes:
 # Across the principal plane, toward the sun (left) and away from it. The paper's SAIL has no hot spot; ``hotspot``,
 # leaf size over canopy height, gives it one.
 
-sun = fifesim.fife_geometry()
 views = np.union1d(np.arange(-70, 71), -sun.sza)
 two = lai.isel(x=[40])  # LAI 2
 figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
@@ -45,7 +45,8 @@ for hotspot, style in ((0.0, "-"), (0.05, "--"), (0.2, ":")):
     for view in views:
         side = sun.saa if view <= 0 else sun.saa + 180
         geometry = fifesim.Geometry(sun.sza, sun.saa, vza=abs(view), vaa=side)
-        rho = two.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], geometry=geometry, hotspot=hotspot)
+        case = {"geometry": geometry, "atmosphere": air, "hotspot": hotspot}
+        rho = two.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **case)
         values.append(rho.values.ravel())
     for axis, band in zip(axes, np.transpose(values), strict=True):
         axis.plot(views, band, style, color="black", label=f"hotspot {hotspot:g}")

@@ -16,13 +16,14 @@ import fifesim
 grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=30, height=30, cell=30)
 wavelength = np.linspace(0.4025, 2.4975, 839)
 cell = wrap_xr(np.ones((1, 1)), grid)
+sun = fifesim.fife_geometry()  # the paper's
 spectrum = cell * xr.DataArray(np.ones(839), dims="band", coords={"wavelength": ("band", wavelength)})
 
 figure, axis = plt.subplots(figsize=(11, 4.4), layout="constrained")
 for visibility, color in ((5, "#8c510a"), (23, "#35978f"), (100, "#01665e")):
     air = fifesim.Atmosphere(visibility=visibility)
     for reflectance, style in ((0.0, ":"), (0.3, "-")):
-        toa = (reflectance * spectrum).fifesim.to_toa(air)
+        toa = (reflectance * spectrum).fifesim.to_toa(air, geometry=sun)
         label = f"visibility {visibility} km" if reflectance else None
         axis.plot(wavelength, toa.squeeze(), style, color=color, linewidth=1, label=label)
 for band in fifesim.instrument("TM").bands:
@@ -52,9 +53,10 @@ lai = wrap_xr(
 ndvi = []
 for visibility in visibilities:
     air = fifesim.Atmosphere(visibility=visibility)
-    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], atmosphere=air)
+    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], geometry=sun, atmosphere=air)
     ndvi.append(rho.fifesim.to_toa().fifesim.ndvi().values[0])
-below = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.ndvi().values[0]
+clear = {"geometry": sun, "atmosphere": fifesim.Atmosphere()}
+below = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **clear).fifesim.ndvi().values[0]
 
 figure, axis = plt.subplots(figsize=(7, 4.4), layout="constrained")
 for index, (area, color) in enumerate(zip(areas, plt.get_cmap("YlGn")([0.35, 0.55, 0.75, 0.95]), strict=True)):

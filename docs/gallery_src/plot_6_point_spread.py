@@ -49,7 +49,7 @@ grids = {
 }
 figure, axes = plt.subplots(3, 1, figsize=(11, 6), layout="constrained", sharex=True, sharey=True)
 for axis, (name, grid) in zip(axes, grids.items(), strict=True):
-    reflectance = toa.fifesim.sense("TM", onto=grid).fifesim.to_reflectance()[0, 20]
+    reflectance = toa.fifesim.sense("TM", onto=grid, geometry=fifesim.fife_geometry()).fifesim.to_reflectance()[0, 20]
     axis.plot((np.arange(540) + 0.5) * 30 / 9, stripes, color="0.7", label="scene")
     axis.plot(reflectance.x - west, reflectance, "o", color="#2166ac", markersize=4, label=f"pixels, {name}")
     axis.set(ylabel="reflectance", ylim=(0.03, 0.35))

@@ -15,7 +15,8 @@ import fifesim
 
 BANDS = ["TM3", "TM4"]
 strip = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=71 * 30, height=30, cell=30)
-ground = wrap_xr(np.full((1, 71), 2.0), strip).fifesim.surface_reflectance("TM", bands=BANDS)
+case = {"geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere()}  # of the ground; the air differs below
+ground = wrap_xr(np.full((1, 71), 2.0), strip).fifesim.surface_reflectance("TM", bands=BANDS, **case)
 ground = ground.drop_attrs(deep=False)
 
 

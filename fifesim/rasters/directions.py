@@ -18,8 +18,8 @@ def with_geometry(array, geometry, names=_GEOMETRY):
     Parameters
     ----------
     array : xarray.DataArray or xarray.Dataset
-    geometry : fifesim.base.geometry.Geometry or xarray.Dataset
-        From `checked_geometry`.
+    geometry : fifesim.base.geometry.Geometry, xarray.Dataset or None
+        From `checked_geometry`; of None the array stays as it is.
     names : sequence of str, optional
         Which of them; all by default.
 
@@ -27,7 +27,7 @@ def with_geometry(array, geometry, names=_GEOMETRY):
     -------
     array : xarray.DataArray or xarray.Dataset
     """
-    angles = {name: _angle(geometry, name) for name in names}
+    angles = {} if geometry is None else {name: _angle(geometry, name) for name in names}
     return array.assign_coords(
         {name: xr.Variable(angle.dims, angle.data, cf.attributes(name)) for name, angle in angles.items()}
     )
@@ -59,6 +59,36 @@ def given_geometry(given, array, time=None):
 
     Parameters
     ----------
+    given, array, time
+        As in `known_geometry`.
+
+    Returns
+    -------
+    geometry : Geometry or Dataset
+        As `known_geometry` gives it.
+
+    Raises
+    ------
+    ValueError
+        If nothing says where the sun stands, or as in `known_geometry`.
+    TypeError
+        As in `checked_geometry`.
+    """
+    geometry = known_geometry(given, array, time)
+    if geometry is None:
+        raise ValueError(
+            f"nothing says where the sun stands over {array.name or 'the raster'}, which has no sza and no time: type "
+            "time='2022-06-03T17:10Z', or geometry=fifesim.Geometry(sza, saa)"
+        )
+    return geometry
+
+
+def known_geometry(given, array, time=None):
+    """
+    Directions of sun and sensor where something says them.
+
+    Parameters
+    ----------
     given : fifesim.base.geometry.Geometry, xarray.Dataset or None
     array : xarray.DataArray
         With a scalar coordinate ``time`` the sun is that over the middle of its grid, and the view nadir.
@@ -67,13 +97,13 @@ def given_geometry(given, array, time=None):
 
     Returns
     -------
-    geometry : Geometry or Dataset
+    geometry : Geometry, Dataset or None
         As `checked_geometry` gives it; that of the paper for a scene made on the FIFE site which has no time.
 
     Raises
     ------
     ValueError
-        If nothing says where the sun stands, both are given, or as in `checked_geometry`.
+        If both are given, or as in `checked_geometry`.
     TypeError
         As in `checked_geometry`.
     """
@@ -88,12 +118,7 @@ def given_geometry(given, array, time=None):
         time = array.coords["time"].values
     if time is not None:
         return sun_over(grids.geobox(array), time)
-    if is_fife(array):
-        return fife_geometry()
-    raise ValueError(
-        f"nothing says where the sun stands over {array.name or 'the raster'}, which has no sza and no time: type "
-        "time='2022-06-03T17:10Z', or geometry=fifesim.Geometry(sza, saa)"
-    )
+    return fife_geometry() if is_fife(array) else None
 
 
 def sun_over(grid, time):

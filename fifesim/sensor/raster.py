@@ -77,7 +77,7 @@ def sense(
     min_valid : float, optional
         Share of its footprint that a pixel needs on valid cells; below it is no data. [1]
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
-        By default that which the array carries, else of the sun at its time and place.
+        By default that which the array carries, else of the sun at its time and place. A radiance needs none.
     time : str or datetime, optional
         In the place of ``geometry``: when the sun stood over the scene.
 
@@ -102,7 +102,9 @@ def sense(
     """
     toa, description, bands = by_bands(toa, instrument)
     digital_numbers.check_scaling(scaling, description, quantise)
-    geometry = directions.given_geometry(geometry, toa, time)
+    # A radiance is recorded whatever the sun.
+    needed = not _is_radiance(toa) or scaling == "product"
+    geometry = (directions.given_geometry if needed else directions.known_geometry)(geometry, toa, time)
     groups = bands_by_grid(description, bands, onto, interval)
     if len(groups) > 1:
         options = {"offset": offset, "noise": noise, "seed": seed, "noise_models": noise_models, "geometry": geometry}
@@ -110,7 +112,7 @@ def sense(
         images = {size: sense(toa.isel(band=numbers), description, **options) for size, numbers in groups.items()}
         return xr.DataTree.from_dict({f"/{size}": image.to_dataset() for size, image in images.items()})
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
-    geometry = directions_on(pixels, geometry)
+    geometry = None if geometry is None else directions_on(pixels, geometry)
     scene = toa.drop_vars(ANGLES, errors="ignore")
     means = means_by_band(scene, description, bands, pixels, offset=offset, min_valid=min_valid)
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
@@ -142,12 +144,16 @@ def by_bands(toa, instrument):
     ValueError
         If the array is something else, or the instrument is unknown or has none of the bands.
     """
-    if toa.attrs.get("units") != cf.QUANTITIES["toa_radiance"].units:
+    if not _is_radiance(toa):
         toa = incoming(toa, "toa_reflectance")
     cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
     description = given_instrument(instrument, toa)
     toa = toa if "band" in toa.dims else toa.expand_dims("band")
     return toa, description, matching_bands(toa, description)
+
+
+def _is_radiance(array):
+    return str(array.attrs.get("units", "1")).strip() == cf.QUANTITIES["toa_radiance"].units
 
 
 def recorded(radiance, description, bands, quantise, product_geometry=None):
@@ -304,7 +310,7 @@ def as_radiance(array, bands, geometry):
     radiance : xarray.DataArray
         [W m-2 sr-1 um-1]
     """
-    if str(array.attrs.get("units", "1")) == cf.QUANTITIES["toa_radiance"].units:
+    if _is_radiance(array):
         return array
     irradiance = xr.DataArray([band.solar_irradiance for band in bands], dims="band")
     plain = array.drop_vars("band", errors="ignore")
