@@ -14,6 +14,7 @@ from fifesim.base.foreign import in_a_line, read_toml, shown
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.plausibility import check_units
+from fifesim.sensor.description.short_file import completed
 
 # Keys whose value has several forms: what follows them in the place of an error is the form's name.
 _FORMS = ("srf", "lsf", "interval", "ifov")
@@ -109,6 +110,10 @@ def _parse(path):
         content = read_toml(path)
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no instrument file {in_a_line(str(path))}") from None
+    try:
+        content = completed(content, path)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from None
     try:
         return TypeAdapter(Instrument).validate_python(_with_folder(content, path.parent))
     except ValidationError as error:

@@ -1,9 +1,9 @@
-"""Spectral responses as instrument files name them: in pyrsr, in a table beside the file, or written out."""
+"""Spectral responses as instrument files name them: in pyrsr, in a table beside the file, written out, or by width."""
 
 import os
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import pandas as pd
@@ -14,10 +14,13 @@ from pyrsr.rsr import RSR_reader
 from fifesim.base import datasets
 from fifesim.base.bands import Band
 from fifesim.base.foreign import check_regular, shown
-from fifesim.sensor.description.fields import CONFIG, Name, Number
+from fifesim.sensor.description.fields import CONFIG, Name, Number, Positive
 
 # No band of these instruments reaches 100 um, and none begins below 100 nm.
 _LONGEST = 100.0
+
+# A Gaussian ends 1.5 of its widths from its centre, where it is 0.2 % of its maximum; it has so many wavelengths.
+_REACH, _NODES = 1.5, 121
 
 
 class NamedResponse:
@@ -140,15 +143,55 @@ class ResponseList(NamedResponse):
         return Band(name, self.wavelength, self.response)
 
 
+@dataclass(frozen=True, config=CONFIG)
+class CenteredResponse(NamedResponse):
+    """
+    Relative spectral response by its centre and width.
+
+    Parameters
+    ----------
+    center : float
+        [um]
+    width : float
+        Full width at half of the maximum. [um]
+    shape : "gaussian" or "boxcar", optional
+    """
+
+    center: Positive
+    width: Positive
+    shape: Literal["gaussian", "boxcar"] = "gaussian"
+
+    def __post_init__(self):
+        if self.center > _LONGEST:
+            raise ValueError(f"center = {self.center:g}: wavelengths are in um, this looks like nm: divide by 1000")
+        if self.width >= self.center / _REACH:
+            raise ValueError(
+                f"width = {self.width:g}: it is in um, and too wide for center = {self.center:g}; divide nm by 1000"
+            )
+
+    def _read(self, name):
+        if self.shape == "boxcar":
+            half, edge = self.width / 2, self.width * 1e-6
+            at = np.array([-half - edge, -half + edge, half - edge, half + edge])
+            return Band(name, self.center + at, (0.0, 1.0, 1.0, 0.0))
+        at = np.linspace(-_REACH, _REACH, _NODES)
+        response = 0.5 ** (4 * at**2)
+        response[[0, -1]] = 0.0
+        return Band(name, self.center + at * self.width, response)
+
+
 def _kind(value):
     keys = set(value) if isinstance(value, dict) else set(vars(value))
+    if keys & {"center", "width"}:
+        return "centered"
     return "table" if "table" in keys else "listed" if keys & {"wavelength", "response"} else "pyrsr"
 
 
 SpectralResponse = Annotated[
     Annotated[PyrsrResponse, Tag("pyrsr")]
     | Annotated[ResponseTable, Tag("table")]
-    | Annotated[ResponseList, Tag("listed")],
+    | Annotated[ResponseList, Tag("listed")]
+    | Annotated[CenteredResponse, Tag("centered")],
     Discriminator(_kind),
 ]
 
