@@ -122,7 +122,7 @@ def test_every_compressed_count_returns_to_itself_and_the_ends_are_the_linear_on
 
 def test_radiance_of_a_compressed_count_lies_in_the_middle_of_those_it_stands_for():
     """Edges of count n, found by search: half of their sum is what it decodes to."""
-    fine = np.linspace(0.3, 63.0, 2_000_001)
+    fine = np.linspace(0.0, 63.0, 2_000_001)
     dn = radiance_to_dn(fine, 1.0, 0.0, 6, 63)
     for count in (2, 10, 31, 62):
         seen = fine[dn == count]
