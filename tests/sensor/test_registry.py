@@ -33,7 +33,20 @@ def band(name, which):
 def test_registry_has_every_instrument_that_is_compared():
     expected = {"TM", "L4TM", "ETM+", "OLI", "OLI2", "MSI", "MSI-B", "HRV"}
     expected |= {"MODIS", "MODIS-Aqua", "AVHRR", "AVHRR10", "AVHRR11"}
-    expected |= {"MSS", "MSS2", "MSS3", "MSS4", "MSS5", "MSI-C", "VIIRS", "OLCI", "EMIT", "EnMAP", "PRISMA", "SuperDove"}
+    expected |= {
+        "MSS",
+        "MSS2",
+        "MSS3",
+        "MSS4",
+        "MSS5",
+        "MSI-C",
+        "VIIRS",
+        "OLCI",
+        "EMIT",
+        "EnMAP",
+        "PRISMA",
+        "SuperDove",
+    }
     assert expected <= set(instrument_names())
 
 
@@ -436,6 +449,20 @@ def test_noise_of_modis_is_that_of_its_specification(number):
     model = item.noise_model(band("MODIS", f"MODIS{number}"))
     np.testing.assert_allclose(model.snr(radiance), snr, rtol=1e-9)
     assert model.detectors == (40 if number < 3 else 20)
+
+
+# Noise of Aqua MODIS in flight, c0 + c1 L [W m-2 sr-1 um-1], from NASA's l2gen; band 6 has broken detectors.
+AQUA = {1: (0.104069, 8.533e-05), 2: (0.040559, 1.9755e-04), 3: (0.119315, 8.195e-05), 4: (0.0876954, 7e-05)}
+AQUA |= {5: (0.0787773, 4.994e-04), 7: (0.00628912, 2.116e-04)}
+
+
+@pytest.mark.parametrize("number", AQUA)
+def test_noise_of_aqua_modis_is_that_in_flight_from_half_to_twice_its_radiance(number):
+    each, (c0, c1) = band("MODIS-Aqua", f"MODIS{number}"), AQUA[number]
+    radiance = each.noise.radiance * np.array([0.5, 1.0, 2.0])
+    found = instrument("MODIS-Aqua").noise_model(each).noise_equivalent_radiance(radiance)
+    np.testing.assert_allclose(found, c0 + c1 * radiance, rtol=6e-3)
+    assert radiance[1] == MODIS_SNR[number][0]
 
 
 def test_noise_of_msi_is_that_of_its_requirement():
