@@ -551,7 +551,7 @@ def test_bands_of_spectrometers_lie_beside_each_other():
 
 def test_a_number_alone_means_no_band_of_viirs():
     viirs = instrument("VIIRS")
-    assert [band_called(name, viirs).name for name in ("M03", "i3", "red", "M11")] == ["M3", "I3", "I1", "M11"]
+    assert [band_called(name, viirs).name for name in ("M03", "i3", "red", "M11")] == ["M3", "I3", "M5", "M11"]
     assert band_called("B3", viirs) is None and band_called(11, viirs).name == "M11"
 
 
