@@ -57,8 +57,8 @@ def radiance_to_dn(radiance, gain, offset, bits, compression=0):
 
     .. math:: DN = \mathrm{round}(x), \qquad x = \frac{L - o}{g}, \qquad 1 \le DN \le 2^b - 1
 
-    on a linear scale. On one of square roots, which meets the linear one at 0 and at its count c, with finer steps up to
-    a quarter of c,
+    on a linear scale. On one of square roots, which meets the linear one at 0 and at its count c, with finer steps up
+    to a quarter of c,
 
     .. math:: DN = \mathrm{round}(\sqrt{c \, x})
 
