@@ -32,10 +32,10 @@ def functions():
     parts = [_heading("Functions and classes", text)]
     for group, members in groupby(PUBLIC.items(), key=lambda item: item[1].group):
         names = [name for name, _ in members]
-        methods = [name for name in names if PUBLIC[name].methods_of]
         parts.append(f"\n.. rubric:: {group}\n" + _summary(names + _BESIDE.get(group, [])))
-        if methods:
-            parts.append(f"\nMethods of a raster: {', '.join(f'``{name}``' for name in methods)}.\n")
+        for kind, called in (("DataArray", "a raster"), ("DataTree", "what ``compare`` returns")):
+            if methods := [f"``{name}``" for name in names if kind in PUBLIC[name].methods_of]:
+                parts.append(f"\nMethods of {called}: {', '.join(methods)}.\n")
     return "".join(parts)
 
 

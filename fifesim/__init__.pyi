@@ -10,7 +10,7 @@ from .rasters.sites import fife_site as fife_site
 from .rasters.grid import grid_at as grid_at
 from .base.geometry import Geometry as Geometry
 from .base.geometry import fife_geometry as fife_geometry
-from .base.geometry import sun_position as sun_position
+from .rasters.sun import sun_position as sun_position
 
 # Ground
 from .ground.landscape.raster import lai_scene as lai_scene
@@ -47,10 +47,16 @@ from .chain.engines import compare_engines as compare_engines
 
 # Sensor
 from .sensor.raster import sense as sense  # method, of a Dataset too
+from .sensor.response.rasters.bands import to_bands as to_bands  # method
 from .sensor.scan.rasters.view import scan_geometry as scan_geometry
 from .sensor.scan.track import Track as Track
 from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method
+from .rasters.swaths import grid_swath as grid_swath  # method
 from .chain.comparison import compare as compare  # method
+from .chain.adjustment import as_seen_by as as_seen_by  # method, of a Dataset too
+from .chain.adjustment import adjust_bands as adjust_bands  # method, of a Dataset too
+from .chain.adjustment import spectral_adjustment as spectral_adjustment
+from .chain.comparison import comparison_table as comparison_table  # method of a DataTree
 from .sensor.response.rasters.spread import psf as psf
 from .sensor.response.rasters.spread import mtf as mtf
 from .sensor.response.noise import NoiseModel as NoiseModel
@@ -67,6 +73,7 @@ from .base.bands import Band as Band
 # Analysis
 from .analysis.rasters.means import aggregate as aggregate  # method
 from .chain.images import ndvi as ndvi  # method, of a Dataset too
+from .analysis.rasters.composites import composite as composite  # method
 from .analysis.rasters.regression import regress as regress  # method
 from .analysis.regression import Regression as Regression
 from .analysis.rasters.uncertainty import relative_equivalent_noise as relative_equivalent_noise  # method
@@ -81,6 +88,18 @@ from .analysis.rasters.scaling import fpar_bias as fpar_bias  # method
 from .analysis.rasters.lags import autocovariance as autocovariance  # method
 from .analysis.rasters.lags import variogram as variogram  # method
 from .analysis.rasters.lags import regularized_variance as regularized_variance  # method
+from .chain.images import index as index  # method
+
+# Pictures
+from .output.pictures import plot as plot  # method
+from .output.composites import rgb as rgb  # method
+from .output.pictures import plot_fit as plot_fit
+from .output.pictures import plot_comparison as plot_comparison  # method of a DataTree
+
+# Images of one's own
+from .sensor.products.rasters.landsat import open_landsat as open_landsat
+from .sensor.products.rasters.sentinel2 import open_sentinel2 as open_sentinel2
+from .sensor.products.rasters.calibrated import calibrate as calibrate  # method
 
 # Files and runs
 from .rasters.files import to_geotiff as to_geotiff  # method, of a Dataset too

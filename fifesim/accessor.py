@@ -1,15 +1,22 @@
 """Public names, found when they are first used, and the ``.fifesim`` accessor, whose methods are some of them."""
 
 import re
+from functools import cache
 from importlib import import_module
+from inspect import isfunction
 from pathlib import Path
-from types import MethodType
+from textwrap import fill
 from typing import NamedTuple
 
 import xarray as xr
 
-# One line of the table: where a name lives, and whether it is a method of a DataArray, or of a Dataset too.
-_LINE = re.compile(r"from \.([\w.]+) import (\w+) as \2(  # method(, of a Dataset too)?)?")
+from fifesim.base.arguments import checked
+from fifesim.base.methods import Method
+
+# One line of the table: where a name lives, and whether it is a method of a DataArray, of a Dataset too, or of a
+# DataTree instead.
+_LINE = re.compile(r"from \.([\w.]+) import (\w+) as \2(?:  # method(, of a Dataset too| of a DataTree)?)?")
+_KINDS = {None: ("DataArray",), ", of a Dataset too": ("DataArray", "Dataset"), " of a DataTree": ("DataTree",)}
 
 
 class Public(NamedTuple):
@@ -27,8 +34,8 @@ def _table():
         if line.startswith("# "):
             group = line[2:]
         elif match := _LINE.fullmatch(line):
-            module, name, of_array, of_dataset = match.groups()
-            methods_of = ("DataArray",) * bool(of_array) + ("Dataset",) * bool(of_dataset)
+            module, name, which = match.groups()
+            methods_of = _KINDS[which] if "  # method" in line else ()
             found[name] = Public(f"fifesim.{module}", methods_of, group)
     return found
 
@@ -36,9 +43,10 @@ def _table():
 PUBLIC = _table()
 
 
+@cache
 def find(name):
     """
-    A public name.
+    A public name; a function looks at its arguments first.
 
     Parameters
     ----------
@@ -49,36 +57,56 @@ def find(name):
     -------
     found : object
     """
-    return getattr(import_module(PUBLIC[name].module), name)
+    found = getattr(import_module(PUBLIC[name].module), name)
+    if not isfunction(found):
+        return found
+    function = checked(found, PUBLIC[name].methods_of)
+    # Pickle looks a function up where it says that it lives.
+    function.__module__, function.__qualname__ = "fifesim", name
+    return function
 
 
-class _Method:
-    """
-    Forward to a function, found when it is first asked for: importing fifesim stays quick.
+# Classes below find the functions that draw them here.
+Method.find = staticmethod(find)
 
-    A bound method keeps the function's name, signature and documentation.
-    """
 
-    def __init__(self, name):
-        self._name = name
+class _RasterMethod(Method):
+    """Method of the accessor, which hands the function its raster."""
 
     def __get__(self, accessor, owner=None):
-        return find(self._name) if accessor is None else MethodType(find(self._name), accessor._raster)
+        return super().__get__(None if accessor is None else accessor._raster)
 
 
 class _Accessor:
     def __init__(self, raster):
         self._raster = raster
 
+    def __repr__(self):
+        return _summary(type(self).kind)
 
-def _methods(kind):
-    return {name: _Method(name) for name, public in PUBLIC.items() if kind in public.methods_of}
+
+def _summary(kind):
+    """The methods of a kind of object by their group, a line for each."""
+    groups = {}
+    for name, public in PUBLIC.items():
+        if kind in public.methods_of:
+            groups.setdefault(public.group, []).append(name)
+    indent = max(map(len, groups)) + 4
+    lines = [
+        fill(f"  {group:{indent - 2}}{', '.join(names)}", 100, subsequent_indent=" " * indent)
+        for group, names in groups.items()
+    ]
+    return "\n".join([f"fifesim on a {kind}, its methods:", *lines])
 
 
-DataArrayAccessor = type(
-    "DataArrayAccessor", (_Accessor,), {"__doc__": "fifesim on a DataArray."} | _methods("DataArray")
-)
-DatasetAccessor = type("DatasetAccessor", (_Accessor,), {"__doc__": "fifesim on a Dataset."} | _methods("Dataset"))
+def _accessor(kind):
+    methods = {name: _RasterMethod(name) for name, public in PUBLIC.items() if kind in public.methods_of}
+    told = {"__doc__": f"fifesim on a {kind}.", "kind": kind, "__module__": __name__}
+    return type(f"{kind}Accessor", (_Accessor,), told | methods)
+
+
+DataArrayAccessor, DatasetAccessor, DataTreeAccessor = map(_accessor, ("DataArray", "Dataset", "DataTree"))
 
 xr.register_dataarray_accessor("fifesim")(DataArrayAccessor)
 xr.register_dataset_accessor("fifesim")(DatasetAccessor)
+xr.register_datatree_accessor("fifesim")(DataTreeAccessor)

@@ -103,6 +103,7 @@ def simulate(
 
     with _importing():
         from fifesim.output.folders import check_folder
+        from fifesim.output.progress import since_start
         from fifesim.output.run.estimates import estimate, estimate_in_words
         from fifesim.output.run.folder import simulate_to_folder
         from fifesim.output.run.identity import scenario_to_resume
@@ -115,7 +116,8 @@ def simulate(
     found = scenario_to_resume(output) if resume and scenario is None else None
     found = found or (Scenario() if scenario is None else read_scenario(scenario))
     if dry_run:
-        _say(estimate_in_words(estimate(found, output, threads=workers or threads, scene=scene), as_json))
+        options = {"threads": workers or threads, "scene": scene, "start": since_start()}
+        _say(estimate_in_words(estimate(found, output, **options), as_json))
         return
     found.complete()
     try:

@@ -37,14 +37,15 @@ def test_functions_of_a_raster_are_methods_and_no_others():
             assert not found.methods_of
             continue
         first = re.search(r"Parameters\n-+\n\w+(?:, \w+)* : (.*)", inspect.cleandoc(function.__doc__))
-        takes_one = first is not None and first[1].startswith("xarray.")
-        assert takes_one == ("DataArray" in found.methods_of), name
+        kind = re.match(r"xarray\.(\w+)", first[1]) if first is not None else None
+        assert (kind is not None) == bool(found.methods_of), name
+        assert kind is None or kind[1] in found.methods_of, name
 
 
 def test_editors_find_every_name():
     """What the table says is where the name is defined, or where it is meant to be imported from."""
     for name, found in PUBLIC.items():
-        defined = getattr(getattr(fifesim, name), "__module__", found.module)
+        defined = getattr(inspect.unwrap(getattr(fifesim, name)), "__module__", found.module)
         assert defined == found.module or not defined.startswith("fifesim"), name
 
 
@@ -72,3 +73,17 @@ def test_any_array_has_the_accessor_and_copies_keep_it():
 
 def test_arguments_are_passed_on(lai):
     xr.testing.assert_identical(lai.fifesim.aggregate(30.0, min_valid=0.5), fifesim.aggregate(lai, 30.0, min_valid=0.5))
+
+
+def test_accessor_tells_its_methods_by_group(lai):
+    said = repr(lai.fifesim)
+    assert all(name in said.replace(",", " ").split() for name in METHODS)
+    assert "compare" in said and "comparison_table" not in said
+    assert max(map(len, said.splitlines())) <= 100
+    assert "to_geotiff" in repr(lai.to_dataset(name="lai").fifesim)
+
+
+def test_a_tree_of_images_has_methods_of_its_own(lai):
+    tree = xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")})
+    assert tree.fifesim.comparison_table.__func__ is fifesim.comparison_table
+    assert tree.fifesim.comparison_table.__self__ is tree

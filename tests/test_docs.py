@@ -37,13 +37,14 @@ def test_code_of_a_page_runs(page, tmp_path, monkeypatch):
         exec(compile(block, page, "exec"), names)
 
 
-@pytest.mark.parametrize(
-    "block", re.findall(r"^```toml\n(.*?)^```", (DOCS / "guide.md").read_text("utf-8"), re.S | re.M)
-)
-def test_scenario_of_the_guide_is_valid(block, tmp_path):
-    path = tmp_path / "scenario.toml"
-    path.write_text(block)
-    assert fifesim.read_scenario(path).atmosphere.visibility == 23
+def test_scenario_and_instrument_of_the_guide_are_valid(tmp_path):
+    blocks = re.findall(r"^```toml\n(.*?)^```", (DOCS / "guide.md").read_text("utf-8"), re.S | re.M)
+    (instrument,) = (block for block in blocks if block.startswith("name ="))
+    (scenario,) = (block for block in blocks if block != instrument)
+    for name, block in (("camera.toml", instrument), ("scenario.toml", scenario)):
+        (tmp_path / name).write_text(block)
+    assert [band.name for band in fifesim.read_instrument(tmp_path / "camera.toml").bands] == ["red", "nir"]
+    assert fifesim.read_scenario(tmp_path / "scenario.toml").atmosphere.visibility == 23
 
 
 def test_every_reference_is_in_the_bibliography():

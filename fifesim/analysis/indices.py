@@ -29,7 +29,171 @@ def normalized_difference(nir, red):
     0.5
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
-    total = nir + red
+    return _ratio(nir - red, nir + red)
+
+
+def enhanced(nir, red, blue):
+    r"""
+    Enhanced vegetation index (EVI).
+
+    .. math::
+
+        \mathrm{EVI} = 2.5 \, \frac{\rho_\mathrm{nir} - \rho_\mathrm{red}}
+            {\rho_\mathrm{nir} + 6 \rho_\mathrm{red} - 7.5 \rho_\mathrm{blue} + 1}
+
+    Parameters
+    ----------
+    nir, red, blue : array
+        Reflectances, of the ground. [1]
+
+    Returns
+    -------
+    evi : array, shape of the broadcast inputs
+        NaN where the denominator is zero. [1]
+
+    References
+    ----------
+    [Huete2002]_
+
+    Examples
+    --------
+    >>> float(enhanced(0.5, 0.1, 0.08))
+    0.6666666666666666
+    """
+    nir, red, blue = (np.asarray(each, float) for each in (nir, red, blue))
+    return _ratio(2.5 * (nir - red), nir + 6 * red - 7.5 * blue + 1)
+
+
+def enhanced_of_two_bands(nir, red):
+    r"""
+    Enhanced vegetation index without the blue (EVI2).
+
+    .. math::
+
+        \mathrm{EVI2} = 2.5 \, \frac{\rho_\mathrm{nir} - \rho_\mathrm{red}}
+            {\rho_\mathrm{nir} + 2.4 \rho_\mathrm{red} + 1}
+
+    Parameters
+    ----------
+    nir, red : array
+        Reflectances, of the ground. [1]
+
+    Returns
+    -------
+    evi2 : array, shape of the broadcast inputs
+        [1]
+
+    References
+    ----------
+    [Jiang2008]_
+
+    Examples
+    --------
+    >>> round(float(enhanced_of_two_bands(0.5, 0.1)), 12)
+    0.574712643678
+    """
+    nir, red = np.asarray(nir, float), np.asarray(red, float)
+    return _ratio(2.5 * (nir - red), nir + 2.4 * red + 1)
+
+
+def soil_adjusted(nir, red, soil=0.5):
+    r"""
+    Soil-adjusted vegetation index (SAVI).
+
+    .. math::
+
+        \mathrm{SAVI} = (1 + L) \, \frac{\rho_\mathrm{nir} - \rho_\mathrm{red}}
+            {\rho_\mathrm{nir} + \rho_\mathrm{red} + L}
+
+    Parameters
+    ----------
+    nir, red : array
+        Reflectances. [1]
+    soil : float, optional
+        L: 0 is NDVI. [1]
+
+    Returns
+    -------
+    savi : array, shape of the broadcast inputs
+        [1]
+
+    References
+    ----------
+    [Huete1988]_
+
+    Examples
+    --------
+    >>> float(soil_adjusted(0.75, 0.25)), float(soil_adjusted(0.75, 0.25, soil=0))
+    (0.5, 0.5)
+    """
+    nir, red = np.asarray(nir, float), np.asarray(red, float)
+    return _ratio((1 + soil) * (nir - red), nir + red + soil)
+
+
+def modified_soil_adjusted(nir, red):
+    r"""
+    Modified soil-adjusted vegetation index (MSAVI), which finds L by itself.
+
+    .. math::
+
+        \mathrm{MSAVI} = \tfrac{1}{2} \left[ 2 \rho_\mathrm{nir} + 1
+            - \sqrt{(2 \rho_\mathrm{nir} + 1)^2 - 8 (\rho_\mathrm{nir} - \rho_\mathrm{red})} \right]
+
+    Parameters
+    ----------
+    nir, red : array
+        Reflectances. [1]
+
+    Returns
+    -------
+    msavi : array, shape of the broadcast inputs
+        NaN where noise makes the root imaginary. [1]
+
+    References
+    ----------
+    [Qi1994]_, the second of them
+
+    Examples
+    --------
+    A leaf that absorbs all of the red, over any soil:
+
+    >>> float(modified_soil_adjusted(0.5, 0.0))
+    1.0
+    """
+    nir, red = np.asarray(nir, float), np.asarray(red, float)
+    square = (2 * nir + 1) ** 2 - 8 * (nir - red)
+    return (2 * nir + 1 - np.sqrt(np.where(square >= 0, square, np.nan))) / 2
+
+
+def near_infrared_of_vegetation(nir, red):
+    r"""
+    Near infrared reflectance of vegetation (NIRv).
+
+    .. math:: \mathrm{NIR_V} = \mathrm{NDVI} \; \rho_\mathrm{nir}
+
+    Parameters
+    ----------
+    nir, red : array
+        Reflectances. [1]
+
+    Returns
+    -------
+    nirv : array, shape of the broadcast inputs
+        [1]
+
+    References
+    ----------
+    [Badgley2017]_
+
+    Examples
+    --------
+    >>> float(near_infrared_of_vegetation(0.75, 0.25))
+    0.375
+    """
+    return normalized_difference(nir, red) * np.asarray(nir, float)
+
+
+def _ratio(above, below):
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = (nir - red) / total
-    return np.where(total == 0, np.nan, ratio)
+        ratio = above / below
+    return np.where(below == 0, np.nan, ratio)

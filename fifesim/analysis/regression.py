@@ -7,6 +7,8 @@ import numba
 import numpy as np
 from scipy import stats
 
+from fifesim.base.methods import Method
+
 
 @dataclass(frozen=True)
 class Regression:
@@ -34,6 +36,16 @@ class Regression:
     residual_deviation: float
     x_mean: float
     x_sum_of_squares: float
+
+    plot = Method("plot_fit")
+
+    def __repr__(self):
+        sign = "+" if self.slope >= 0 else "-"
+        return (
+            f"Regression: y = {self.intercept:.6g} {sign} {abs(self.slope):.6g} x, R2 {self.r2:.4f}, n {self.n}\n"
+            f"  standard errors: slope {self.slope_error:.3g}, intercept {self.intercept_error:.3g}; "
+            f"y about the line {self.residual_deviation:.4g}"
+        )
 
     @property
     def slope_error(self):

@@ -6,8 +6,7 @@ import xarray as xr
 from fifesim.atmosphere.adjacency import raster as adjacency_raster
 from fifesim.atmosphere.schemes import coupling, engines, lookup
 from fifesim.base.geometry import ANGLES
-from fifesim.rasters import cf, chunks, directions
-from fifesim.rasters import grid as grids
+from fifesim.rasters import cf, chunks, directions, swaths
 
 _REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
 
@@ -114,6 +113,7 @@ def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adja
     reflectance = adjacency_raster.banded(reflectance)
     if surroundings is not None and not adjacency:
         raise ValueError("surroundings matter with adjacency=True only: give both, or leave surroundings out")
+    _check_cells(reflectance, geometry, elevation, adjacency)
     plain = reflectance.drop_vars(["band", *ANGLES], errors="ignore")
     if adjacency:
         out = _with_adjacency(verb, plain, atmosphere, bands, geometry, elevation, surroundings)
@@ -125,9 +125,22 @@ def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adja
         out = out.astype(np.float32)
     if "band" in reflectance.coords:
         out = out.assign_coords(band=reflectance["band"])
-    out = directions.with_geometry(grids.place(out, grids.geobox(reflectance)), geometry)
+    out = directions.with_geometry(swaths.placed_as(out, reflectance), geometry)
     text = f"{verb}: {atmosphere.engine}{' with adjacency' if adjacency else ''}, {atmosphere.text}"
     return cf.label(out, name, source=reflectance, history=text, atmosphere=atmosphere.text, references=_REFERENCE)
+
+
+def _check_cells(reflectance, geometry, elevation, adjacency):
+    """Refuse what lies on a map, where the light is that of a scan: both would be spread over each other."""
+    if "line" not in reflectance.dims:
+        return
+    rasters = {name: geometry[name] for name in directions.varying(geometry)} | {"elevation": elevation}
+    on_map = [name for name, each in rasters.items() if each is not None and not set(each.dims) <= set(swaths.DIMS)]
+    if adjacency or on_map:
+        what = "adjacency" if adjacency else f"{', '.join(on_map)} by (y, x)"
+        raise ValueError(
+            f"{what} does not fit the lines and samples of a scan: put it onto a map with .grid_swath(grid)"
+        )
 
 
 def _uniform(verb, reflectance, atmosphere, bands, geometry):

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pvlib
 
+from fifesim.base.kinds import described
+
 
 class Window(NamedTuple):
     """
@@ -27,10 +29,13 @@ class Window(NamedTuple):
     best: float
 
 
-# The green peak and the red absorption of chlorophyll, and the plateau of leaves in the near infrared.
+# The absorption of all pigments, the green peak and the red absorption of chlorophyll, the plateau of leaves in the
+# near infrared, and the window between two absorption bands of water vapour, where that of leaves absorbs too.
+BLUE = Window("blue", 0.45, 0.52, 0.48)
 GREEN = Window("green", 0.50, 0.60, 0.56)
 RED = Window("red", 0.60, 0.70, 0.66)
 NEAR_INFRARED = Window("near infrared", 0.75, 1.00, 0.84)
+SHORTWAVE_INFRARED = Window("shortwave infrared", 1.53, 1.75, 1.62)
 
 # Common names of bands in catalogues of images, with the wavelengths between which they lie by the table of STAC's
 # extension for electro-optical data (its README, github.com/stac-extensions/eo), and where Landsat or Sentinel-2 has
@@ -109,8 +114,7 @@ class Band:
     response: tuple = field(repr=False)
 
     def __post_init__(self):
-        wavelength = tuple(float(each) for each in self.wavelength)
-        response = tuple(float(each) for each in self.response)
+        wavelength, response = (_numbers(self, name) for name in ("wavelength", "response"))
         if len(wavelength) < 2 or len(wavelength) != len(response) or np.any(np.diff(wavelength) <= 0):
             raise ValueError(f"band {self.name}: wavelengths must increase, one for each response")
         if min(response) < 0 or max(response) == 0:
@@ -171,6 +175,17 @@ class Band:
         own = [w for w in self.wavelength if low <= w <= high]
         nodes = np.union1d(inside, own)
         return nodes, np.interp(nodes, self.wavelength, self.response)
+
+
+def _numbers(band, name):
+    value = getattr(band, name)
+    try:
+        numbers = np.asarray(value, float)
+    except (TypeError, ValueError):
+        numbers = None
+    if numbers is None or numbers.ndim != 1:
+        raise TypeError(f"band {band.name}: {name} must be a list of numbers, got {described(value)}")
+    return tuple(numbers.tolist())
 
 
 @lru_cache

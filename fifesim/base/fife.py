@@ -6,9 +6,6 @@ LATITUDE = 39.06  # [degree north]
 LONGITUDE = -96.54  # [degree east]
 ALTITUDE = 400.0  # [m]
 
-# What lies between them is the site, to 100 m. [degree]
-LATITUDES = 38.993, 39.134
-LONGITUDES = -96.634, -96.454
 
 # The site is a square, in UTM zone 14. [m]
 SIZE = 15000.0

@@ -8,6 +8,8 @@ import pandas as pd
 import pvlib
 
 from fifesim.base import fife
+from fifesim.base.arguments import check_fields
+from fifesim.base.kinds import described, is_a
 
 ANGLES = ("sza", "saa", "vza", "vaa")
 
@@ -45,11 +47,12 @@ class Geometry:
 
     def __post_init__(self):
         for name in ANGLES:
-            if np.ndim(getattr(self, name)):
+            if not is_a(getattr(self, name), "Dataset") and np.ndim(getattr(self, name)):
                 raise TypeError(
                     f"{name} of a Geometry is one number, got an array: angles by cell are an xarray.Dataset with sza, "
                     "saa, vza and vaa, such as fifesim.scan_geometry(...).assign(sza=30.0, saa=120.0)"
                 )
+        check_fields(self, *ANGLES, "earth_sun_distance")
         for name in ("saa", "vaa"):
             if not np.isfinite(getattr(self, name)):
                 raise ValueError(f"{name} must be finite degrees, got {getattr(self, name)}")
@@ -161,6 +164,48 @@ def sun_position(time, latitude, longitude, altitude=0.0):
     return Geometry(float(sun["zenith"]), float(sun["azimuth"]), earth_sun_distance=earth_sun_distance(time))
 
 
+def sun_positions(times, latitude, longitude, altitude=0.0):
+    """
+    Directions and distance of the sun at many times, or times and places.
+
+    Parameters
+    ----------
+    times : sequence of str or datetime, shape (n,)
+        As in `sun_position`.
+    latitude, longitude, altitude : float, or array of shape (n,)
+        As in `sun_position`.
+
+    Returns
+    -------
+    utc : array of datetime64, shape (n,)
+    sza, saa : array, shape (n,)
+        A zenith beyond 90 is a sun below the horizon. [degree]
+    earth_sun_distance : array, shape (n,)
+        [astronomical unit]
+
+    Raises
+    ------
+    ValueError
+        If one is no time, or the shapes differ.
+    """
+    stamps = pd.DatetimeIndex([_utc(time)[0] for time in times])
+    numbers = [np.asarray(each, float) for each in (latitude, longitude, altitude)]
+    if any(each.shape not in ((), (1,), stamps.shape) for each in numbers):
+        shapes = " and ".join(str(each.shape) for each in numbers)
+        raise ValueError(
+            f"latitude, longitude and altitude must be numbers, or one for each of {len(stamps)} times, got {shapes}"
+        )
+    sza, saa = np.empty(len(stamps)), np.empty(len(stamps))
+    places = np.stack([np.broadcast_to(each, stamps.shape) for each in numbers])
+    kinds, which = np.unique(places, axis=1, return_inverse=True)
+    for number, (north, east, height) in enumerate(kinds.T):
+        here = np.ravel(which) == number
+        sun = pvlib.solarposition.get_solarposition(stamps[here], north, east, altitude=height)
+        sza[here], saa[here] = sun["zenith"], sun["azimuth"]
+    distance = pvlib.solarposition.nrel_earthsun_distance(stamps).to_numpy()
+    return stamps.tz_localize(None).to_numpy(), sza, saa, distance
+
+
 def earth_sun_distance(time):
     """
     Distance of Earth and Sun.
@@ -189,9 +234,12 @@ def earth_sun_distance(time):
 
 def _utc(time):
     try:
-        stamp = pd.Timestamp(time)
-    except ValueError:
-        raise ValueError(f"time must be a date and time such as 1987-06-06T16:35:00Z, got {time!r}") from None
+        # A number would be taken for nanoseconds since 1970.
+        stamp = pd.NaT if isinstance(time, int | float | np.number) else pd.Timestamp(time)
+    except (TypeError, ValueError):
+        stamp = pd.NaT
+    if stamp is pd.NaT:
+        raise ValueError(f"time must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}")
     return pd.DatetimeIndex([stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")])
 
 
@@ -206,3 +254,31 @@ def fife_geometry():
         sza 28.5, saa 117.0, vza 0, vaa 0. [degree]
     """
     return sun_position(fife.TIME, fife.LATITUDE, fife.LONGITUDE, fife.ALTITUDE)
+
+
+def angle_between(zenith, azimuth, other_zenith, other_azimuth):
+    r"""
+    Angle between two directions.
+
+    .. math:: \cos \gamma = \cos \theta \cos \theta' + \sin \theta \sin \theta' \cos(\varphi - \varphi')
+
+    Parameters
+    ----------
+    zenith, azimuth, other_zenith, other_azimuth : array
+        [degree]
+
+    Returns
+    -------
+    angle : array, shape of the broadcast inputs
+        [degree]
+
+    Examples
+    --------
+    >>> [round(float(angle_between(20.0, 90.0, *other)), 9) for other in ((50.0, 90.0), (50.0, 270.0), (0.0, 17.0))]
+    [30.0, 70.0, 20.0]
+    """
+    theta, other = np.radians(zenith), np.radians(other_zenith)
+    # By half angles, which keep their digits where the two agree.
+    turn = np.radians(np.subtract(azimuth, other_azimuth)) / 2
+    square = np.sin((theta - other) / 2) ** 2 + np.sin(theta) * np.sin(other) * np.sin(turn) ** 2
+    return np.degrees(2 * np.arcsin(np.sqrt(np.clip(square, 0, 1))))

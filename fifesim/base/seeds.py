@@ -1,11 +1,14 @@
 """
 Seeds, and random numbers that are a function of a seed and of a place.
 
-Each stage draws from streams of its own, so that one seed serves them all: 1 is the periodic field, 16 and up are the
-synthetic hills, 2**40 and up the bands of a sensor. The streaming field has its own generator.
+Each stage draws from streams of its own, so that one seed serves them all: 1 is the periodic field, 2 the library of
+spectra, 16 and up are the synthetic hills, 2**40 and up the bands of a sensor. The streaming field has its own
+generator.
 """
 
 import numpy as np
+
+from fifesim.base.kinds import described
 
 LIMIT = 2**63  # scenario files hold signed whole numbers
 
@@ -36,7 +39,9 @@ def check_seed(seed):
     7
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
-        raise TypeError(f"seed must be a whole number from 0 to 2**63 - 1, got {seed!r}: give for instance seed=7")
+        raise TypeError(
+            f"seed must be a whole number from 0 to 2**63 - 1, got {described(seed)}: give for instance seed=7"
+        )
     if not 0 <= seed < LIMIT:
         raise ValueError(f"seed must be a whole number from 0 to 2**63 - 1, got {seed}: give for instance seed=7")
     return int(seed)

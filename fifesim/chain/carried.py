@@ -4,6 +4,7 @@ import numpy as np
 
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.base.bands import Band
+from fifesim.base.kinds import described
 from fifesim.base.warned import warn
 from fifesim.rasters import cf, directions
 from fifesim.rasters.own_rasters import incoming
@@ -17,7 +18,7 @@ from fifesim.sensor.response.rasters.pixels import matching_bands
 _NARROW = 0.0025
 
 
-def air_of(atmosphere, array):
+def air_of(atmosphere, array, assume=False):
     """
     Atmosphere: as given, else as an array carries it, else midlatitude summer with continental aerosol.
 
@@ -25,6 +26,8 @@ def air_of(atmosphere, array):
     ----------
     atmosphere : fifesim.atmosphere.air.models.Atmosphere or None
     array : xarray.DataArray
+    assume : bool, optional
+        Whether the one given counts, whatever the array carries.
 
     Returns
     -------
@@ -39,14 +42,19 @@ def air_of(atmosphere, array):
         If it is something else.
     """
     if atmosphere is not None and not isinstance(atmosphere, Atmosphere):
-        raise TypeError(f"atmosphere must be a fifesim.Atmosphere, got {atmosphere!r}: see fifesim.Atmosphere")
+        raise TypeError(f"atmosphere must be a fifesim.Atmosphere, got {described(atmosphere)}: see fifesim.Atmosphere")
     carried = array.attrs.get("atmosphere")
+    if assume:
+        if atmosphere is None:
+            raise ValueError("assume=True needs the atmosphere to assume: give it too, such as fifesim.Atmosphere(...)")
+        return atmosphere
     if carried is not None:
         carried = Atmosphere.parse(carried)
         if atmosphere is not None and atmosphere != carried:
             raise ValueError(
                 f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
-                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...), or drop .attrs['atmosphere']"
+                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...); or, to correct with the wrong "
+                "air on purpose, to_surface(..., assume=True)"
             )
     if atmosphere is None and carried is None and not is_fife(array):
         warn(
@@ -56,7 +64,7 @@ def air_of(atmosphere, array):
     return atmosphere or carried or Atmosphere()
 
 
-def air_bands_and_geometry(array, atmosphere, geometry, instrument, time=None):
+def air_bands_and_geometry(array, atmosphere, geometry, instrument, time=None, *, assume=False):
     """
     Atmosphere, spectral bands and geometry: as given, else as the array carries them.
 
@@ -68,6 +76,8 @@ def air_bands_and_geometry(array, atmosphere, geometry, instrument, time=None):
     instrument : str, fifesim.sensor.description.instruments.Instrument or None
     time : str or datetime, optional
         In the place of a geometry.
+    assume : bool, optional
+        Whether the atmosphere given counts, whatever the array carries.
 
     Returns
     -------
@@ -81,7 +91,7 @@ def air_bands_and_geometry(array, atmosphere, geometry, instrument, time=None):
         If the array was made for another atmosphere, its bands are not known, or nothing says where the sun stands.
     """
     geometry = directions.given_geometry(geometry, array, time)
-    return air_of(atmosphere, array), _responses(array, instrument), geometry
+    return air_of(atmosphere, array, assume), _responses(array, instrument), geometry
 
 
 def as_bands_of(raster, instrument, name):

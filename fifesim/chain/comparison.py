@@ -2,10 +2,17 @@
 
 from dataclasses import replace
 
+import pandas as pd
 import xarray as xr
 
+from fifesim.analysis.rasters.regression import regress
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
+from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
+from fifesim.rasters import grid as grids
+from fifesim.rasters.reductions import computed
+from fifesim.rasters.regularization import areas, regularized
+from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 
@@ -27,7 +34,8 @@ def compare(lai, instruments, setup=None, *, bands=None):
     Returns
     -------
     images : xarray.DataTree
-        A node for each instrument by its name, with ``dn`` (or ``toa_radiance``), dims (band, y, x).
+        A node for each instrument by its name, with ``dn`` (or ``toa_radiance``), dims (band, y, x); below it, of bands
+        of several resolutions, a node for each, such as ``/MSI/10m``.
 
     Raises
     ------
@@ -51,23 +59,99 @@ def compare(lai, instruments, setup=None, *, bands=None):
         raise ValueError(f"bands are given for {', '.join(set(bands) - set(names))}, which is not compared")
     nodes = {}
     for description in descriptions:
-        selected = tuple(band.name for band in _bands(description, bands.get(description.name)))
-        own = replace(setup, instrument=description, bands=selected)
-        nodes[f"/{description.name}"] = image_of(own, reflectance_of(own, lai)).to_dataset()
+        given = bands.get(description.name)
+        selected = description.red_and_near_infrared() if given is None else description.select(given)
+        own = replace(setup, instrument=description, bands=tuple(band.name for band in selected))
+        image = image_of(own, reflectance_of(own, lai))
+        nodes[f"/{description.name}"] = image if isinstance(image, xr.DataTree) else image.to_dataset()
     return xr.DataTree.from_dict(nodes)
 
 
-def _bands(description, names):
-    """Bands by name, or the red and the near infrared one."""
-    if names is not None:
-        return description.select(names)
-    found = []
-    for window in (RED, NEAR_INFRARED):
-        number = nearest([band.wavelength for band in description.bands], window)
-        if number is None:
-            raise ValueError(
-                f"{description.name} has no {window.name} band, {window.low:g} to {window.high:g} um: give "
-                f"bands={{{description.name!r}: ...}}"
-            )
-        found.append(description.bands[number])
-    return tuple(found)
+def comparison_table(images, truth=None):
+    """
+    What each of some images of one scene shows, a row for each instrument; computes.
+
+    Parameters
+    ----------
+    images : xarray.DataTree
+        From `compare`.
+    truth : xarray.DataArray, dims (y, x), optional
+        On cells, such as leaf area index; its means over the pixels of each image are compared with the NDVI.
+
+    Returns
+    -------
+    table : pandas.DataFrame
+        By instrument: ``pixel`` [m], ``rows``, ``columns``, ``bands``, ``ndvi_mean``, ``ndvi_sd``, and with a truth
+        ``slope``, ``intercept`` and ``r2`` of it on the NDVI, with the ``n`` pixels that both have. NaN where the bands
+        make no NDVI.
+
+    Raises
+    ------
+    ValueError
+        If the tree holds something else, or the truth does not lie on its ground.
+
+    See Also
+    --------
+    fifesim.analysis.rasters.regression.regress
+    """
+    rows = {}
+    for name, image in recorded_images(images).items():
+        grid = grids.geobox(image)
+        row = {"pixel": grids.cell_size(grid)[0], "rows": grid.shape.y, "columns": grid.shape.x}
+        rows[name] = row | {"bands": ", ".join(map(str, image["band"].values))}
+        if not shows_ndvi(image):
+            continue
+        # Once, for the mean, the deviation and the regression.
+        shown = computed(ndvi(image))[0]
+        row = {"ndvi_mean": float(shown.mean()), "ndvi_sd": float(shown.std(ddof=1))}
+        if truth is not None:
+            means = regularized(truth, areas(grid), grid, min_valid=sensor.MIN_VALID)
+            fit = regress(means, shown)
+            row |= {"slope": fit.slope, "intercept": fit.intercept, "r2": fit.r2, "n": fit.n}
+        rows[name] |= row
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("instrument")
+
+
+def recorded_images(images):
+    """
+    What instruments recorded, as `compare` keeps it.
+
+    Parameters
+    ----------
+    images : xarray.DataTree
+
+    Returns
+    -------
+    images : dict of str to xarray.DataArray, dims (band, y, x)
+        By the name of the instrument, with its pixel where it has several.
+
+    Raises
+    ------
+    ValueError
+        If a node holds neither digital numbers nor radiance.
+    """
+    found = {}
+    for node in images.leaves:
+        name = node.path.strip("/") or "the tree"
+        variables = [each for each in ("dn", "toa_radiance") if each in node.data_vars]
+        if not variables:
+            holds = ", ".join(map(str, node.data_vars)) or "nothing"
+            raise ValueError(f"{name} holds no dn and no toa_radiance, but {holds}: give that of compare")
+        found[name] = node[variables[0]]
+    return found
+
+
+def shows_ndvi(image):
+    """
+    Whether an image has a red and a near infrared band.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+        With a coordinate ``wavelength``. [um]
+
+    Returns
+    -------
+    shows : bool
+    """
+    return all(nearest(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))

@@ -11,6 +11,7 @@ from fifesim.atmosphere.schemes import coupling
 from fifesim.atmosphere.schemes import engines as schemes
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.base.geometry import fife_geometry
+from fifesim.base.kinds import described
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
@@ -146,8 +147,8 @@ def _surface(setup, air, reflectance, n_bands):
     surface = np.asarray(reflectance, float)
     if surface.shape not in ((), (n_bands,)) or not np.all((surface >= 0) & (surface <= 1)):
         raise ValueError(
-            f"reflectance must be one number from 0 to 1, or {n_bands}, one for each band, got {reflectance!r}: "
-            "leave it out to have that of a canopy"
+            f"reflectance must be one number from 0 to 1, or {n_bands}, one for each band, got "
+            f"{described(reflectance)}: leave it out to have that of a canopy"
         )
     return np.broadcast_to(surface, n_bands)
 

@@ -34,6 +34,41 @@ def ndvi(image):
     return indices.ndvi(planetary_reflectance(image))
 
 
+@by_date
+def index(image, name):
+    """
+    Spectral index of an image.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+        Reflectance, of the ground or planetary, with a coordinate ``wavelength`` [um] along band. Digital numbers and
+        radiance are brought to planetary reflectance first.
+    name : {"NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"}
+        As in the catalogue of spyndex: NDWI shows open water (green and near infrared), NDMI the water of leaves (near
+        and shortwave infrared). EVI is meant for reflectance of the ground: take it after `to_surface`.
+
+    Returns
+    -------
+    index : xarray.DataArray, dims (y, x)
+        NaN where there are no data. [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no such index, the image lacks a band of it, or its calibration.
+
+    References
+    ----------
+    [Rouse1974]_; [Huete1988]_; [Qi1994]_; [McFeeters1996]_; [Gao1996]_; [Huete2002]_; [Jiang2008]_; [Badgley2017]_
+
+    See Also
+    --------
+    fifesim.analysis.indices
+    """
+    return indices.index(planetary_reflectance(image), name)
+
+
 def planetary_reflectance(image):
     """
     Reflectance of an image, converted where it holds digital numbers or radiance.

@@ -1,11 +1,12 @@
 """Everything between the leaf area of a scene and its digital numbers, said once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.base.foreign import in_a_line
 from fifesim.base.geometry import Geometry
 from fifesim.chain import steps
 from fifesim.sensor import raster as sensor
@@ -63,6 +64,26 @@ class Setup:
     noise_models: object = None
     seed: int = 0
     quantise: bool = True
+
+    def __repr__(self):
+        others = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "instrument"}
+        said = [f"{name}={_brief(value)}" for name, value in others.items() if not _is_default(self, name)]
+        name = getattr(self.instrument, "name", self.instrument)
+        return f"Setup({', '.join([f'instrument={name!r}', *said])})"
+
+
+def _is_default(setup, name):
+    """Whether a field has its default; no raster is one."""
+    value, default = getattr(setup, name), Setup.__dataclass_fields__[name].default
+    return value is default or (isinstance(value, (str, int, float, tuple)) and value == default)
+
+
+def _brief(value):
+    """A value in a few words: what is large by its kind and size."""
+    if isinstance(value, xr.DataArray | xr.Dataset | GeoBox):
+        sizes = dict(zip(value.dims, value.shape, strict=True)) if isinstance(value, GeoBox) else dict(value.sizes)
+        return f"<{type(value).__name__} of {' x '.join(f'{name} {size}' for name, size in sizes.items())}>"
+    return in_a_line(repr(value), 160)
 
 
 def reflectance_of(setup, lai):

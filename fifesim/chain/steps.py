@@ -1,15 +1,13 @@
 """The steps of Figure 1 that need more than one stage: what a stage needs of another is handed to it here."""
 
-import xarray as xr
-
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.schemes import engines
 from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
-from fifesim.ground.canopy import optics
 from fifesim.ground.canopy import raster as ground
-from fifesim.ground.canopy.spectra import Spectrum
+from fifesim.ground.canopy.rasters import leaves, soils
 from fifesim.ground.terrain.rasters import light as terrain
+from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.rasters import directions
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
@@ -62,17 +60,20 @@ def surface_reflectance(
     time : str or datetime, optional
         In the place of ``geometry``: when the sun stood over the middle of the grid, below a nadir view.
     leaf_optics : Leaf, or mapping of str to (float, float), optional
-        A leaf by what it is made of, or its reflectance and transmittance by band name; by default green tallgrass. [1]
+        A leaf by what it is made of, or its reflectance and transmittance by band name; by default green tallgrass.
+        Each number may be a raster over (y, x): SAIL is evaluated at every cell then. Where one content of the `Leaf`
+        alone is a raster, its optics are from a table within 1e-8; of more, each kind of leaf is computed once. [1]
     background : optional
         Reflectance below the canopy: a number, by band name, or a raster over ([band], y, x); a `Background` or
         ``{spectrum: fraction}`` that mixes spectra; the path of a CSV file, or a Dataset, with ``wavelength`` [um] and
-        ``reflectance``. By default soil and litter of tallgrass. [1]
+        ``reflectance``. Each number by band or spectrum may be a raster over (y, x). By default soil and litter of
+        tallgrass. [1]
     leaf_angles : optional
         A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
     hotspot : float, optional
         Leaf size over canopy height; 0 is none, as in the paper. [1]
     exact : bool, optional
-        Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it.
+        Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it, and all leaves.
 
     Returns
     -------
@@ -102,14 +103,14 @@ def surface_reflectance(
     description = given_instrument(instrument, lai)
     selected = description.select(bands)
     responses = tuple(band.response for band in selected)
-    leaf_reflectance, leaf_transmittance = optics.leaf_optics(responses, leaf_optics)
+    leaf_reflectance, leaf_transmittance = leaves.leaf_optics(responses, leaf_optics, lai, exact=exact)
     level = ground.level_reflectance(
         lai,
         bands=[band.name for band in selected],
         wavelengths=[band.wavelength for band in selected],
         leaf_reflectance=leaf_reflectance,
         leaf_transmittance=leaf_transmittance,
-        background=_background(responses, background),
+        background=soils.background(responses, background, lai),
         diffuse_fraction=atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry),
         geometry=geometry,
         leaf_angles=leaf_angles,
@@ -120,6 +121,7 @@ def surface_reflectance(
     )
     if dem is None:
         return level
+    dem = beside_altitude(dem, atmosphere.altitude)
     light = _sunlight(atmosphere, responses, geometry, "surface_reflectance on slopes")
     return terrain.terrain_reflectance(level, dem, upwelling=upwelling, horizon=horizon, **light)
 
@@ -237,6 +239,7 @@ def to_surface(
     reflectance,
     atmosphere=None,
     *,
+    assume=False,
     geometry=None,
     time=None,
     instrument=None,
@@ -251,7 +254,12 @@ def to_surface(
     ----------
     reflectance : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
         Reflectance at the top of the atmosphere; radiance and digital numbers are converted first.
-    atmosphere, geometry, time, instrument, elevation, adjacency, surroundings : optional
+    atmosphere : Atmosphere, optional
+        As in `to_toa`; another than that which the array carries is an error, unless it is assumed.
+    assume : bool, optional
+        Whether to correct for the atmosphere given, whatever air the image was taken through: what a wrong haze costs.
+        The result carries the assumed one.
+    geometry, time, instrument, elevation, adjacency, surroundings : optional
         As in `to_toa`.
 
     Returns
@@ -269,7 +277,7 @@ def to_surface(
     fifesim.atmosphere.schemes.coupling.corrected_reflectance
     """
     reflectance = as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance")
-    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
+    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time, assume=assume)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
     return _of(instrument, atmosphere_raster.to_surface(reflectance, *light, **scene))
 
@@ -280,18 +288,6 @@ def _of(instrument, array):
         return array
     attrs = {key: value for key, value in array.attrs.items() if key != "instrument_description"}
     return array.drop_attrs(deep=False).assign_attrs(attrs | attributes_of(find_instrument(instrument)))
-
-
-def _background(responses, given):
-    """Reflectance below the canopy: a raster as it is, all else by band."""
-    if isinstance(given, xr.DataArray):
-        return given
-    if isinstance(given, xr.Dataset):
-        missing = {"wavelength", "reflectance"} - set(given.variables)
-        if missing:
-            raise ValueError(f"the background's Dataset has no {' nor '.join(sorted(missing))}: it is to have both")
-        given = Spectrum(given["wavelength"].values, given["reflectance"].values)
-    return optics.background(responses, given)
 
 
 def _sunlight(atmosphere, bands, geometry, what):

@@ -1,15 +1,27 @@
-"""How far a run is: a bar on a terminal, lines of JSON for batch systems, else nothing."""
+"""How far a run is: a bar on a terminal, lines of JSON for batch systems, else a line a minute."""
 
 import json
 import sys
 import time
 
 import psutil
+from dask.utils import format_time
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn, track
 
-# Between two lines of JSON. [s]
-_PAUSE = 1.0
+# Between two lines of JSON, and between two in words where no terminal shows a bar. [s]
+_PAUSE, _LONG_PAUSE = 1.0, 60.0
+
+
+def since_start():
+    """
+    Time since this process began, which began with imports.
+
+    Returns
+    -------
+    seconds : float
+    """
+    return time.time() - psutil.Process().create_time()
 
 
 def memory():
@@ -43,12 +55,14 @@ class CellProgress:
     done : int, optional
         Of them from an earlier run.
     as_json : bool, optional
-        One line of JSON a second at most, on standard output, instead of a bar on a terminal.
+        One line of JSON a second at most, on standard output, instead of a bar on a terminal, or a line a minute on
+        standard error where that is none.
     """
 
     def __init__(self, cells, done=0, as_json=False):
         self._cells, self._before, self._done, self._as_json = cells, done, done, as_json
         self._start, self._said = time.monotonic(), -_PAUSE
+        self._told = self._start
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -86,12 +100,17 @@ class CellProgress:
         if self._as_json:
             print(json.dumps(self.state()), flush=True)
         elif not self._bar.disable:
-            state = self.state()
-            said = (
-                f"{state['cells_done'] / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, "
-                f"{state['cells_per_second'] / 1e6:.1f} million/s, {state['memory'] / 1e9:.2f} GB"
-            )
-            self._bar.update(self._task, completed=self._done, said=said)
+            self._bar.update(self._task, completed=self._done, said=self._in_words(self.state()))
+        elif now - self._told >= _LONG_PAUSE:
+            self._told, state = now, self.state()
+            left = f", {format_time(state['seconds_left'])} left" if state["seconds_left"] else ""
+            print(f"simulating: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
+
+    def _in_words(self, state):
+        return (
+            f"{state['cells_done'] / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, "
+            f"{state['cells_per_second'] / 1e6:.1f} million/s, {state['memory'] / 1e9:.2f} GB"
+        )
 
     def state(self):
         """

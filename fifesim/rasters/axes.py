@@ -12,7 +12,7 @@ def north_up(array):
 
     Parameters
     ----------
-    array : xarray.DataArray, dims (..., y, x)
+    array : xarray.DataArray, dims (..., y, x), or (..., line, sample) of a scan, which stays as it is
 
     Returns
     -------
@@ -23,10 +23,27 @@ def north_up(array):
     ValueError
         If it has other dimensions than these.
     """
+    if is_scan(array):
+        return array
     check_axes(array)
     if array.sizes["y"] > 1 and "y" in array.coords and array["y"].values[1] > array["y"].values[0]:
         return array.isel(y=slice(None, None, -1))
     return array
+
+
+def is_scan(array):
+    """
+    Whether an array is by the lines and samples of a scan instead of rows and columns.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+
+    Returns
+    -------
+    is_scan : bool
+    """
+    return {"line", "sample"} <= set(getattr(array, "dims", ()))
 
 
 def check_axes(array):
@@ -48,6 +65,11 @@ def check_axes(array):
         raise TypeError(f"a raster is an xarray.DataArray, got {type(array).__name__}: open it with rioxarray")
     if {"y", "x"} <= set(array.dims):
         return
+    if is_scan(array):
+        raise ValueError(
+            f"a raster has dimensions y and x, got {array.dims} of a scan: put it onto a map with "
+            ".fifesim.grid_swath(grid)"
+        )
     for down, across in _OTHERS:
         if {down, across} <= set(array.dims):
             cure = f".rename({down}='y', {across}='x')"

@@ -53,6 +53,13 @@ QUANTITIES = {
     ),
     "dn": Quantity("1", "", "digital number", "0 is no data; radiance = gain * dn + offset"),
     "ndvi": Quantity("1", "normalized_difference_vegetation_index", "normalized difference vegetation index"),
+    "evi": Quantity("1", "", "enhanced vegetation index"),
+    "evi2": Quantity("1", "", "enhanced vegetation index of two bands"),
+    "savi": Quantity("1", "", "soil-adjusted vegetation index", "L = 0.5"),
+    "msavi": Quantity("1", "", "modified soil-adjusted vegetation index"),
+    "ndwi": Quantity("1", "", "normalized difference water index", "green and near infrared, McFeeters (1996)"),
+    "ndmi": Quantity("1", "", "normalized difference moisture index", "near and shortwave infrared, Gao's water index"),
+    "nirv": Quantity("1", "", "near infrared reflectance of vegetation"),
     "ndvi_bias": Quantity("1", "", "mean NDVI less NDVI of the mean reflectance"),
     "fpar_bias": Quantity("1", "", "mean FPAR less FPAR of the mean leaf area index"),
     "ren": Quantity("1", "", "relative equivalent noise", "uncertainty of an inferred variable over its value"),
@@ -69,6 +76,7 @@ QUANTITIES = {
     "solar_irradiance": Quantity(
         "W m-2 um-1", "solar_irradiance_per_unit_wavelength", "extraterrestrial solar irradiance of the band at 1 AU"
     ),
+    "adjustment_error": Quantity("1", "", "standard error of the surface reflectance from another instrument's bands"),
     "gain": Quantity("W m-2 sr-1 um-1", "", "radiance of one digital count"),
     "offset": Quantity("W m-2 sr-1 um-1", "", "radiance of digital number 0"),
     "compression": Quantity(

@@ -9,6 +9,7 @@ import xarray as xr
 from dask.base import tokenize
 
 from fifesim.rasters import grid as grids
+from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.windows import array_from_windows, gather, slices
 
 
@@ -39,7 +40,7 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     ValueError
         If the rasters differ in grid, or in a scalar coordinate such as sza.
     """
-    arrays = _aligned(arrays)
+    arrays = aligned(arrays)
     core = {}
     if bands is not None:
         core = {
@@ -154,7 +155,7 @@ def windows(kernel, reads, shape, chunks=None, dtype=float):
     return array_from_windows(kernel, arrays, chunks, ask, token=token, leading=leading, dtype=dtype)
 
 
-def in_blocks(kernel, reads, shape, size):
+def in_blocks(kernel, reads, shape, size, dtype=float):
     """
     Array that is made by fixed blocks, however it is read.
 
@@ -164,6 +165,8 @@ def in_blocks(kernel, reads, shape, size):
         As in `windows`.
     size : int
         Rows and columns of a block, counted from the first cell.
+    dtype : dtype, optional
+        Of the result.
 
     Returns
     -------
@@ -172,8 +175,8 @@ def in_blocks(kernel, reads, shape, size):
     """
     sizes = tuple(tuple(np.diff([*range(0, length, size), length]).tolist()) for length in shape[-2:])
     if any(isinstance(each.array, da.Array) for each in reads):
-        return windows(kernel, reads, shape, sizes)
-    out = np.empty(shape)
+        return windows(kernel, reads, shape, sizes, dtype)
+    out = np.empty(shape, dtype)
     for block in product(*map(slices, sizes)):
         out[(..., *block)] = kernel(*block, *(gather(each.array, each.window(*block)) for each in reads))
     return out
@@ -246,9 +249,39 @@ def runs(cells, chunks):
     return tuple(np.diff([*starts, len(chunk)]).tolist())
 
 
-def _aligned(arrays):
-    """The same with the coordinates of one raster on all; they must share their cells and their scalar coordinates."""
-    rasters = [array for array in arrays if isinstance(array, xr.DataArray) and {"y", "x"} <= set(array.dims)]
+def _is_raster(array):
+    return isinstance(array, xr.DataArray) and {"y", "x"} <= set(array.dims)
+
+
+def _with_crs(arrays):
+    """The same, where rasters without a CRS lie on the cells of one that has it."""
+    rasters = [array for array in arrays if _is_raster(array)]
+    known = [array for array in rasters if array.odc.crs is not None] if rasters[1:] else []
+    if len(known) in (0, len(rasters)):
+        return arrays
+    return [with_crs_of(array, known[0]) if _is_raster(array) else array for array in arrays]
+
+
+def aligned(arrays):
+    """
+    Rasters with the coordinates of one on all.
+
+    Parameters
+    ----------
+    arrays : sequence of xarray.DataArray
+        Those without dimensions y and x stay as they are; one that has lost its CRS takes that of the others.
+
+    Returns
+    -------
+    arrays : list of xarray.DataArray
+
+    Raises
+    ------
+    ValueError
+        If they do not share their cells, or a scalar coordinate such as sza differs.
+    """
+    arrays = _with_crs(arrays)
+    rasters = [array for array in arrays if _is_raster(array)]
     for one, other in combinations(rasters, 2):
         if not grids.same_grid(grids.geobox(one), grids.geobox(other)):
             raise ValueError(

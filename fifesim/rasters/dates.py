@@ -1,6 +1,7 @@
 """Rasters over time: a step of one date, taken for each date by itself."""
 
 from functools import wraps
+from inspect import signature
 
 import numpy as np
 import xarray as xr
@@ -23,10 +24,15 @@ def by_date(step):
         a coordinate along time.
     """
 
+    first = next(iter(signature(step).parameters))
+
     @wraps(step)
-    def each_date(raster, *args, **options):
-        if "time" not in getattr(raster, "dims", ()):
-            return step(raster, *args, **options)
+    def each_date(*args, **options):
+        if not args and first in options:
+            args = (options.pop(first),)
+        if not args or "time" not in getattr(args[0], "dims", ()):
+            return step(*args, **options)
+        raster, *args = args
         dates = []
         for number in range(raster.sizes["time"]):
             others = [_at(each, number, raster) for each in args]
@@ -43,7 +49,7 @@ def joined(dates):
 
     Parameters
     ----------
-    dates : sequence of xarray.DataArray
+    dates : sequence of xarray.DataArray, or of xarray.DataTree with one in each leaf
         On one grid; with a scalar coordinate ``time`` each.
 
     Returns
@@ -52,6 +58,10 @@ def joined(dates):
         Lazy where they are. Coordinates that differ from date to date are along time.
     """
     first = dates[0]
+    if isinstance(first, xr.DataTree):
+        nodes = {node.path: next(iter(node.data_vars)) for node in first.leaves}
+        rasters = {path: joined([date[path][name] for date in dates]) for path, name in nodes.items()}
+        return xr.DataTree.from_dict({path: raster.to_dataset() for path, raster in rasters.items()})
     bare = [date.drop_vars(set(date.coords) - set(date.dims)) for date in dates]
     raster = xr.concat(bare, dim="time", join="override", combine_attrs="override").transpose("time", ...)
     raster = raster.assign_coords(time=_along_time("time", dates))

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import ANGLES, Geometry, fife_geometry, sun_position
-from fifesim.rasters import cf, projection
+from fifesim.rasters import cf, whereabouts
 from fifesim.rasters import grid as grids
 from fifesim.rasters.sites import is_fife
 
@@ -115,7 +115,7 @@ def sun_over(grid, time):
     ValueError
         If it is no time, or the sun is below the horizon then.
     """
-    longitude, latitude = projection.middle(grid)
+    longitude, latitude = whereabouts.middle(grid)
     return sun_position(time, latitude, longitude)
 
 

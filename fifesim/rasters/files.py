@@ -7,7 +7,6 @@ import shutil
 import tempfile
 import warnings
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 
 import dask.array as da
@@ -15,7 +14,6 @@ import numpy as np
 import rasterio
 import rasterio.errors
 import rasterio.shutil
-import rioxarray
 import xarray as xr
 from dask.utils import SerializableLock
 from rasterio.windows import Window
@@ -25,7 +23,8 @@ from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
-from fifesim.rasters.opening import ErrorsOfGdal, raster_file
+from fifesim.rasters.gis import colours, tags_of
+from fifesim.rasters.opening import ErrorsOfGdal, raster_file, stored_cells
 from fifesim.rasters.soundness import check_memory, check_raster, horizontal_crs
 from fifesim.rasters.tags import TAG, read_tag, tag_of
 
@@ -34,9 +33,11 @@ _BLOCK = 512
 
 _TILED = {"driver": "GTiff", "tiled": True, "blockxsize": _BLOCK, "blockysize": _BLOCK, "bigtiff": "if_safer"}
 _COG = {"driver": "COG", "compress": "deflate", "predictor": "yes", "overview_resampling": "average"}
+# Without it GDAL leaves behind what the whole file has in IMAGERY.
+_COG |= {"copy_src_mdd": "yes"}
 
 
-def to_geotiff(raster, path):
+def to_geotiff(raster, path, *, overwrite=False):
     """
     Write a raster as a cloud-optimised GeoTIFF.
 
@@ -47,6 +48,8 @@ def to_geotiff(raster, path):
     raster : xarray.DataArray, dims ([band], y, x), or xarray.Dataset of variables over (y, x)
         The variables of a dataset become bands.
     path : str or path
+    overwrite : bool, optional
+        Replace a file of that name.
 
     Returns
     -------
@@ -56,16 +59,29 @@ def to_geotiff(raster, path):
     ------
     ValueError
         If the raster has no projected grid or other dimensions.
+    FileExistsError
+        If there is such a file, and ``overwrite`` is not given.
     OSError
         If the file cannot be written.
 
     Notes
     -----
     Bands have names, units, scale and offset, and ``CENTRAL_WAVELENGTH_UM`` in the ``IMAGERY`` domain where there is a
-    wavelength; attributes and the sun are tags. Angles that vary over the cells are not written, which is a warning.
+    wavelength; attributes and the sun are tags, the latter also as Landsat's metadata spell them (``SUN_ELEVATION``), a
+    coordinate ``time`` is ``TIFFTAG_DATETIME`` and ``ACQUISITIONDATETIME``. Red, green, blue and near infrared are
+    what the wavelengths say, not the order of the bands. Angles that vary over the cells are not written, which is a
+    warning.
     """
     path = Path(path)
+    if path.exists() and not overwrite:
+        raise FileExistsError(
+            f"there is a file {in_a_line(path, 150)}: type overwrite=True to replace it, or another name"
+        )
     array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
+    if "line" in array.dims:
+        raise ValueError(
+            "a GeoTIFF holds a map, and this is by line and sample: put it onto one with .grid_swath(grid)"
+        )
     if not set(array.dims) <= {"band", "y", "x"}:
         raise ValueError(f"a GeoTIFF holds dimensions (band, y, x), got {array.dims}: select or rename")
     array = array if "band" in array.dims else array.expand_dims("band")
@@ -126,7 +142,7 @@ def open_image(path, chunks=None, *, allow_remote=False):
             written_here = description is not None
             if not written_here:
                 description, storage = _gdal_description(source, file.name)
-        plain = _cells(file, crs, chunks)
+        plain = stored_cells(file, crs, chunks)
     try:
         grid = grids.geobox(plain)
     except ValueError as error:
@@ -139,29 +155,6 @@ def open_image(path, chunks=None, *, allow_remote=False):
     if "gain" in array.coords:
         array.attrs["_FillValue"] = array.dtype.type(0)
     return array if "band" in description["dims"] else array.isel(band=0, drop=True)
-
-
-def _cells(file, crs, chunks):
-    """Cells of a file as they are stored, with coordinates."""
-    with warnings.catch_warnings():
-        # rioxarray has one scale and offset for all bands; here they are coordinates along band.
-        warnings.filterwarnings("ignore", "(Scales|Offsets) differ across bands")
-        opened = rioxarray.open_rasterio(file.path, driver=file.driver, chunks=chunks, mask_and_scale=False)
-    if not isinstance(opened, xr.DataArray):
-        raise ValueError(f"{file.name} holds several rasters: take one of them out of it with gdal_translate")
-    opened = opened.rio.write_crs(crs)
-    if chunks is None:
-        return opened.load()
-    read = partial(_read_block, file, file.state, opened.dtype)
-    return opened.copy(data=da.map_blocks(read, chunks=opened.chunks, meta=np.empty((0, 0, 0), opened.dtype)))
-
-
-def _read_block(file, state, dtype, block_info=None):
-    """A chunk of a file, which has changed where its state has."""
-    (first, last), (top, bottom), (left, right) = block_info[None]["array-location"]
-    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
-        window = Window(left, top, right - left, bottom - top)
-        return source.read(list(range(first + 1, last + 1)), window=window).astype(dtype, copy=False)
 
 
 def _stacked(dataset):
@@ -224,6 +217,7 @@ def _stream(array, grid, path, described):
         "width": grid.shape.x,
         "crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
         "transform": grid.affine,
+        "photometric": "minisblack",  # three bytes a pixel would be red, green and blue
         "nodata": 0 if dtype.kind == "u" else np.nan if dtype.kind == "f" else None,
     }
     with rasterio.open(path, "w", **_TILED, **profile) as sink:
@@ -260,7 +254,10 @@ def _describe(sink, array, described):
     kept = tag_of(array, described.dims if isinstance(described, xr.DataArray) else array.dims)
     scalars = {name: item["values"] for name, item in kept["coords"].items() if not item["dims"]}
     readable = {key: str(value) for key, value in (kept["attrs"] | scalars).items()}
-    sink.update_tags(**readable, **{TAG: json.dumps(kept)}, AREA_OR_POINT="Area")
+    tags, imagery = tags_of(array)
+    sink.update_tags(**tags | readable, **{TAG: json.dumps(kept)}, AREA_OR_POINT="Area")
+    sink.update_tags(ns="IMAGERY", **imagery)
+    sink.colorinterp = colours(array)
     names = [str(name) for name in array["band"].values] if "band" in array.coords else [str(array.name)]
     for number, name in enumerate(names, 1):
         sink.set_band_description(number, name)

@@ -110,14 +110,17 @@ def geobox(array):
         If there is no CRS, or the grid is not one that `check_grid` passes.
     """
     check_axes(array)
-    if "spatial_ref" not in array.coords and array.odc.crs is None:
+    if 0 in array.shape:
+        raise ValueError(f"the raster has no cells, shape {array.shape}: look at how it was selected")
+    if not ("spatial_ref" in array.coords and array.coords["spatial_ref"].attrs) and array.odc.crs is None:
         raise ValueError(
             "the raster has no CRS: open its file with decode_coords='all', or import rioxarray and give it one with "
-            ".rio.write_crs('EPSG:26914')"
+            ".rio.write_crs('EPSG:26914'); xr.where drops it, .where of a raster keeps it"
         )
     found = array.odc.geobox
     if found is None:
-        raise ValueError("the raster's x and y are not the centres of a regular grid")
+        cure = ": one row tells no cell, give .rio.write_transform(...)" if 1 in (array.y.size, array.x.size) else ""
+        raise ValueError(f"the raster's x and y are not the centres of a regular grid{cure}")
     a = found.affine
     (west, cell_x), (north, cell_y) = _axis(array, "x", a.c, a.a), _axis(array, "y", a.f, a.e)
     cell_x, cell_y = _exact_cell(array, cell_x, cell_y)
@@ -324,8 +327,11 @@ def _snapped(grid):
 
 def _axis(array, name, edge, cell):
     """Outer edge and cell along an axis, from all coordinates; odc-geo, whose these are, looks at two."""
-    if name not in array.coords or array.sizes[name] < 2:
+    if name not in array.coords:
         return edge, cell
+    if array.sizes[name] == 1:
+        # Of a part, the GeoTransform is that of the whole: its cell holds, its corner does not.
+        return float(array.coords[name].values[0] - cell / 2), cell
     centres = array.coords[name].values.astype(float)
     even, cell = np.linspace(centres[0], centres[-1], centres.size, retstep=True)
     # Single precision resolves half a metre of a northing, a sixtieth of a 30 m cell.

@@ -6,9 +6,15 @@ import warnings
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import partial
 
+import dask.array as da
+import numpy as np
 import rasterio
 import rasterio.errors
+import rioxarray
+import xarray as xr
+from rasterio.windows import Window
 
 from fifesim.base.foreign import check_regular, in_a_line
 from fifesim.rasters import mosaics
@@ -193,3 +199,44 @@ def _check_mosaic(path, around):
             _first_that_opens(name, formats)
         except ValueError as error:
             raise ValueError(f"{said} of a file that is not opened: {in_a_line(error, 280)}") from None
+
+
+def stored_cells(file, crs, chunks):
+    """
+    Cells of a file as they are stored, with coordinates.
+
+    Parameters
+    ----------
+    file : RasterFile
+    crs : rasterio.crs.CRS
+    chunks : mapping or int or None
+        Makes the result lazy.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims (band, y, x)
+
+    Raises
+    ------
+    ValueError
+        If it holds several rasters.
+    """
+    with warnings.catch_warnings():
+        # rioxarray has one scale and offset for all bands; here they are coordinates along band.
+        warnings.filterwarnings("ignore", "(Scales|Offsets) differ across bands")
+        opened = rioxarray.open_rasterio(file.path, driver=file.driver, chunks=chunks, mask_and_scale=False)
+    if not isinstance(opened, xr.DataArray):
+        raise ValueError(f"{file.name} holds several rasters: take one of them out of it with gdal_translate")
+    opened = opened.rio.write_crs(crs)
+    if chunks is None:
+        return opened.load()
+    read = partial(_read_block, file, file.state, opened.dtype)
+    return opened.copy(data=da.map_blocks(read, chunks=opened.chunks, meta=np.empty((0, 0, 0), opened.dtype)))
+
+
+def _read_block(file, state, dtype, block_info=None):
+    """A chunk of a file, which has changed where its state has."""
+    (first, last), (top, bottom), (left, right) = block_info[None]["array-location"]
+    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
+        window = Window(left, top, right - left, bottom - top)
+        return source.read(list(range(first + 1, last + 1)), window=window).astype(dtype, copy=False)

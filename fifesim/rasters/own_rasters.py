@@ -4,7 +4,8 @@ import numpy as np
 import xarray as xr
 
 from fifesim.rasters import cf, chunks
-from fifesim.rasters.axes import check_axes, north_up
+from fifesim.rasters.axes import check_axes, is_scan, north_up
+from fifesim.rasters.packed import STORAGE, scale_and_offset, unpacked
 
 # A reflectance factor beyond these is none: glint, snow and slopes in low sun stay within. [1]
 LOWEST, HIGHEST = -0.5, 5.0
@@ -13,10 +14,6 @@ LOWEST, HIGHEST = -0.5, 5.0
 _LONGEST = 100.0
 _NANOMETRES = {"nm", "nanometer", "nanometers", "nanometre", "nanometres"}
 _MICROMETRES = {"um", "µm", "μm", "micron", "microns", "micrometer", "micrometers", "micrometre", "micrometres"}
-
-# Attributes that say which value stands for no data.
-_NO_DATA = ("_FillValue", "missing_value", "nodata")
-_STORAGE = ("scale_factor", "add_offset", *_NO_DATA)
 
 
 def incoming(raster, name):
@@ -126,14 +123,15 @@ def check_reflectance(values):
 def _bands_as_one(raster, name):
     """Variables of a Dataset as bands."""
     if not isinstance(raster, xr.Dataset):
-        check_axes(raster)
+        if not is_scan(raster):
+            check_axes(raster)
         return raster
     bands = [key for key, value in raster.data_vars.items() if value.ndim >= 2]
     if not bands:
         raise ValueError(f"the Dataset has no variables over (y, x): {', '.join(map(str, raster.data_vars)) or 'none'}")
     for key in bands:
         check_axes(raster[key])
-    said = {repr([raster[key].attrs.get(each) for each in _STORAGE]) for key in bands}
+    said = {repr([raster[key].attrs.get(each) for each in STORAGE]) for key in bands}
     parts = [raster[key] if len(said) == 1 else _physical(raster[key], name) for key in bands]
     index = xr.DataArray([str(key) for key in bands], dims="band", name="band")
     joined = xr.concat(parts, dim=index, combine_attrs="drop_conflicts", coords="minimal", compat="override")
@@ -152,30 +150,14 @@ def _named(array):
 
 
 def _physical(array, name):
-    """Values in their unit, NaN where there are no data."""
-    said = array.attrs | {key: value for key, value in array.encoding.items() if array.dtype.kind in "iu"}
-    scale, offset = float(said.get("scale_factor", 1.0)), float(said.get("add_offset", 0.0))
-    scaled = (scale, offset) != (1.0, 0.0)
-    called = array.name or "the raster"
-    if array.dtype.kind in "iub" and not scaled:
+    """Values in their unit, NaN where there are no data; looked at when they are computed."""
+    if array.dtype.kind in "iub" and scale_and_offset(array) == (1.0, 0.0):
         raise ValueError(
-            f"{called} holds whole numbers ({array.dtype}) without a scale, where {cf.QUANTITIES[name].long_name} is "
-            "needed: type .assign_attrs(scale_factor=0.0001) for what scales them, or calibrate digital numbers with "
-            "fifesim.calibrate"
+            f"{array.name or 'the raster'} holds whole numbers ({array.dtype}) without a scale, where "
+            f"{cf.QUANTITIES[name].long_name} is needed: type .assign_attrs(scale_factor=0.0001) for what scales them, "
+            "or calibrate digital numbers with fifesim.calibrate"
         )
-    if array.dtype.kind == "f" and scaled:
-        raise ValueError(
-            f"{called} holds fractions and says scale_factor {scale:g}, add_offset {offset:g}: where they were "
-            "applied, drop them from .attrs; where not, open the file with mask_and_scale=True"
-        )
-    missing = [float(each) for key in _NO_DATA if key in said for each in np.ravel(said[key])]
-    dtype = np.float32 if array.dtype == np.float32 else float
-
-    def kernel(values):
-        physical = values * scale + offset if scaled else values
-        return check_reflectance(np.where(np.isin(values, missing), np.nan, physical) if missing else physical)
-
-    attrs = {key: value for key, value in array.attrs.items() if key not in _STORAGE}
-    out = chunks.pointwise(kernel, array, dtype=dtype)
-    out.attrs, out.encoding = attrs, {}
+    plain = unpacked(array)
+    out = chunks.pointwise(check_reflectance, plain, dtype=np.float32 if plain.dtype == np.float32 else float)
+    out.attrs = dict(plain.attrs)
     return out

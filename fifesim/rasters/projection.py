@@ -14,6 +14,8 @@ from fifesim.base.foreign import in_a_line, shown
 
 # By how much a metre of a grid may differ from one on the ground. [1]
 _SCALE_BOUND = 0.035
+# Beyond that it is told: the edges of the zones of UTM and of most national grids are within. [1]
+_SCALE_TOLD = 0.01
 # A place that comes back this far from where it was lies where the projection does not reach. [m]
 _RETURNS = 1.0
 
@@ -168,6 +170,11 @@ def check_metres(crs, bounds):
         If it is not projected, is in other units, has axes that lead elsewhere, does not reach the place, or has a
         scale there that is not within 3.5 % of one.
 
+    Warns
+    -----
+    UserWarning
+        If the scale is not within 1 % of one; once for a CRS and a degree of longitude and latitude.
+
     Notes
     -----
     The scale is the largest and the smallest in any direction (Tissot's), at corners and middle. Both axes of a polar
@@ -182,6 +189,7 @@ def check_metres(crs, bounds):
     if ways not in ({"east", "north"}, {"north"}, {"south"}):
         raise ValueError(f"the axes of the CRS must lead east and north, those of {name} lead {' and '.join(ways)}")
     west, south, east, north = bounds
+    found = []
     for x, y in (((west + east) / 2, (south + north) / 2), (west, north), (east, north), (west, south), (east, south)):
         scale, longitude, latitude = _scale(crs, x, y)
         if scale is None:
@@ -194,6 +202,21 @@ def check_metres(crs, bounds):
                 f"the scale of {name} is {scale:.3f} at longitude {longitude:.2f}, latitude {latitude:.2f}: a metre of "
                 f"a grid may be {_SCALE_BOUND:.1%} off; use another CRS, such as {_undistorted(longitude, latitude)}"
             )
+        found.append((scale, longitude, latitude))
+    scale, longitude, latitude = max(found, key=lambda each: abs(each[0] - 1))
+    if abs(scale - 1) > _SCALE_TOLD:
+        _warn_of_scale(name, round(scale, 2), round(longitude), round(latitude))
+
+
+@lru_cache(maxsize=1024)
+def _warn_of_scale(name, scale, longitude, latitude):
+    """Once for a place, for a chain asks at every step."""
+    warnings.warn(
+        f"the scale of {name} is {scale:.2f} near longitude {longitude}, latitude {latitude}: a cell of 30 m is "
+        f"{30 / scale:.1f} m on the ground, where slopes, footprints and distances are taken as if it were 30 m; "
+        f"{_undistorted(longitude, latitude)} is within 1 %",
+        stacklevel=5,
+    )
 
 
 @lru_cache(maxsize=1024)
@@ -259,24 +282,6 @@ def degrees(grid):
     return to_degrees.transform_bounds(*grid.boundingbox.bbox)
 
 
-def middle(grid):
-    """
-    Where the middle of a grid lies.
-
-    Parameters
-    ----------
-    grid : odc.geo.geobox.GeoBox
-
-    Returns
-    -------
-    longitude, latitude : float
-        On the ellipsoid of its CRS. [degree]
-    """
-    crs = pyproj.CRS.from_wkt(grid.crs.to_wkt())
-    to_degrees = pyproj.Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
-    return to_degrees.transform(*transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2))
-
-
 def convergence(grid):
     """
     Angle from true north to the north of a grid, at its middle; positive where grid north lies east of true north.
@@ -291,7 +296,9 @@ def convergence(grid):
         [degree]
     """
     crs = pyproj.CRS.from_wkt(grid.crs.to_wkt())
-    return float(pyproj.Proj(crs).get_factors(*middle(grid)).meridian_convergence)
+    x, y = transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)
+    to_degrees = pyproj.Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
+    return float(pyproj.Proj(crs).get_factors(*to_degrees.transform(x, y)).meridian_convergence)
 
 
 def transform_points(affine, columns, rows):

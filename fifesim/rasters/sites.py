@@ -1,10 +1,12 @@
 """Study sites: their grids, and which scenes were made on them."""
 
+import pyproj
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.base import fife
-from fifesim.rasters import projection
+from fifesim.base.kinds import described
+from fifesim.rasters import whereabouts
 
 _NAME = "FIFE"
 
@@ -48,6 +50,32 @@ def fife_site(cell, window=None, datum="NAD83"):
     return site if window is None else _window(site, window)
 
 
+def on_fife_site(grid):
+    """
+    Whether the middle of a grid lies on the FIFE site, where the paper's sun and air hold.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    answer : bool
+
+    Examples
+    --------
+    >>> on_fife_site(fife_site(300.0)), on_fife_site(fife_site(300.0).pad(50)[:50, :50])
+    (True, False)
+    """
+    longitude, latitude = whereabouts.middle(grid)
+    if max(abs(longitude - fife.LONGITUDE), abs(latitude - fife.LATITUDE)) > 1:
+        return False
+    crs, west, north = fife.CORNERS["NAD83"]
+    x, y = pyproj.Transformer.from_crs(4326, crs, always_xy=True).transform(longitude, latitude)
+    # The corner of one datum is 9 m from that of the other.
+    return max(abs(x - west - fife.SIZE / 2), abs(y - north + fife.SIZE / 2)) <= fife.SIZE / 2 + 10
+
+
 def made_on_site(grid):
     """
     Attributes of a scene that is made on a grid.
@@ -59,12 +87,9 @@ def made_on_site(grid):
     Returns
     -------
     attributes : dict of str
-        ``site`` where the middle of the grid lies on the FIFE site: a scene that is made there has the paper's sun by
-        default.
+        ``site`` where it is the FIFE site: a scene that is made there has the paper's sun by default.
     """
-    longitude, latitude = projection.middle(grid)
-    (west, east), (south, north) = fife.LONGITUDES, fife.LATITUDES
-    return {"site": _NAME} if west <= longitude <= east and south <= latitude <= north else {}
+    return {"site": _NAME} if on_fife_site(grid) else {}
 
 
 def is_fife(array):
@@ -87,7 +112,7 @@ def _window(site, window):
         (top, bottom), (left, right) = window
     except (TypeError, ValueError):
         raise ValueError(
-            f"window must be ((first row, last row), (first column, last column)), got {window!r}"
+            f"window must be ((first row, last row), (first column, last column)), got {described(window)}"
         ) from None
     rows, columns = site.shape
     if not (0 <= top < bottom <= rows and 0 <= left < right <= columns):

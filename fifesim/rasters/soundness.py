@@ -1,5 +1,7 @@
 """Whether an open raster holds real numbers at a place on the Earth."""
 
+from contextlib import contextmanager
+
 import numpy as np
 import psutil
 import pyproj
@@ -9,9 +11,37 @@ import rasterio.errors
 
 from fifesim.base.foreign import in_a_line
 from fifesim.rasters import projection
+from fifesim.rasters.opening import ErrorsOfGdal
 
 # Coordinates beyond are none of the Earth's in any unit. [m or degree]
 _FARTHEST = 1e9
+
+
+@contextmanager
+def sound_raster(file):
+    """
+    A context with an open file that holds numbers at places on the Earth.
+
+    Parameters
+    ----------
+    file : fifesim.rasters.opening.RasterFile
+
+    Yields
+    ------
+    source : rasterio.io.DatasetReader
+    crs : rasterio.crs.CRS
+        Of its places.
+
+    Raises
+    ------
+    ValueError
+        As `check_raster` and `horizontal_crs`.
+    OSError
+        If it cannot be read.
+    """
+    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
+        check_raster(source, file.name)
+        yield source, horizontal_crs(source, file.name)
 
 
 def check_raster(source, name, *, north_up=False):

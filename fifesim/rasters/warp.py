@@ -1,26 +1,28 @@
 """Bring a raster file onto a grid, by an operation between the two CRSs whose accuracy is known."""
 
-from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import product
 from threading import Lock
+from typing import NamedTuple
 
+import dask.array as da
 import numpy as np
-import pyproj
 import rasterio
 import rasterio.windows
+import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
-from pyproj.aoi import AreaOfInterest
-from pyproj.database import query_utm_crs_info
 from rasterio.enums import Resampling
 from rasterio.warp import reproject
 
 from fifesim.base.lattice import assemble
+from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters import places, projection
-from fifesim.rasters.opening import ErrorsOfGdal, raster_file
-from fifesim.rasters.soundness import check_raster, horizontal_crs
+from fifesim.rasters.opening import raster_file
+from fifesim.rasters.soundness import sound_raster
+from fifesim.rasters.whereabouts import lies_in_words
 
 # Cells are made in fixed tiles of this size, so that the warper's rounding is the same under any chunking.
 _TILE = 512
@@ -71,12 +73,11 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False):
     """
     grids.check_grid(grid)
     file = raster_file(path, allow_remote)
-    with _checked(file) as (source, crs):
+    with sound_raster(file) as (source, crs):
         area = projection.degrees(grid)
         pipeline, _ = projection.operation(crs, grid.crs.to_wkt(), area)
         back, _ = projection.operation(grid.crs.to_wkt(), crs, area)
-        if _source_window(source, crs, grid, back) is None:
-            raise ValueError(f"{file.name} does not overlap the grid, which spans {grids.extent(grid)}")
+        _check_overlap(source, crs, grid, back, file.name)
     # A file that has changed is another file to the cache.
     make_tile = partial(_warp_tile, file, file.state, grid, pipeline, back)
     row, column = grids.lattice_position(grid)
@@ -87,57 +88,134 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False):
     return places.tiles(kernel, grid, chunks, tile=_TILE)
 
 
-def covering_grid(path, cell, pixel):
+def raster_onto_grid(raster, grid, chunks=None):
     """
-    Grid that covers a raster file, from and to whole pixels of its CRS.
+    A raster on a grid, as `file_onto_grid` brings a file there.
 
     Parameters
     ----------
-    path : str or path
-    cell : float
-        [m]
-    pixel : float
-        Size that the corners are multiples of. [m]
+    raster : xarray.DataArray, dims (y, x)
+        In any CRS and orientation.
+    grid : odc.geo.geobox.GeoBox
+    chunks : mapping or int, optional
+        Makes the result lazy, as it is without where the raster is.
 
     Returns
     -------
-    grid : odc.geo.geobox.GeoBox
-        In the file's CRS where that is projected, else in its UTM zone.
+    array : xarray.DataArray, dims (y, x)
+        NaN where the raster has no data.
 
     Raises
     ------
     ValueError
-        If the file is missing, has no CRS, or lies in a CRS that is not in metres.
+        If the raster has no regular grid or no CRS, lies elsewhere, or needs a change of datum of unknown accuracy.
     """
-    with _checked(raster_file(path)) as (source, crs):
-        crs = pyproj.CRS.from_user_input(crs)
-        outline = [np.linspace(0, size, 17) for size in (source.width, source.height)]
-        columns, rows = (values.ravel() for values in np.meshgrid(*outline))
-        x, y = projection.transform_points(source.transform, columns, rows)
-    if crs.is_geographic:
-        target = _utm(crs, x, y)
-        pipeline, _ = projection.operation(crs, target, (x.min(), y.min(), x.max(), y.max()))
-        x, y = projection.carry(pipeline, crs, target, x, y)
-        crs = target
-    west, north = np.floor(np.min(x) / pixel) * pixel, np.ceil(np.max(y) / pixel) * pixel
-    width, height = np.ceil((np.max(x) - west) / pixel) * pixel, np.ceil((north - np.min(y)) / pixel) * pixel
-    name = f"EPSG:{crs.to_epsg()}" if crs.to_epsg() else crs.to_wkt()
-    return grids.grid_at(name, float(west), float(north), float(width), float(height), cell)
+    grids.check_grid(grid)
+    source, crs = _array_source(raster)
+    area = projection.degrees(grid)
+    pipeline, _ = projection.operation(crs, grid.crs.to_wkt(), area)
+    back, _ = projection.operation(grid.crs.to_wkt(), crs, area)
+    _check_overlap(source, crs, grid, back, source.name)
+    row, column = grids.lattice_position(grid)
+    reads = _TileReads(source.cells, replace(source, cells=None), crs, grid, back)
+
+    def kernel(rows, columns, cells):
+        down, across = reads.window(rows, columns)
+        known = replace(reads.source, cells=cells, first=(down.start, across.start))
+        make_tile = partial(_tile, known, crs, source.name, grid, pipeline, back)
+        shape = rows.stop - rows.start, columns.stop - columns.start
+        return assemble(make_tile, _TILE, row + rows.start, column + columns.start, shape)
+
+    lazy = chunks is not None or isinstance(source.cells, da.Array)
+    sizes = places.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=_TILE) if lazy else None
+    made = chunking.windows(kernel, [reads], tuple(grid.shape), sizes)
+    return grids.place(xr.DataArray(made, dims=("y", "x")), grid)
 
 
-def _utm(crs, longitude, latitude):
-    """UTM zone of the middle of some places, in their own datum where it is NAD83, else in WGS 84."""
-    datum = "NAD83" if crs.datum is not None and crs.datum.name == "North American Datum 1983" else "WGS 84"
-    middle = AreaOfInterest(*(float(np.mean(values)) for values in (longitude, latitude) * 2))
-    return pyproj.CRS.from_epsg(query_utm_crs_info(datum_name=datum, area_of_interest=middle)[0].code)
+@dataclass(frozen=True, eq=False)
+class _ArraySource:
+    """What the warper asks of an open file, of an array of which a window is known."""
+
+    name: str
+    cells: np.ndarray | da.Array | None
+    shape: tuple[int, int]
+    transform: Affine
+    first: tuple[int, int] = (0, 0)
+    scales: tuple = (1.0,)
+    offsets: tuple = (0.0,)
+
+    @property
+    def width(self):
+        return self.shape[1]
+
+    @property
+    def height(self):
+        return self.shape[0]
+
+    def read(self, band, window, masked):
+        rows, columns = (
+            slice(int(start - first), int(start - first + size))
+            for start, size, first in zip(
+                (window.row_off, window.col_off), (window.height, window.width), self.first, strict=True
+            )
+        )
+        return np.ma.asarray(self.cells[rows, columns])
+
+    def window_transform(self, window):
+        return self.transform * Affine.translation(window.col_off, window.row_off)
 
 
-@contextmanager
-def _checked(file):
-    """The open file, which holds numbers at places on the Earth, and the reference system of these."""
-    with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
-        check_raster(source, file.name)
-        yield source, horizontal_crs(source, file.name)
+class _TileReads(NamedTuple):
+    """What each chunk reads of an array: the window of it that the chunk's tiles read."""
+
+    array: np.ndarray | da.Array
+    source: _ArraySource
+    crs: object
+    grid: GeoBox
+    back: str | None
+
+    def window(self, rows, columns):
+        row, column = grids.lattice_position(self.grid)
+        top, left = ((start + at.start) // _TILE for start, at in ((row, rows), (column, columns)))
+        ends = (-(-(start + at.stop) // _TILE) for start, at in ((row, rows), (column, columns)))
+        found = [
+            _source_window(
+                self.source, self.crs, _part(self.grid, down * _TILE - row, across * _TILE - column, _TILE), self.back
+            )
+            for down, across in product(*(range(first, end) for first, end in zip((top, left), ends, strict=True)))
+        ]
+        found = [each for each in found if each is not None]
+        if not found:
+            return slice(0, 0), slice(0, 0)
+        # The window of a block is not wholly that of its tile, by the curvature between their outlines.
+        around = _SOURCE_MARGIN
+        top, left = (
+            max(int(min(each)) - around, 0) for each in zip(*((w.row_off, w.col_off) for w in found), strict=True)
+        )
+        ends = zip(*((w.row_off + w.height, w.col_off + w.width) for w in found), strict=True)
+        bottom, right = (min(int(max(each)) + around, size) for each, size in zip(ends, self.source.shape, strict=True))
+        return slice(top, bottom), slice(left, right)
+
+
+def _array_source(raster):
+    """An array as a source of cells, and its CRS."""
+    name = str(raster.name or "the raster")
+    found = raster.odc.geobox
+    if found is None or raster.odc.crs is None:
+        raise ValueError(f"{name} has no regular grid or no CRS: give it one with .rio.write_crs('EPSG:26914')")
+    cells = raster.transpose(*raster.odc.spatial_dims).data
+    crs = projection.horizontal(raster.odc.crs.to_wkt())
+    return _ArraySource(name, cells, cells.shape, found.affine), rasterio.crs.CRS.from_user_input(crs)
+
+
+def _check_overlap(source, crs, grid, back, name):
+    """Refuse what lies elsewhere."""
+    if _source_window(source, crs, grid, back) is None:
+        lies = lies_in_words(source.transform, source.shape, crs)
+        raise ValueError(
+            f"{name} does not overlap the grid, which spans {grids.extent(grid)} in "
+            f"{projection.name_of(grid.crs.proj)}: it spans {lies}"
+        )
 
 
 def _source_places(source, crs, grid, back):
@@ -169,23 +247,28 @@ def _cells_per_cell(source, crs, grid, back):
 
 @lru_cache(maxsize=16)
 def _warp_tile(file, state, grid, pipeline, back, tile_row, tile_column):
-    """One lattice tile of the file's first band, in its physical unit; blocks that do not meet the grid stay empty."""
+    """One lattice tile of the file's first band, in its physical unit."""
+    with sound_raster(file) as (source, crs):
+        return _tile(source, crs, file.name, grid, pipeline, back, tile_row, tile_column)
+
+
+def _tile(source, crs, name, grid, pipeline, back, tile_row, tile_column):
+    """One lattice tile of a file or array; blocks that do not meet the grid stay empty."""
     row, column = grids.lattice_position(grid)
     top, left = tile_row * _TILE - row, tile_column * _TILE - column
     out = np.full((_TILE, _TILE), np.nan)
-    with _checked(file) as (source, crs):
-        options = {"src_crs": crs, "src_nodata": np.nan}
-        options |= {"dst_crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()), "dst_nodata": np.nan}
-        finer = max(_cells_per_cell(source, crs, grid, back)) > 1.01
-        options |= {"resampling": Resampling.average if finer else Resampling.bilinear}
-        options |= {"COORDINATE_OPERATION": pipeline} if pipeline else {}
-        # Of the tile, not of the grid, so that it is the same in every window.
-        size = _block_size(max(_cells_per_cell(source, crs, _part(grid, top, left, _TILE), back)))
-        for down, across in product(range(0, _TILE, size), repeat=2):
-            first, start = top + down, left + across
-            if -size < first < grid.shape.y and -size < start < grid.shape.x:
-                block = _part(grid, first, start, size)
-                out[down : down + size, across : across + size] = _warp_block(source, file.name, block, back, options)
+    options = {"src_crs": crs, "src_nodata": np.nan}
+    options |= {"dst_crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()), "dst_nodata": np.nan}
+    finer = max(_cells_per_cell(source, crs, grid, back)) > 1.01
+    options |= {"resampling": Resampling.average if finer else Resampling.bilinear}
+    options |= {"COORDINATE_OPERATION": pipeline} if pipeline else {}
+    # Of the tile, not of the grid, so that it is the same in every window.
+    size = _block_size(max(_cells_per_cell(source, crs, _part(grid, top, left, _TILE), back)))
+    for down, across in product(range(0, _TILE, size), repeat=2):
+        first, start = top + down, left + across
+        if -size < first < grid.shape.y and -size < start < grid.shape.x:
+            block = _part(grid, first, start, size)
+            out[down : down + size, across : across + size] = _warp_block(source, name, block, back, options)
     return out
 
 

@@ -13,6 +13,7 @@ from fifesim.scenario.section import Section, file, nearest, number, seed, text
 
 LAND_FORMS = ("flint-hills", "flat")
 INTERVALS = ("product", "native")
+EXTENT = ("west", "north", "width", "height")
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
 # A date alone has no sun, and 06/07/1987 is in June or in July.
@@ -27,7 +28,7 @@ _LEAST_HOTSPOT = 1e-6  # below it the hot spot is narrower than the sun
 
 
 class GridKeys(Section):
-    """Ground cells. Without any key but cell, a scene that reads a LAI file covers that file."""
+    """Ground cells. Without corner and size, a scene that reads a LAI file covers that file."""
 
     crs: str = text(fife.CORNERS["NAD83"][0], "projected coordinate reference system in metres")
     west: float = number(fife.CORNERS["NAD83"][1], "m", "easting of the upper left corner")
@@ -117,11 +118,13 @@ class TerrainKeys(Section):
 class SunAndViewKeys(Section):
     """Directions; the sun's from time and place, or given by sza and saa."""
 
-    time: str = text(
-        fife.TIME, "date and time of day, UTC without an offset such as -05:00; a hypothetical overpass by default"
+    time: str | None = text(
+        None,
+        "date and time of day, UTC without an offset such as -05:00; by default a hypothetical overpass of FIFE, on "
+        "its site only; elsewhere, where sza and saa are given instead, the sun is 1 astronomical unit away",
     )
-    latitude: float = number(fife.LATITUDE, "degree", "north", ge=-90, le=90)
-    longitude: float = number(fife.LONGITUDE, "degree", "east", ge=-180, le=360)
+    latitude: float | None = number(None, "degree", "north; by default the grid's own", ge=-90, le=90)
+    longitude: float | None = number(None, "degree", "east; by default the grid's own", ge=-180, le=360)
     sza: float | None = number(None, "degree", "solar zenith, instead of that of time and place", ge=0, lt=90)
     saa: float | None = number(None, "degree", "solar azimuth, clockwise from north", ge=-360, le=360)
     vza: float = number(0.0, "degree", "sensor zenith; 0 is nadir", ge=0, le=75)
@@ -130,6 +133,8 @@ class SunAndViewKeys(Section):
     @field_validator("time", mode="before")
     @classmethod
     def _full_date(cls, value):
+        if value is None:
+            return value
         # TOML has dates of its own.
         written = value.isoformat() if isinstance(value, datetime) else value
         try:
@@ -161,7 +166,7 @@ class AirKeys(Section):
     )
     visibility: float | None = number(45.0, "km", "meteorological range; give it or aot", ge=5, le=100)
     aot: float | None = number(None, "1", "aerosol optical thickness at 0.55 um, instead of visibility", ge=0, le=2)
-    altitude: float = number(0.4, "km", "of the ground above the sea", ge=0, le=4)
+    altitude: float = number(0.4, "km", "of the ground above the sea; by default FIFE's, on its site only", ge=0, le=4)
     h2o: float | None = number(None, "g cm-2", "water vapour, instead of the profile's", ge=0, le=10)
     o3: float | None = number(None, "cm-atm", "ozone, instead of the profile's", ge=0, le=1)
     engine: str = text("5S", f"one of {', '.join(ENGINES)}")
@@ -180,11 +185,11 @@ class SensorKeys(Section):
     """The instrument."""
 
     instrument: str = file("TM", "see: fifesim sensors", suffix=".toml")
-    bands: list[str] = text(["TM3", "TM4"], "names of bands")
+    bands: list[str] = text(["TM3", "TM4"], "names of bands; by default red and near infrared")
     pixel: float | None = number(
         None,
         "m",
-        "size of a pixel; by default the instrument's gridded product; the footprint stays the instrument's",
+        "size of a pixel; by default the bands' gridded product; the footprint stays the instrument's",
         gt=0,
     )
     interval: str | float = Field(
@@ -200,6 +205,11 @@ class SensorKeys(Section):
         max_length=2,
     )
     noise: list[str] = text([], "of the detectors: shot, thermal, fixed-pattern")
+    noise_model: _ByName = text(
+        {},
+        "of every band, instead of the instrument's: thermal [W m-2 sr-1 um-1], shot [W m-2 sr-1 um-1], detectors, "
+        "gain_spread [1], offset_spread [W m-2 sr-1 um-1]",
+    )
     seed: int = seed(0, "of the noise")
     min_valid: float = number(0.98, "1", "share of its footprint that a pixel needs on valid cells", ge=0, le=1)
 

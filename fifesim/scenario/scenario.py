@@ -2,15 +2,19 @@
 
 import os
 
+from pydantic import ValidationError
+
 from fifesim.atmosphere.schemes import six_s
 from fifesim.atmosphere.schemes.engines import check_zenith
-from fifesim.base import geometry
+from fifesim.base import fife, geometry
 from fifesim.base.foreign import shown
 from fifesim.rasters import grid as grids
-from fifesim.rasters import warp
-from fifesim.scenario.keys import GridKeys, Keys
+from fifesim.rasters import whereabouts
+from fifesim.rasters.covering import covering_grid
+from fifesim.rasters.sites import on_fife_site
+from fifesim.scenario.keys import EXTENT, GridKeys, Keys
 from fifesim.scenario.sections import Air, Ground, Sensor, Terrain
-from fifesim.scenario.toml import load_values, validated
+from fifesim.scenario.toml import load_values, mistakes
 
 
 class Scenario(Keys):
@@ -24,8 +28,8 @@ class Scenario(Keys):
 
     Raises
     ------
-    pydantic.ValidationError
-        If a key is unknown or a value not allowed; `read_scenario` turns it into one line a mistake.
+    ValueError
+        If a key is unknown or a value not allowed: one line a mistake.
     """
 
     ground: Ground = Ground()
@@ -33,25 +37,77 @@ class Scenario(Keys):
     atmosphere: Air = Air()
     sensor: Sensor = Sensor()
 
+    def __init__(self, /, **sections):
+        try:
+            super().__init__(**sections)
+        except ValidationError as error:
+            raise ValueError(mistakes(error)) from None
+
     def geobox(self):
-        """Grid of the ground cells, an `odc.geo.geobox.GeoBox`."""
-        if self.ground.lai_file and not self.grid.model_fields_set - {"cell"}:
-            return warp.covering_grid(self.ground.lai_file, self.grid.cell, self.sensor.size)
-        grid = self.grid
-        return grids.grid_at(grid.crs, grid.west, grid.north, grid.width, grid.height, grid.cell)
+        """
+        Grid of the ground cells.
+
+        Returns
+        -------
+        grid : odc.geo.geobox.GeoBox
+            That of the keys; without corner and size, that which covers the LAI file.
+
+        Raises
+        ------
+        ValueError
+            If there is no such grid, or a CRS of one's own comes without the corner.
+        """
+        grid, own = self.grid, self.grid.model_fields_set
+        lacking = [key for key in EXTENT if key not in own]
+        if self.ground.lai_file and len(lacking) == len(EXTENT):
+            crs = grid.crs if "crs" in own else None
+            return covering_grid(self.ground.lai_file, grid.cell, self.sensor.size, crs)
+        box = grids.grid_at(grid.crs, grid.west, grid.north, grid.width, grid.height, grid.cell)
+        corner = [key for key in ("west", "north") if key in lacking]
+        if "crs" in own and corner and box.crs != fife.CORNERS["NAD83"][0]:
+            raise ValueError(
+                f"grid.crs = {shown(grid.crs)} is given without {' and '.join(corner)}: type the upper left corner in "
+                "metres of that CRS"
+            )
+        return box
 
     def sun_and_view(self):
         """Directions of sun and sensor, a `fifesim.base.geometry.Geometry`."""
-        place = self.geometry
-        distance = geometry.earth_sun_distance(place.time)
-        if place.sza is not None:
-            return geometry.Geometry(place.sza, place.saa, place.vza, place.vaa, distance)
-        altitude = 1000 * self.atmosphere.altitude
-        sun = geometry.sun_position(place.time, place.latitude, place.longitude, altitude)
-        return geometry.Geometry(sun.sza, sun.saa, place.vza, place.vaa, distance)
+        self._check_place()
+        given, time = self.geometry, self._time()
+        distance = 1.0 if time is None else geometry.earth_sun_distance(time)
+        if given.sza is not None:
+            return geometry.Geometry(given.sza, given.saa, given.vza, given.vaa, distance)
+        sun = geometry.sun_position(time, *self._place(), 1000 * self.atmosphere.altitude)
+        return geometry.Geometry(sun.sza, sun.saa, given.vza, given.vaa, distance)
+
+    def _time(self):
+        """Date and time: as given, else that of FIFE on its site."""
+        return self.geometry.time or (fife.TIME if on_fife_site(self.geobox()) else None)
+
+    def _place(self):
+        """Latitude and longitude of the sun: as given, else FIFE's on its site, else those of the grid's middle."""
+        longitude, latitude = whereabouts.middle(self.geobox())
+        if on_fife_site(self.geobox()):
+            longitude, latitude = fife.LONGITUDE, fife.LATITUDE
+        given = self.geometry
+        latitude = latitude if given.latitude is None else given.latitude
+        return latitude, longitude if given.longitude is None else given.longitude
+
+    def _check_place(self):
+        """The paper's overpass and altitude are those of its site: elsewhere they are asked for."""
+        wanted = []
+        if self.geometry.time is None and self.geometry.sza is None:
+            wanted.append('geometry.time, such as "2022-06-01T10:05:00Z", or geometry.sza and saa')
+        if "altitude" not in self.atmosphere.model_fields_set:
+            wanted.append("atmosphere.altitude, of the ground [km]")
+        if wanted and not on_fife_site(self.geobox()):
+            where = whereabouts.place_in_words(*whereabouts.middle(self.geobox()))
+            raise ValueError(f"grid: its middle, {where}, is not on the site of FIFE: give {'; and '.join(wanted)}")
 
     def model_atmosphere(self):
         """The atmosphere, a `fifesim.atmosphere.air.models.Atmosphere`."""
+        self._check_place()
         return self.atmosphere.model()
 
     def complete(self):
@@ -80,6 +136,7 @@ class Scenario(Keys):
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
         sections = {"ground": ground, "terrain": self.terrain, "atmosphere": self.atmosphere, "sensor": sensor}
+        sections["geometry"] = self.geometry.model_copy(update={"time": self._time()})
         whole = {name: section.with_whole_paths() for name, section in sections.items()}
         return self.model_copy(update={"grid": grid_keys(box), **whole})
 
@@ -163,7 +220,7 @@ def parse_scenario(values):
     >>> parse_scenario({"atmosphere": {"visibility": "23 km"}}).atmosphere.visibility
     23.0
     """
-    return validated(Scenario, values)
+    return Scenario(**values)
 
 
 def read_scenario(path):

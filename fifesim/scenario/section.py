@@ -11,6 +11,9 @@ from fifesim.base.foreign import check_regular, shown
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
+# Units of length by their power of ten. [m]
+_LENGTHS = {"km": 3, "m": 0, "cm": -2}
+
 
 def number(default, unit, description, **limits):
     """
@@ -85,7 +88,7 @@ def file(default, description, *, names=(), suffix=None):
 
 
 class Section(BaseModel):
-    """A table of the scenario. A number may be written with its unit, ``"45 km"``; another unit is a mistake."""
+    """A table of the scenario. A number may be written with its unit, ``"45 km"``, a length in km, m or cm."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 
@@ -107,9 +110,11 @@ class Section(BaseModel):
         if match is None and str in get_args(cls.model_fields[key].annotation):
             # A key that takes words beside numbers.
             return value
-        if match is None or match[2] not in ("", unit):
-            raise ValueError(f"{key} = {shown(value)}: {key} is in {unit}; write a number, or a number and {unit!r}")
-        return float(match[1])
+        given = (match[2] or unit) if match else None
+        if given != unit and not {given, unit} <= set(_LENGTHS):
+            units = " or ".join(repr(each) for each in (_LENGTHS if unit in _LENGTHS else [unit]))
+            raise ValueError(f"{key} = {shown(value)}: {key} is in {unit}; write a number, or a number and {units}")
+        return float(match[1]) if given == unit else _in_length(float(match[1]), given, unit)
 
     @classmethod
     def unit(cls, key):
@@ -174,6 +179,12 @@ class Section(BaseModel):
     def with_whole_paths(self):
         """The same with the full paths of its files, so that it can be run from elsewhere."""
         return self.model_copy(update={key: str(Path(value).absolute()) for key, value in self.files.items()})
+
+
+def _in_length(value, given, wanted):
+    """A length in another unit; a power of ten is divided by where that is exact."""
+    shift = _LENGTHS[given] - _LENGTHS[wanted]
+    return value * 10**shift if shift > 0 else value / 10**-shift
 
 
 def nearest(value, allowed):

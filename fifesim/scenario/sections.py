@@ -1,6 +1,7 @@
 """What the values of a scenario mean, section by section, and what physics refuses of them."""
 
 from dataclasses import asdict, fields
+from pathlib import Path
 
 from pydantic import field_validator, model_validator
 
@@ -16,8 +17,8 @@ from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.scenario.keys import AirKeys, GroundKeys, SensorKeys, TerrainKeys
 from fifesim.scenario.section import nearest
-from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.response.noise import check_kinds
+from fifesim.sensor.description.instruments import instrument, noise_of
+from fifesim.sensor.response.noise import NoiseModel, check_kinds
 
 _BY_BAND = ("leaf_reflectance", "leaf_transmittance")
 
@@ -161,6 +162,17 @@ class Air(AirKeys):
 class Sensor(SensorKeys):
     """The instrument."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _own_bands(cls, values):
+        """Without names the red and near infrared band are meant, which scenes of vegetation are seen in."""
+        if not isinstance(values, dict) or "bands" in values or not isinstance(values.get("instrument"), str):
+            return values
+        if cls.names_a_file("instrument", values["instrument"]) and not Path(values["instrument"]).is_file():
+            return values
+        bands = instrument(values["instrument"]).red_and_near_infrared()
+        return values | {"bands": [band.name for band in bands]}
+
     @field_validator("noise")
     @classmethod
     def _known_noise(cls, value):
@@ -169,9 +181,33 @@ class Sensor(SensorKeys):
     @model_validator(mode="after")
     def _known_bands(self):
         for band in self.description.select(self.bands):
-            if self.noise:
-                self.description.noise_model(band)
+            if self.noise and not self.noise_model:
+                noise_of(self.description, band)
+        if self.pixel is None:
+            _shared_pixel(self.description, self.bands)
         return self
+
+    @field_validator("noise_model")
+    @classmethod
+    def _known_noise_model(cls, value):
+        known = [each.name for each in fields(NoiseModel) if each.name != "along"]
+        for name in value:
+            if name not in known:
+                raise ValueError(f"unknown key {name!r}: {nearest(name, known)}allowed are {', '.join(known)}")
+        if value:
+            NoiseModel(**{"thermal": 0.0, "shot": 0.0} | value)
+        if value.get("detectors", 1) % 1:
+            raise ValueError(f"detectors must be a whole number, got {value['detectors']:g}")
+        return value
+
+    def given_noise(self):
+        """The noise that the keys describe, a `fifesim.sensor.response.noise.NoiseModel`; None for the instrument's."""
+        if not self.noise_model:
+            return None
+        scan = self.description.scan
+        keys = {"thermal": 0.0, "shot": 0.0, "along": "columns" if scan and scan.kind == "pushbroom" else "rows"}
+        keys |= self.noise_model
+        return NoiseModel(**keys | {"detectors": int(keys.get("detectors", 1))})
 
     @property
     def description(self):
@@ -190,5 +226,18 @@ class Sensor(SensorKeys):
 
     @property
     def size(self):
-        """Size of a pixel: as given, else that of the instrument's gridded product. [m]"""
-        return self.pixel or self.description.gsd
+        """Size of a pixel: as given, else that of the bands' gridded product. [m]"""
+        return self.pixel or _shared_pixel(self.description, self.bands)
+
+
+def _shared_pixel(description, names):
+    """Pixel of the gridded product of some bands, which must share one. [m]"""
+    sizes = {}
+    for band in description.select(names):
+        sizes.setdefault(description.pixel(band), []).append(band.name)
+    if len(sizes) > 1:
+        groups = "; ".join(f"{size:g} m: {', '.join(each)}" for size, each in sizes.items())
+        raise ValueError(
+            f"bands of {description.name} lie on different grids ({groups}): name those of one, or give pixel"
+        )
+    return next(iter(sizes))

@@ -10,7 +10,7 @@ from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.ground.canopy import raster as ground
-from fifesim.ground.landscape.raster import lai_scene, open_lai
+from fifesim.ground.landscape.raster import lai_scene, lai_window
 from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
 from fifesim.scenario.land import elevation
@@ -90,7 +90,7 @@ def leaf_area(scenario, grid, chunks=None):
     """
     land = scenario.ground
     if land.lai_file:
-        return open_lai(land.lai_file, grid, chunks=chunks)
+        return lai_window(land.lai_file, grid, chunks=chunks)
     return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
 
 
@@ -130,6 +130,7 @@ def setup_of(scenario):
         offset=tuple(own.offset),
         min_valid=own.min_valid,
         noise=tuple(own.noise),
+        noise_models=own.given_noise(),
         seed=own.seed,
     )
 

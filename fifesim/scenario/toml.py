@@ -72,7 +72,23 @@ def validated(model, values):
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise ValueError(_shortened([_explain(item) for item in error.errors()])) from None
+        raise ValueError(mistakes(error)) from None
+
+
+def mistakes(error):
+    """
+    Mistakes of a scenario, a line each.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+
+    Returns
+    -------
+    lines : str
+        As many as can be read at once.
+    """
+    return _shortened([_explain(item) for item in error.errors()])
 
 
 def _shortened(lines):

@@ -4,15 +4,22 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import ANGLES
-from fifesim.rasters import cf, chunks, directions
+from fifesim.rasters import cf, chunks, directions, swaths
 from fifesim.rasters import grid as grids
 from fifesim.rasters.dates import by_date
 from fifesim.rasters.own_rasters import incoming
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import check_kinds
+from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.noise import noisy
-from fifesim.sensor.response.rasters.pixels import directions_on, matching_bands, means_by_band, pixel_grid
+from fifesim.sensor.response.rasters.pixels import (
+    bands_by_grid,
+    directions_on,
+    matching_bands,
+    means_by_band,
+    pixel_grid,
+)
 
 # Share of its footprint's weight that a pixel needs on valid cells. The paper's footprint of 30.32 m leaves a
 # scene of whole 30 m pixels by 0.16 m.
@@ -31,6 +38,7 @@ def sense(
     seed=0,
     noise_models=None,
     quantise=True,
+    scaling="detector",
     min_valid=MIN_VALID,
     geometry=None,
     time=None,
@@ -62,6 +70,10 @@ def sense(
         Size of the noise for every band, or by name of a band, where the description lacks it or is not to count.
     quantise : bool, optional
         Whether to digitise; radiance otherwise.
+    scaling : "detector" or "product", optional
+        What a digital number is: a count of the instrument's own, spread over its radiances; or one of the agency's
+        Level-1 product, which is scaled by reflectance (OLI, OLI2; MSI and MSI-B with the offset of processing baseline
+        04.00). Those are finer than the detector's, whose steps are not in them.
     min_valid : float, optional
         Share of its footprint that a pixel needs on valid cells; below it is no data. [1]
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
@@ -74,21 +86,30 @@ def sense(
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
         Digital numbers from 1; 0 is no data. ``gain``, ``offset``, ``wavelength`` and ``solar_irradiance`` are
         coordinates along band, and ``compression`` where a band has a scale of square roots. Without ``quantise``,
-        radiance with ``wavelength`` and ``solar_irradiance``. [1 or W m-2 sr-1 um-1]
+        radiance with ``wavelength`` and ``solar_irradiance``. Of bands of several resolutions, an `xarray.DataTree`
+        with a node for each, such as ``/10m`` and ``/20m``, that holds its ``dn``, or ``toa_radiance``.
+        [1 or W m-2 sr-1 um-1]
 
     Raises
     ------
     ValueError
-        If the instrument is unknown, has none of the bands or no such noise, bands lie on different grids, ``onto`` is
-        no grid of the scene's CRS, or a point spread is wider than the scene.
+        If the instrument is unknown, has none of the bands, no such noise or no such scaling, ``onto`` is no grid of
+        the scene's CRS, or a point spread is wider than the scene.
 
     See Also
     --------
     fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise,
-    fifesim.sensor.response.calibration.radiance_to_dn
+    fifesim.sensor.response.calibration.radiance_to_dn, fifesim.sensor.response.product_scaling
     """
     toa, description, bands = by_bands(toa, instrument)
+    digital_numbers.check_scaling(scaling, description, quantise)
     geometry = directions.given_geometry(geometry, toa, time)
+    groups = bands_by_grid(description, bands, onto, interval)
+    if len(groups) > 1:
+        options = {"offset": offset, "noise": noise, "seed": seed, "noise_models": noise_models, "geometry": geometry}
+        options |= {"interval": interval, "quantise": quantise, "scaling": scaling, "min_valid": min_valid}
+        images = {size: sense(toa.isel(band=numbers), description, **options) for size, numbers in groups.items()}
+        return xr.DataTree.from_dict({f"/{size}": image.to_dataset() for size, image in images.items()})
     pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
     geometry = directions_on(pixels, geometry)
     scene = toa.drop_vars(ANGLES, errors="ignore")
@@ -96,8 +117,9 @@ def sense(
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
-    image = directions.with_geometry(grids.place(recorded(radiance, description, bands, quantise), pixels), geometry)
-    return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise))
+    image = recorded(radiance, description, bands, quantise, geometry if scaling == "product" else None)
+    image = directions.with_geometry(grids.place(image, pixels), geometry)
+    return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise, scaling))
 
 
 def by_bands(toa, instrument):
@@ -129,7 +151,7 @@ def by_bands(toa, instrument):
     return toa, description, matching_bands(toa, description)
 
 
-def recorded(radiance, description, bands, quantise):
+def recorded(radiance, description, bands, quantise, product_geometry=None):
     """
     What an instrument records of a radiance, with the coordinates of its bands.
 
@@ -142,6 +164,8 @@ def recorded(radiance, description, bands, quantise):
         One for each of the array.
     quantise : bool
         Whether as digital numbers.
+    product_geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
+        Sun by which the agency's product scales them; the detector's own counts without.
 
     Returns
     -------
@@ -150,10 +174,10 @@ def recorded(radiance, description, bands, quantise):
     """
     along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
     if quantise:
-        full_scale, lowest = [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands]
-        gain, offset = calibration.gain_offset(full_scale, lowest, description.bits)
-        compression = [band.compressed_count(description.bits) for band in bands]
-        scales, bits = [xr.DataArray(each, dims="band") for each in (gain, offset)], description.bits
+        gain, offset, bits = digital_numbers.scale(description, bands, product_geometry)
+        scales = [xr.DataArray(each, dims="band") for each in (gain, offset)]
+        # A product's numbers are linear, whatever the detector's are.
+        compression = [band.compressed_count(bits) if product_geometry is None else 0 for band in bands]
         dtype = np.uint8 if bits <= 8 else np.uint16
         kernel = calibration.radiance_to_dn if not any(compression) else _compressed
         scales += [xr.DataArray(compression, dims="band")] if any(compression) else []
@@ -193,11 +217,13 @@ def labelled(image, toa, description, history):
     return image
 
 
-def _history(description, interval, offset, noise, seed, quantise):
+def _history(description, interval, offset, noise, seed, quantise, scaling):
     """What was done, beside the defaults."""
     kinds = check_kinds(noise)
+    bits = description.bits if scaling == "detector" else description.product.bits
     parts = [
-        f"sense: {description.name}, {description.bits} bits" if quantise else f"sense: {description.name}, radiance",
+        f"sense: {description.name}, {bits} bits" if quantise else f"sense: {description.name}, radiance",
+        f"scaling {scaling}" if scaling != "detector" else "",
         f"interval {interval}" if interval is not None else "",
         "offset" if any(np.any(np.asarray(each) != 0) for each in offset) else "",
         f"noise {' '.join(kinds)}, seed {seed}" if kinds else "",
@@ -234,7 +260,7 @@ def to_radiance(image):
         raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
     names = [name for name in ("gain", "offset", "compression") if name in image.coords]
     out = chunks.pointwise(calibration.dn_to_radiance, image, *[_along_band(image, name) for name in names])
-    out = _placed_as(out.drop_vars(names), image)
+    out = swaths.placed_as(out.drop_vars(names), image)
     return cf.label(out, "toa_radiance", source=image, history="to_radiance")
 
 
@@ -269,13 +295,8 @@ def to_reflectance(image):
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
     out = _by_sun(calibration.radiance_to_reflectance, radiance, _along_band(image, "solar_irradiance"), geometry)
-    out = _placed_as(out, image)
+    out = swaths.placed_as(out, image)
     return cf.label(out, "toa_reflectance", source=radiance, history="to_reflectance")
-
-
-def _placed_as(array, image):
-    """On the grid of an image; the pixels of a scan have none, and keep their coordinates."""
-    return grids.place(array, grids.geobox(image)) if {"y", "x"} <= set(image.dims) else array
 
 
 def as_radiance(array, bands, geometry):

@@ -1,9 +1,57 @@
 """Vegetation indices at their limits."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
+from fifesim.analysis import indices
 from fifesim.analysis.indices import normalized_difference
+from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED
+
+# As the catalogue of spyndex writes them, with its letters for the bands.
+CATALOGUE = {
+    "enhanced": (("N", "R", "B"), "2.5 * (N - R) / (N + 6.0 * R - 7.5 * B + 1.0)"),
+    "enhanced_of_two_bands": (("N", "R"), "2.5 * (N - R) / (N + 2.4 * R + 1.0)"),
+    "soil_adjusted": (("N", "R"), "(1.0 + 0.5) * (N - R) / (N + R + 0.5)"),
+    "modified_soil_adjusted": (("N", "R"), "0.5 * (2.0 * N + 1 - (((2 * N + 1) ** 2) - 8 * (N - R)) ** 0.5)"),
+    "near_infrared_of_vegetation": (("N", "R"), "((N - R) / (N + R)) * N"),
+}
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_formulas_are_those_of_the_catalogue(name):
+    letters, formula = CATALOGUE[name]
+    values = dict(zip("NRB", np.random.default_rng(1).uniform(0.01, 0.6, (3, 50)), strict=True))
+    values["B"] = values["B"] / 6
+    found = getattr(indices, name)(*(values[each] for each in letters))
+    np.testing.assert_allclose(found, eval(formula, {}, values), rtol=1e-13)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_bare_ground_without_contrast_has_none(name):
+    letters, _ = CATALOGUE[name]
+    np.testing.assert_allclose(getattr(indices, name)(*[0.2] * len(letters)), 0.0, rtol=0, atol=1e-15)
+    assert np.isnan(getattr(indices, name)(np.nan, *[0.2] * (len(letters) - 1)))
+
+
+def test_soil_adjustment_of_a_modified_index_is_its_own():
+    """MSAVI is SAVI with L = 1 - MSAVI, the fixed point from which its closed form was found (Qi et al. 1994)."""
+    nir, red = np.random.default_rng(2).uniform([[0.2], [0.02]], [[0.6], [0.15]], (2, 50))
+    msavi = indices.modified_soil_adjusted(nir, red)
+    np.testing.assert_allclose(msavi, indices.soil_adjusted(nir, red, soil=1 - msavi), rtol=1e-12)
+
+
+def test_index_without_a_denominator_or_a_root_is_missing():
+    assert np.isnan(indices.enhanced(0.5, 0.0, 0.2))
+    assert np.isnan(indices.modified_soil_adjusted(0.5, -0.3))
+
+
+def test_windows_of_bands_do_not_overlap():
+    """But for the blue and the green, of which a band at 0.5 to 0.52 um shows both."""
+    windows = (BLUE, GREEN, RED, NEAR_INFRARED, SHORTWAVE_INFRARED)
+    assert all(each.low < each.best < each.high for each in windows)
+    assert all(one.high <= other.low for one, other in pairwise(windows[1:]))
 
 
 def test_index_is_antisymmetric_and_bounded():

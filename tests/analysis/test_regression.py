@@ -5,7 +5,7 @@ import pytest
 import statsmodels.api
 from scipy import stats
 
-from fifesim.analysis.regression import fit, row_sums
+from fifesim.analysis.regression import Regression, fit, row_sums
 
 RNG = np.random.default_rng(8)
 X = RNG.uniform(0.3, 0.8, (20, 30))
@@ -128,3 +128,10 @@ def test_infinite_values_are_left_out():
 def test_impossible_levels_are_refused(level):
     with pytest.raises(ValueError, match="level must be between 0 and 1"):
         line(Y, X).confidence_interval(0.5, level)
+
+
+def test_regression_is_told_in_two_lines():
+    line = Regression(-2.0, 1.25, 0.9, 10, 0.1, 0.5, 4.0)
+    first, second = repr(line).splitlines()
+    assert first == "Regression: y = 1.25 - 2 x, R2 0.9000, n 10"
+    assert second == "  standard errors: slope 0.05, intercept 0.0403; y about the line 0.1"

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import fifesim
-from fifesim.base.geometry import Geometry, relative_azimuth, scattering_angle_cosine, sun_position
+from fifesim.base.geometry import Geometry, angle_between, relative_azimuth, scattering_angle_cosine, sun_position
 
 
 def almanac_sun(time, latitude, longitude):
@@ -97,3 +97,15 @@ def test_geometry_is_frozen_and_hashable():
         fifesim.fife_geometry().sza = 10.0
     assert hash(Geometry(30.0, 0.0)) == hash(Geometry(30.0, 0.0))
     assert Geometry(60.0, 0.0, 0.0).mu_s == pytest.approx(0.5, abs=1e-15)
+
+
+def test_angle_between_directions_is_that_of_their_unit_vectors():
+    zenith, azimuth = np.random.default_rng(6).uniform(0, [[[90.0]], [[360.0]]], (2, 2, 50))
+    one, other = (
+        np.stack([np.sin(t) * np.sin(a), np.sin(t) * np.cos(a), np.cos(t)])
+        for t, a in ((np.radians(zenith[k]), np.radians(azimuth[k])) for k in range(2))
+    )
+    expected = np.degrees(np.arccos(np.sum(one * other, axis=0)))
+    found = angle_between(zenith[0], azimuth[0], zenith[1], azimuth[1])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+    assert angle_between(33.0, 10.0, 33.0, 370.0) < 1e-12

@@ -138,3 +138,57 @@ def test_the_instrument_that_a_raster_carries_is_the_default(lai):
     assert toa.fifesim.sense("TM").attrs["instrument"] == "TM"
     with pytest.raises(ValueError, match="which instrument looks at"):
         toa.drop_attrs(deep=False).fifesim.sense()
+
+
+@pytest.fixture(scope="module")
+def hazy(site):
+    """Black, even ground and its image through haze, and the ground of a canopy."""
+    dark = directions.with_geometry(user_raster(site, [0.665, 0.842]) * 0, fifesim.fife_geometry())
+    canopy = dark + xr.DataArray([0.05, 0.4], dims="band")
+    return {name: fifesim.to_toa(rho, fifesim.Atmosphere(visibility=10.0)) for name, rho in
+            (("dark", dark), ("canopy", canopy))}  # fmt: skip
+
+
+class TestAssumedAir:
+    """The classic experiment: a hazy image corrected as if the air were clear, and the other way round."""
+
+    def test_is_asked_for(self, hazy):
+        clear = fifesim.Atmosphere(visibility=40.0)
+        with pytest.raises(ValueError, match=r"made for another atmosphere.*to_surface\(\.\.\., assume=True\)"):
+            hazy["dark"].fifesim.to_surface(clear)
+        with pytest.raises(ValueError, match="assume=True needs the atmosphere to assume"):
+            hazy["dark"].fifesim.to_surface(assume=True)
+
+    def test_leaves_the_path_reflectance_that_was_not_taken_off(self, hazy):
+        """Over black ground all that is left is the difference of two paths, through the clear air's transmittance."""
+        clear = fifesim.Atmosphere(visibility=40.0)
+        found = check_raster_function(
+            lambda toa: toa.fifesim.to_surface(clear, assume=True), hazy["dark"], quantity="surface_reflectance"
+        )
+        bands = tuple(fifesim.Band("narrow", (at - 0.0025, at, at + 0.0025), (0.0, 1.0, 0.0)) for at in (0.665, 0.842))
+        sun = fifesim.fife_geometry()
+        true, assumed = (
+            engines.band_terms(air, bands, sun.sza, 0.0, 0.0) for air in (fifesim.Atmosphere(visibility=10.0), clear)
+        )
+        path = true.path_reflectance * true.gas_transmittance / assumed.gas_transmittance - assumed.path_reflectance
+        left = path / (assumed.transmittance_down * assumed.transmittance_up)
+        assert np.all(left > 0.005)
+        expected = left / (1 + assumed.spherical_albedo * left)
+        np.testing.assert_allclose(found[:, 0, 0], expected, rtol=1e-12)
+        assert found.attrs["atmosphere"] == clear.text
+
+    def test_haze_left_lowers_ndvi_and_haze_overdone_raises_it(self, hazy):
+        """Path reflectance is larger in the red, where a canopy is dark."""
+        ndvi = {
+            visibility: float(
+                hazy["canopy"].fifesim.to_surface(fifesim.Atmosphere(visibility=visibility), assume=True)
+                .fifesim.ndvi().mean()
+            )
+            for visibility in (40.0, 10.0, 7.0)
+        }  # fmt: skip
+        assert ndvi[10.0] == pytest.approx(0.35 / 0.45, abs=1e-12)
+        assert ndvi[40.0] < ndvi[10.0] - 0.02 and ndvi[7.0] > ndvi[10.0] + 0.02
+
+    def test_same_air_is_no_error_and_makes_none(self, hazy):
+        same = hazy["canopy"].fifesim.to_surface(fifesim.Atmosphere(visibility=10.0), assume=True)
+        xr.testing.assert_identical(same, hazy["canopy"].fifesim.to_surface())

@@ -103,3 +103,38 @@ def test_a_band_beyond_the_spectra_is_named(lai):
         ValueError, match=r"spectrum for band far, 2\.4 to 2\.6 um: .*give leaf_optics= and background="
     ):
         fifesim.compare(lai, [replace(tm, bands=(*tm.bands, far))], bands={"TM": ["far"]})
+
+
+def test_bands_of_several_resolutions_are_nodes_below(lai):
+    images = fifesim.compare(lai, ["MSI", "TM"], bands={"MSI": ["MSI4", "MSI11"]})
+    assert sorted(node.path for node in images.leaves) == ["/MSI/10m", "/MSI/20m", "/TM"]
+    assert images["MSI/20m/dn"]["band"].values.tolist() == ["MSI11"]
+
+
+def test_table_has_a_row_for_each_instrument(lai):
+    images = fifesim.compare(in_chunks(lai, {"y": 23, "x": 27}), ["MSI", "TM"])
+    table = images.fifesim.comparison_table(truth=lai)
+    assert table.index.tolist() == ["MSI", "TM"] and table.index.name == "instrument"
+    assert table.loc["TM", "bands"] == "TM3, TM4" and table["pixel"].tolist() == [10.0, 30.0]
+    assert (table.loc["TM", "rows"], table.loc["TM", "columns"]) == (5, 6)
+    ndvi = images["TM"]["dn"].fifesim.ndvi().compute()
+    assert table.loc["TM", "ndvi_mean"] == pytest.approx(float(ndvi.mean()), rel=1e-14)
+    assert table.loc["TM", "ndvi_sd"] == pytest.approx(float(ndvi.std(ddof=1)), rel=1e-14)
+    fit = fifesim.regress(lai.fifesim.aggregate(30), ndvi)
+    found = table.loc["TM", ["slope", "intercept", "r2", "n"]]
+    np.testing.assert_allclose(found.astype(float), [fit.slope, fit.intercept, fit.r2, fit.n], rtol=1e-10)
+    assert "r2" not in images.fifesim.comparison_table()
+
+
+def test_images_of_an_instrument_s_other_pixels_have_rows_of_their_own(lai):
+    """Bands without a red and a near infrared have no NDVI."""
+    image = fifesim.compare(lai, ["TM"])["TM"]
+    tree = xr.DataTree.from_dict({"/TM/30m": image.to_dataset(), "/TM/red": image["dn"].isel(band=[0]).to_dataset()})
+    table = tree.fifesim.comparison_table()
+    assert table.index.tolist() == ["TM/30m", "TM/red"]
+    assert np.isnan(table.loc["TM/red", "ndvi_mean"]) and table.loc["TM/red", "bands"] == "TM3"
+
+
+def test_table_of_something_else_is_refused(lai):
+    with pytest.raises(ValueError, match="TM holds no dn and no toa_radiance, but lai"):
+        xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")}).fifesim.comparison_table()

@@ -14,6 +14,13 @@ def test_ndvi_is_from_planetary_reflectance(whole):
     np.testing.assert_array_equal(rho.fifesim.ndvi(), whole["ndvi"])
 
 
+def test_index_is_from_planetary_reflectance(whole):
+    rho = whole["image"].fifesim.to_reflectance()
+    red, nir = rho.sel(band="TM3").values, rho.sel(band="TM4").values
+    np.testing.assert_array_equal(whole["image"].fifesim.index("EVI2"), 2.5 * (nir - red) / (nir + 2.4 * red + 1))
+    np.testing.assert_array_equal(whole["image"].fifesim.index("NDVI"), whole["ndvi"])
+
+
 @pytest.mark.parametrize(
     "step", [lambda image: image.fifesim.aggregate(60), lambda image: image[0].fifesim.regress(image[1])]
 )

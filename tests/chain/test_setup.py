@@ -7,6 +7,7 @@ import xarray as xr
 
 import fifesim
 from fifesim.chain.setup import Setup, image_of, reflectance_of
+from fifesim.rasters import grid as grids
 
 # Every field of the ground, the air and the sampling away from its default, as the public functions take them.
 GROUND = {
@@ -57,3 +58,13 @@ def test_defaults_are_those_of_the_functions(lai, whole):
 def test_setup_is_frozen():
     with pytest.raises(FrozenInstanceError):
         Setup().instrument = "OLI"
+
+
+def test_setup_tells_what_is_not_the_default(lai):
+    assert repr(Setup()) == "Setup(instrument='TM')"
+    said = repr(Setup("OLI", dem=lai, hotspot=0.1, onto=grids.geobox(lai), noise=("shot",)))
+    assert said == (
+        "Setup(instrument='OLI', hotspot=0.1, dem=<DataArray of y 45 x x 54>, onto=<GeoBox of y 45 x x 54>, "
+        "noise=('shot',))"
+    )
+    assert repr(Setup(fifesim.instrument("TM"))) == "Setup(instrument='TM')"

@@ -144,7 +144,10 @@ def test_hole_in_the_ground_is_no_data_in_the_image(lai):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({"horizon": 1}, "a horizon stands around a dem"),
+        (
+            {"horizon": xr.DataArray(np.zeros((16, 2, 2)), dims=("direction", "y", "x"))},
+            "a horizon stands around a dem",
+        ),
         ({"instrument": "TN"}, "TM"),
         ({"bands": ["TM33"]}, "TM3"),
         ({"leaf_optics": {"TM3": (0.8, 0.3), "TM4": (0.5, 0.4)}}, "TM3|sum|1"),

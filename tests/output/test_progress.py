@@ -1,8 +1,10 @@
 """Progress as lines of JSON, and nothing where nobody looks."""
 
 import json
+import re
+import time
 
-from fifesim.output.progress import CellProgress, memory, steps
+from fifesim.output.progress import CellProgress, memory, since_start, steps
 
 
 def test_lines_say_where_the_run_is(capsys):
@@ -21,7 +23,24 @@ def test_lines_are_a_second_apart(capsys):
     assert len(capsys.readouterr().out.splitlines()) < 10
 
 
-def test_nothing_is_printed_without_a_terminal(capsys):
+def test_a_line_a_minute_says_where_the_run_is_without_a_terminal(capsys, monkeypatch):
+    now = iter(range(0, 10**6, 25))
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(now)))
+    with CellProgress(cells=8_000_000) as progress:
+        for _ in range(8):
+            progress.advance(1_000_000)
+    out, err = capsys.readouterr()
+    assert out == "" and 2 <= len(err.splitlines()) <= 5
+    assert re.match(
+        r"simulating: \d\.0 of 8\.0 million cells, 0\.0 million/s, \d+\.\d+ GB, .* left$", err.splitlines()[0]
+    )
+
+
+def test_time_since_start_goes_on():
+    assert 0 < since_start() < since_start() + 1 < 1e6
+
+
+def test_nothing_is_printed_of_a_short_run_without_a_terminal(capsys):
     with CellProgress(cells=2) as progress:
         progress.advance(2)
     assert list(steps([1, 2], "counting")) == [1, 2]

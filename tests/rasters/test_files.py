@@ -137,7 +137,7 @@ def test_file_of_others_is_read_by_what_gdal_knows(image, tmp_path):
 def test_existing_file_is_replaced(image, tmp_path):
     path = tmp_path / "tm.tif"
     path.write_text("old")
-    fifesim.to_geotiff(image, path)
+    fifesim.to_geotiff(image, path, overwrite=True)
     xr.testing.assert_identical(fifesim.open_image(path), image)
     assert [each.name for each in tmp_path.iterdir()] == ["tm.tif"]
 
@@ -160,7 +160,7 @@ def test_write_that_fails_leaves_things_as_they_were(image, tmp_path, before):
     if before:
         path.write_text(before)
     with pytest.raises(RuntimeError, match="disk on fire"):
-        fifesim.to_geotiff(failing(image), path)
+        fifesim.to_geotiff(failing(image), path, overwrite=True)
     assert [each.name for each in tmp_path.iterdir()] == (["tm.tif"] if before else [])
     assert not before or path.read_text() == before
 
@@ -254,3 +254,13 @@ def test_values_of_others_are_masked_and_in_their_unit(tmp_path, dtype, stored, 
 def test_a_time_comes_back_as_a_time(image, tmp_path):
     dated = image.assign_coords(time=np.datetime64("1987-06-06T16:35:00", "ns"))
     xr.testing.assert_identical(fifesim.open_image(fifesim.to_geotiff(dated, tmp_path / "dated.tif")), dated)
+
+
+def test_a_file_is_replaced_only_where_that_is_said(lai, tmp_path):
+    path = fifesim.to_geotiff(lai, tmp_path / "lai.tif")
+    before = path.read_bytes()
+    with pytest.raises(FileExistsError, match=r"there is a file .*lai.tif: type overwrite=True"):
+        fifesim.to_geotiff(lai + 1, path)
+    assert path.read_bytes() == before
+    fifesim.to_geotiff((lai + 1).rename("lai"), path, overwrite=True)
+    np.testing.assert_array_equal(fifesim.open_image(path), lai + 1)

@@ -193,3 +193,19 @@ def test_grid_without_a_cell_is_refused(width, height, cell):
 def test_grid_of_more_cells_than_a_file_counts_is_refused(width, cell):
     with pytest.raises(ValueError, match="holds over 2147483647 cells"):
         fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, width, 90.0, cell)
+
+
+def test_a_part_of_one_cell_or_row_lies_where_it_was_cut(lai):
+    whole = grids.geobox(lai)
+    for rows, columns in ((slice(5, 6), slice(7, 8)), (slice(5, 6), slice(3, 9)), (slice(2, 7), slice(7, 8))):
+        assert grids.same_grid(grids.geobox(lai[rows, columns]), whole[rows, columns])
+    plain = lai[5:6].drop_vars("spatial_ref").rio.write_crs(26914)
+    with pytest.raises(ValueError, match=r"regular grid: one row tells no cell, .*write_transform"):
+        grids.geobox(plain)
+    assert fifesim.surface_reflectance(lai[5:6, 7:8], bands=["TM3"]).shape == (1, 1, 1)
+
+
+def test_a_raster_without_cells_is_refused(lai):
+    for empty in (lai[:0], lai[:, :0]):
+        with pytest.raises(ValueError, match="the raster has no cells, "):
+            grids.geobox(empty)

@@ -1,12 +1,14 @@
 """Coordinate operations of known accuracy."""
 
+import warnings
+
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
 import pyproj
 import pytest
 
 from fifesim.rasters import projection, sites
-from fifesim.rasters.grid import grid_at
+from fifesim.rasters.grid import check_grid, grid_at
 
 FIFE = (-96.63, 38.98, -96.45, 39.13)
 
@@ -115,3 +117,15 @@ def test_heights_are_left_out():
     assert projection.horizontal("EPSG:26914+5703") == "EPSG:26914"
     assert projection.horizontal(pyproj.CRS("EPSG:7415").to_wkt()) == "EPSG:28992"
     assert projection.horizontal("EPSG:26914") == "EPSG:26914"
+
+
+def test_a_scale_beyond_a_percent_is_told_once_for_a_place():
+    """Web Mercator stretches by the secant of the latitude; 8 degrees from the equator, by 1 %."""
+    mercator = {"crs": "EPSG:3857", "width": 300.0, "height": 300.0, "cell": 30.0}
+    with pytest.warns(UserWarning, match=r"of EPSG:3857 is 1.02 near .* 30 m is 29.\d m on the ground.*EPSG:32735"):
+        grid = grid_at(west=28.2e5 * 1.113, north=-1.2e6, **mercator)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        grid_at(west=28.2e5 * 1.113 + 30, north=-1.2e6, **mercator)
+        check_grid(grid)
+        grid_at(west=28.2e5 * 1.113, north=-0.5e6, **mercator)

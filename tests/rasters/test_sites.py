@@ -5,6 +5,7 @@ import odc.geo.xr  # noqa: F401  registers .odc
 import pytest
 
 import fifesim
+from fifesim.rasters.sites import is_fife, made_on_site, on_fife_site
 
 CELL = 30 / 9
 
@@ -48,3 +49,24 @@ def test_only_whole_cells_are_kept():
 def test_site_refuses_what_makes_no_grid(options, message):
     with pytest.raises(ValueError, match=message):
         fifesim.fife_site(**options)
+
+
+@pytest.mark.parametrize(
+    ("east", "north", "inside"),
+    [(0, 0, True), (7000, 7000, True), (8500, 0, False), (-8500, 0, False), (0, 8500, False), (0, -8500, False)],
+)
+def test_scenes_that_are_made_on_the_site_say_so(east, north, inside):
+    """A square of 300 m beside the middle of the site."""
+    grid = fifesim.grid_at("EPSG:26914", 712470 + east - 150, 4326720 + north + 150, 300, 300, 30)
+    lai = fifesim.lai_scene(grid)
+    assert is_fife(lai) == is_fife(fifesim.flint_hills(grid)) == inside
+    assert made_on_site(grid) == ({"site": "FIFE"} if inside else {})
+
+
+@pytest.mark.parametrize("datum", ["NAD83", "NAD27"])
+def test_the_site_is_the_site_in_any_reference_system(datum):
+    corner = fifesim.fife_site(30, datum=datum)[:2, :2]
+    assert on_fife_site(corner) and not on_fife_site(corner.pad(20)[:3, :3])
+    geodetic = fifesim.grid_at("EPSG:5070", -50000.0, 1788000.0, 300.0, 300.0, 30)
+    assert on_fife_site(geodetic)
+    assert not on_fife_site(fifesim.grid_at("EPSG:32735", 712000.0, 4327000.0 + 1e6, 300.0, 300.0, 30))

@@ -4,6 +4,7 @@ import numpy as np
 import pyproj
 import pytest
 import rasterio
+import rioxarray
 import xarray as xr
 from affine import Affine
 from lazy import check_place, no_compute
@@ -173,27 +174,6 @@ def test_files_that_cannot_be_used_are_named(tmp_path):
         fifesim.open_lai(away, GRID)
 
 
-@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:26914"])
-def test_covering_grid_covers_the_file_in_whole_pixels(tmp_path, crs):
-    if crs == "EPSG:4326":
-        path, values = geographic(tmp_path / "lai.tif")
-    else:
-        values = hills(77, 91)
-        path = write(tmp_path / "lai.tif", values, Affine(10, 0, 709003, 0, -10, 4332001), crs)
-    grid = warp.covering_grid(path, 10 / 3, 30.0)
-    a, box = grid.affine, grid.boundingbox
-    assert grid.crs.epsg == (32614 if crs == "EPSG:4326" else 26914)
-    assert a.c % 30 == 0 and a.f % 30 == 0 and grid.shape.x % 9 == 0 and grid.shape.y % 9 == 0
-    with rasterio.open(path) as source:
-        corners = np.array([source.transform * corner for corner in [(0, 0), (91, 0), (0, 77), (91, 77)]])
-    if crs == "EPSG:4326":
-        corners = np.array(
-            [pyproj.Transformer.from_crs(4326, 32614, always_xy=True).transform(*each) for each in corners]
-        )
-    assert (corners[:, 0] >= box.left).all() and (corners[:, 0] <= box.right).all()
-    assert (corners[:, 1] >= box.bottom).all() and (corners[:, 1] <= box.top).all()
-
-
 @pytest.mark.parametrize("times", [8, 40])
 def test_far_finer_files_are_averaged_block_by_block(tmp_path, times):
     """Means are exact, and the same in every window and chunk; a whole tile of the file is never read."""
@@ -220,3 +200,32 @@ def test_a_cell_of_too_many_is_refused(tmp_path):
         pass
     with pytest.raises(ValueError, match=r"finest\.tif is far finer than the cells.*gdalwarp -r average -tr"):
         fifesim.open_lai(path, fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 900.0, 900.0, 300.0))
+
+
+@pytest.mark.parametrize("south_up", [False, True])
+@pytest.mark.parametrize("kind", ["same", "coarser", "degrees"])
+def test_an_array_comes_onto_a_grid_as_its_file_does(tmp_path, kind, south_up):
+    """In memory and lazy, under any chunks of either, to the bit."""
+    if kind == "degrees":
+        path, _ = geographic(tmp_path / "lai.tif")
+    else:
+        cell = 10 if kind == "same" else 33
+        path = write(tmp_path / "lai.tif", hills(120, 130), Affine(cell, 0, 709450, 0, -cell, 4331500), "EPSG:26914")
+    raster = xr.DataArray(rioxarray.open_rasterio(path, masked=True))
+    raster = raster.isel(y=slice(None, None, -1)) if south_up else raster
+    whole = warp.file_onto_grid(path, GRID)
+    assert np.isfinite(whole).mean() > 0.3
+    tolerance = {"rtol": 0, "atol": 1e-9 if south_up else 0}
+    found = warp.raster_onto_grid(raster.squeeze("band"), GRID)
+    np.testing.assert_allclose(found, whole, **tolerance)
+    with no_compute():
+        lazy = warp.raster_onto_grid(raster.squeeze("band").chunk({"y": 50, "x": 70}), GRID, {"y": 33, "x": 41})
+    np.testing.assert_array_equal(lazy.compute(scheduler="synchronous"), found)
+    check_place(lazy, GRID.crs)
+
+
+def test_an_array_elsewhere_says_where_it_lies():
+    away = xr.DataArray(np.ones((4, 4)), dims=("y", "x"), name="mine")
+    grid = fifesim.grid_at("EPSG:32735", 620000.0, 7220000.0, 40.0, 40.0, 10.0)
+    with pytest.raises(ValueError, match=r"mine does not overlap .* it spans 620000 to 620040 E .*\(latitude -25.13, "):
+        warp.raster_onto_grid(grids.place(away, grid), GRID)

@@ -5,6 +5,7 @@ import tomllib
 from dataclasses import fields
 
 import numpy as np
+import pyproj
 import pytest
 import rasterio
 from affine import Affine
@@ -12,7 +13,7 @@ from affine import Affine
 import fifesim
 from fifesim.atmosphere.schemes import six_s
 from fifesim.base import fife
-from fifesim.base.geometry import earth_sun_distance
+from fifesim.base.geometry import earth_sun_distance, sun_position
 from fifesim.rasters import grid as grids
 from fifesim.scenario.scenario import Scenario, parse_scenario
 from fifesim.scenario.sections import Ground
@@ -100,13 +101,27 @@ def test_number_may_carry_its_unit(tmp_path, written, value):
     assert read_text(tmp_path, f"[atmosphere]\nvisibility = {written}").atmosphere.visibility == value
 
 
+def test_lengths_are_taken_in_any_of_their_units():
+    """In decimals as they are written."""
+    lengths = {"width": "3 km", "height": "1.1km", "cell": "333 cm", "west": "709.0 km"}
+    grid = parse_scenario({"grid": lengths}).grid
+    assert (grid.width, grid.height, grid.cell, grid.west) == (3000.0, 1100.0, 3.33, 709000.0)
+    air = parse_scenario({"atmosphere": {"altitude": "412 m", "visibility": "23000m"}}).atmosphere
+    assert (air.altitude, air.visibility) == (0.412, 23.0)
+
+
 @pytest.mark.parametrize(
     "text, message",
     [
         ("[atmosphere]\nvisibilty = 45", "atmosphere.visibilty = 45: did you mean 'visibility'? allowed are profile, "),
         ("[ground]\nARP = 0.1", "unknown key ground.ARP = 0.1"),
         ("[atmosfere]\nvisibility = 45", "did you mean 'atmosphere'? allowed are grid, ground"),
-        ("[atmosphere]\nvisibility = '45000 m'", "visibility = '45000 m': visibility is in km; write a number, or a "),
+        (
+            "[atmosphere]\nvisibility = '45 mi'",
+            "visibility = '45 mi': visibility is in km; write a number, or a number",
+        ),
+        ("[grid]\nwidth = '3 degree'", "width is in m; write a number, or a number and 'km' or 'm' or 'cm'"),
+        ("[geometry]\nsza = '30 m'", "sza is in degree; write a number, or a number and 'degree'"),
         ("[grid]\ncell = '3 px'", "cell = '3 px': cell is in m"),
         ("[atmosphere]\nvisibility = 2", "atmosphere.visibility = 2"),
         ("[atmosphere]\nvisibility = nan", "atmosphere.visibility = nan"),
@@ -133,7 +148,7 @@ def test_number_may_carry_its_unit(tmp_path, written, value):
         ("[sensor]\nbands = ['TM9']", "TM9"),
         ("[sensor]\nbands = []", "name at least one band"),
         ("[sensor]\ninterval = 'natve'", "interval = 'natve': must be product or native, or metres above 0"),
-        ("[sensor]\ninterval = '30 km'", "interval is in m"),
+        ("[sensor]\ninterval = '30 degree'", "interval is in m"),
         ("[sensor]\ninterval = -3", "sensor.interval = -3"),
         ("[sensor]\noffset = [1.0]", "sensor.offset"),
         ("[sensor]\noffset = [nan, 0.0]", "two finite numbers"),
@@ -155,6 +170,26 @@ def test_every_mistake_is_told_at_once(tmp_path):
         read_text(tmp_path, "[atmosphere]\nvisibility = 2\naltitude = -1\n[ground]\narp = 0.3")
     lines = str(caught.value).splitlines()
     assert [line.split(" = ")[0] for line in lines] == ["ground.arp", "atmosphere.visibility", "atmosphere.altitude"]
+
+
+@pytest.mark.parametrize(
+    ("sections", "said"),
+    [
+        ({"ground": {"ARP": 0.1}}, "unknown key ground.ARP = 0.1: allowed are distribution, "),
+        ({"atmosphere": {"visibility": 2}}, "atmosphere.visibility = 2: "),
+        ({"atmosfere": {}}, "unknown key atmosfere = {}: did you mean 'atmosphere'?"),
+        ({"sensor": {"instrument": "TN"}}, "unknown instrument 'TN'"),
+        ({"grid": 3}, "grid = 3: expected a table of keys, got 3"),
+    ],
+)
+def test_mistake_in_python_is_the_line_of_a_file(sections, said):
+    with pytest.raises(ValueError) as caught:
+        Scenario(**sections)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value) and "http" not in str(caught.value)
+    with pytest.raises(ValueError) as parsed:
+        parse_scenario(sections)
+    assert str(parsed.value) == str(caught.value)
 
 
 def test_missing_scenario_is_named(tmp_path):
@@ -188,6 +223,39 @@ def test_scene_of_a_map_covers_the_map(tmp_path):
     assert covering.left <= 709003 < covering.left + 30 and covering.top - 30 < 4332001 <= covering.top
     given = parse_scenario(SMALL | {"ground": {"lai_file": str(path)}}).geobox()
     assert given == parse_scenario(SMALL).geobox()
+    in_cone = parse_scenario({"grid": {"crs": "EPSG:5070"}, "ground": {"lai_file": str(path)}}).geobox()
+    to_cone = pyproj.Transformer.from_crs(26914, 5070, always_xy=True)
+    west, south, east, north = to_cone.transform_bounds(709003, 4331671, 709443, 4332001)
+    box = in_cone.boundingbox
+    assert in_cone.crs.epsg == 5070
+    assert box.left <= west < box.left + 30 and box.top - 30 < north <= box.top
+    assert box.right - 30 < east <= box.right and box.bottom <= south < box.bottom + 30
+
+
+SOUTH = {"crs": "EPSG:32735", "west": 620000.0, "north": 7220000.0, "width": 300.0, "height": 300.0, "cell": 10.0}
+
+
+def test_place_of_a_grid_is_its_own_and_what_holds_for_fife_is_asked_for():
+    with pytest.raises(ValueError) as caught:
+        parse_scenario({"grid": SOUTH}).complete()
+    said = str(caught.value)
+    assert said.startswith("grid: its middle, latitude -25.13, longitude 28.19, is not on the site of FIFE: give ")
+    assert "geometry.time" in said and "geometry.sza and saa" in said and "atmosphere.altitude" in said
+    with pytest.raises(ValueError, match=r"FIFE: give geometry.time, such as [^;]*$"):
+        parse_scenario({"grid": SOUTH, "atmosphere": {"altitude": 1.3}}).complete()
+    air = {"atmosphere": {"altitude": 1.3}}
+    overpass = parse_scenario({"grid": SOUTH, "geometry": {"time": "2022-06-01T08:05Z"}} | air).complete()
+    longitude, latitude = pyproj.Transformer.from_crs(32735, 4326, always_xy=True).transform(620150, 7219850)
+    sun = sun_position("2022-06-01T08:05Z", latitude, longitude, 1300)
+    assert (overpass.sun_and_view().sza, overpass.sun_and_view().saa) == pytest.approx((sun.sza, sun.saa), abs=1e-9)
+    assert sun.saa < 90  # north of east, as below the equator in winter
+    given = parse_scenario({"grid": SOUTH, "geometry": {"sza": 50, "saa": 40}} | air).complete()
+    assert given.geometry.time is None and given.sun_and_view().earth_sun_distance == 1.0
+
+
+def test_crs_alone_has_no_corner():
+    with pytest.raises(ValueError, match=r"grid.crs = 'EPSG:32614' is given without west and north: type the upper"):
+        parse_scenario({"grid": {"crs": "EPSG:32614"}}).geobox()
 
 
 def test_scenario_is_frozen():

@@ -26,11 +26,12 @@ def test_number_may_carry_its_unit(written, value):
 
 
 def test_another_unit_is_a_mistake_and_words_pass_where_they_may():
-    with pytest.raises(ValidationError, match="length is in m; write a number, or a number and 'm'"):
-        Shelf(length="3 km")
+    with pytest.raises(ValidationError, match="length is in m; write a number, or a number and 'km' or 'm' or 'cm'"):
+        Shelf(length="3 ft")
+    assert (Shelf(length="3 km").length, Shelf(length="3 cm").length) == (3000.0, 0.03)
     assert Shelf(step="native").step == "native"
     with pytest.raises(ValidationError, match="step is in m"):
-        Shelf(step="3 km")
+        Shelf(step="3 ft")
 
 
 @pytest.mark.parametrize(

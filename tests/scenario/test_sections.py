@@ -67,3 +67,41 @@ def test_file_of_an_aerosol_lies_beside_the_scenario(tmp_path, monkeypatch):
     ):
         with pytest.raises(ValueError, match=message):
             fifesim.Scenario(atmosphere=wrong)
+
+
+@pytest.mark.parametrize(
+    ("name", "bands", "size"),
+    [("TM", ["TM3", "TM4"], 30), ("MSI", ["MSI4", "MSI8"], 10), ("MODIS", ["MODIS1", "MODIS2"], 250)],
+)
+def test_an_instrument_alone_sees_in_its_red_and_near_infrared(name, bands, size):
+    sensor = Sensor(instrument=name)
+    assert (sensor.bands, sensor.size) == (bands, size)
+
+
+def test_pixels_are_those_of_the_bands_as_in_python():
+    """A scene sensed without onto= has them too."""
+    assert Sensor(instrument="MSI", bands=["MSI11"]).size == 20
+    assert Sensor(instrument="MSI", bands=["MSI4", "MSI11"], pixel=20).size == 20
+    with pytest.raises(
+        ValueError, match=r"bands of MSI lie on different grids \(10 m: MSI4; 20 m: MSI11\): name those"
+    ):
+        Sensor(instrument="MSI", bands=["MSI4", "MSI11"])
+
+
+def test_noise_of_a_scenario_is_that_of_python():
+    given = {"thermal": 0.4, "shot": 0.005, "detectors": 16, "gain_spread": 0.005}
+    assert Sensor(noise=["shot"], noise_model=given).given_noise() == fifesim.NoiseModel(**given)
+    assert Sensor(instrument="OLI", noise=["thermal"], noise_model={"thermal": 1}).given_noise().along == "columns"
+    assert Sensor().given_noise() is None
+    for values, said in (
+        ({"thermall": 1.0}, "did you mean 'thermal'"),
+        ({"shot": -1.0}, "shot must not be negative"),
+        ({"detectors": 1.5}, "whole number"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            Sensor(noise_model=values)
+
+
+def test_noise_that_an_instrument_lacks_is_told_with_those_that_have_it():
+    with pytest.raises(ValueError, match=r"TM has no noise for TM3: .*\[sensor.noise_model\].* such as .*L4TM, MODIS"):
+        Sensor(noise=["shot"])

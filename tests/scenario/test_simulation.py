@@ -296,12 +296,26 @@ def test_instrument_and_its_tables_lie_beside_the_scenario(tmp_path, monkeypatch
     np.testing.assert_array_equal(mine, named)
 
 
+def test_noise_of_a_scenario_is_in_its_image():
+    keys = {"noise": ["thermal"], "noise_model": {"thermal": 1.5}, "seed": 3}
+    noisy = fifesim.simulate(parse_scenario(LEVEL | {"sensor": keys}))["image"]["dn"]
+    plain = fifesim.simulate(parse_scenario(LEVEL))
+    toa = plain["scene"]["surface_reflectance"].fifesim.to_toa()
+    onto = grids.geobox(plain["image"]["dn"])
+    model = fifesim.NoiseModel(thermal=1.5, shot=0.0)
+    by_hand = fifesim.sense(toa, onto=onto, noise="thermal", seed=3, noise_models=model)
+    np.testing.assert_array_equal(noisy, by_hand)
+    assert (noisy != plain["image"]["dn"]).any()
+
+
 @pytest.mark.parametrize(
     ("crs", "west", "north"), [("EPSG:3031", 0.0, 1.8e6), ("EPSG:3413", 0.0, -2.0e6), ("EPSG:5042", 2.1e6, 2.2e6)]
 )
 def test_polar_scene_is_simulated(crs, west, north):
     grid = {"crs": crs, "west": west, "north": north, "width": 120.0, "height": 90.0, "cell": 10.0}
     sun = {"sza": 60.0, "saa": 0.0}
-    case = parse_scenario({"grid": grid, "geometry": sun, "terrain": {"horizon_reach": 300}})
+    case = parse_scenario(
+        {"grid": grid, "geometry": sun, "terrain": {"horizon_reach": 300}, "atmosphere": {"altitude": 0.4}}
+    )
     image = fifesim.simulate(case)["image"]["dn"].compute()
     assert image.rio.crs == crs and image.shape == (2, 3, 4) and (image[:, 1, 1:3] > 0).all()

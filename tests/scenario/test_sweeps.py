@@ -88,7 +88,7 @@ def test_sections_are_named_where_a_key_is_in_several(small):
 
 
 def test_sweep_takes_a_scenario():
-    with pytest.raises(TypeError, match="takes a Scenario, got dict"):
+    with pytest.raises(TypeError, match=r"scenario must be a fifesim\.Scenario, .* got a dict of 0"):
         fifesim.sweep({}, {"arp": [0.1]})
 
 

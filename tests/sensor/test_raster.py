@@ -193,3 +193,55 @@ def test_two_lazy_scenes_share_nothing_but_their_bits(toa):
         image = fifesim.sense(in_chunks(toa, ODD_CHUNKS), "TM")
         check_place(image, grids.geobox(toa).crs)
     xr.testing.assert_identical(image[:, :3].compute(), fifesim.sense(toa, "TM")[:, :3])
+
+
+class TestSeveralResolutions:
+    """All bands of MSI and OLI: a tree with a node for each size of pixels."""
+
+    @pytest.fixture
+    def toa(self, site):
+        values = np.random.default_rng(4).uniform(0.05, 0.4, (3, *site.shape))
+        array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": ["MSI11", "MSI4", "MSI8"]})
+        return directions.with_geometry(grids.place(array, site), SUN)
+
+    def test_each_band_lies_on_its_own_grid(self, toa):
+        noise = {"noise": "thermal", "seed": 3, "noise_models": fifesim.NoiseModel(thermal=2.0, shot=0.01)}
+        tree = fifesim.sense(toa, "MSI", **noise)
+        assert [node.path for node in tree.leaves] == ["/10m", "/20m"]
+        for path, names in (("10m", ["MSI4", "MSI8"]), ("20m", ["MSI11"])):
+            alone = fifesim.sense(toa.sel(band=names), "MSI", **noise)
+            xr.testing.assert_identical(tree[path]["dn"], alone)
+            assert grids.cell_size(grids.geobox(tree[path]["dn"]))[0] == float(path.removesuffix("m"))
+
+    def test_one_resolution_and_one_grid_for_all_stay_arrays(self, toa, site):
+        assert isinstance(fifesim.sense(toa.sel(band=["MSI4", "MSI8"]), "MSI"), xr.DataArray)
+        for where in ({"interval": 20.0}, {"onto": grids.aligned(site, 30.0)}):
+            assert fifesim.sense(toa, "MSI", **where)["band"].values.tolist() == ["MSI11", "MSI4", "MSI8"]
+
+    def test_native_intervals_and_radiance(self, toa):
+        tree = fifesim.sense(toa, "MSI", interval="native", quantise=False)
+        assert all(set(node.data_vars) == {"toa_radiance"} for node in tree.leaves) and len(tree.leaves) == 2
+
+    def test_stays_lazy(self, toa):
+        with no_compute():
+            lazy = fifesim.sense(in_chunks(toa, ODD_CHUNKS), "MSI")
+        xr.testing.assert_identical(lazy.compute(), fifesim.sense(toa, "MSI"))
+
+    def test_a_file_is_one_node(self, toa, tmp_path):
+        tree = fifesim.sense(toa, "MSI")
+        with pytest.raises(TypeError, match=r"got an xarray.DataTree of 10m, 20m: take one of its arrays, such as"):
+            fifesim.to_geotiff(tree, tmp_path / "image.tif")
+        path = fifesim.to_geotiff(tree["10m/dn"], tmp_path / "image_10m.tif")
+        np.testing.assert_array_equal(fifesim.open_image(path), tree["10m/dn"])
+
+
+@pytest.mark.parametrize("crs", ["EPSG:26915", "+proj=tmerc +lon_0=-96.3 +x_0=500000 +datum=NAD83 +units=m"])
+def test_pixels_in_another_crs_are_one_line(toa, crs):
+    box = toa.odc.geobox.boundingbox
+    other = fifesim.grid_at(crs, box.left, box.top, 90, 90, 30)
+    with pytest.raises(
+        ValueError,
+        match=r"onto must be in the CRS of the scene, EPSG:26914, got .*: make it there",
+    ) as e:
+        fifesim.sense(toa, "TM", onto=other)
+    assert "\n" not in str(e.value) and len(str(e.value)) < 300

@@ -90,3 +90,12 @@ def test_fourth_band_of_the_first_scanner_is_not_that_of_the_last(image):
     """MSS4 is green on Landsat-1 and near infrared on Landsat-5: the wavelength decides."""
     seen = fifesim.sense(fifesim.to_radiance(image), "MSS5")
     assert seen["band"].values.tolist() == ["MSS1", "MSS2", "MSS3", "MSS4"]
+
+
+def test_own_counts_are_calibrated_by_the_scale_of_square_roots(image):
+    counts = image.drop_vars(["gain", "offset", "compression"])
+    again = fifesim.calibrate(counts, "MSS")
+    np.testing.assert_array_equal(fifesim.to_radiance(again), fifesim.to_radiance(image))
+    linear = fifesim.calibrate(counts, "MSS", gain=1.0, offset=0.0)
+    assert "compression" not in linear.coords
+    np.testing.assert_array_equal(fifesim.to_radiance(linear), counts.where(counts > 0))

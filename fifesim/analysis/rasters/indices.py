@@ -1,11 +1,57 @@
-"""Vegetation indices of labelled reflectance."""
+"""Spectral indices of labelled reflectance."""
 
 import numpy as np
 
 from fifesim.analysis import indices
-from fifesim.base.bands import NEAR_INFRARED, RED, nearest
-from fifesim.rasters import cf, chunks
-from fifesim.rasters import grid as grids
+from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED, nearest
+from fifesim.rasters import cf, chunks, swaths
+
+# The kernel of each index, and the bands that it takes. Names are those of the spyndex catalogue.
+INDICES = {
+    "NDVI": (indices.normalized_difference, (NEAR_INFRARED, RED)),
+    "EVI": (indices.enhanced, (NEAR_INFRARED, RED, BLUE)),
+    "EVI2": (indices.enhanced_of_two_bands, (NEAR_INFRARED, RED)),
+    "SAVI": (indices.soil_adjusted, (NEAR_INFRARED, RED)),
+    "MSAVI": (indices.modified_soil_adjusted, (NEAR_INFRARED, RED)),
+    "NDWI": (indices.normalized_difference, (GREEN, NEAR_INFRARED)),
+    "NDMI": (indices.normalized_difference, (NEAR_INFRARED, SHORTWAVE_INFRARED)),
+    "NIRv": (indices.near_infrared_of_vegetation, (NEAR_INFRARED, RED)),
+}
+
+
+def index(reflectance, name):
+    """
+    Spectral index of a reflectance.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        With a coordinate ``wavelength`` along band, which tells blue (0.45-0.52 um), green (0.50-0.60 um), red
+        (0.60-0.70 um), near infrared (0.75-1.00 um) and shortwave infrared (1.53-1.75 um).
+    name : str
+        A key of `INDICES`.
+
+    Returns
+    -------
+    index : xarray.DataArray, dims (y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no such index, a band of it is missing, or the units are not those of a reflectance.
+
+    See Also
+    --------
+    fifesim.analysis.indices
+    """
+    known = {each.lower(): each for each in INDICES}
+    if str(name).lower() not in known:
+        raise ValueError(f"there is no index {name!r}: type one of {', '.join(INDICES)}")
+    name = known[name.lower()]
+    kernel, windows = INDICES[name]
+    out = swaths.placed_as(chunks.pointwise(kernel, *_bands(reflectance, windows, name)), reflectance)
+    return cf.label(out, name.lower(), source=reflectance, history=name.lower())
 
 
 def ndvi(reflectance):
@@ -25,7 +71,7 @@ def ndvi(reflectance):
     Raises
     ------
     ValueError
-        If there is no red or no near infrared band, or the units are not those of a reflectance.
+        As in `index`.
 
     References
     ----------
@@ -35,9 +81,7 @@ def ndvi(reflectance):
     --------
     fifesim.analysis.indices.normalized_difference
     """
-    red, nir = red_and_nir(reflectance)
-    out = grids.place(chunks.pointwise(indices.normalized_difference, nir, red), grids.geobox(reflectance))
-    return cf.label(out, "ndvi", source=reflectance, history="ndvi")
+    return index(reflectance, "NDVI")
 
 
 def red_and_nir(reflectance):
@@ -59,15 +103,20 @@ def red_and_nir(reflectance):
     ValueError
         As in `ndvi`.
     """
+    return _bands(reflectance, (RED, NEAR_INFRARED), "ndvi")
+
+
+def _bands(reflectance, windows, what):
+    """The bands of a raster that lie best in some windows, without the coordinates along band."""
     cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
-    numbers = [_nearest_band(reflectance, window) for window in (RED, NEAR_INFRARED)]
+    numbers = [_nearest_band(reflectance, window, what) for window in windows]
     per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
     return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
 
 
-def _nearest_band(reflectance, window):
+def _nearest_band(reflectance, window, what):
     if "band" not in reflectance.dims:
-        raise ValueError("ndvi needs a red and a near infrared band along band, got a raster of one band")
+        raise ValueError(f"{what} needs a {window.name} and other bands along band, got a raster of one band")
     if "wavelength" not in reflectance.coords:
         raise ValueError("the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords")
     wavelengths = np.atleast_1d(reflectance["wavelength"].values)

@@ -7,8 +7,7 @@ import xarray as xr
 from fifesim.analysis import uncertainty
 from fifesim.analysis.rasters.pairs import matched
 from fifesim.analysis.regression import totals
-from fifesim.rasters import cf, chunks
-from fifesim.rasters import grid as grids
+from fifesim.rasters import cf, chunks, swaths
 from fifesim.rasters.reductions import sums_by_row
 
 _LIMITS = ("low", "high")
@@ -48,11 +47,10 @@ def invert(ndvi, fit, quantity="lai", *, level=0.95):
         raise ValueError(f"quantity must be 'lai' or 'fpar', got {quantity!r}")
     if not 0 < level < 1:
         raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")
-    grid = grids.geobox(ndvi)
     kernels = {quantity: fit.predict} | {name: _limit(fit, k, level) for k, name in enumerate(_LIMITS)}
     found = {}
     for name, kernel in kernels.items():
-        values = grids.place(chunks.pointwise(kernel, ndvi), grid)
+        values = swaths.placed_as(chunks.pointwise(kernel, ndvi), ndvi)
         line = f"invert: {fit.intercept:.6g} + {fit.slope:.6g} x {ndvi.name or 'index'}"
         found[name] = cf.label(values, quantity, source=ndvi, history=line).rename(name)
         # A standard name says that the values are the quantity, which the ends of an interval are not.

@@ -1,5 +1,7 @@
 """True means of labelled rasters over blocks of ground."""
 
+from numbers import Real
+
 from fifesim.analysis.rasters.pairs import check_no_counts
 from fifesim.rasters import grid as grids
 from fifesim.rasters.dates import by_date
@@ -31,11 +33,18 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     ------
     ValueError
         If the array has no grid, or no block fits.
+    TypeError
+        If the size is no number.
 
     See Also
     --------
     fifesim.base.footprints.regularize
     """
+    if not isinstance(pixel, Real):
+        raise TypeError(
+            f"aggregate takes the size of a block in metres, such as 30.0, got {type(pixel).__name__}: blocks lie from "
+            "the upper left corner of the raster"
+        )
     check_no_counts(array)
     blocks = grids.aligned(grids.geobox(array), pixel)
     spreads = areas(blocks) if lsf is None else (lsf, lsf)

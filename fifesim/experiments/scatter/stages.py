@@ -249,7 +249,7 @@ def _recorded(scene, means, counts, grains):
     radiance = sensor.as_radiance(xr.DataArray(means, dims=("band", "y", "x")), bands, geometry)
     if grains:
         first = grids.lattice_position(scene.image)
-        radiance = noisy(radiance, setup.instrument, bands, setup.noise, setup.seed, first)
+        radiance = noisy(radiance, setup.instrument, bands, setup.noise, setup.seed, first, setup.noise_models)
     radiance = radiance.values
     if counts:
         gain, offset = calibration.gain_offset(full_scale, lowest, setup.instrument.bits)

@@ -10,6 +10,8 @@ from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
 from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, did_you_mean, is_mixture
 
 LARGEST_LAI = 100.0
+# Of measured canopies, and a little more: a map beyond is in another scale. [m2 m-2]
+LARGEST_OF_MAPS = 20.0
 """Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
 
 # What the tables of the TM bands were modelled with; see data/README.md.
@@ -52,7 +54,7 @@ def leaf_optics(bands, given=None):
     elif isinstance(given, Leaf):
         given = _leaf_means(_responses(bands, "Leaf"), given)
     if isinstance(given, Mapping):
-        given = np.reshape([_of_band(given, band, "leaf optics") for band in _names(bands)], (-1, 2)).T
+        given = np.reshape([of_band(given, band, "leaf optics") for band in _names(bands)], (-1, 2)).T
     reflectance, transmittance = (_for_bands(values, bands, "leaf optics") for values in given)
     check_leaf_optics(reflectance, transmittance)
     return reflectance, transmittance
@@ -96,7 +98,7 @@ def background(bands, given=None):
     elif isinstance(given, Background | Spectrum):
         given = _background_means(_responses(bands, type(given).__name__), given)
     if isinstance(given, Mapping):
-        given = [_of_band(given, band, "background") for band in _names(bands)]
+        given = [of_band(given, band, "background") for band in _names(bands)]
     reflectance = _for_bands(given, bands, "background")
     check_background(reflectance)
     return reflectance
@@ -134,7 +136,33 @@ def _background_means(bands, mixture):
     return dict(zip(_names(bands), background_means(bands, mixture).tolist(), strict=True))
 
 
-def _of_band(given, band, what):
+def _for_bands(values, bands, what):
+    values = np.asarray(values, float)
+    if values.shape not in ((), (1,), (len(bands),)):
+        raise ValueError(f"{what} of shape {values.shape} for {len(bands)} bands: give one value for each band")
+    return np.broadcast_to(values, len(bands)).copy()
+
+
+def of_band(given, band, what):
+    """
+    What a mapping has for a band.
+
+    Parameters
+    ----------
+    given : mapping
+    band : str
+    what : str
+        "leaf optics" or "background".
+
+    Returns
+    -------
+    value : object
+
+    Raises
+    ------
+    ValueError
+        If it has nothing.
+    """
     if band in given:
         return given[band]
     typed = "(reflectance, transmittance)" if what == "leaf optics" else "reflectance"
@@ -144,16 +172,9 @@ def _of_band(given, band, what):
     )
 
 
-def _for_bands(values, bands, what):
-    values = np.asarray(values, float)
-    if values.shape not in ((), (1,), (len(bands),)):
-        raise ValueError(f"{what} of shape {values.shape} for {len(bands)} bands: give one value for each band")
-    return np.broadcast_to(values, len(bands)).copy()
-
-
 def check_leaf_optics(reflectance, transmittance):
     """
-    Refuse leaf optics that no leaf can have.
+    Refuse leaf optics that no leaf can have; there may be none.
 
     Parameters
     ----------
@@ -171,7 +192,7 @@ def check_leaf_optics(reflectance, transmittance):
     """
     for name, values in (("reflectance", reflectance), ("transmittance", transmittance)):
         _check_fraction(f"leaf {name}", values)
-    total = np.max(np.add(reflectance, transmittance))
+    total = np.max(np.add(reflectance, transmittance), initial=0.0)
     # Decimal fractions that add up to 1 may exceed it by rounding.
     if not total <= 1 + 1e-12:
         raise ValueError(
@@ -235,6 +256,50 @@ def check_lai(lai):
         raise ValueError(
             f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
             f"{wrong.sum()} of {cells.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
+        )
+    return lai
+
+
+def check_map(lai):
+    """
+    Refuse a map of leaf area index whose numbers look like those of another scale; NaN passes.
+
+    Parameters
+    ----------
+    lai : array
+        [m2 m-2]
+
+    Returns
+    -------
+    lai : array
+        What was given.
+
+    Raises
+    ------
+    ValueError
+        As `check_lai`, or if one is above 20.
+
+    Notes
+    -----
+    The largest of some 1000 measured values is 18, once outliers are removed.
+
+    References
+    ----------
+    Asner, G.P., Scurlock, J.M.O., Hicke, J.A. (2003), Global synthesis of leaf area index observations. Global Ecology
+    and Biogeography 12, 191-205
+
+    Examples
+    --------
+    >>> check_map(2.5)
+    2.5
+    """
+    cells = np.asarray(check_lai(lai), float)
+    largest = np.fmax.reduce(cells, axis=None, initial=0.0)
+    if largest > LARGEST_OF_MAPS:
+        raise ValueError(
+            f"leaf area index up to {largest:g}, canopies have at most {LARGEST_OF_MAPS:g}: where the numbers are "
+            "scaled, as MODIS by 0.1, type lai * 0.1, or gdal_edit.py -a_scale 0.1 for a file; set cells without data "
+            "to NaN"
         )
     return lai
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import exp1
 
 from fifesim.base import datasets
+from fifesim.base.kinds import described
 
 CONTENTS = {
     "chlorophyll": ("ug cm-2", 200.0),
@@ -34,21 +35,23 @@ class Leaf:
 
     Parameters
     ----------
-    structure : float, optional
+    structure : float or raster, optional
         N, layers of cells with air between them, 1 (compact) to about 3. [1]
-    chlorophyll, carotenoids, anthocyanins : float, optional
+    chlorophyll, carotenoids, anthocyanins : float or raster, optional
         Pigments, per one-sided leaf area. [ug cm-2]
-    brown : float, optional
+    brown : float or raster, optional
         Brown pigments of a senescent leaf, 0 (green) to about 1. [1]
-    water : float, optional
+    water : float or raster, optional
         Equivalent thickness. [cm]
-    dry_matter : float, optional
+    dry_matter : float or raster, optional
         Leaf mass per area. [g cm-2]
 
     Raises
     ------
     ValueError
-        If a number is outside the range of leaves.
+        If a number is outside the range of leaves; of a raster when it is used.
+    TypeError
+        If it is no number.
 
     References
     ----------
@@ -74,14 +77,25 @@ class Leaf:
         ranges = {"structure": ("1", 1.0, LARGEST_STRUCTURE)}
         ranges |= {name: (unit, 0.0, largest) for name, (unit, largest) in CONTENTS.items()}
         for name, (unit, low, high) in ranges.items():
-            value = float(getattr(self, name))
-            if not low <= value <= high:
-                unit = "" if unit == "1" else f" {unit}"
-                raise ValueError(f"Leaf: {name} must be in [{low:g}, {high:g}]{unit}, got {value:g}: check its unit")
+            value = getattr(self, name)
+            if not hasattr(value, "ndim") or not value.ndim:
+                value = _number(name, value)
+            # Lazy arrays are looked at when they compute.
+            if isinstance(value, float | np.ndarray):
+                outside = np.atleast_1d(value)[np.atleast_1d((value < low) | (value > high))]
+                if outside.size or (isinstance(value, float) and np.isnan(value)):
+                    got = outside[0] if outside.size else value
+                    unit = "" if unit == "1" else f" {unit}"
+                    raise ValueError(f"Leaf: {name} must be in [{low:g}, {high:g}]{unit}, got {got:g}: check its unit")
             object.__setattr__(self, name, value)
 
+    def varying(self):
+        """What differs from leaf to leaf, a dict of str to array."""
+        values = {name: getattr(self, name) for name in ("structure", *CONTENTS)}
+        return {name: value for name, value in values.items() if not isinstance(value, float)}
 
-def leaf_spectrum(leaf):
+
+def leaf_spectrum(leaf, limits=(0.4, 2.5)):
     """
     Hemispherical reflectance and transmittance of a leaf, PROSPECT-D.
 
@@ -91,11 +105,16 @@ def leaf_spectrum(leaf):
     Parameters
     ----------
     leaf : Leaf
+        Of numbers, or of arrays of shape (...) that broadcast; NaN gives NaN.
+    limits : (float, float), optional
+        Wavelengths that are wanted. [um]
 
     Returns
     -------
-    wavelength, reflectance, transmittance : array, shape (2101,)
-        0.4 to 2.5 um in steps of 0.001; fractions. [um], [1], [1]
+    wavelength : array, shape (n,)
+        0.4 to 2.5 in steps of 0.001, as far as the limits and the next step on either side. [um]
+    reflectance, transmittance : array, shape (..., n)
+        [1]
 
     References
     ----------
@@ -110,17 +129,33 @@ def leaf_spectrum(leaf):
     True
     """
     table = datasets.table("prospect_d.csv")
+    first, last = np.searchsorted(table["wavelength"].to_numpy(), limits)
+    table = table.iloc[max(first - 1, 0) : last + 2]
     refractive_index = table["refractive_index"].to_numpy()
-    absorption = sum(getattr(leaf, name) * table[name].to_numpy() for name in CONTENTS) / leaf.structure
+    content = {name: _column(getattr(leaf, name)) for name in CONTENTS}
+    structure = _column(leaf.structure)
+    absorption = sum(content[name] * table[name].to_numpy() for name in CONTENTS) / structure
     tau = layer_transmissivity(absorption)
     # Reflectance of one layer that is lit from outside, and of one between others.
     first = plate(refractive_index, tau, _INCIDENCE)
     other = plate(refractive_index, tau, 90.0)
-    reflectance_below, transmittance_below = pile(*other, leaf.structure - 1)
+    reflectance_below, transmittance_below = pile(*other, structure - 1)
     multiple = 1 - reflectance_below * other[0]
     reflectance = first[0] + first[1] * reflectance_below * other[1] / multiple
     transmittance = first[1] * transmittance_below / multiple
     return table["wavelength"].to_numpy(), reflectance, transmittance
+
+
+def _number(name, value):
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"Leaf: {name} must be a number, or a raster, got {described(value)}") from None
+
+
+def _column(value):
+    """A number as it is, or one for each leaf beside the wavelengths."""
+    return value if isinstance(value, float) else np.asarray(value, float)[..., None]
 
 
 def layer_transmissivity(absorption):

@@ -6,12 +6,13 @@ import xarray as xr
 from fifesim.base.geometry import ANGLES, relative_azimuth
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.optics import check_lai
+from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
 from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.packed import unpacked
 
 
 def level_reflectance(
@@ -40,8 +41,8 @@ def level_reflectance(
         Names.
     wavelengths : sequence of float, shape (band,)
         [um]
-    leaf_reflectance, leaf_transmittance : sequence of float, shape (band,)
-        [1]
+    leaf_reflectance, leaf_transmittance : sequence of float, shape (band,), or xarray.DataArray, dims (band, y, x)
+        Where they are rasters, SAIL is evaluated at every cell. [1]
     background : sequence of float, shape (band,), or xarray.DataArray, dims ([band], y, x)
         Reflectance below the canopy. [1]
     diffuse_fraction : sequence of float, shape (band,), or xarray.DataArray, dims (band, y, x)
@@ -74,21 +75,19 @@ def level_reflectance(
     if not 0 <= hotspot < np.inf:
         raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
     angles = leaf_angle_classes(leaf_angles)
-    parameters = {
-        "leaf_reflectance": tuple(map(float, leaf_reflectance)),
-        "leaf_transmittance": tuple(map(float, leaf_transmittance)),
-        "leaf_angles": angles,
-        "hotspot": float(hotspot),
-    }
-    _check_scene(lai)
+    parameters = {"leaf_angles": angles, "hotspot": float(hotspot)}
+    lai = _checked_scene(lai)
     described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
     if described == "raster":
         cf.check_units(background, "surface_reflectance")
         background = _background_bands(background, bands)
     background = _per_band(background)
-    if directions.varying(geometry):
-        out = _in_directions(lai, background, diffuse_fraction, geometry, parameters)
+    leaves = leaf_reflectance, leaf_transmittance
+    if directions.varying(geometry) or any(isinstance(each, xr.DataArray) for each in leaves):
+        out = _by_cell(lai, background, diffuse_fraction, leaves, geometry, parameters)
     else:
+        names = "leaf_reflectance", "leaf_transmittance"
+        parameters |= {name: tuple(map(float, values)) for name, values in zip(names, leaves, strict=True)}
         parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
         parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
         out = chunking.pointwise(_reflectance, lai, background, bands=len(bands), **parameters)
@@ -141,16 +140,22 @@ def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=abs
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "fpar")
     extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))
-    _check_scene(lai)
+    lai = _checked_scene(lai)
     out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
     out = grids.place(out, grids.geobox(lai))
     return cf.label(out, "fpar", source=lai, history=f"fpar: Beer's law, K {extinction:.4f}, limit {fpar_inf:g}")
 
 
-def _check_scene(lai):
+def _checked_scene(lai):
+    """Leaf area of a scene, in its unit; of what is in memory, with data."""
     cf.check_quantity(lai, "lai")
     if set(lai.dims) != {"y", "x"}:
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
+    grids.geobox(lai)
+    lai = unpacked(lai)
+    if lai.chunks is None and lai.size and not np.isfinite(lai.values).any():
+        raise ValueError("all cells of the leaf area index are NaN: look at the nodata value and the place of its map")
+    return lai
 
 
 def _per_band(values):
@@ -162,19 +167,20 @@ def _per_band(values):
 
 def _reflectance(lai, background, **parameters):
     # apply_ufunc hands the bands over as the last axis.
-    return canopy_reflectance(lai, background=np.moveaxis(background, -1, 0), **parameters)
+    return canopy_reflectance(check_map(lai), background=np.moveaxis(background, -1, 0), **parameters)
 
 
-def _in_directions(lai, background, diffuse_fraction, geometry, parameters):
-    """Reflectance where the directions of sun or sensor vary over the scene."""
+def _by_cell(lai, background, diffuse_fraction, leaves, geometry, parameters):
+    """Reflectance where the directions of sun or sensor, or the leaves, vary over the scene."""
 
-    def kernel(cells, ground, sky, sza, saa, vza, vaa):
+    def kernel(cells, ground, sky, reflectance, transmittance, sza, saa, vza, vaa):
         directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
-        return directional_reflectance(cells, background=ground, diffuse_fraction=sky, **directions, **parameters)
+        light = {"background": ground, "diffuse_fraction": sky, **directions}
+        return directional_reflectance(check_map(cells), reflectance, transmittance, **light, **parameters)
 
     plain = lai.drop_vars(ANGLES, errors="ignore")
-    angles, bands = directions.angles(geometry), len(parameters["leaf_reflectance"])
-    return chunking.pointwise(kernel, plain, background, _per_band(diffuse_fraction), *angles, bands=bands)
+    by_band = [_per_band(each) for each in (background, diffuse_fraction, *leaves)]
+    return chunking.pointwise(kernel, plain, *by_band, *directions.angles(geometry), bands=len(by_band[2]["band"]))
 
 
 def _directions(geometry):
@@ -186,7 +192,7 @@ def _directions(geometry):
 
 
 def _fpar(lai, **parameters):
-    return absorption.fpar(check_lai(lai), **parameters)
+    return absorption.fpar(check_map(lai), **parameters)
 
 
 def _background_bands(background, bands):

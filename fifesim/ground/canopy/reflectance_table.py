@@ -18,21 +18,19 @@ _BLOCK = 2**15  # cells evaluated exactly at a time, to bound memory
 class _Scene(NamedTuple):
     """What a canopy's reflectance depends on besides its leaf area and its background."""
 
-    leaf_reflectance: tuple
-    leaf_transmittance: tuple
-    sky: tuple
-    sza: float
-    vza: float
-    raa: float
+    leaf_reflectance: tuple | np.ndarray
+    leaf_transmittance: tuple | np.ndarray
+    sky: tuple | np.ndarray
+    sza: float | np.ndarray
+    vza: float | np.ndarray
+    raa: float | np.ndarray
     leaf_angles: LeafAngles
     hotspot: float
 
     def part(self, cells):
-        """The same for some of the cells, where directions vary."""
-        if not np.ndim(self.sza):
-            return self
-        angles = {"sza": self.sza[cells], "vza": self.vza[cells], "raa": self.raa[cells]}
-        return self._replace(sky=self.sky[:, cells], **angles)
+        """The same for some of the cells: of arrays that vary, whose last axis they are."""
+        by_cell = {name: v for name, v in self._asdict().items() if isinstance(v, np.ndarray) and v.shape[-1:] > (1,)}
+        return self._replace(**{name: values[..., cells] for name, values in by_cell.items()})
 
 
 def canopy_reflectance(
@@ -122,14 +120,14 @@ def directional_reflectance(
     lai, leaf_reflectance, leaf_transmittance, background, *, sza, vza, raa, leaf_angles, hotspot, diffuse_fraction
 ):
     r"""
-    Reflectance factor of a canopy where the directions of sun and view differ from cell to cell.
+    Reflectance factor of a canopy where the directions of sun and view, or the leaves, differ from cell to cell.
 
     Parameters
     ----------
     lai : array, shape (...)
         NaN gives NaN. [m2 m-2]
-    leaf_reflectance, leaf_transmittance : array, shape (band,)
-        [1]
+    leaf_reflectance, leaf_transmittance : array, shape (band,) or (..., band)
+        NaN gives NaN. [1]
     background, diffuse_fraction : array, broadcastable to (..., band)
         [1]
     sza, vza, raa : array, broadcastable to (...)
@@ -152,14 +150,16 @@ def directional_reflectance(
     [Verhoef2007]_
     """
     check_lai(lai)
-    check_leaf_optics(leaf_reflectance, leaf_transmittance)
+    leaf_reflectance, leaf_transmittance = _leaves_by_cell(leaf_reflectance, leaf_transmittance, np.shape(lai))
     check_background(background)
     for name, angle in (("sza", np.asarray(sza, float)), ("vza", np.asarray(vza, float))):
         wrong = angle[(angle < 0) | (angle >= 90)]
         if wrong.size:
             raise ValueError(f"{name} must be in [0, 90) degrees in every cell, got {wrong[0]:g}")
     cells, bands = np.shape(lai), len(leaf_reflectance)
-    lai, sza, vza, raa = (np.broadcast_to(np.asarray(v, float), cells).reshape(-1) for v in (lai, sza, vza, raa))
+    lai = np.asarray(lai, float).reshape(-1)
+    if np.ndim(sza) or np.ndim(vza) or np.ndim(raa):
+        sza, vza, raa = (np.broadcast_to(np.asarray(v, float), cells).reshape(-1) for v in (sza, vza, raa))
     ground, sky = (
         np.broadcast_to(np.asarray(v, float), (*cells, bands)).reshape(-1, bands).T
         for v in (background, diffuse_fraction)
@@ -169,8 +169,19 @@ def directional_reflectance(
     leaves = leaf_angle_classes(leaf_angles)
     scene = _Scene(leaf_reflectance, leaf_transmittance, sky, sza, vza, raa, leaves, hotspot)
     out = _cell_by_cell(lai, ground, scene)
-    out[:, missing] = np.nan
+    out[:, np.broadcast_to(missing, lai.shape)] = np.nan
     return out.reshape(bands, *cells)
+
+
+def _leaves_by_cell(reflectance, transmittance, cells):
+    """Leaf optics of cells, shape (band, n), or (band, 1) where they are the same."""
+    rho, tau = np.broadcast_arrays(np.asarray(reflectance, float), np.asarray(transmittance, float))
+    known = ~np.isnan(rho + tau) if rho.ndim > 1 else ...
+    check_leaf_optics(rho[known], tau[known])
+    if rho.ndim == 1:
+        return rho[:, None], tau[:, None]
+    shape = *cells, rho.shape[-1]
+    return tuple(np.ascontiguousarray(np.broadcast_to(each, shape).reshape(-1, shape[-1]).T) for each in (rho, tau))
 
 
 def _per_band(values, bands):
@@ -180,7 +191,7 @@ def _per_band(values, bands):
 
 def _sail(lai, scene):
     """SAIL of cells, shape (band, n) from (n,), and the sky's share, shape (band, 1) or (band, n)."""
-    rho, tau = np.array(scene.leaf_reflectance)[:, None], np.array(scene.leaf_transmittance)[:, None]
+    rho, tau = (np.reshape(v, (len(v), -1)) for v in (scene.leaf_reflectance, scene.leaf_transmittance))
     angles = {"sza": scene.sza, "vza": scene.vza, "raa": scene.raa, "leaf_angles": scene.leaf_angles}
     return sail(lai, rho, tau, **angles, hotspot=scene.hotspot), np.reshape(scene.sky, (len(rho), -1))
 

@@ -10,6 +10,7 @@ import pandas as pd
 
 from fifesim.base import datasets
 from fifesim.base.bands import solar_spectrum
+from fifesim.base.kinds import described
 
 SHADE = "shade"
 """Part of a mixture that reflects nothing."""
@@ -84,8 +85,8 @@ class Background:
 
     def __post_init__(self):
         if not isinstance(self.fractions, Mapping):
-            raise TypeError(f"Background takes {{spectrum: fraction}}, got {self.fractions!r}")
-        fractions = {str(name): float(value) for name, value in self.fractions.items()}
+            raise TypeError(f"Background takes fractions as {{spectrum: fraction}}, got {described(self.fractions)}")
+        fractions = {str(name): _share(name, value) for name, value in self.fractions.items()}
         names = spectrum_names()
         for name, value in fractions.items():
             if name not in names and not _is_file(name):
@@ -93,18 +94,44 @@ class Background:
                     f"Background: no spectrum {name!r}{did_you_mean(name, names)} There are {', '.join(names)}, "
                     "or the path of a .csv file"
                 )
-            if not 0 <= value <= 1:
-                raise ValueError(f"Background: the fraction of {name!r} must be in [0, 1], got {value:g}")
-        total = sum(fractions.values())
-        if not abs(total - 1) <= _WHOLE:
-            raise ValueError(
-                f"Background: the fractions must add up to 1, got {total:g}: what reflects nothing is {SHADE!r}"
-            )
+            if np.isnan(value):
+                raise ValueError(f"Background: the fraction of {name!r} must be in [0, 1], got nan")
+        check_shares(tuple(fractions), tuple(fractions.values()))
         object.__setattr__(self, "fractions", fractions)
 
     def spectra(self):
         """Spectrum and share of each part that reflects, a list of (Spectrum, float)."""
         return [(_spectrum(name), value) for name, value in self.fractions.items() if name != SHADE and value > 0]
+
+
+def check_shares(names, shares):
+    """
+    Refuse shares of a mixture that are no fractions, or do not add up to 1; NaN passes.
+
+    Parameters
+    ----------
+    names : sequence of str
+    shares : sequence of array, shape (...)
+        One for each name. [1]
+
+    Raises
+    ------
+    ValueError
+
+    Examples
+    --------
+    >>> check_shares(["soil_dry", "shade"], [0.25, 0.75])
+    """
+    for name, share in zip(names, shares, strict=True):
+        wrong = np.ravel(share)[np.ravel((np.asarray(share) < 0) | (np.asarray(share) > 1))]
+        if wrong.size:
+            raise ValueError(f"Background: the fraction of {name!r} must be in [0, 1], got {wrong[0]:g}")
+    total = np.ravel(sum(np.asarray(share, float) for share in shares))
+    wrong = total[np.abs(total - 1) > _WHOLE]
+    if wrong.size:
+        raise ValueError(
+            f"Background: the fractions must add up to 1, got {wrong[0]:g}: what reflects nothing is {SHADE!r}"
+        )
 
 
 def spectrum_names():
@@ -242,6 +269,16 @@ def did_you_mean(name, allowed):
     """
     near = difflib.get_close_matches(str(name), map(str, allowed), n=1, cutoff=0.4)
     return f", did you mean {near[0]!r}?" if near else "."
+
+
+def _share(name, value):
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise TypeError(
+            f"Background: the fraction of {name!r} must be a number, got {described(value)}: rasters of fractions are "
+            "background={spectrum: raster, ...}"
+        ) from None
 
 
 def _is_file(name):

@@ -2,19 +2,22 @@
 
 from pathlib import Path
 
+import numpy as np
 import psutil
 import xarray as xr
 
 from fifesim.base.foreign import in_a_line
 from fifesim.base.seeds import check_seed
-from fifesim.ground.canopy.optics import check_lai
+from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.landscape.autoregression import check_arp
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
 from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
-from fifesim.rasters import cf, places, warp
+from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.packed import unpacked
 from fifesim.rasters.sites import made_on_site
+from fifesim.rasters.warp import file_onto_grid, raster_onto_grid
 
 FIELD_METHODS = ("streaming", "periodic")
 
@@ -75,14 +78,15 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     return cf.label(lai, "lai", history=said, **made, method=method, references=_REFERENCE)
 
 
-def open_lai(path, grid, chunks=None, *, allow_remote=False):
+def open_lai(path_or_raster, grid, chunks=None, *, allow_remote=False):
     """
     A user's own map of leaf area index on a grid.
 
     Parameters
     ----------
-    path : str or path
-        A raster file; its first band is LAI. [m2 m-2]
+    path_or_raster : str, path or xarray.DataArray
+        A raster file, whose first band is LAI, or what rioxarray has opened, in any CRS and orientation. Whole numbers
+        with a scale, as of MODIS, are LAI by their ``scale_factor``. [m2 m-2]
     grid : odc.geo.geobox.GeoBox
         Of ground cells. Cells no larger than the map's are interpolated bilinearly, larger ones hold means.
     chunks : mapping or int, optional
@@ -99,11 +103,52 @@ def open_lai(path, grid, chunks=None, *, allow_remote=False):
     ------
     ValueError
         If the file is missing or not of a format that is opened, has no CRS, does not overlap the grid, or needs a
-        change of datum whose accuracy is unknown; and, when computed, if LAI is negative.
+        change of datum whose accuracy is unknown; if it has no data on the grid, known at once where the result is in
+        memory; and, when computed, if LAI is negative or above what canopies have, where it lacks its scale.
     """
-    lai = chunking.pointwise(check_lai, warp.file_onto_grid(path, grid, chunks, allow_remote))
-    name = in_a_line(Path(path).name, 150)
+    lai = lai_window(path_or_raster, grid, chunks, allow_remote=allow_remote)
+    if lai.chunks is None and not np.isfinite(lai.values).any():
+        raise ValueError(
+            f"{lai.attrs['lai_distribution']} has no data on the grid, which spans {grids.extent(grid)}: all of it is "
+            "marked as no data; look at its nodata value with gdalinfo -stats"
+        )
+    return lai
+
+
+def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
+    """
+    A map of leaf area index on a grid where it may have no data, such as in one of many windows.
+
+    Parameters
+    ----------
+    path_or_raster, grid, chunks, allow_remote
+        As in `open_lai`.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+
+    Raises
+    ------
+    ValueError
+        As in `open_lai`, but not for want of data.
+    """
+    if isinstance(path_or_raster, xr.DataArray):
+        name = in_a_line(str(path_or_raster.name or "raster"), 150)
+        found = raster_onto_grid(_one_layer(unpacked(path_or_raster)), grid, chunks)
+    else:
+        name = in_a_line(Path(path_or_raster).name, 150)
+        found = file_onto_grid(path_or_raster, grid, chunks, allow_remote)
+    lai = chunking.pointwise(check_map, found)
     return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
+
+
+def _one_layer(raster):
+    raster = raster.squeeze([name for name in raster.dims if raster.sizes[name] == 1 and name == "band"], drop=True)
+    if raster.ndim != 2:
+        raise ValueError(f"a map of leaf area has rows and columns, got dimensions {raster.dims}: select one layer")
+    return raster
 
 
 def _streaming_scene(grid, density, arp, seed, chunks):

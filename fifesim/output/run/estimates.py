@@ -1,12 +1,16 @@
 """What a run will take on this machine, from a small piece of it."""
 
 import json
+import tempfile
 import time
+from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 from dask.utils import format_bytes, format_time
 
 from fifesim.output.progress import memory
+from fifesim.output.run.folder import simulate_to_folder
 from fifesim.output.run.products import products_of, wanted_blocks
 from fifesim.output.run.schedule import run_on_threads, tasks_of
 from fifesim.output.run.size import check_size, disk_of
@@ -21,7 +25,7 @@ _PIECE = 2016
 _SLACK = 1.1
 
 
-def estimate(scenario, folder=".", *, threads=None, scene=False):
+def estimate(scenario, folder=".", *, threads=None, scene=False, start=0.0):
     """
     Cells, tasks, memory, disk and time of a run.
 
@@ -34,6 +38,8 @@ def estimate(scenario, folder=".", *, threads=None, scene=False):
         Or workers; by default one for each core that this process may use.
     scene : bool, optional
         With the products of the scene.
+    start : float, optional
+        What a run needs before it begins, such as for imports. [s]
 
     Returns
     -------
@@ -47,7 +53,8 @@ def estimate(scenario, folder=".", *, threads=None, scene=False):
 
     Notes
     -----
-    A piece of up to 2016 x 2016 cells of the same ground is simulated twice; the second time counts.
+    A piece of up to 2016 x 2016 cells of the same ground is run whole once, with its report, and computed a second
+    time: the first says what does not grow with the scene, the second what does.
     """
     complete = scenario.complete()
     check_size(complete, folder)
@@ -56,7 +63,7 @@ def estimate(scenario, folder=".", *, threads=None, scene=False):
     found = products_of(tree)
     lai, image = tree["scene"]["lai"], found.arrays["image"]
     tasks = tasks_of(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))[0]
-    rate, used = _calibrate(complete, threads)
+    once, cells, rate, used = _calibrate(complete, threads)
     return {
         "cells": lai.size,
         "pixels": image.shape[-2] * image.shape[-1],
@@ -64,7 +71,7 @@ def estimate(scenario, folder=".", *, threads=None, scene=False):
         "threads": threads,
         "memory": used,
         "disk": round(disk_of(complete, scene)[1]),
-        "seconds": _SLACK * lai.size / rate,
+        "seconds": start + once + _SLACK * (lai.size - cells) / rate,
     }
 
 
@@ -96,17 +103,19 @@ def estimate_in_words(found, as_json=False):
 
 
 def _calibrate(scenario, threads):
-    """Cells a second, and memory, of a piece in the middle of the scene."""
+    """Seconds of a whole run of a piece in the middle of the scene, its cells, those a second, and memory."""
     piece = _piece(scenario)
-    for _ in range(2):
-        tree = simulate(piece)
-        found = products_of(tree)
-        lai = tree["scene"]["lai"]
-        tasks = tasks_of(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))
-        start = time.monotonic()
-        run_on_threads(*tasks, lambda name, index, block: None, threads)
-        taken = time.monotonic() - start
-    return lai.size / taken, memory()
+    start = time.monotonic()
+    # A piece without data has no files, where the scene may have some.
+    with tempfile.TemporaryDirectory(prefix="fifesim-") as folder, suppress(ValueError):
+        simulate_to_folder(piece, Path(folder) / "piece", threads=threads)
+    once, start = time.monotonic() - start, time.monotonic()
+    tree = simulate(piece)
+    found = products_of(tree)
+    lai = tree["scene"]["lai"]
+    tasks = tasks_of(found.arrays, wanted_blocks(found, lai.chunks, grids.geobox(lai)))
+    run_on_threads(*tasks, lambda name, index, block: None, threads)
+    return once, lai.size, lai.size / (time.monotonic() - start), memory()
 
 
 def _piece(scenario):

@@ -168,8 +168,9 @@ def _write_files(scenario, tree, found, folder):
     if "ndvi" in tree["image"]:
         image["ndvi"] = ndvi(saved["image"])
     truth = xr.Dataset({name: saved[name] for name in ("lai", "fpar")})
-    to_geotiff(image["dn"], folder / "image.tif")
-    to_geotiff(truth, folder / "truth.tif")
+    to_geotiff(image["dn"], folder / "image.tif", overwrite=True)
+    # Seven digits are more than a mean of leaf area has.
+    to_geotiff(truth.astype(np.float32), folder / "truth.tif", overwrite=True)
     terrain = level = None
     if "terrain" in tree.children:
         level = saved["level"].compute()

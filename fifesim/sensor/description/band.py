@@ -14,10 +14,13 @@ from fifesim.sensor.description.spectral_response import SpectralResponse
 # Numbers that must be there and those that may; each that is there has a source.
 INSTRUMENT_NUMBERS = ("altitude", "gsd", "interval", "bits", "lsf")
 BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance")
-OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "noise", "gains", "limits", "compression")
+OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "product", "noise", "gains", "limits", "compression")
 
 # Publications by number.
 Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]
+
+# What a band tells of itself, as far as it is given.
+_TOLD = ("name", "srf", "full_scale_radiance", "min_radiance", "solar_irradiance", "limits", "gsd", "gain")
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -78,6 +81,10 @@ class InstrumentBand:
             raise ValueError(f"limits: the first must be below the second, got {self.limits} um")
         if self.gain in self.gains:
             raise ValueError(f"gains: {self.gain!r} is the band's own gain state, give the others")
+
+    def __repr__(self):
+        said = {name: value for name, value in vars(self).items() if value is not None and name in _TOLD}
+        return f"InstrumentBand({', '.join(f'{name}={value!r}' for name, value in said.items())})"
 
     @property
     def response(self):

@@ -7,10 +7,11 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
 from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
 from fifesim.sensor.description.names import key, lookup
-from fifesim.sensor.description.performance import Scan
+from fifesim.sensor.description.performance import Product, Scan
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
 
 
@@ -43,6 +44,8 @@ class Instrument:
     detectors : int, optional
         Detectors of a band, which take turns at its lines (whiskbroom) or stand side by side (pushbroom).
     scan : Scan, optional
+    product : Product, optional
+        Scale of the agency's product.
     aliases : tuple of str, optional
         Other names.
 
@@ -66,6 +69,7 @@ class Instrument:
     ifov: Angle | None = None
     detectors: Count | None = None
     scan: Scan | None = None
+    product: Product | None = None
     aliases: tuple[Name, ...] = ()
 
     def __post_init__(self):
@@ -77,6 +81,12 @@ class Instrument:
         for band in self.bands:
             for number in (*BAND_NUMBERS, *_given(band)):
                 self.source(number, band)
+
+    def __repr__(self):
+        return (
+            f"Instrument {self.name}: {self.title}, {self.gsd:g} m pixels from {self.altitude / 1000:g} km, "
+            f"{self.bits} bits\n  bands {', '.join(band.name for band in self.bands)}"
+        )
 
     @property
     def max_angle(self):
@@ -243,6 +253,30 @@ class Instrument:
                 f"bands of {self.name} must be at least one, each once, got {', '.join(map(str, names)) or 'none'}"
             )
         return found
+
+    def red_and_near_infrared(self):
+        """
+        The bands of vegetation indices.
+
+        Returns
+        -------
+        bands : (InstrumentBand, InstrumentBand)
+
+        Raises
+        ------
+        ValueError
+            If the instrument lacks one of them.
+        """
+        found = []
+        for window in (RED, NEAR_INFRARED):
+            number = nearest([band.wavelength for band in self.bands], window)
+            if number is None:
+                raise ValueError(
+                    f"{self.name} has no {window.name} band, {window.low:g} to {window.high:g} um: say which of its "
+                    f"bands are meant: {', '.join(band.name for band in self.bands)}"
+                )
+            found.append(self.bands[number])
+        return tuple(found)
 
     def source(self, number, band=None):
         """

@@ -105,6 +105,34 @@ def read_instrument(path):
     return found
 
 
+def noise_of(description, band):
+    """
+    Noise of a band of an instrument at every radiance.
+
+    Parameters
+    ----------
+    description : Instrument
+    band : fifesim.sensor.description.band.InstrumentBand
+
+    Returns
+    -------
+    model : fifesim.sensor.response.noise.NoiseModel
+
+    Raises
+    ------
+    ValueError
+        If the instrument's file has none; the message says whose have.
+    """
+    if band.noise is None:
+        known = [name for name in instrument_names() if any(each.noise for each in instrument(name).bands)]
+        raise ValueError(
+            f"the description of {description.name} has no noise for {band.name}: leave noise out, give "
+            "noise_models=fifesim.NoiseModel(...), in a scenario [sensor.noise_model], or take an instrument that has "
+            f"it, such as {', '.join(known)}"
+        )
+    return description.noise_model(band)
+
+
 def _parse(path):
     try:
         content = read_toml(path)

@@ -53,6 +53,7 @@ def instrument_in_words(instrument):
     if instrument.aliases:
         lines.append(f"  also called {', '.join(instrument.aliases)}")
     lines += [f"  altitude {instrument.altitude / 1000:g} km, {instrument.bits} bits", *_scan(instrument)]
+    lines += _product(instrument)
     lines += _sampling(instrument)
     lines += _radiometry(instrument)
     lines += ["  sources", *(f"    {text}" for text in instrument.references.values())]
@@ -67,6 +68,14 @@ def _scan(instrument):
     parts += [f"swath {scan.swath / 1000:g} km"] if scan.swath else []
     parts += [f"{instrument.detectors} detectors a band"] if instrument.detectors else []
     return [f"  {', '.join(parts)}"]
+
+
+def _product(instrument):
+    product = instrument.product
+    if product is None:
+        return []
+    sun = "" if product.sun_corrected else " x cosine of the solar zenith angle"
+    return [f"  Level-1 product: {product.gain:g} x DN {product.offset:+g} is reflectance{sun}, {product.bits} bits"]
 
 
 def _sampling(instrument):

@@ -1,4 +1,4 @@
-"""Noise, gain states and scan of an instrument, as its file gives them."""
+"""Noise, gain states, scan and products of an instrument, as its file gives them."""
 
 from typing import Annotated, Literal
 
@@ -94,6 +94,27 @@ class Gain:
                 f"full_scale_radiance must be above min_radiance, got {self.full_scale_radiance:g} "
                 f"and {self.min_radiance:g} W m-2 sr-1 um-1"
             )
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Product:
+    """
+    How the agency scales the digital numbers of its Level-1 product: by reflectance.
+
+    Parameters
+    ----------
+    gain, offset : float
+        Reflectance of one count and of digital number 0. [1]
+    bits : int
+        Of the product's numbers.
+    sun_corrected : bool
+        Whether that reflectance has the cosine of the solar zenith angle divided out.
+    """
+
+    gain: Positive
+    offset: Number
+    bits: Annotated[int, Field(strict=True, ge=2, le=16)]
+    sun_corrected: Annotated[bool, Field(strict=True)]
 
 
 @dataclass(frozen=True, config=CONFIG)

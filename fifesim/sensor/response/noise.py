@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fifesim.base.arguments import check_fields
 from fifesim.base.seeds import generator
 
 # What can be switched on by name.
@@ -56,6 +57,7 @@ class NoiseModel:
     along: str = "rows"
 
     def __post_init__(self):
+        check_fields(self, "thermal", "shot", "detectors", "gain_spread", "offset_spread", "along")
         for name in ("thermal", "shot", "gain_spread", "offset_spread"):
             value = getattr(self, name)
             if not 0 <= value < np.inf:

@@ -1,6 +1,7 @@
 """How noisy an instrument is at a radiance, by its description."""
 
 from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.description.instruments import noise_of
 
 
 def noise_equivalent_radiance(instrument, band, radiance):
@@ -56,4 +57,4 @@ def snr(instrument, band, radiance):
 def _noise_of(instrument, band):
     description = find_instrument(instrument)
     (found,) = description.select([band])
-    return description.noise_model(found)
+    return noise_of(description, found)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fifesim.base.arguments import check_fields
+
 # Mean radius of the earth [m].
 EARTH_RADIUS = 6.371e6
 
@@ -40,6 +42,7 @@ class Track:
     heading: float
 
     def __post_init__(self):
+        check_fields(self, "latitude", "longitude", "heading")
         if not -90 < self.latitude < 90:
             raise ValueError(f"the latitude of a track must be in (-90, 90) degrees, got {self.latitude}")
         if not np.all(np.isfinite([self.longitude, self.heading])):

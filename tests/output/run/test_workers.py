@@ -47,7 +47,9 @@ def scene(path, chunks):
 
 
 def image_of(lai):
-    return lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM")
+    known = {"atmosphere": fifesim.Atmosphere(), "geometry": fifesim.fife_geometry()}
+    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **known)
+    return rho.fifesim.to_toa().fifesim.sense("TM")
 
 
 def test_a_scale_of_the_file_is_applied(lai_file):

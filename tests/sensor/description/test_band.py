@@ -66,3 +66,8 @@ def test_limits_the_wrong_way_round_are_refused():
     (red,) = instrument("TM").select("TM3")
     with pytest.raises(ValueError, match="limits: the first must be below the second"):
         dataclasses.replace(red, limits=(0.69, 0.63))
+
+
+def test_band_is_told_by_what_it_has():
+    said = repr(instrument("TM").bands[2])
+    assert said.startswith("InstrumentBand(name='TM3', srf=") and "None" not in said and len(said) < 240

@@ -99,3 +99,17 @@ def test_bands_are_asked_for_once():
         instrument("TM").select(["TM3", "tm3"])
     with pytest.raises(ValueError, match="at least one, each once, got none"):
         instrument("TM").select([])
+
+
+def test_instrument_is_told_in_two_lines():
+    assert repr(instrument("TM")) == (
+        "Instrument TM: Landsat-5 Thematic Mapper, 30 m pixels from 705 km, 8 bits\n"
+        "  bands TM1, TM2, TM3, TM4, TM5, TM7"
+    )
+
+
+def test_red_and_near_infrared_are_found_by_wavelength():
+    assert [band.name for band in instrument("OLI").red_and_near_infrared()] == ["OLI4", "OLI5"]
+    blue = dataclasses.replace(instrument("TM"), bands=instrument("TM").select(["TM1", "TM3"]))
+    with pytest.raises(ValueError, match=r"TM has no near infrared band, 0.75 to 1 um: say which .* meant: TM1, TM3"):
+        blue.red_and_near_infrared()

@@ -38,3 +38,10 @@ def test_bands_that_share_their_pixels_share_a_line():
 def test_list_has_a_line_for_each():
     lines = list_instruments([instrument(name) for name in instrument_names()]).splitlines()
     assert [line.split()[0] for line in lines] == ["name", *instrument_names()]
+
+
+def test_the_scale_of_a_product_is_said():
+    said = "  Level-1 product: 0.0001 x DN -0.1 is reflectance, 16 bits"
+    assert said in instrument_in_words(instrument("MSI")).splitlines()
+    assert "is reflectance x cosine of the solar zenith angle, 16 bits" in instrument_in_words(instrument("OLI2"))
+    assert "Level-1 product" not in instrument_in_words(instrument("TM"))

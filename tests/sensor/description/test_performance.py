@@ -20,6 +20,31 @@ def test_mistakes_in_noise_and_scan_name_key_and_remedy(changed, replacements, m
         changed(*replacements)
 
 
+PRODUCT = "[product]\ngain = 2e-5\noffset = -0.1\nbits = 16\nsun_corrected = false\n\n[lsf]"
+SOURCE = '\n[sources]\nproduct = "Chander2009"'
+
+
+def test_the_scale_of_a_product_has_a_source(changed):
+    product = changed("[lsf]", PRODUCT, "\n[sources]", SOURCE).product
+    assert (product.gain, product.offset, product.bits, product.sun_corrected) == (2e-5, -0.1, 16, False)
+    with pytest.raises(ValueError, match=r"mine\.toml: sources\.product: must be one of"):
+        changed("[lsf]", PRODUCT)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("2e-5", "-2e-5", r"product\.gain = -2e-05: .*greater than 0"),
+        ("bits = 16\nsun", "bits = 32\nsun", r"product\.bits = 32: .*less than or equal to 16"),
+        ("false", '"no"', r"product\.sun_corrected = 'no'"),
+        ("\noffset = -0.1", "", r"the key product\.offset is missing"),
+    ],
+)
+def test_mistakes_in_a_product_name_the_key(changed, old, new, said):
+    with pytest.raises(ValueError, match=said):
+        changed("[lsf]", PRODUCT.replace(old, new), "\n[sources]", SOURCE)
+
+
 def test_noise_by_its_ratio_and_by_its_radiance_is_the_same():
     """Half of the variance is shot noise: at a fourth of the light, an eighth and a half of it are left."""
     by_ratio, by_radiance = Noise(radiance=80.0, snr=160.0, shot=0.5), Noise(radiance=80.0, nedl=0.5, shot=0.5)

@@ -5,6 +5,7 @@ import pytest
 
 import fifesim
 from fifesim.base.bands import solar_irradiance
+from fifesim.scenario.scenario import parse_scenario
 
 CAMERA = """
 name = "Camera"
@@ -72,6 +73,21 @@ def test_bands_may_stand_in_a_table_beside_the_file(tmp_path):
 def test_share_of_shot_noise_stands_beside_the_ratio(tmp_path):
     red, _ = read(tmp_path, CAMERA.replace("snr_radiance = 100.0", "snr_radiance = 100.0, snr_shot = 0.75")).bands
     assert (red.noise.equivalent_radiance, red.noise.shot) == (0.5, 0.75)
+
+
+def test_scenario_sees_through_a_short_file(tmp_path):
+    path = tmp_path / "camera.toml"
+    path.write_text(CAMERA, encoding="utf-8")
+    case = parse_scenario(
+        {
+            "grid": {"width": 2.0, "height": 2.0, "cell": 0.05},
+            "terrain": {"dem": "flat"},
+            "sensor": {"instrument": str(path)},
+        }
+    )
+    image = fifesim.simulate(case.complete())["image"]
+    assert image["dn"]["band"].values.tolist() == ["red", "nir"] and image["dn"].shape == (2, 20, 20)
+    assert 0.1 < float(image["ndvi"].mean()) < 0.9
 
 
 @pytest.mark.parametrize(

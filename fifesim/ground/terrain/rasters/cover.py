@@ -10,6 +10,7 @@ from fifesim.ground.terrain.rasters.source import check_heights
 from fifesim.ground.terrain.units import terrace_step
 from fifesim.rasters import grid as grids
 from fifesim.rasters import projection
+from fifesim.rasters.whereabouts import lies_in_words
 
 # What a model covers is looked at on so many rows and columns of the grid at most, so many rows at a time.
 _LOOKS = 2000
@@ -79,14 +80,19 @@ def check_cover(model, grid):
 
 def _raise_for_gaps(model, grid, unknown, rows, columns):
     """Say which part of a grid a model lacks, from a look at some of its rows and columns."""
-    name = model.source.name
+    source, name = model.source, model.source.name
     if unknown.all():
         raise ValueError(
-            f"{name} holds no elevation on the grid, which spans {grids.extent(grid)}: is it the right place?"
+            f"{name} holds no elevation on the grid, which spans {grids.extent(grid)} in "
+            f"{projection.name_of(grid.crs.proj)}; it spans {lies_in_words(source.affine, source.shape, source.crs)}"
         )
     down, across = grids.cell_size(grid)
     height, width = np.gradient(rows.astype(float)) * down, np.gradient(columns.astype(float)) * across
-    words = [*_short_sides(model, unknown, height, width), *_holes(grid, unknown, rows, columns, height, width)]
+    words = [
+        *_short_sides(model, unknown, height, width),
+        *_covered(grid, unknown, rows, columns),
+        *_holes(grid, unknown, rows, columns, height, width),
+    ]
     raise ValueError(f"{name} does not cover the grid, which spans {grids.extent(grid)}; " + "; ".join(words))
 
 
@@ -106,6 +112,31 @@ def _short_sides(model, unknown, height, width):
     near = int(np.ceil((max(leads.values()) + model.resolution + filled) / 10 + 1)) * 10
     carried = f", or fill={near} carries it on" if near <= _NEAR else ""
     yield f"it lacks up to {sides}: take a smaller grid or a model that reaches farther{carried}"
+
+
+def _covered(grid, unknown, rows, columns):
+    """The part of a grid that remains without the edges that a model lacks, in words."""
+    edges = unknown[0].any(), unknown[-1].any(), unknown[:, 0].any(), unknown[:, -1].any()
+    first, last, start, stop = 0, rows.size, 0, columns.size
+    # Edge by edge, the one that lacks the larger share goes first, until the rest is known.
+    while any(edges) and last - first > 2 and stop - start > 2:
+        part = unknown[first:last, start:stop]
+        shares = [part[0].mean(), part[-1].mean(), part[:, 0].mean(), part[:, -1].mean()]
+        worst = int(np.argmax(shares))
+        if not shares[worst]:
+            break
+        first, last = first + (worst == 0), last - (worst == 1)
+        start, stop = start + (worst == 2), stop - (worst == 3)
+    if (first, last, start, stop) == (0, rows.size, 0, columns.size) or unknown[first:last, start:stop].any():
+        return
+    down, across = grids.cell_size(grid)
+    top, bottom = rows[first], rows[last - 1] + 1
+    left, right = columns[start], columns[stop - 1] + 1
+    west, north = projection.transform_points(grid.affine, left, top)
+    yield (
+        f"it covers west={west:.10g}, north={north:.10g}, width={(right - left) * across:.6g}, "
+        f"height={(bottom - top) * down:.6g}"
+    )
 
 
 def _lead(unknown, sizes):

@@ -1,5 +1,7 @@
 """What raster functions take for an elevation model: its grid, its unit, and how finely it was known."""
 
+import warnings
+
 import numpy as np
 import xarray as xr
 
@@ -10,6 +12,13 @@ REFERENCE = "Dozier and Frew (1990), doi:10.1109/36.58986"
 
 # Where a model does not say at what distance its elevations are independent. [m]
 _SOURCE_RESOLUTION = 30.0
+
+# [m]
+_FOOT = 0.3048
+# Elevations that lie all so far from the altitude of the atmosphere are another place's, or another unit's.
+_APART = 500.0
+# So far above it they may be feet of it: 150 m are 492 feet.
+_NOT_FEET = 150.0
 
 
 def elevation_grid(dem):
@@ -34,7 +43,9 @@ def elevation_grid(dem):
         If it is no DataArray.
     """
     if not isinstance(dem, xr.DataArray):
-        raise TypeError(f"a dem is an xarray.DataArray, got {dem!r}: bring it onto the grid with fifesim.fine_dem")
+        raise TypeError(
+            f"a dem is an xarray.DataArray, got {type(dem).__name__}: bring it onto the grid with fifesim.fine_dem"
+        )
     cf.check_units(dem, "dem")
     grid = grids.geobox(dem)
     nodata = dem.rio.nodata
@@ -44,6 +55,50 @@ def elevation_grid(dem):
             "open it with masked=True, or bring it onto the grid with fifesim.fine_dem"
         )
     return grid
+
+
+def beside_altitude(dem, altitude):
+    """
+    An elevation model that warns where its numbers are not those of the atmosphere's altitude.
+
+    Parameters
+    ----------
+    dem : xarray.DataArray, dims (y, x)
+        [m]
+    altitude : float
+        Of the atmosphere. [km]
+
+    Returns
+    -------
+    dem : xarray.DataArray, dims (y, x)
+        The same; where it is lazy, it warns when it computes, of each block by itself.
+
+    Warns
+    -----
+    UserWarning
+        If all of it lies over 500 m above or below the altitude, or over 150 m above it where numbers in feet would
+        not.
+    """
+    if dem.chunks is None:
+        _look(dem.values, altitude)
+        return dem
+    return dem.copy(data=dem.data.map_blocks(_look, altitude, dtype=dem.dtype, meta=np.empty((0, 0), dem.dtype)))
+
+
+def _look(cells, altitude):
+    """The cells, after a warning where they lie elsewhere."""
+    low, high, at = np.fmin.reduce(cells, axis=None), np.fmax.reduce(cells, axis=None), 1000 * altitude
+    in_feet = low > at + _NOT_FEET and _FOOT * low - _APART / 5 < at < _FOOT * high + _APART / 5
+    if in_feet or low > at + _APART or high < at - _APART:
+        feet = (
+            "where they are feet, type vertical_units='ft', or dem * 0.3048; where they are metres, " if in_feet else ""
+        )
+        warnings.warn(
+            f"the dem has elevations of {low:.0f} to {high:.0f} m beside an altitude of the atmosphere of {altitude:g} "
+            f"km: {feet}type altitude={np.clip((low + high) / 2000, 0, None):.1f}",
+            stacklevel=3,
+        )
+    return cells
 
 
 def source_resolution(dem, given=None):

@@ -16,6 +16,7 @@ from fifesim.ground.terrain.rasters.source import placement
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.whereabouts import lies_in_words
 
 
 def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=None, allow_remote=False):
@@ -102,7 +103,11 @@ def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None, 
     model = replace(model, place=placement(model.source, coarse))
     values = model.elevation(model.tiles(), 0, 0, tuple(coarse.shape))
     if not np.isfinite(values).any():
-        raise ValueError(f"{model.source.name} does not reach the grid, which spans {grids.extent(grid)}")
+        source = model.source
+        raise ValueError(
+            f"{source.name} does not reach the grid, which spans {grids.extent(grid)}: it spans "
+            f"{lies_in_words(source.affine, source.shape, source.crs)}"
+        )
     reach = _reach(np.isfinite(values), around, grids.cell_size(coarse))
     kept = _with_data(np.isfinite(values), around)
     dem = grids.place(xr.DataArray(values[kept], dims=("y", "x")), coarse[kept])

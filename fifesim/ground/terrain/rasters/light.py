@@ -13,6 +13,7 @@ from fifesim.ground.terrain.rasters.sky import sky_above
 from fifesim.rasters import cf, directions, projection
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.windows import lazy_together
 
 
@@ -256,6 +257,7 @@ def _of_level(kernel, reflectance, dem, geometry, horizon, name, said):
 
 def _on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True):
     """Array of a kernel that takes the reflectance, if there is one, and what `slope_light` takes, from grid north."""
+    dem = dem if reflectance is None else with_crs_of(dem, reflectance)
     dem_grid = elevation_grid(dem)
     grid = dem_grid if reflectance is None else grids.geobox(reflectance)
     offset, shape = _offset(dem_grid, grid), tuple(grid.shape)

@@ -7,6 +7,7 @@ import numpy as np
 from fifesim.base.seeds import check_seed
 from fifesim.rasters import places
 from fifesim.rasters.dates import epoch
+from fifesim.sensor.description.instruments import noise_of
 from fifesim.sensor.response.noise import NoiseModel, add_noise, check_kinds
 
 
@@ -69,7 +70,7 @@ def _model(instrument, band, kinds, given):
     if isinstance(given, NoiseModel):
         model = given
     else:
-        model = (given or {}).get(band.name) or instrument.noise_model(band)
+        model = (given or {}).get(band.name) or noise_of(instrument, band)
     random = {"shot": model.shot, "thermal": model.thermal}
     asked = [kind for kind in random if kind in kinds]
     absent = [] if not asked or any(random[kind] for kind in asked) else asked

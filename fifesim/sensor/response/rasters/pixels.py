@@ -3,7 +3,8 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.rasters import directions
+from fifesim.base.kinds import described
+from fifesim.rasters import directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
 from fifesim.sensor.description.band_names import band_called
@@ -95,7 +96,11 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
             raise ValueError("onto and interval both say where pixels lie: give one of them")
         pixels = grids.check_grid(onto)
         if pixels.crs != scene.crs:
-            raise ValueError(f"onto must be in the CRS of the scene, {scene.crs}, got {pixels.crs}")
+            wanted, got = (projection.name_of(grid.crs.proj) for grid in (scene, pixels))
+            raise ValueError(
+                f"onto must be in the CRS of the scene, {wanted}, got {got}: make it there, such as "
+                f"fifesim.grid_at({wanted!r}, west, north, width, height, cell)"
+            )
         return pixels
     if interval is None:
         return grids.aligned(scene, common_size(instrument, bands, lambda band: (instrument.pixel(band),) * 2))
@@ -108,6 +113,30 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
             f"interval must be 'native', or positive metres between pixels, down and across, got {interval}"
         )
     return grids.aligned(scene, interval)
+
+
+def bands_by_grid(instrument, bands, onto=None, interval=None):
+    """
+    Bands that share a grid of pixels.
+
+    Parameters
+    ----------
+    instrument, bands, onto, interval
+        As in `pixel_grid`.
+
+    Returns
+    -------
+    groups : dict of str to list of int
+        Numbers of the bands by the size of their pixels in words, such as ``10m``, the smallest first.
+    """
+    if onto is not None or interval not in (None, "native"):
+        return {"": list(range(len(bands)))}
+    size = instrument.ground_intervals if interval else (lambda band: (instrument.pixel(band),) * 2)
+    groups = {}
+    for number, band in enumerate(bands):
+        groups.setdefault(tuple(size(band)), []).append(number)
+    words = {each: f"{each[0]:g}m" if each[0] == each[1] else f"{each[0]:g}x{each[1]:g}m" for each in groups}
+    return {words[each]: groups[each] for each in sorted(groups)}
 
 
 def common_size(instrument, bands, size):
@@ -173,7 +202,9 @@ def means_by_band(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_va
     fifesim.base.footprints.regularize
     """
     if not hasattr(offset, "__len__") or len(offset) != 2:
-        raise ValueError(f"offset must be two, of rows and of columns in pixels, such as (0.5, 0.0), got {offset!r}")
+        raise ValueError(
+            f"offset must be two, of rows and of columns in pixels, such as (0.5, 0.0), got {described(offset)}"
+        )
     down, across = grids.cell_size(pixels)
     shifts = _shift(offset[0], pixels.shape.y, down, "rows"), _shift(offset[1], pixels.shape.x, across, "columns")
 

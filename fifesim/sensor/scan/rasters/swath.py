@@ -9,10 +9,12 @@ import xarray as xr
 
 from fifesim.rasters import cf, chunks, directions, projection
 from fifesim.rasters import grid as grids
+from fifesim.rasters.dates import by_date
 from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled, recorded
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import by_line_spread, common_size
 from fifesim.sensor.scan import track as scan
+from fifesim.sensor.scan.rasters.light import at_pixels, seen_alike
 from fifesim.sensor.scan.rasters.view import find_track, scan_nodes, transformer
 from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_operator
 
@@ -23,9 +25,10 @@ _BLOCK = 128
 _STEP = 100.0
 
 
+@by_date
 def sense_swath(
     toa,
-    instrument="TM",
+    instrument=None,
     track=None,
     *,
     nadir_offset=0.0,
@@ -36,6 +39,8 @@ def sense_swath(
     quantise=True,
     min_valid=MIN_VALID,
     geometry=None,
+    time=None,
+    view_tolerance=1.0,
 ):
     """
     Image of a scan as the instrument takes it: by line and sample, at its own interval, and never resampled.
@@ -47,10 +52,14 @@ def sense_swath(
     toa : xarray.DataArray, dims (band, y, x)
         As in `fifesim.sensor.raster.sense`. [1 or W m-2 sr-1 um-1]
     instrument : str or fifesim.sensor.description.instruments.Instrument, optional
+        By default that whose bands the array carries.
     track, nadir_offset, heading : optional
         As in `fifesim.sensor.scan.rasters.view.scan_geometry`.
-    noise, seed, noise_models, quantise, min_valid, geometry : optional
+    noise, seed, noise_models, quantise, min_valid, geometry, time : optional
         As in `fifesim.sensor.raster.sense`.
+    view_tolerance : float, optional
+        How far the view that the light was computed for may be from that of the scan; 180 takes light that does not
+        depend on it. [degree]
 
     Returns
     -------
@@ -61,7 +70,8 @@ def sense_swath(
     Raises
     ------
     ValueError
-        As in `fifesim.sensor.raster.sense`, and if no pixel of the scan lies in the scene.
+        As in `fifesim.sensor.raster.sense`, if no pixel of the scan lies in the scene, and, where angles are lazy when
+        it computes, if the light was computed for another view.
 
     Notes
     -----
@@ -73,14 +83,18 @@ def sense_swath(
     fifesim.sensor.scan.swath.footprint_operator, fifesim.sensor.scan.track
     """
     toa, description, bands = by_bands(toa, instrument)
-    geometry = directions.given_geometry(geometry, toa.drop_vars(["vza", "vaa"], errors="ignore"))
-    geometry = directions.uniform_geometry(geometry, "sense_swath")
+    geometry = directions.given_geometry(geometry, toa, time)
     scene = grids.geobox(toa)
     track = find_track(scene, track, nadir_offset, heading)
     pixels = _pixels(scene, description, bands, track)
+    coordinates = _coordinates(scene, pixels, description)
+    geometry = at_pixels(geometry, pixels.row, pixels.column)
     means = _means(toa.transpose("band", "y", "x"), description, bands, pixels, min_valid)
+    view = coordinates["vza"][1], coordinates["vaa"][1]
+    said = f"fifesim.Track({track.latitude:.4f}, {track.longitude:.4f}, {track.heading:.2f})"
+    means = seen_alike(means, geometry, view, view_tolerance, f"{description.name!r}, grid, {said}")
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, pixels.first, noise_models)
-    image = recorded(radiance, description, bands, quantise).assign_coords(_coordinates(scene, pixels, description))
+    image = recorded(radiance, description, bands, quantise).assign_coords(coordinates)
     history = f"sense_swath: {description.name}, track {track.heading:.2f} degrees"
     image = directions.with_geometry(image, geometry, ("sza", "saa", "earth_sun_distance"))
     image = labelled(image, toa, description, history)

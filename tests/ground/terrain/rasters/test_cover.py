@@ -17,8 +17,24 @@ def test_model_that_ends_inside_the_grid_is_refused_by_how_much(path):
         fifesim.fine_dem(path, beyond)
     found = dict((side, float(metres)) for metres, side in re.findall(r"(\d+) m in the (\w+)", str(error.value)))
     assert found == {"south": pytest.approx(300, abs=20), "east": pytest.approx(100, abs=20)}
-    with pytest.raises(ValueError, match="holds no elevation on the grid"):
+    with pytest.raises(
+        ValueError, match=r"hills.tif holds no elevation on the grid.*it spans 707520 to .*latitude 39.1"
+    ):
         fifesim.fine_dem(path, grid(west=WEST + 90000))
+
+
+@pytest.mark.parametrize(("east", "south"), [(700, 900), (-700, -800), (650, 0)])
+def test_model_that_ends_inside_the_grid_says_what_it_covers(path, east, south):
+    """What it names is covered, and a pixel of 30 m more is not."""
+    with pytest.raises(ValueError, match="it covers west=") as error:
+        fifesim.fine_dem(path, grid(west=WEST + east, north=NORTH - south))
+    found = re.search(r"west=(\S+), north=(\S+), width=(\S+), height=(\S+?)(;|$)", str(error.value)).groups()[:4]
+    west, north, width, height = map(float, found)
+    dem = fifesim.fine_dem(path, fifesim.grid_at("EPSG:26914", west, north, width, height, 30 / 9))
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=0.1 * AMPLITUDE)
+    more = {"east": (west, width + 30), "west": (west - 30, width + 30)}["east" if east > 0 else "west"]
+    with pytest.raises(ValueError, match="does not cover"):
+        fifesim.fine_dem(path, fifesim.grid_at("EPSG:26914", more[0], north, more[1], height, 30 / 9))
 
 
 def test_hole_is_refused_by_its_place_and_size(tmp_path):

@@ -1,11 +1,16 @@
 """What is taken for an elevation model, and what is refused."""
 
+import warnings
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 import xarray as xr
+from lazy import no_compute
 
 import fifesim
-from fifesim.ground.terrain.rasters.dem import source_resolution
+from fifesim.ground.terrain.rasters.dem import beside_altitude, source_resolution
+from fifesim.rasters import grid as grids
 
 
 @pytest.mark.parametrize("units", ["ft", "US survey foot", "km"])
@@ -34,7 +39,7 @@ def test_a_dem_of_integers_is_an_elevation_and_an_undeclared_mark_is_not(dem):
     np.testing.assert_array_equal(fifesim.slope(whole), fifesim.slope(whole.astype(float).assign_attrs(dem.attrs)))
     with pytest.raises(ValueError, match="masked=True"):
         fifesim.slope(dem.rio.write_nodata(-9999.0))
-    with pytest.raises(TypeError, match="fine_dem"):
+    with pytest.raises(TypeError, match=r"dem must be an xarray.DataArray .* fine_dem"):
         fifesim.slope("hill.tif")
 
 
@@ -45,3 +50,38 @@ def test_resolution_of_the_source_is_given_or_carried_or_thirty_metres(dem):
     for wrong in (0.0, -3.0, np.nan, np.inf):
         with pytest.raises(ValueError, match="must be positive metres"):
             source_resolution(dem, wrong)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "altitude", "said"),
+    [
+        (1239, 1393, 0.4, r"1239 to 1393 m beside .* of 0.4 km: where they are feet, type vertical_units='ft'.*=1.3"),
+        (656, 700, 0.2, "feet"),
+        (2500, 3100, 1.5, "1.5 km: type altitude=2.8"),
+        (0, 100, 2.0, "2 km: type altitude=0.1"),
+        (320, 440, 0.4, None),
+        (300, 2000, 0.4, None),
+        (-50, 120, 0.0, None),
+    ],
+)
+def test_elevations_of_another_place_than_the_air_are_told(site, low, high, altitude, said):
+    """At once, or when lazy ones compute; by their mean, their height may also be right."""
+    cells = np.linspace(low, high, site.shape.y * site.shape.x).reshape(site.shape)
+    cells[0, 0] = np.nan
+    dem = grids.place(xr.DataArray(cells, dims=("y", "x")), site)
+    expected = pytest.warns(UserWarning, match=said) if said else nullcontext()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error" if said is None else "always")
+        with expected:
+            assert beside_altitude(dem, altitude) is dem
+        with no_compute():
+            lazy = beside_altitude(dem.chunk(), altitude)
+        with expected:
+            np.testing.assert_array_equal(lazy.compute(scheduler="synchronous"), cells)
+
+
+def test_masked_elevation_is_refused_in_a_line(dem):
+    with pytest.raises(TypeError, match=r"^a dem is an xarray.DataArray, got MaskedArray: .*fine_dem$"):
+        fifesim.slope(np.ma.masked_less(dem.values, 0))
+    with pytest.raises(ValueError, match=r"^the dem marks missing cells as -9999, .*masked=True"):
+        fifesim.slope(dem.assign_attrs(_FillValue=-9999.0))

@@ -13,7 +13,7 @@ from fifesim.rasters import grid as grids
 
 @pytest.mark.parametrize("fill", [True, 0, -3])
 def test_fill_is_a_distance(path, fill):
-    with pytest.raises(ValueError, match="fill is a distance"):
+    with pytest.raises((TypeError, ValueError), match=r"fill (is a distance|must be a number, got True)"):
         fifesim.fine_dem(path, grid(), fill=fill)
 
 

@@ -54,7 +54,7 @@ def test_missing_reference_system_is_refused(tmp_path):
 def test_what_is_no_model_is_refused(tmp_path, path):
     with pytest.raises(ValueError, match="cannot read"):
         fifesim.fine_dem(tmp_path / "missing.tif", grid())
-    with pytest.raises(TypeError, match=r"a path or an xarray\.DataArray"):
+    with pytest.raises(TypeError, match=r"path_or_raster must be the path of a file, or an xarray\.DataArray"):
         fifesim.fine_dem(np.zeros((3, 3)), grid())
     bands = xr.concat([rioxarray.open_rasterio(path)] * 2, "band")
     with pytest.raises(ValueError, match="has one band"):

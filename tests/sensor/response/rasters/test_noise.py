@@ -55,7 +55,7 @@ def test_uniform_scene_shows_the_published_ratio():
         quantised = np.hypot(expected, float(dn["gain"].sel(band=name)) / np.sqrt(12))
         assert abs(float(counts.std()) - quantised) < 3 * quantised / np.sqrt(2 * image.size)
     assert float(fifesim.snr(NOISY, "TM3", 50.0)) == pytest.approx(60.0, rel=1e-12)
-    with pytest.raises(TypeError, match=r"band of TM: the name must be text, got \['TM3', 'TM4'\]"):
+    with pytest.raises(TypeError, match="band must be a name, got a list of 2"):
         fifesim.snr(NOISY, ["TM3", "TM4"], 50.0)
 
 

@@ -18,7 +18,7 @@ from fifesim.sensor.description.spatial_response import (
     GaussianResponse,
     TwoAxesResponse,
 )
-from fifesim.sensor.response.rasters.pixels import matching_bands
+from fifesim.sensor.response.rasters.pixels import bands_by_grid, matching_bands, pixel_grid
 
 TM = instrument("TM")
 INTERVAL = 43e-6 * 705e3
@@ -138,8 +138,13 @@ def test_each_band_has_its_own_response():
 def test_bands_of_different_pixels_go_apart_or_onto_one_grid():
     coarse = replace(TM.bands[3], gsd=60.0)
     mixed = replace(TM, bands=(*TM.bands[:3], coarse, *TM.bands[4:]))
+    assert bands_by_grid(mixed, mixed.select(["TM4", "TM3"])) == {"30m": [1], "60m": [0]}
     with pytest.raises(ValueError, match=r"30 x 30 m: TM3; 60 x 60 m: TM4.*sense each group by itself.*onto="):
-        sensed(scene(), mixed)
+        pixel_grid(grids.geobox(scene()), mixed, mixed.select(["TM3", "TM4"]))
+    assert {node.path: node["toa_radiance"].sizes["x"] for node in sensed(scene(), mixed).leaves} == {
+        "/30m": 22,
+        "/60m": 11,
+    }
     assert sensed(scene().sel(band=["TM4"]), mixed).sizes["x"] == 11
     assert sensed(scene(), mixed, interval=30.0).sizes["x"] == 22
     assert sensed(scene(), mixed, interval="native").sizes["band"] == 2

@@ -8,6 +8,7 @@ import xarray as xr
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
 import fifesim
+from fifesim.analysis.regression import Regression
 from fifesim.base.geometry import Geometry
 from fifesim.rasters import cf, directions, projection
 from fifesim.rasters import grid as grids
@@ -18,7 +19,7 @@ from fifesim.sensor.scan.rasters.view import degrees
 from fifesim.sensor.scan.track import growth, place_beside, view_from_ground
 
 TM = instrument("TM")
-VIEW = {"nadir_offset": -36e3, "heading": 193.6}
+VIEW = {"nadir_offset": -36e3, "heading": 193.6, "view_tolerance": 180}
 
 
 def scene(shape=(180, 198), plane=None):
@@ -110,7 +111,7 @@ def test_wide_scans_see_wider():
     # 705 km and 833 km widen the footprint alike.
     variance = {}
     for offset in (0.0, 735e3):
-        image = fifesim.sense_swath(scene((360, 360)), wide, quantise=False, nadir_offset=offset)
+        image = fifesim.sense_swath(scene((360, 360)), wide, quantise=False, nadir_offset=offset, view_tolerance=180)
         variance[offset] = float(image.sel(band="TM3").var())
         angle = float(image["vza"].mean())
     scan_angle = np.degrees(np.arcsin(np.sin(np.radians(angle)) * 6371 / (6371 + 833)))
@@ -132,7 +133,7 @@ def test_lines_and_samples_are_all_those_whose_centres_lie_in_the_scene():
     """Neither more nor less, from the first to the last; corners of the scene are the farthest along and across."""
     track = fifesim.Track(39.1, -96.9, 193.6)
     plane = scene()
-    image = fifesim.sense_swath(plane, TM, track, quantise=False)
+    image = fifesim.sense_swath(plane, TM, track, quantise=False, view_tolerance=180)
     rows, columns = np.meshgrid([0, plane.sizes["y"]], [0, plane.sizes["x"]])
     distance, aside = place_beside(track, *degrees(grids.geobox(plane), rows, columns))
     theta = np.radians(view_from_ground(aside, 705e3)[1])
@@ -151,3 +152,92 @@ def test_bands_with_other_line_spreads_are_seen_each_by_its_own():
     both = fifesim.sense_swath(scene(), alone, **options)
     np.testing.assert_array_equal(image.sel(band="TM4"), both.sel(band="TM4"))
     np.testing.assert_array_equal(image.sel(band="TM3"), fifesim.sense_swath(scene(), TM, **options).sel(band="TM3"))
+
+
+def lit(reflectance=(0.05, 0.4)):
+    """A uniform ground seen as the scan sees it, in Track's own directions."""
+    grid = grids.geobox(scene((60, 66)))
+    ground = xr.DataArray(np.broadcast_to(np.reshape(reflectance, (2, 1, 1)), (2, 60, 66)), dims=("band", "y", "x"))
+    ground = grids.place(ground.assign_coords(band=["TM3", "TM4"]), grid)
+    away = {"nadir_offset": -60e3, "heading": 193.6}
+    view = fifesim.scan_geometry("TM", grid, **away).assign(sza=30.0, saa=120.0)
+    return fifesim.to_toa(ground, fifesim.Atmosphere(), geometry=view, instrument="TM"), away
+
+
+def test_a_scan_goes_back_to_the_ground_that_it_was_made_of():
+    """Through radiance, planetary reflectance and air, in the scan's own directions: what was put in comes out."""
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", quantise=False, **away)
+    surface = image.fifesim.to_surface()
+    assert surface.dims == ("band", "line", "sample") and surface.name == "surface_reflectance"
+    assert "latitude" in surface.coords and surface.encoding["grid_mapping"] == "spatial_ref"
+    valid = surface.isel(band=0).notnull().values
+    assert valid.sum() > 10
+    # The air's terms are interpolated over the angles to 1e-5, there and back at slightly different nodes.
+    np.testing.assert_allclose(surface.values[:, valid].T, np.tile([0.05, 0.4], (valid.sum(), 1)), rtol=0, atol=2e-5)
+    ndvi = image.fifesim.ndvi()
+    planetary = image.fifesim.to_reflectance()
+    by_hand = (planetary[1] - planetary[0]) / (planetary[1] + planetary[0])
+    assert ndvi.dims == ("line", "sample")
+    np.testing.assert_array_equal(ndvi, by_hand)
+
+
+def test_verbs_of_a_lazy_scan_are_lazy_and_the_same():
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", **away)
+    fit = Regression(3.0, -0.5, 0.9, 100, 0.1, 0.5, 10.0)
+    for verb in (fifesim.to_radiance, fifesim.to_surface, lambda array: fifesim.index(array, "EVI2"),
+                 lambda array: fifesim.invert(fifesim.ndvi(array), fit)["lai"]):  # fmt: skip
+        with no_compute():
+            lazy = verb(in_chunks(image, {"line": 2, "sample": 3}))
+        assert lazy.chunks is not None and lazy.dims[-2:] == ("line", "sample")
+        xr.testing.assert_identical(lazy.compute(), verb(image))
+
+
+def test_what_takes_maps_names_the_way_to_one():
+    toa, away = lit()
+    ndvi = fifesim.sense_swath(toa, "TM", **away).fifesim.ndvi()
+    with pytest.raises(ValueError, match=r"\.fifesim\.grid_swath\(grid\)"):
+        fifesim.regress(ndvi, ndvi)
+
+
+def test_sun_that_varies_over_the_scene_is_that_of_each_pixel():
+    toa, away = lit()
+    angles = np.linspace(20.0, 40.0, 66)
+    varied = toa.assign_coords(sza=(("y", "x"), np.broadcast_to(angles, (60, 66)), cf.attributes("sza")))
+    image = fifesim.sense_swath(varied, "TM", quantise=False, **away)
+    column = ((image["x"] - toa["x"][0]) / (10 / 3)).round().astype(int).clip(0, 65)
+    np.testing.assert_allclose(image["sza"], angles[column], rtol=0, atol=0.32)
+    np.testing.assert_allclose(image.fifesim.to_reflectance().mean(), toa.mean(), rtol=1e-4, atol=0)
+
+
+def test_a_scan_is_written_as_netcdf_and_read_again(tmp_path):
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", **away)
+    image.to_netcdf(tmp_path / "scan.nc")
+    with xr.open_dataarray(tmp_path / "scan.nc", decode_coords="all", mask_and_scale=False) as back:
+        xr.testing.assert_equal(back, image)
+        xr.testing.assert_identical(back.fifesim.to_radiance().drop_attrs(), image.fifesim.to_radiance().drop_attrs())
+        assert back.rio.crs == image.rio.crs
+    with xr.open_dataset(tmp_path / "scan.nc") as plain:
+        assert {"latitude", "longitude"} <= set(plain["dn"].encoding["coordinates"].split())
+        assert plain["dn"].attrs["grid_mapping"] == "spatial_ref"
+
+
+def test_a_map_is_what_a_geotiff_holds(tmp_path):
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", **away)
+    with pytest.raises(ValueError, match=r"put it onto one with .grid_swath\(grid\)"):
+        image.fifesim.to_geotiff(tmp_path / "scan.tif")
+    with pytest.warns(UserWarning, match="leaves out vza, vaa"):
+        image.fifesim.grid_swath(grids.aligned(grids.geobox(toa), 30.0)).fifesim.to_geotiff(tmp_path / "map.tif")
+    assert fifesim.open_image(tmp_path / "map.tif").dtype == np.uint8
+
+
+def test_what_lies_on_a_map_is_not_spread_over_a_scan():
+    toa, away = lit()
+    image = fifesim.sense_swath(toa, "TM", quantise=False, **away)
+    height = toa.isel(band=0, drop=True).drop_vars(["vza", "vaa"]).drop_attrs() * 0 + 400
+    for option in ({"elevation": height}, {"adjacency": True}):
+        with pytest.raises(ValueError, match="does not fit the lines and samples"):
+            image.fifesim.to_surface(**option)

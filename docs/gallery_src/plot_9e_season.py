@@ -1,0 +1,57 @@
+"""
+A season and its composite
+==========================
+
+Ten dates through the whole chain: grassland with a field of wheat in a corner, each date with its own sun and clouds. The
+maximum value composite (Holben 1986) keeps the greenest date of each pixel. It is free of clouds, and it is no image of
+any one day: wheat and grass are seen at different times, and the error of every date raises what is kept.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+import fifesim
+
+grid = fifesim.fife_site(cell=30 / 9, window=((0, 900), (0, 900)))
+lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
+dates = pd.date_range("1987-04-16T16:35", periods=10, freq="18D")
+share = xr.DataArray(np.linspace(0, 1, 10), coords={"time": dates}, dims="time")
+field = (lai.y > lai.y.mean()) & (lai.x > lai.x.mean())
+wheat = 4 * np.exp(-(((share - 0.3) / 0.2) ** 2))
+grass = 1.3 * np.exp(-(((share - 0.5) / 0.3) ** 2))
+leaves = (lai * grass).where(~field, wheat).transpose("time", "y", "x").assign_attrs(lai.attrs)
+toa = leaves.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa()
+clouds = xr.concat([fifesim.lai_scene(grid, arp=0.2497, seed=day) for day in range(10)], dim=toa.time) > 1.1
+image = toa.where(~clouds, 0.6).fifesim.sense()
+ndvi = image.fifesim.ndvi()
+clear = image.fifesim.to_reflectance().fifesim.composite()
+
+# %%
+# Four of the dates, and the composite with the date that each pixel shows.
+
+figure, axes = plt.subplots(2, 3, figsize=(10.5, 7), layout="constrained", sharex=True, sharey=True)
+maps = {f"{date:%d %B}": ndvi.sel(time=date) for date in dates[[1, 3, 5, 8]]} | {"Composite": clear.fifesim.ndvi()}
+for axis, (title, values) in zip(axes.flat, maps.items(), strict=False):
+    shown = axis.imshow(values, cmap="YlGn", vmin=0, vmax=0.8)
+    axis.set(title=title, xticks=[], yticks=[])
+figure.colorbar(shown, ax=axes[:, :2], label="NDVI", location="left", shrink=0.6)
+days = clear["date"].dt.dayofyear
+shown = axes[1, 2].imshow(days, cmap="viridis")
+axes[1, 2].set(title="Date that is kept", xticks=[], yticks=[])
+figure.colorbar(shown, ax=axes[:, 2], label="day of the year", shrink=0.6)
+
+# %%
+# Means over both covers, by date and of the composite.
+
+in_field = field.coarsen(y=9, x=9).mean().values > 0.5
+figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
+for name, of_cover, color in (("wheat", in_field, "#b8860b"), ("grass", ~in_field, "#2e7d32")):
+    axis.plot(dates, [float(each.where(of_cover).mean()) for each in ndvi], "o-", color=color, label=name)
+    level = float(clear.fifesim.ndvi().where(of_cover).mean())
+    axis.axhline(level, color=color, linestyle=":", linewidth=1.5, label=f"{name}, composite")
+axis.set(ylabel="NDVI, clouds in the mean", xlabel="1987", ylim=(0, 0.95))
+axis.legend(frameon=False, ncols=2)
+figure.autofmt_xdate()
+plt.show()

@@ -1,0 +1,108 @@
+"""Composites of labelled images of many dates."""
+
+from functools import partial
+
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis.compositing import date_of_maximum, values_of_date
+from fifesim.analysis.rasters.indices import ndvi
+from fifesim.base.geometry import ANGLES
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
+
+_METHODS = {"maximum-value": date_of_maximum}
+_REFERENCE = "Holben (1986), doi:10.1080/01431168608948945"
+
+
+def composite(images, method="maximum-value", *, by=None):
+    """
+    One image of many dates: at each cell that of the date with the largest NDVI, which clouds and haze lower.
+
+    Parameters
+    ----------
+    images : xarray.DataArray, dims (time, y, x) or (time, band, y, x)
+        NDVI, or reflectance in bands with a coordinate ``wavelength``.
+    method : {"maximum-value"}, optional
+    by : xarray.DataArray, dims (time, y, x), optional
+        What is largest on the date that is kept; by default the images themselves where they have no bands, else their
+        NDVI. Images of anything else than reflectance need it.
+
+    Returns
+    -------
+    composite : xarray.DataArray, dims (y, x) or (band, y, x)
+        With ``date``, that of each cell, as coordinate over (y, x), and so the angles of sun and view where they differ
+        among the dates. NaN, or 0 in unsigned integers, where no date has data. Lazy where the images are.
+
+    Raises
+    ------
+    ValueError
+        If there is no dimension time, no such method, or ``by`` has other dates or cells.
+
+    Notes
+    -----
+    The largest of many values with errors is too large: see `fifesim.analysis.compositing.date_of_maximum`.
+
+    References
+    ----------
+    [Holben1986]_
+    """
+    if method not in _METHODS:
+        raise ValueError(f"method must be one of {', '.join(_METHODS)}, got {method!r}")
+    if "time" not in images.dims:
+        raise ValueError(
+            f"a composite is made of images along time, got dimensions {images.dims}: join dates with "
+            "xarray.concat([...], dim='time')"
+        )
+    grid = grids.geobox(images.isel(time=0))
+    index = _index(images) if by is None else by
+    if index.dims != ("time", "y", "x") or index.sizes["time"] != images.sizes["time"]:
+        raise ValueError(f"by has dimensions (time, y, x) with the dates of the images, got {dict(index.sizes)}")
+    chosen = _along_time(_METHODS[method], index.drop_vars(list(index.coords)), dtype=np.int64)
+    plain = images.drop_vars(list(images.coords))
+    missing = 0 if images.dtype.kind == "u" else np.nan
+    out = _along_time(values_of_date, plain, chosen, dtype=images.dtype, missing=missing)
+    out = out.transpose(*(name for name in images.dims if name != "time"))
+    kept = {name: value for name, value in images.coords.items() if not {"time", "y", "x"} & set(value.dims)}
+    out = grids.place(out.assign_coords(kept), grid).assign_coords(_of_date(images, chosen))
+    history = f"composite: {method} of {images.sizes['time']} dates"
+    out.attrs = dict(images.attrs) | {"composite": method, "references": _REFERENCE}
+    out.attrs["history"] = "\n".join(filter(None, [images.attrs.get("history", ""), history]))
+    return out.rename(images.name)
+
+
+def _index(images):
+    """What is largest on the date that is kept."""
+    if "band" not in images.dims:
+        cf.check_quantity(images, "ndvi")
+        return images.transpose("time", "y", "x")
+    dates = [ndvi(images.isel(time=number, drop=True)) for number in range(images.sizes["time"])]
+    # The angles of each date would have to agree.
+    return xr.concat([each.drop_vars(list(each.coords)) for each in dates], "time")
+
+
+def _of_date(images, chosen):
+    """Coordinates that each cell has of its date."""
+    named = {"date": images["time"]}
+    named |= {name: images[name] for name in ANGLES if name in images.coords and images[name].dims == ("time",)}
+    found = {}
+    for name, values in named.items():
+        dated = values.dtype.kind == "M"
+        dates = values.variable.values if dated else values.variable.values.astype(float)
+        look_up = partial(_looked_up, dates, np.datetime64("NaT") if dated else np.nan)
+        attrs = cf.attributes(name) if name in ANGLES else {"long_name": "date of the image that is kept"}
+        found[name] = _along_time(look_up, chosen, dtype=dates.dtype).assign_attrs(attrs)
+    return found
+
+
+def _looked_up(values, missing, chosen):
+    return np.where(chosen < 0, np.asarray(missing, values.dtype), values[np.maximum(chosen, 0)])
+
+
+def _along_time(kernel, *arrays, dtype, **parameters):
+    """Apply a kernel that has all dates of a cell along its last axis."""
+    core = [["time"] if "time" in each.dims else [] for each in arrays]
+    return xr.apply_ufunc(
+        kernel, *arrays, input_core_dims=core, join="exact", dask="parallelized", output_dtypes=[dtype],
+        kwargs=parameters, dask_gufunc_kwargs={"allow_rechunk": True},
+    )  # fmt: skip

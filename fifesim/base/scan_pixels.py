@@ -1,0 +1,208 @@
+"""Pixels of a scan on the cells of a map: which of them is nearest to a cell, and how much of it each covers."""
+
+import numpy as np
+from numba import njit
+
+# Corners that a quadrilateral may have once it is cut along four lines: each cut doubles them at most.
+_MOST = 64
+
+
+def corners(row, column):
+    """
+    Corners of pixels that tile a swath, half way between their centres.
+
+    Parameters
+    ----------
+    row, column : array, shape (line, sample)
+        Centres on a map. [cell]
+
+    Returns
+    -------
+    rows, columns : array, shape (line + 1, sample + 1)
+        At the border as far out as the pixels before them are wide. [cell]
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two lines or samples, which do not tell how large a pixel is.
+
+    Examples
+    --------
+    >>> corners(*np.mgrid[0.5:2.5, 0.5:3.5])[0][:, 0]
+    array([0., 1., 2.])
+    """
+    if min(np.shape(row)) < 2:
+        raise ValueError(
+            f"a swath of {' x '.join(map(str, np.shape(row)))} pixels does not tell how large they are: "
+            "take at least 2 lines and 2 samples"
+        )
+    return tuple(_between(_between(np.asarray(each, float)).T).T for each in (row, column))
+
+
+def _between(values):
+    """Values half way between the rows of an array, and beyond the first and the last of them."""
+    inside = (values[1:] + values[:-1]) / 2
+    return np.concatenate([values[:1] * 1.5 - values[1:2] / 2, inside, values[-1:] * 1.5 - values[-2:-1] / 2])
+
+
+def reach(row, column, cell):
+    """
+    Distance from the centre of each pixel to its farthest corner.
+
+    Parameters
+    ----------
+    row, column : array, shape (line, sample)
+        Centres on a map. [cell]
+    cell : (float, float)
+        Size of a cell, down and across. [m]
+
+    Returns
+    -------
+    reach : array, shape (line, sample)
+        [m]
+
+    Examples
+    --------
+    >>> bool(np.allclose(reach(*np.mgrid[0:2.0, 0:3.0], (30.0, 40.0)), 25.0))
+    True
+    """
+    rows, columns = corners(row, column)
+    farthest = np.zeros(np.shape(row))
+    for down in (slice(-1), slice(1, None)):
+        for right in (slice(-1), slice(1, None)):
+            away = (rows[down, right] - row) * cell[0], (columns[down, right] - column) * cell[1]
+            farthest = np.maximum(farthest, np.hypot(*away))
+    return farthest
+
+
+@njit(nogil=True, cache=True)
+def nearest_pixels(row, column, reach, cell, rows, columns):
+    """
+    Pixel whose centre is nearest to that of each cell, among those that reach it.
+
+    Parameters
+    ----------
+    row, column : array, shape (n_pixels,)
+        Centres on the map. [cell]
+    reach : array, shape (n_pixels,)
+        How far each counts. [m]
+    cell : (float, float)
+        Size of a cell, down and across. [m]
+    rows, columns : (int, int)
+        First cell and the one after the last of the window.
+
+    Returns
+    -------
+    number : array of int, shape (n_rows, n_columns)
+        The first of those that are equally near; -1 where none reaches.
+    """
+    number = np.full((rows[1] - rows[0], columns[1] - columns[0]), -1)
+    least = np.full(number.shape, np.inf)
+    for pixel in range(row.size):
+        far = reach[pixel]
+        # Rounding must not lose a cell that lies on the circle.
+        limit = far * far * (1 + 1e-9)
+        top, bottom = _between_cells(row[pixel], far / cell[0], rows)
+        left, right = _between_cells(column[pixel], far / cell[1], columns)
+        for i in range(top, bottom):
+            for j in range(left, right):
+                down, across = (i + 0.5 - row[pixel]) * cell[0], (j + 0.5 - column[pixel]) * cell[1]
+                distance = down * down + across * across
+                if distance <= limit and distance < least[i - rows[0], j - columns[0]]:
+                    least[i - rows[0], j - columns[0]] = distance
+                    number[i - rows[0], j - columns[0]] = pixel
+    return number
+
+
+@njit(nogil=True, cache=True)
+def _between_cells(center, half, limits):
+    """Cells of an axis within half a width of a place, as far as they lie in a window; none where it is no number."""
+    if not np.isfinite(center + half):
+        return 0, 0
+    first = max(np.floor(center - half) - 1, limits[0])
+    last = min(np.ceil(center + half) + 1, limits[1])
+    return int(min(first, limits[1])), int(max(last, limits[0]))
+
+
+@njit(nogil=True, cache=True)
+def covered_means(values, row, column, rows, columns):
+    """
+    Means over cells of the pixels that cover them, each by the area that it covers.
+
+    Parameters
+    ----------
+    values : array, shape (band, line, sample)
+        NaN where they are missing.
+    row, column : array, shape (line + 1, sample + 1)
+        Corners of the pixels on the map, as `corners` gives them. [cell]
+    rows, columns : (int, int)
+        First cell and the one after the last of the window.
+
+    Returns
+    -------
+    means : array, shape (band, n_rows, n_columns)
+        NaN where no valid pixel lies.
+    covered : array, shape (band, n_rows, n_columns)
+        Area of valid pixels over that of the cell; over 1 where pixels overlap. [1]
+    """
+    shape = values.shape[0], rows[1] - rows[0], columns[1] - columns[0]
+    total, covered = np.zeros(shape), np.zeros(shape)
+    pixel, cut, other = np.empty((4, 2)), np.empty((_MOST, 2)), np.empty((_MOST, 2))
+    for line in range(values.shape[1]):
+        for sample in range(values.shape[2]):
+            for k in range(4):
+                down, right = line + k // 2, sample + (k + 1) // 2 % 2
+                pixel[k, 0], pixel[k, 1] = row[down, right], column[down, right]
+            top, bottom = _touched(pixel[:, 0], rows)
+            left, right = _touched(pixel[:, 1], columns)
+            for i in range(top, bottom):
+                for j in range(left, right):
+                    area = _area_in_cell(pixel, i, j, cut, other)
+                    for band in range(values.shape[0]):
+                        value = values[band, line, sample]
+                        if area > 0 and np.isfinite(value):
+                            total[band, i - rows[0], j - columns[0]] += area * value
+                            covered[band, i - rows[0], j - columns[0]] += area
+    return np.where(covered > 0, total / np.where(covered > 0, covered, 1.0), np.nan), covered
+
+
+@njit(nogil=True, cache=True)
+def _touched(places, limits):
+    """Cells of an axis that a polygon touches, as far as they lie in a window."""
+    low, high = places.min(), places.max()
+    return _between_cells((low + high) / 2, (high - low) / 2, limits)
+
+
+@njit(nogil=True, cache=True)
+def _area_in_cell(pixel, i, j, cut, other):
+    """Area of a pixel inside the cell of row i and column j: cut along its four sides, then the shoelace formula."""
+    count = _cut(pixel, 4, cut, 0, i, 1.0)
+    count = _cut(cut, count, other, 0, i + 1.0, -1.0)
+    count = _cut(other, count, cut, 1, j, 1.0)
+    count = _cut(cut, count, other, 1, j + 1.0, -1.0)
+    area = 0.0
+    # From its first corner, which keeps the digits of what lies far from the origin.
+    for k in range(2, count):
+        down, right = other[k - 1, 0] - other[0, 0], other[k - 1, 1] - other[0, 1]
+        area += down * (other[k, 1] - other[0, 1]) - right * (other[k, 0] - other[0, 0])
+    return abs(area) / 2
+
+
+@njit(nogil=True, cache=True)
+def _cut(polygon, corners, kept, axis, limit, side):
+    """Put the part of a polygon on one side of a line along an axis into an array; the number of its corners."""
+    count, before = 0, corners - 1
+    for here in range(corners):
+        inside, was_inside = side * (polygon[here, axis] - limit), side * (polygon[before, axis] - limit)
+        if (inside >= 0) != (was_inside >= 0):
+            share = was_inside / (was_inside - inside)
+            kept[count, 1 - axis] = polygon[before, 1 - axis] + share * (
+                polygon[here, 1 - axis] - polygon[before, 1 - axis]
+            )
+            kept[count, axis] = limit
+            count += 1
+        if inside >= 0:
+            kept[count, 0], kept[count, 1] = polygon[here, 0], polygon[here, 1]
+            count += 1
+        before = here
+    return count

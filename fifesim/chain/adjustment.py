@@ -1,0 +1,289 @@
+"""From one sensor to another: the bands of an image as those of another instrument, and what it would have recorded."""
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from fifesim.base import datasets
+from fifesim.chain.carried import as_bands_of
+from fifesim.chain.steps import to_toa
+from fifesim.ground.canopy.library import library_spectra
+from fifesim.rasters import cf, directions
+from fifesim.rasters import grid as grids
+from fifesim.rasters.combination import combined
+from fifesim.rasters.dates import by_date
+from fifesim.sensor import raster as sensor
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.description.rasters.carried import attributes_of, carried_instrument
+from fifesim.sensor.description.spectral_response import half_peak
+from fifesim.sensor.response.adjustment import band_moments, best_linear, line_between
+from fifesim.sensor.response.rasters.bands import MIN_COVERAGE
+from fifesim.sensor.response.rasters.pixels import matching_bands
+from fifesim.sensor.response.spectral import band_weights, covered_steps
+
+UNCERTAINTY = 0.0005
+"""Standard error of the reflectance that an adjustment allows for by default [1]."""
+
+
+@by_date
+def adjust_bands(reflectance, instrument, *, bands=None, source=None, uncertainty=UNCERTAINTY):
+    """
+    Surface reflectance in the bands of another instrument, by spectra that fit each pixel.
+
+    Every band of the other instrument is the sum of all bands of the raster, with the weights that estimate it best
+    over a library of spectra by PROSPECT, SAIL and soils, whose leaves, leaf area and ground vary widely.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray
+        Surface reflectance with a dimension ``band``: names of the source's bands, or a coordinate ``wavelength`` [um].
+        [1]
+    instrument : str or Instrument
+        The other instrument.
+    bands : str or sequence of str, optional
+        Names of its bands; all by default.
+    source : str or Instrument, optional
+        Whose bands the raster has; by default that which it carries.
+    uncertainty : float, optional
+        Standard error of the reflectance, independent from band to band. A larger one, such as 0.01 after an
+        atmospheric correction, relies less on differences between bands. [1]
+
+    Returns
+    -------
+    reflectance : xarray.DataArray
+        With ``adjustment_error`` along band: the standard error over the library, with the uncertainty of the input.
+        NaN where any band is. Lazy where the input is. [1]
+
+    Raises
+    ------
+    ValueError
+        If the raster is no surface reflectance or its instrument is not known, or no band of it lies where one of
+        the other instrument does.
+
+    Notes
+    -----
+    The library holds leaves, litter and soil. Snow and water are none of these, and the error does not hold for them;
+    what is grey stays about grey. The directions of sun and view stay those of the raster.
+
+    See Also
+    --------
+    fifesim.sensor.response.adjustment.best_linear, fifesim.ground.canopy.library.library_spectra
+    """
+    if {"y", "x"} <= set(reflectance.dims):  # and not spectra of the field
+        reflectance = as_bands_of(reflectance, source, "surface_reflectance")
+    cf.check_quantity(reflectance, "surface_reflectance")
+    if not (math.isfinite(uncertainty) and uncertainty > 0):
+        raise ValueError(f"uncertainty must be above 0, got {uncertainty:g}: it is in reflectance, such as 0.005")
+    description = find_instrument(instrument)
+    from_bands = _source_bands(reflectance, source)
+    to = description.select(bands)
+    _check_neighbours(from_bands, to, description)
+    estimate = _estimate(_responses(from_bands), _responses(to), float(uncertainty))
+    out = combined(reflectance, "band", estimate.weights)
+    along_band = {"wavelength": [band.wavelength for band in to], "adjustment_error": estimate.error}
+    out = out.assign_coords(cf.band_coordinates(band=[band.name for band in to], **along_band))
+    out.encoding = {"grid_mapping": "spatial_ref"} if "spatial_ref" in out.coords else {}
+    names = " ".join(band.name for band in from_bands)
+    history = f"adjust_bands: {description.name} from {names}, uncertainty {uncertainty:g}"
+    return cf.label(out, "surface_reflectance", source=reflectance, history=history, **attributes_of(description))
+
+
+@by_date
+def as_seen_by(
+    reflectance,
+    instrument,
+    *,
+    bands=None,
+    source=None,
+    atmosphere=None,
+    time=None,
+    geometry=None,
+    onto=None,
+    noise=(),
+    seed=0,
+    uncertainty=UNCERTAINTY,
+):
+    """
+    The image that another instrument would have recorded of a scene.
+
+    The surface reflectance is brought to the bands of the other instrument (`adjust_bands`), then to the top of the
+    atmosphere (`to_toa`), and is regularized onto its pixels, with its noise, and digitised (`sense`). Take these steps
+    by themselves for what else they know.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        As in `adjust_bands`. Its pixels are the cells that the other instrument sees: let them be smaller than its own.
+        [1]
+    instrument : str or Instrument
+        The other instrument.
+    bands, source, uncertainty : optional
+        As in `adjust_bands`.
+    atmosphere : Atmosphere, optional
+        As in `to_toa`.
+    time : str or datetime, optional
+        When the other instrument passes, UTC where it names no time zone: the sun is that over the middle of the scene,
+        the view that of the raster. It lights the atmosphere and the band; the reflectance factor stays that of
+        the raster's own sun.
+    geometry : Geometry, optional
+        Of sun and sensor, instead of ``time``; by default that which the raster carries.
+    onto, noise, seed : optional
+        As in `sense`.
+
+    Returns
+    -------
+    image : xarray.DataArray of unsigned integers, dims (band, y, x)
+        As from `sense`, with ``adjustment_error`` of the surface reflectance along band.
+
+    Raises
+    ------
+    ValueError
+        If both time and geometry are given; else as in `adjust_bands`, `to_toa` and `sense`.
+
+    See Also
+    --------
+    adjust_bands, fifesim.chain.steps.to_toa, fifesim.sensor.raster.sense
+    """
+    description = find_instrument(instrument)
+    reflectance = as_bands_of(reflectance, source, "surface_reflectance")
+    geometry = _geometry(reflectance, time, geometry)
+    surface = adjust_bands(reflectance, description, bands=bands, source=source, uncertainty=uncertainty)
+    toa = to_toa(surface, atmosphere, geometry=geometry, instrument=description)
+    image = sensor.sense(toa, description, onto=onto, noise=noise, seed=seed, geometry=geometry)
+    # As a variable: a DataArray would bring the sun that it had with it.
+    return image.assign_coords(adjustment_error=surface["adjustment_error"].variable)
+
+
+def spectral_adjustment(source, target, *, bands=None):
+    """
+    Bands of one instrument as straight lines of those of another: target = slope * source + offset.
+
+    Parameters
+    ----------
+    source, target : str or Instrument
+    bands : str or sequence of str, optional
+        Names of the target's bands; by default those where the source has a band.
+
+    Returns
+    -------
+    lines : xarray.Dataset, dims (band)
+        For each band of the target: ``source_band``, that whose mean wavelength is nearest; ``slope`` and ``offset`` by
+        least squares over the package's library of spectra; ``error``, the standard deviation about the line, and
+        ``difference``, the root mean square of the difference without it; ``published_slope``, ``published_offset`` and
+        ``reference`` of ``data/spectral_adjustment.csv``, NaN and empty where nobody's were found. [1]
+
+    Raises
+    ------
+    ValueError
+        If no band of the source lies where one of the target does.
+
+    Notes
+    -----
+    One line for all land is what tables hold. `adjust_bands` uses all bands, and is several times as good.
+
+    See Also
+    --------
+    fifesim.sensor.response.adjustment.line_between
+    """
+    source, target = find_instrument(source), find_instrument(target)
+    to = target.select(bands) if bands is not None else [band for band in target.bands if _beside(source.bands, band)]
+    _check_neighbours(source.bands, to or target.bands, target)
+    nearest = [min(source.bands, key=lambda band: abs(band.wavelength - each.wavelength)) for each in to]
+    own, other = (_library_means(_responses(each)) for each in (nearest, to))
+    lines = [line_between(own[:, number], other[:, number]) for number in range(len(to))]
+    columns = {name: [getattr(line, name) for line in lines] for name in ("slope", "offset", "error", "difference")}
+    pairs = zip(nearest, to, strict=True)
+    columns |= _published([(source.name, band.name, target.name, each.name) for band, each in pairs])
+    columns["source_band"] = [band.name for band in nearest]
+    coords = cf.band_coordinates(band=[band.name for band in to], wavelength=[band.wavelength for band in to])
+    attrs = {"source": source.name, "target": target.name, "comment": "target = slope * source + offset"}
+    return xr.Dataset({name: ("band", values) for name, values in columns.items()}, coords=coords, attrs=attrs)
+
+
+def _source_bands(array, source):
+    """Bands that a raster has, of the instrument given or carried."""
+    description = carried_instrument(array) if source is None else find_instrument(source)
+    if description is None:
+        raise ValueError(
+            "the raster does not say which instrument's bands it has: give it as source=, such as source='MSI'"
+        )
+    if "band" not in array.dims:
+        raise ValueError(f"the raster needs a dimension band, got {array.dims}: keep all of its bands")
+    return matching_bands(array, description)
+
+
+def _geometry(array, time, geometry):
+    """Directions of sun and sensor: the sun of a time over the middle of a scene, with its own view."""
+    if time is None:
+        return geometry
+    if geometry is not None:
+        raise ValueError("time and geometry both say where the sun is: give one of them")
+    sun = directions.sun_over(grids.geobox(array), time)
+    own = directions.uniform_geometry(directions.geometry_of(array) or sun, "as_seen_by with a time")
+    return replace(sun, vza=own.vza, vaa=own.vaa)
+
+
+def _responses(bands):
+    return tuple(band.response for band in bands)
+
+
+def _beside(sources, band):
+    """Whether a band of the source responds where a band does, both with half of their peak."""
+    low, high = half_peak(band.response)
+    return any(limits[0] <= high and low <= limits[1] for limits in (half_peak(each.response) for each in sources))
+
+
+def _check_neighbours(sources, bands, instrument):
+    """Refuse bands about which the source knows nothing but by the library."""
+    alone = [band.name for band in bands if not _beside(sources, band)]
+    if alone:
+        others = [band.name for band in bands if band.name not in alone]
+        raise ValueError(
+            f"no band of the source lies where {', '.join(alone)} of {instrument.name} responds: pick bands, "
+            f"bands={others or '[...]'}"
+        )
+
+
+@lru_cache(maxsize=64)
+def _weights(responses):
+    """Weights of the library's wavelengths in bands."""
+    wavelength, _ = library_spectra()
+    found = [band_weights(band, wavelength, covered_steps(wavelength)) for band in responses]
+    for band, each in zip(responses, found, strict=True):
+        if each.coverage < MIN_COVERAGE:
+            low, high = band.limits
+            raise ValueError(
+                f"band {band.name}, {low:g} to {high:g} um, reaches out of the library of spectra, "
+                f"{wavelength[0]:g} to {wavelength[-1]:g} um: leave it out"
+            )
+    return np.stack([each.weights for each in found])
+
+
+@lru_cache(maxsize=64)
+def _estimate(sources, targets, uncertainty):
+    """Best linear estimate of bands from others over the library."""
+    wavelength, spectra = library_spectra()
+    moments = band_moments(_weights(sources + targets), wavelength, spectra)
+    return best_linear(moments, len(sources), uncertainty)
+
+
+def _library_means(responses):
+    """Band means of the library, shape (spectrum, band)."""
+    _, spectra = library_spectra()
+    return spectra @ _weights(responses).T
+
+
+def _published(pairs):
+    """Published lines of (source, its band, target, its band), as columns."""
+    keys = ["source", "source_band", "target", "target_band"]
+    table = datasets.table("spectral_adjustment.csv").set_index(keys)
+    rows = table.reindex(pd.MultiIndex.from_tuples(pairs, names=keys))
+    return {
+        "published_slope": rows["slope"].to_numpy(float),
+        "published_offset": rows["offset"].to_numpy(float),
+        "reference": rows["reference"].fillna("").to_numpy(str),
+    }

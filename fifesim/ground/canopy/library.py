@@ -1,0 +1,113 @@
+"""A library of land spectra: leaves, canopies and what lies below them, as the models of this package make them."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from fifesim.base import datasets
+from fifesim.base.seeds import generator
+from fifesim.ground.canopy.background import reflectance_factor, with_background
+from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
+from fifesim.ground.canopy.sail_model import sail
+
+# How many leaves there are, and canopies of each.
+LEAVES = 60
+CANOPIES = 8
+
+# Every so many of PROSPECT's wavelengths, which are 1 nm apart: band means differ by 1e-4 at most.
+_STRIDE = 5
+
+# Uniform ranges that leaves are drawn from: wide, and fitted to nothing. Contents as in `Leaf`.
+_STRUCTURE = (1.2, 2.5)
+_CHLOROPHYLL = (5.0, 80.0)
+_CAROTENOIDS = (0.15, 0.35)  # over chlorophyll
+_WATER = (0.004, 0.030)
+_DRY_MATTER = (0.002, 0.018)
+_ANTHOCYANINS = 4.0  # at most, in three of ten leaves
+
+# Mean of the leaf area index, which is exponential and cut off; and ranges of sun and sky.
+_MEAN_LAI, _COVERED = 1.5, 0.97
+_SZA = (20.0, 60.0)
+_SKYLIGHT = 0.3
+_LEAF_ANGLES = ("planophile", "spherical", "erectophile", "plagiophile")
+
+# Brightness of the ground over that of the mixed spectra.
+_BRIGHTNESS = (0.3, 1.1)
+
+# The stream of random numbers that is the library's.
+_STREAM = 2
+
+
+@lru_cache
+def library_spectra():
+    """
+    Reflectance spectra of canopies of many leaves over many soils, PROSPECT-D and SAIL.
+
+    Returns
+    -------
+    wavelength : array, shape (n,)
+        0.4 to 2.45, in steps of 0.005. [um]
+    reflectance : array, shape (spectrum, n)
+        Read only. [1]
+
+    Notes
+    -----
+    Leaf contents are uniform in wide ranges, brown pigments mostly few. Leaf area is exponential with mean 1.5: a
+    quarter of the spectra has an NDVI below 0.5. Ground is mixed of all spectra of ``data/ground_spectra.csv``, from
+    0.3 to 1.1 times as bright. The view is from nadir, the sun at 20 to 60 degrees, up to 0.3 of its light from the
+    sky. The spectra are the same in every session.
+
+    Examples
+    --------
+    >>> wavelength, reflectance = library_spectra()
+    >>> reflectance.shape == (480, wavelength.size), bool(reflectance.min() > 0), bool(reflectance.max() < 1)
+    (True, True, True)
+    """
+    ground = datasets.table("ground_spectra.csv")
+    found = []
+    for number in range(LEAVES):
+        random = generator(0, _STREAM, (0, number, 0, 0))
+        wavelength, leaf_reflectance, leaf_transmittance = leaf_spectrum(_leaf(random))
+        kept = slice(0, np.searchsorted(wavelength, ground["wavelength"].iloc[-1], side="right"), _STRIDE)
+        below = _ground(random, ground, wavelength[kept])
+        lai = -_MEAN_LAI * np.log(1 - _COVERED * random.random(CANOPIES))
+        canopy = sail(
+            lai[:, None],
+            leaf_reflectance[kept],
+            leaf_transmittance[kept],
+            sza=_uniform(random, _SZA),
+            leaf_angles=_LEAF_ANGLES[random.integers(len(_LEAF_ANGLES))],
+        )
+        surface = with_background(canopy, below)
+        found.append(reflectance_factor(surface.rso, surface.rdo, _SKYLIGHT * random.random()))
+    wavelength, reflectance = wavelength[kept], np.concatenate(found)
+    for each in (wavelength, reflectance):
+        each.flags.writeable = False
+    return wavelength, reflectance
+
+
+def _uniform(random, limits):
+    return limits[0] + (limits[1] - limits[0]) * random.random()
+
+
+def _leaf(random):
+    """A leaf drawn from the ranges."""
+    chlorophyll = _uniform(random, _CHLOROPHYLL)
+    return Leaf(
+        structure=_uniform(random, _STRUCTURE),
+        chlorophyll=chlorophyll,
+        carotenoids=chlorophyll * _uniform(random, _CAROTENOIDS),
+        anthocyanins=_ANTHOCYANINS * random.random() * (random.random() < 0.3),
+        brown=random.random() ** 2,
+        water=_uniform(random, _WATER),
+        dry_matter=_uniform(random, _DRY_MATTER),
+    )
+
+
+def _ground(random, table, wavelength):
+    """Mixtures of the ground's spectra, one for each canopy."""
+    names = table.columns.drop("wavelength")
+    shares = random.dirichlet(np.full(len(names), 0.7), CANOPIES)
+    bright = _BRIGHTNESS[0] + (_BRIGHTNESS[1] - _BRIGHTNESS[0]) * random.random((CANOPIES, 1))
+    spectra = np.stack([np.interp(wavelength, table["wavelength"], table[name]) for name in names])
+    return bright * np.sum(shares[:, :, None] * spectra, axis=1)

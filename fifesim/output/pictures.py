@@ -1,0 +1,291 @@
+"""Pictures that a person looks at while working: a raster, a regression, one scene through many instruments."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import xarray as xr
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap
+
+from fifesim.analysis.rasters.pairs import matched
+from fifesim.base.scan_pixels import corners
+from fifesim.chain.comparison import recorded_images, shows_ndvi
+from fifesim.chain.images import ndvi
+from fifesim.output.composites import composite_bands, rgb, thinned, valid
+from fifesim.output.words import long_name, short_name, subject, unit
+from fifesim.rasters import grid as grids
+from fifesim.rasters import swaths
+from fifesim.rasters.reductions import computed
+
+_NO_DATA = (0.85, 0.85, 0.85)
+_LINE, _BAND = "#b2182b", "#f4a582"
+
+# Without the blue of the map's seas.
+_LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)), name="land")
+
+# Colours by the name of a quantity, and the value about which they diverge.
+_COLOURS = {
+    **dict.fromkeys(("lai", "fpar", "ndvi", "evi", "evi2", "savi", "msavi", "nirv"), ("YlGn", None)),
+    **dict.fromkeys(("ndwi", "ndmi"), ("YlGnBu", None)),
+    **dict.fromkeys(("dn", "toa_radiance", "toa_reflectance", "surface_reflectance"), ("gray", None)),
+    **dict.fromkeys(("illumination", "sky_view"), ("gray", None)),
+    **dict.fromkeys(("ndvi_bias", "fpar_bias"), ("RdBu_r", 0.0)),
+    "dem": (_LAND, None),
+    "slope": ("YlOrBr", None),
+    "aspect": ("twilight", None),
+    "shadow": ("gray_r", None),
+    "kt": ("RdBu_r", 1.0),
+}
+
+# Pixels that are drawn along the longer side at most.
+_SIZE = 1500
+
+# Above this a map has its axes in kilometres. [m]
+_KILOMETRES = 3000.0
+
+
+def plot(
+    raster, *, band=None, composite="false colour", stretch=(2, 98), cmap=None, limits=None, axes=None, size=_SIZE
+):
+    """
+    Draw a raster as a map: an image in colours, one band or quantity by its colour map.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray, dims ([band], y, x) or ([band], line, sample)
+        A large one is thinned, so that it is not loaded whole.
+    band : str, optional
+        The band to draw; by default three of them as colours, or the only one.
+    composite, stretch : optional
+        As in `fifesim.output.composites.rgb`; the percentiles are those of one band too.
+    cmap : str or matplotlib.colors.Colormap, optional
+        By default that of the quantity.
+    limits : (float, float), optional
+        Values of the first and of the last colour; by default the percentiles of ``stretch``.
+    axes : matplotlib.axes.Axes, optional
+        A new figure by default.
+    size : int, optional
+        Pixels drawn along the longer side at most.
+
+    Returns
+    -------
+    axes : matplotlib.axes.Axes
+
+    Raises
+    ------
+    ValueError
+        If the raster has other dimensions, or a band is missing.
+    """
+    raster = _checked(raster, band)
+    names = composite_bands(raster, composite) if "band" in raster.dims else []
+    few = raster.sel(band=list(dict.fromkeys(names))) if names else valid(raster)
+    shown = computed(thinned(few, size))[0]
+    if axes is None:
+        _, axes = plt.subplots(figsize=_figure_size(shown), layout="constrained")
+    axes.set_facecolor(_NO_DATA)
+    if names:
+        picture = rgb(shown, names, stretch=stretch)
+        _draw(axes, picture, colours=np.dstack([np.nan_to_num(picture.values), picture.notnull().all("rgb").values]))
+        what = picture.attrs["long_name"]
+    else:
+        style = _style(shown, stretch, cmap, limits)
+        drawn = _draw(axes, shown, **style)
+        extend = _extend(shown, style["vmin"], style["vmax"])
+        label = " ".join(filter(None, [short_name(shown), unit(shown)]))
+        axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label=label, extend=extend)
+        what = long_name(shown)
+    where = subject(raster)
+    axes.set_title(what + (f"\n{where}" if where else ""), fontsize="medium")
+    return axes
+
+
+def plot_fit(fit, y=None, x=None, *, pair="coordinates", level=0.95, axes=None):
+    """
+    Draw a regression: its line and prediction interval, over the pixels where they are given.
+
+    Parameters
+    ----------
+    fit : fifesim.analysis.regression.Regression
+    y, x : xarray.DataArray, dims (y, x), optional
+        What was given to `fifesim.regress`; large ones are thinned before they are computed.
+    pair : {"coordinates", "index"}, optional
+        As there.
+    level : float, optional
+        Of the prediction interval. [1]
+    axes : matplotlib.axes.Axes, optional
+        A new figure by default.
+
+    Returns
+    -------
+    axes : matplotlib.axes.Axes
+
+    Raises
+    ------
+    ValueError
+        If one raster is given without the other, or they do not match.
+    """
+    if (y is None) != (x is None):
+        raise ValueError("fit.plot() draws the line alone, fit.plot(y, x) the pixels too: give both rasters or none")
+    if axes is None:
+        _, axes = plt.subplots(figsize=(5.8, 4.4), layout="constrained")
+    labels = "y", "x"
+    spread = 2.5 * np.sqrt(fit.x_sum_of_squares / fit.n)
+    span = fit.x_mean - spread, fit.x_mean + spread
+    if y is not None:
+        labels = tuple(" ".join(filter(None, [_first_capital(long_name(each)), unit(each)])) for each in (y, x))
+        pairs = computed(*(thinned(each, _SIZE) for each in matched(y, x, pair)))
+        ordinate, abscissa = (np.asarray(each, float).ravel() for each in pairs)
+        both = np.isfinite(ordinate) & np.isfinite(abscissa)
+        span = abscissa[both].min(), abscissa[both].max()
+        density = axes.hexbin(
+            abscissa[both], ordinate[both], gridsize=60, mincnt=1, bins="log", cmap="Greys", linewidths=0.1
+        )
+        axes.figure.colorbar(density, ax=axes, shrink=0.8, label="pixels")
+    line = np.linspace(*span, 50)
+    interval = f"{100 * level:g} % prediction interval"
+    axes.fill_between(line, *fit.prediction_interval(line, level), color=_BAND, alpha=0.3, linewidth=0, label=interval)
+    axes.plot(line, fit.predict(line), color=_LINE, linewidth=2, label="least-squares line")
+    sign = "+" if fit.slope >= 0 else "−"
+    title = f"y = {fit.intercept:.4g} {sign} {abs(fit.slope):.4g} x,  R² = {fit.r2:.3f},  n = {fit.n}"
+    title = title.replace("-", "−")
+    axes.set(xlabel=labels[1], ylabel=labels[0])
+    axes.set_title(title, fontsize="medium")
+    # Above what the line and its interval reach, whichever way they go.
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.22 * (high - low))
+    axes.legend(frameon=False, loc="upper center", ncols=2, fontsize="small")
+    return axes
+
+
+def plot_comparison(images, *, limits=None):
+    """
+    Draw one scene through many instruments: their NDVI side by side, in the same colours.
+
+    Parameters
+    ----------
+    images : xarray.DataTree
+        From `fifesim.compare`.
+    limits : (float, float), optional
+        NDVI of the first and of the last colour.
+
+    Returns
+    -------
+    figure : matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If no image has a red and a near infrared band.
+
+    Notes
+    -----
+    Large images are thinned; mean and deviation are of the pixels drawn.
+    """
+    recorded = {name: image for name, image in recorded_images(images).items() if shows_ndvi(image)}
+    if not recorded:
+        raise ValueError(
+            "no image has a red and a near infrared band: compare them with bands={instrument: [red, nir]}"
+        )
+    found = {name: ndvi(thinned(image, 800)) for name, image in recorded.items()}
+    maps = dict(zip(found, computed(*found.values()), strict=True))
+    if limits is None:
+        values = np.concatenate([each.values[np.isfinite(each.values)] for each in maps.values()])
+        limits = np.percentile(values, (1, 99)) if values.size else (0.0, 1.0)
+    columns = min(len(maps), 4)
+    rows = -(-len(maps) // columns)
+    width = 3.0 * columns + 0.8
+    height = rows * (3.0 * max(_ratio(each) for each in maps.values()) + 0.8)
+    figure, panels = plt.subplots(rows, columns, figsize=(width, height), layout="constrained", squeeze=False)
+    for axes in panels.ravel()[len(maps) :]:
+        axes.set_axis_off()
+    for axes, (name, array) in zip(panels.ravel(), maps.items(), strict=False):
+        axes.set_facecolor(_NO_DATA)
+        drawn = _draw(axes, array, cmap="YlGn", vmin=limits[0], vmax=limits[1])
+        pixel = grids.cell_size(grids.geobox(recorded[name]))[0]
+        mean, deviation = float(array.mean()), float(array.std())
+        axes.set_title(f"{name}, {pixel:g} m\nmean {mean:.3f}, sd {deviation:.3f}", fontsize="medium")
+    for axes in panels[:, 1:].ravel():
+        axes.set_ylabel("")
+    figure.colorbar(drawn, ax=panels, shrink=0.8, label="NDVI", extend="both")
+    return figure
+
+
+def _first_capital(text):
+    return text[:1].upper() + text[1:]
+
+
+def _checked(raster, band):
+    """A raster that can be drawn: of several bands, or of one quantity."""
+    if not isinstance(raster, xr.DataArray):
+        raise TypeError(f"plot draws a DataArray, got a {type(raster).__name__}: select a variable, such as run['dn']")
+    if band is not None:
+        if "band" not in raster.dims or band not in raster["band"].values:
+            have = ", ".join(map(str, np.atleast_1d(raster["band"].values))) if "band" in raster.coords else "none"
+            raise ValueError(f"there is no band {band!r}: the raster has {have}")
+        raster = raster.sel(band=band)
+    elif raster.sizes.get("band") == 1:
+        raster = raster.isel(band=0)
+    allowed = [{"band", *axes} for axes in (("y", "x"), swaths.DIMS)]
+    if not any(set(raster.dims) in (each, each - {"band"}) for each in allowed):
+        raise ValueError(
+            f"a map has dimensions ([band], y, x), got {raster.dims}: select one layer of the others with .isel"
+        )
+    return raster.transpose(..., *(swaths.DIMS if "line" in raster.dims else ("y", "x")))
+
+
+def _draw(axes, array, colours=None, **style):
+    """A raster as a map with the same scale along both axes, in metres or kilometres."""
+    values = array.values if colours is None else colours
+    if "line" in array.dims and "x" not in array.coords:
+        latitude, longitude = corners(array["latitude"].values, array["longitude"].values)
+        drawn = axes.pcolormesh(longitude, latitude, values, **style)
+        axes.set(xlabel="Longitude [°]", ylabel="Latitude [°]", aspect=1 / np.cos(np.radians(latitude.mean())))
+        return drawn
+    if "line" in array.dims:
+        y, x = corners(array["y"].values, array["x"].values)
+        unit_size, name = _length(np.ptp(x), np.ptp(y))
+        drawn = axes.pcolormesh(x / unit_size, y / unit_size, values, **style)
+    else:
+        box = grids.geobox(array).boundingbox
+        unit_size, name = _length(box.span_x, box.span_y)
+        extent = [edge / unit_size for edge in (box.left, box.right, box.bottom, box.top)]
+        drawn = axes.imshow(values, extent=extent, interpolation="nearest", **style)
+    axes.set(xlabel=f"Easting [{name}]", ylabel=f"Northing [{name}]", aspect="equal")
+    axes.ticklabel_format(useOffset=False, style="plain")
+    axes.locator_params(nbins=4)
+    axes.tick_params(labelsize="small")
+    return drawn
+
+
+def _length(width, height):
+    return (1000.0, "km") if max(width, height) > _KILOMETRES else (1.0, "m")
+
+
+def _ratio(array):
+    """Height of a map over its width."""
+    if "line" in array.dims:
+        up, right = ("y", "x") if "x" in array.coords else ("latitude", "longitude")
+        return float(np.ptp(array[up].values) / max(np.ptp(array[right].values), 1e-6))
+    down, across = grids.cell_size(grids.geobox(array))
+    return array.sizes["y"] * down / (array.sizes["x"] * across)
+
+
+def _figure_size(array):
+    width = 6.4
+    return width, float(np.clip(0.9 + 0.72 * width * _ratio(array), 2.4, 9.0))
+
+
+def _style(array, stretch, cmap, limits):
+    own, middle = _COLOURS.get(array.name, ("viridis", None))
+    finite = array.values[np.isfinite(array.values)]
+    if limits is None:
+        limits = np.percentile(finite, stretch) if finite.size else (0.0, 1.0)
+        if cmap is None and middle is not None:
+            half = max(*np.abs(np.subtract(limits, middle)), 1e-6)
+            limits = middle - half, middle + half
+    return {"cmap": own if cmap is None else cmap, "vmin": float(limits[0]), "vmax": float(limits[1])}
+
+
+def _extend(array, low, high):
+    """Ends of a colour bar beyond which there are values."""
+    below, above = bool((array < low).any()), bool((array > high).any())
+    return {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")

@@ -1,0 +1,222 @@
+"""Images of a scan on labelled rasters: by line and sample instead of rows and columns, and put onto a map."""
+
+from functools import partial
+from typing import NamedTuple
+
+import dask.array as da
+import numpy as np
+import xarray as xr
+
+from fifesim.base import scan_pixels
+from fifesim.rasters import chunks, projection
+from fifesim.rasters import grid as grids
+
+DIMS = ("line", "sample")
+
+METHODS = ("nearest", "mean")
+
+# Rows and columns of a map that are made at once. [cell]
+_BLOCK = 512
+
+# Where the pixels lie, which on a map its own coordinates say.
+_PLACES = ("x", "y", "latitude", "longitude", "spatial_ref", *DIMS)
+
+
+def placed_as(array, image):
+    """
+    What was made of an image by cell, in its place: on its grid, or on the lines and samples of its scan.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    image : xarray.DataArray
+
+    Returns
+    -------
+    array : xarray.DataArray
+
+    Raises
+    ------
+    ValueError
+        If the image has neither a grid nor lines and samples.
+    """
+    if not set(DIMS) <= set(image.dims):
+        return grids.place(array, grids.geobox(image))
+    array = array.assign_coords({name: image.coords[name] for name in _PLACES if name in image.coords})
+    array.encoding = {"grid_mapping": "spatial_ref"} if "spatial_ref" in array.coords else {}
+    return array
+
+
+def grid_swath(image, grid, method="nearest", *, min_valid=0.5):
+    """
+    Image of a scan put onto a map.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims ([band], line, sample)
+        From `fifesim.sense_swath`, or with coordinates ``latitude`` and ``longitude`` [degree] of each pixel.
+    grid : odc.geo.geobox.GeoBox
+        In any projected CRS in metres, such as from `fifesim.grid_at`.
+    method : {"nearest", "mean"}, optional
+        The pixel whose centre is nearest to that of the cell, if it reaches so far; or the mean of the pixels on the
+        cell, each by the area that it covers. Digital numbers take the nearest.
+    min_valid : float, optional
+        Share of a cell that valid pixels must cover for a mean. [1]
+
+    Returns
+    -------
+    image : xarray.DataArray, dims ([band], y, x)
+        Lazy where the image is. NaN where no pixel lies, 0 in digital numbers. View and sun of each pixel are those of
+        the nearest.
+
+    Raises
+    ------
+    ValueError
+        If the image is not of a scan, its pixels do not say where they lie, there is one line or sample only, or none
+        lies on the grid.
+
+    See Also
+    --------
+    fifesim.base.scan_pixels.nearest_pixels, fifesim.base.scan_pixels.covered_means
+    """
+    grids.check_grid(grid)
+    _check(image, method, min_valid)
+    image = image.transpose(..., *DIMS)
+    scan = _scan_on(grid, image)
+    _check_overlap(scan, grid)
+    if method == "nearest":
+        data = _nearest(scan, image.data, grid)
+    else:
+        data = _means(scan, image.data, grid, min_valid)
+    along = {name: value for name, value in image.coords.items() if not {*DIMS} & set(value.dims)}
+    out = xr.DataArray(data, dims=(*image.dims[:-2], "y", "x"), coords=along, attrs=dict(image.attrs), name=image.name)
+    own = {name: each for name, each in image.coords.items() if name not in _PLACES and set(each.dims) == {*DIMS}}
+    own = {name: each for name, each in own.items() if each.dtype.kind in "fiu"}
+    lazy = isinstance(image.data, da.Array)
+    for name, value in own.items():
+        values = value.transpose(*DIMS).astype(float).data
+        values = _nearest(scan, da.from_array(values, chunks=-1) if lazy else values, grid)
+        out = out.assign_coords({name: (("y", "x"), values, value.attrs)})
+    out = grids.place(out, grid)
+    out.attrs["history"] = "\n".join(filter(None, [image.attrs.get("history", ""), f"grid_swath: {method}"]))
+    return out
+
+
+def _check(image, method, min_valid):
+    if method not in METHODS:
+        raise ValueError(f"method must be 'nearest' or 'mean', got {method!r}")
+    if not 0 <= min_valid <= 1:
+        raise ValueError(f"min_valid must be in [0, 1], got {min_valid}: it is a share of a cell")
+    if not set(DIMS) <= set(image.dims) or set(image.dims) - {"band", *DIMS}:
+        raise ValueError(
+            f"grid_swath takes the image of a scan, dimensions ([band], line, sample), got {image.dims}: "
+            "one that has a grid is taken to another by .rio.reproject_match"
+        )
+    if method == "mean" and image.dtype.kind != "f":
+        raise ValueError(
+            "digital numbers have no mean, for 0 is no data: take method='nearest', or convert them first with "
+            ".fifesim.to_radiance()"
+        )
+
+
+class _Scan(NamedTuple):
+    """Pixels of a scan on the cells of a map: centres, corners [cell] and how far each reaches [m]."""
+
+    row: np.ndarray
+    column: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+    reach: np.ndarray
+
+
+def _scan_on(grid, image):
+    x, y = _places(image, grid)
+    row, column = (y - grid.affine.f) / grid.affine.e, (x - grid.affine.c) / grid.affine.a
+    return _Scan(row, column, *scan_pixels.corners(row, column), scan_pixels.reach(row, column, grids.cell_size(grid)))
+
+
+def _places(image, grid):
+    """Easting and northing of the pixels in the CRS of a grid, shape (line, sample) each."""
+    if {"x", "y", "spatial_ref"} <= set(image.coords):
+        names, crs = ("x", "y"), image["spatial_ref"].attrs["crs_wkt"]
+    elif {"latitude", "longitude"} <= set(image.coords):
+        names, crs = ("longitude", "latitude"), "EPSG:4326"
+    else:
+        raise ValueError(
+            "the image does not say where its pixels lie: assign coordinates latitude and longitude over (line, sample)"
+        )
+    across, up = (np.asarray(image[name].transpose(*DIMS), float) for name in names)
+    target = grid.crs.to_wkt()
+    pipeline, _ = projection.operation(crs, target, projection.degrees(grid))
+    return projection.carry(pipeline, crs, target, across, up)
+
+
+def _check_overlap(scan, grid):
+    inside = (scan.row >= 0) & (scan.row <= grid.shape.y) & (scan.column >= 0) & (scan.column <= grid.shape.x)
+    down, across = grids.cell_size(grid)
+    near = (np.abs(scan.row - grid.shape.y / 2) - grid.shape.y / 2) * down <= scan.reach
+    near &= (np.abs(scan.column - grid.shape.x / 2) - grid.shape.x / 2) * across <= scan.reach
+    if not (inside | near).any():
+        a = grid.affine
+        spans = [
+            f"{start + step * np.nanmin(each):.0f} to {start + step * np.nanmax(each):.0f}"
+            for start, step, each in ((a.c, a.a, scan.column), (a.f, a.e, scan.row))
+        ]
+        raise ValueError(
+            f"no pixel of the scan lies on the grid, which spans {grids.extent(grid)}: the scan spans {spans[0]} E and "
+            f"{spans[1]} N there; make the grid around it with fifesim.grid_at"
+        )
+
+
+class _Touching(NamedTuple):
+    """Pixels that lie on blocks of a map, as `fifesim.rasters.chunks.windows` reads them."""
+
+    array: object
+    scan: _Scan
+    cell: tuple
+
+    def window(self, rows, columns):
+        """Lines and samples that reach some cells, at least one of each."""
+        scan, (down, across) = self.scan, self.cell
+        near = scan.row + scan.reach / down >= rows.start
+        near &= scan.row - scan.reach / down <= rows.stop
+        near &= scan.column + scan.reach / across >= columns.start
+        near &= scan.column - scan.reach / across <= columns.stop
+        return tuple(_span(np.flatnonzero(near.any(axis=axis))) for axis in (1, 0))
+
+
+def _span(numbers):
+    return slice(int(numbers[0]), int(numbers[-1]) + 1) if numbers.size else slice(0, 1)
+
+
+def _nearest(scan, values, grid):
+    """Values of the nearest pixels, of their own type."""
+    touching = _Touching(values, scan, grids.cell_size(grid))
+    kernel = partial(_nearest_block, touching._replace(array=None), np.nan if values.dtype.kind == "f" else 0)
+    return chunks.in_blocks(kernel, [touching], (*values.shape[:-2], *grid.shape), _BLOCK, values.dtype)
+
+
+def _nearest_block(touching, missing, rows, columns, pixels):
+    scan, window = touching.scan, touching.window(rows, columns)
+    spots = (np.ascontiguousarray(each[window]).ravel() for each in (scan.row, scan.column, scan.reach))
+    limits = (rows.start, rows.stop), (columns.start, columns.stop)
+    number = scan_pixels.nearest_pixels(*spots, tuple(map(float, touching.cell)), *limits)
+    flat = np.reshape(pixels, (*pixels.shape[:-2], -1))
+    return np.where(number >= 0, flat[..., np.maximum(number, 0)], np.asarray(missing, pixels.dtype))
+
+
+def _means(scan, values, grid, min_valid):
+    touching = _Touching(values, scan, grids.cell_size(grid))
+    kernel = partial(_means_block, touching._replace(array=None), min_valid)
+    return chunks.in_blocks(kernel, [touching], (*values.shape[:-2], *grid.shape), _BLOCK)
+
+
+def _means_block(touching, min_valid, rows, columns, pixels):
+    lines, samples = touching.window(rows, columns)
+    around = slice(lines.start, lines.stop + 1), slice(samples.start, samples.stop + 1)
+    layers = np.asarray(pixels, float).reshape(-1, *pixels.shape[-2:])
+    limits = (rows.start, rows.stop), (columns.start, columns.stop)
+    edges = (np.ascontiguousarray(each[around]) for each in (touching.scan.rows, touching.scan.columns))
+    means, covered = scan_pixels.covered_means(np.ascontiguousarray(layers), *edges, *limits)
+    means = np.where(covered >= min_valid - 1e-9, means, np.nan)
+    return means.reshape(*pixels.shape[:-2], *means.shape[-2:])

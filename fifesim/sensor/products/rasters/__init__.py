@@ -1,0 +1,1 @@
+"""Images as agencies deliver them, on labelled rasters."""

@@ -1,0 +1,118 @@
+"""Digital numbers of one's own, with the calibration that makes an image of them."""
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from fifesim.rasters import cf, chunks, directions
+from fifesim.rasters import grid as grids
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.description.rasters.carried import attributes_of
+from fifesim.sensor.products.rasters.layers import TIME
+from fifesim.sensor.products.scaling import counts
+from fifesim.sensor.response.rasters import digital_numbers
+from fifesim.sensor.response.rasters.pixels import matching_bands
+
+
+def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=None, nodata=0):
+    """
+    Make an image of digital numbers: with calibration, wavelengths and sun, as `sense` makes one.
+
+    Parameters
+    ----------
+    dn : xarray.DataArray of whole numbers, dims ([band], y, x)
+        With a coordinate ``band`` of the instrument's names, or ``wavelength`` [um]. NaN is no data. [1]
+    instrument : str or Instrument
+    time : str or datetime, optional
+        Of the image, UTC where it names no time zone: the sun is that over the middle of the grid, the view from nadir.
+        By default the raster's coordinate ``time``.
+    geometry : Geometry or xarray.Dataset, optional
+        Sun and view, instead of those of the time; without both, those that the raster carries.
+    gain, offset : float, sequence over the bands, or mapping of band name to float, optional
+        Radiance of one count, and of digital number 0: RADIANCE_MULT and RADIANCE_ADD of Landsat's metadata. By default
+        those of the instrument's description, with its scale of square roots if it has one. [W m-2 sr-1 um-1]
+    nodata : int, optional
+        Digital number of no data.
+
+    Returns
+    -------
+    image : xarray.DataArray of unsigned integers, dims (band, y, x)
+        ``to_radiance``, ``to_reflectance``, ``to_surface`` and ``ndvi`` take it. 0 is no data. Lazy where the input is.
+
+    Raises
+    ------
+    ValueError
+        If bands, sun or one of gain and offset are not known, or a number is none that an instrument records; on lazy
+        data, when it computes.
+    TypeError
+        If it is no DataArray.
+
+    See Also
+    --------
+    fifesim.sensor.products.scaling.counts
+    """
+    if not isinstance(dn, xr.DataArray):
+        raise TypeError(f"dn must be an xarray.DataArray of digital numbers, got {type(dn).__name__}")
+    if "gain" in dn.coords:
+        raise ValueError("the raster carries a calibration already: drop it with .drop_vars(['gain', 'offset'])")
+    description = find_instrument(instrument)
+    dn = (dn if "band" in dn.dims else dn.expand_dims("band")).transpose("band", "y", "x")
+    bands = matching_bands(dn, description)
+    geometry, time = _sun_and_time(geometry, time, dn)
+    if (gain is None) != (offset is None):
+        raise ValueError("gain and offset make radiance of a digital number together: give both, or neither")
+    compression = [0]
+    if gain is None:
+        gain, offset, bits = digital_numbers.scale(description, bands)
+        compression = [band.compressed_count(bits) for band in bands]
+    else:
+        gain, offset = (_by_band(given, bands, name) for name, given in (("gain", gain), ("offset", offset)))
+        bits = 16 if dn.dtype.itemsize > 1 else 8
+        if not np.all(gain > 0):
+            raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")
+    kernel = partial(counts, nodata=nodata, largest=2**bits - 1)
+    out = chunks.pointwise(kernel, dn.drop_vars("band", errors="ignore"), dtype=np.uint8 if bits <= 8 else np.uint16)
+    along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
+    along_band |= {"gain": gain, "offset": offset, "solar_irradiance": [band.solar_irradiance for band in bands]}
+    along_band |= {"compression": compression} if any(compression) else {}
+    out = directions.with_geometry(grids.place(out, grids.geobox(dn)), geometry).assign_coords(
+        cf.band_coordinates(**along_band)
+    )
+    out = out if time is None else out.assign_coords(time=((), time, TIME))
+    history = f"calibrate: {description.name}"
+    image = cf.label(out, "dn", source=dn, history=history, **attributes_of(description))
+    image.attrs["_FillValue"] = image.dtype.type(0)
+    return image
+
+
+def _by_band(given, bands, name):
+    """A number for each band."""
+    if isinstance(given, Mapping):
+        missing = [band.name for band in bands if band.name not in given]
+        if missing:
+            raise ValueError(f"{name} has no number for {', '.join(missing)}: it has {', '.join(map(str, given))}")
+        given = [given[band.name] for band in bands]
+    values = np.asarray(given, float)
+    if values.shape not in ((), (len(bands),)) or not np.isfinite(values).all():
+        raise ValueError(f"{name} must be a number, or one for each of {len(bands)} bands, got {given!r}")
+    return np.broadcast_to(values, (len(bands),))
+
+
+def _sun_and_time(geometry, time, dn):
+    """Sun and view as given, else of the time that is given, else as carried; and the time, or None."""
+    carried = dn.coords["time"].values if "time" in dn.coords and not dn.coords["time"].ndim else None
+    known = _utc(time) if time is not None else carried
+    if geometry is not None:
+        return directions.checked_geometry(geometry), known
+    return directions.given_geometry(None, dn, time), known
+
+
+def _utc(time):
+    try:
+        stamp = pd.Timestamp(time)
+    except (ValueError, TypeError):
+        raise ValueError(f"time must be a date and time such as 1987-06-06T16:35:00Z, got {time!r}") from None
+    return (stamp if stamp.tzinfo is None else stamp.tz_convert("UTC").tz_localize(None)).to_datetime64()

@@ -1,0 +1,170 @@
+"""A Landsat product as a labelled image."""
+
+import numpy as np
+import xarray as xr
+
+from fifesim.base.geometry import ANGLES, Geometry
+from fifesim.rasters import chunks as dask_chunks
+from fifesim.rasters import directions
+from fifesim.rasters import grid as grids
+from fifesim.sensor.description.band_names import band_called
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.products.landsat_metadata import landsat_scene, metadata_file, read_groups
+from fifesim.sensor.products.rasters.layers import (
+    as_image,
+    check_same_grid,
+    chunk_sizes,
+    open_layer,
+    reflectance,
+    stacked,
+)
+from fifesim.sensor.products.scaling import hundredths
+
+# Bit of QA_PIXEL where there are no data.
+_FILL = 1
+
+_QUALITY = {"long_name": "QA_PIXEL, quality of the pixel by bits", "units": "1"}
+
+
+def open_landsat(path, *, bands=None, angles="centre", quality=True, chunks="auto", instrument=None):
+    """
+    Open a Landsat Collection-2 product: Level 1 as reflectance at the top of the atmosphere, Level 2 of the surface.
+
+    Landsat 4 and 5 TM, 7 ETM+, 8 OLI and 9 OLI-2, by the scale, sun and time of the product's own metadata.
+
+    Parameters
+    ----------
+    path : str or path
+        Of the unpacked product's folder, or of its metadata ``*_MTL.txt``, ``.json`` or ``.xml``.
+    bands : str or sequence of str, optional
+        Names of the instrument's bands, such as ``["TM3", "TM4"]``, or as others call them: ``["B4", "B5"]``,
+        ``["red", "nir"]``. By default all that show the ground on the 30 m grid: not the panchromatic one, which has
+        its own grid, and not OLI's cirrus band.
+        Thermal bands are not read.
+    angles : "centre" or "pixel", optional
+        Sun and view of the scene's centre, which every step takes: its view is from nadir. Or by pixel, from the files
+        ``*_SZA.TIF``, ``*_SAA.TIF``, ``*_VZA.TIF`` and ``*_VAA.TIF``: over a scene the sun's zenith differs by some two
+        degrees, and the view's reaches 7.5 degrees at the sides.
+    quality : bool, optional
+        Whether with QA_PIXEL as coordinate ``quality`` over (y, x), and without pixels that QA_RADSAT has as saturated.
+        Without, the two files need not be there.
+    chunks : mapping or int or "auto", optional
+        The image is lazy; "auto" are 2048 x 2048 pixels of a band. None reads all of it at once.
+    instrument : str or Instrument, optional
+        Whose responses the bands have, instead of the spacecraft's.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray of float32, dims (band, y, x)
+        NaN where there are no data (digital number 0), and where a band is saturated: by QA_RADSAT, or at the largest
+        digital number. Coordinates ``wavelength`` and ``solar_irradiance`` along band, ``time``, ``sza``, ``saa``,
+        ``vza``, ``vaa``, ``earth_sun_distance`` and ``quality``. [1]
+
+    Raises
+    ------
+    ValueError
+        If the product is of another collection or spacecraft, a file is missing or no raster, or the sun is down.
+
+    Notes
+    -----
+    Level 1 is scaled by reflectance without the sun's cosine, which is divided out here, with ``angles="pixel"`` by
+    that of each pixel. Its solar irradiance follows from its scales of radiance and of reflectance, and differs from
+    the instrument's description by up to 5 % for TM. Mask clouds with ``scene.where(scene.quality & 0b11000 == 0)``:
+    bit 3 is cloud, bit 4 its shadow. A GeoTIFF keeps neither quality nor angles by pixel.
+
+    References
+    ----------
+    USGS, Landsat Collection 2 Level-1 and Level-2 data format control books
+
+    See Also
+    --------
+    fifesim.sensor.products.scaling.product_reflectance
+    """
+    file = metadata_file(path)
+    scene, folder, sizes = landsat_scene(read_groups(file)), file.parent, chunk_sizes(chunks)
+    if angles not in ("centre", "pixel"):
+        raise ValueError(f"angles must be 'centre' or 'pixel', got {angles!r}")
+    description = find_instrument(scene.instrument if instrument is None else instrument)
+    selected = _selected(scene, folder, description, bands)
+    layers = [open_layer(folder, band.file, sizes, _cure(scene, folder)) for band in selected]
+    stack = stacked(layers)
+    # The panchromatic band's pixels are not parts of those of the other files.
+    beside = quality and all(band.flag for band in selected)
+    mask, flags = _quality(scene, folder, sizes, layers[0]) if beside else (None, None)
+    geometry = _geometry(scene, folder, sizes, angles, layers[0])
+    mu_s = directions.mu_s(geometry) if scene.level == 1 else 1.0
+    array = reflectance(stack, selected, flags, mu_s)
+    return as_image(
+        grids.place(array, grids.geobox(stack)),
+        selected,
+        description,
+        level=scene.level,
+        time=scene.time,
+        geometry=geometry,
+        quality=mask,
+        history=f"open_landsat: {scene.product}",
+        reference=scene.reference,
+    )
+
+
+def _selected(scene, folder, description, names):
+    """Bands that are asked for, by default those of the 30 m grid that show the ground."""
+    known = {band.name: band for band in scene.bands}
+    if names is None:
+        return [band for band in scene.bands if band.name not in scene.aside]
+    names = [names] if isinstance(names, str) else list(names)
+    for name in names:
+        if str(name).upper() in scene.thermal:
+            raise ValueError(
+                f"{name} is thermal, and reflectance is read: {scene.product} has {', '.join(known)} of reflected light"
+            )
+    called = [band_called(name, description) for name in names]
+    names = [name if band is None else band.name for name, band in zip(names, called, strict=True)]
+    found = [band.name for band in description.select(names)]
+    missing = [name for name in found if name not in known]
+    if missing:
+        raise ValueError(f"{scene.product} has no {' nor '.join(missing)}: it has {', '.join(known)}")
+    return [known[name] for name in found]
+
+
+def _cure(scene, folder):
+    there = [band.name for band in scene.bands if (folder / band.file).exists()]
+    return f"fetch it, or open those that are there with bands={there}" if there else "is the product unpacked there?"
+
+
+def _quality(scene, folder, sizes, beside):
+    """Quality of the pixels, and which bands are saturated in them."""
+    cure = "fetch it, or open the scene without it, quality=False"
+    mask, flags = (open_layer(folder, name, sizes, cure) for name in (scene.quality, scene.saturation))
+    for layer in (mask, flags):
+        check_same_grid(layer, beside)
+    return mask.assign_attrs(_QUALITY), flags
+
+
+def _geometry(scene, folder, sizes, angles, beside):
+    sun = {"sza": scene.sza, "saa": scene.saa, "earth_sun_distance": scene.earth_sun_distance}
+    centre = Geometry(**sun)
+    if angles == "centre":
+        if scene.off_nadir:
+            raise ValueError(
+                f"{scene.product} was seen aside of nadir: its view is known by pixel, give angles='pixel'"
+            )
+        return centre
+    missing = [name for name in ANGLES if name not in scene.angles]
+    if missing:
+        raise ValueError(f"the metadata name no files of {', '.join(missing)} by pixel: give angles='centre'")
+    cure = "fetch it from the Level-1 product, or give angles='centre'"
+    fill = open_layer(folder, scene.quality, sizes, cure)
+    layers = {name: open_layer(folder, scene.angles[name], sizes, cure) for name in ANGLES}
+    for layer in (fill, *layers.values()):
+        check_same_grid(layer, beside)
+    fill = xr.apply_ufunc(np.bitwise_and, fill, _FILL, dask="allowed") == _FILL
+    by_pixel = {
+        name: _placed(dask_chunks.pointwise(hundredths, layer, fill, turns=name.endswith("aa")), beside)
+        for name, layer in layers.items()
+    }
+    return directions.checked_geometry(xr.Dataset(by_pixel | {"earth_sun_distance": scene.earth_sun_distance}))
+
+
+def _placed(array, beside):
+    return grids.place(array.rename(None), grids.geobox(beside))

@@ -1,0 +1,65 @@
+"""What a digital number of an image stands for: a count of the detector, or one of the agency's product."""
+
+from fifesim.rasters import directions
+from fifesim.sensor.response.calibration import gain_offset
+from fifesim.sensor.response.product_scaling import product_gain_offset
+
+
+def check_scaling(scaling, description, quantise=True):
+    """
+    Refuse a scaling of digital numbers that is none.
+
+    Parameters
+    ----------
+    scaling : str
+    description : fifesim.sensor.description.instruments.Instrument
+    quantise : bool, optional
+        Whether there are digital numbers.
+
+    Raises
+    ------
+    ValueError
+        If it is unknown, the instrument's products have none of their own, or there are no digital numbers.
+    """
+    if scaling not in ("detector", "product"):
+        raise ValueError(f"scaling must be 'detector' or 'product', got {scaling!r}")
+    if scaling == "product" and not quantise:
+        raise ValueError("scaling='product' is one of digital numbers: leave it out, or quantise=False")
+    if scaling == "product" and description.product is None:
+        raise ValueError(
+            f"the description of {description.name} has no product that is scaled by reflectance, as those of OLI, "
+            "OLI2, MSI and MSI-B have: leave scaling out, or give [product] in a file of your own"
+        )
+
+
+def scale(description, bands, product_geometry=None):
+    """
+    Radiance of a count and of digital number 0, and number of bits.
+
+    Parameters
+    ----------
+    description : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
+    product_geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
+        Sun by which the agency's product scales them; the detector's own counts without.
+
+    Returns
+    -------
+    gain, offset : array, shape (band,)
+        [W m-2 sr-1 um-1]
+    bits : int
+
+    Raises
+    ------
+    ValueError
+        If the product has the sun's cosine divided out, and the sun varies over the scene.
+    """
+    if product_geometry is None:
+        full_scale, lowest = [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands]
+        return *gain_offset(full_scale, lowest, description.bits), description.bits
+    product, mu_s = description.product, 1.0
+    if product.sun_corrected:
+        mu_s = directions.uniform_geometry(product_geometry, f"scaling='product' of {description.name}").mu_s
+    irradiance = [band.solar_irradiance for band in bands]
+    distance = float(product_geometry.earth_sun_distance)
+    return *product_gain_offset(product.gain, product.offset, irradiance, mu_s, distance), product.bits

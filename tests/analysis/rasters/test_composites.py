@@ -1,0 +1,75 @@
+"""Composites of labelled images."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import ODD_CHUNKS, check_place, in_chunks, no_compute
+
+import fifesim
+from fifesim.rasters import grid as grids
+
+DATES = np.array(["1987-06-06T16:35", "1987-07-08T16:35", "1987-08-09T16:34"], "datetime64[ns]")
+
+
+@pytest.fixture(scope="module")
+def stack(lai_values):
+    """NDVI of three dates with clouds of low values and with holes; one cell has no data."""
+    rng = np.random.default_rng(3)
+    dates = [lai_values * 0.1 + rng.normal(0, 0.1, lai_values.shape) for _ in DATES]
+    found = xr.concat(dates, xr.DataArray(DATES, dims="time", name="time")).rename("ndvi")
+    found = found.where(rng.uniform(size=found.shape) > 0.3).assign_attrs(units="1", standard_name="x")
+    found[:, 2, 3] = np.nan
+    found = grids.place(found.assign_coords(sza=("time", [28.0, 30.0, 35.0])), grids.geobox(lai_values))
+    return found
+
+
+def test_composite_of_ndvi_is_the_largest_with_its_date_and_sun(stack):
+    found = fifesim.composite(stack)
+    check_place(found, grids.geobox(stack).crs)
+    np.testing.assert_array_equal(found, stack.max("time"))
+    assert np.isnan(found[2, 3]) and np.isnat(found["date"][2, 3]) and np.isnan(found["sza"][2, 3])
+    chosen = stack.fillna(-9).argmax("time").values
+    kept = ~np.isnan(found.values)
+    np.testing.assert_array_equal(found["date"].values[kept], DATES[chosen[kept]])
+    np.testing.assert_array_equal(found["sza"].values[kept], np.array([28.0, 30.0, 35.0])[chosen[kept]])
+    assert found.attrs["composite"] == "maximum-value" and "composite" in found.attrs["history"]
+
+
+@pytest.mark.parametrize("chunks", [ODD_CHUNKS, ODD_CHUNKS | {"time": 1}])
+def test_composite_is_lazy_and_the_same_in_chunks(stack, chunks):
+    before = stack.copy(deep=True)
+    with no_compute():
+        lazy = fifesim.composite(in_chunks(stack, chunks))
+    assert lazy.chunks is not None and lazy["date"].chunks is not None
+    xr.testing.assert_identical(lazy.compute(), fifesim.composite(stack))
+    xr.testing.assert_identical(stack, before)
+
+
+def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
+    """All bands of a cell are of one date; digital numbers go by an index that is given."""
+    red = 0.05 + 0 * stack
+    images = xr.concat([red, red * (1 + stack) / (1 - stack)], xr.DataArray(["TM3", "TM4"], dims="band", name="band"))
+    images = images.assign_coords(wavelength=("band", [0.66, 0.83])).transpose("time", "band", "y", "x")
+    images = grids.place(images.rename("surface_reflectance"), grids.geobox(stack))
+    images.attrs = {"units": "1"}
+    found = images.fifesim.composite()
+    assert found.dims == ("band", "y", "x") and found["wavelength"].values.tolist() == [0.66, 0.83]
+    np.testing.assert_allclose(found.fifesim.ndvi(), fifesim.composite(stack), rtol=0, atol=1e-14)
+    counts = (images.fillna(0) * 100).round().astype(np.uint8)
+    kept = fifesim.composite(counts, by=stack)
+    assert kept.dtype == np.uint8 and (kept[:, 2, 3] == 0).all()
+    np.testing.assert_array_equal(kept["date"], fifesim.composite(stack)["date"])
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "said"),
+    [
+        (lambda ndvi: ndvi.isel(time=0), {}, "images along time, got dimensions"),
+        (lambda ndvi: ndvi, {"method": "median"}, "method must be one of maximum-value, got 'median'"),
+        (lambda ndvi: ndvi, {"by": xr.DataArray(np.zeros((2, 2, 2)), dims=("time", "y", "x"))}, "dates of the images"),
+        (lambda ndvi: ndvi.assign_attrs(standard_name="leaf_area_index"), {}, "leaf area index by its standard_name"),
+    ],
+)
+def test_what_makes_no_composite_is_refused(stack, change, options, said):
+    with pytest.raises(ValueError, match=said):
+        fifesim.composite(change(stack), **options)

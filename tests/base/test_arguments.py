@@ -1,0 +1,223 @@
+"""Every public function with eight kinds of wrong argument: one line that names it, and no raw message of a library."""
+
+import inspect
+import pickle
+import traceback
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.accessor import PUBLIC
+from fifesim.rasters import grid as grids
+
+PACKAGE = str(Path(fifesim.__file__).parent)
+
+# What takes no arguments, or runs for long; descriptions that are read from files have messages of their own.
+LEFT_OUT = {
+    "fife_geometry", "treatments", "instrument_names", "verify", "sweep", "budget", "simulate", "Instrument",
+    "Scenario", "Setup", "Regression",
+}  # fmt: skip
+
+KINDS = ("numpy", "list", "none", "str", "dataset", "empty", "1-d", "crs")
+
+
+def placed(values, grid, name):
+    raster = grids.place(xr.DataArray(values, dims=("band", "y", "x")[-values.ndim :], name=name), grid)
+    return raster.assign_coords(sza=30.0, saa=120.0, vza=0.0, vaa=0.0, earth_sun_distance=1.0)
+
+
+@pytest.fixture(scope="module")
+def calls(tmp_path_factory):
+    """Arguments with which each public function works, as far as it can on twelve cells."""
+    folder = tmp_path_factory.mktemp("arguments")
+    rng, grid = np.random.default_rng(1), fifesim.fife_site(10.0, window=((90, 102), (180, 192)))
+    lai = placed(rng.uniform(0.5, 4, grid.shape), grid, "lai")
+    dem = placed(300 + rng.uniform(0, 4, grid.shape), grid, "dem")
+    rho = placed(rng.uniform(0.05, 0.4, (2, *grid.shape)), grid, "rho").assign_coords(
+        band=["TM3", "TM4"], wavelength=("band", [0.66, 0.83])
+    )
+    rho.attrs["instrument"] = "TM"
+    image = fifesim.sense(rho, "TM", min_valid=0.1, interval=20.0)
+    ndvi = fifesim.ndvi(rho)
+    horizon = fifesim.horizon(dem, directions=16, reach=50.0)
+    file = fifesim.to_geotiff(lai, folder / "lai.tif")
+    tables = fifesim.aerosol_tables("continental")
+    surface = {"atmosphere": None, "geometry": None, "instrument": "TM", "elevation": dem, "adjacency": False}
+    sensed = {"toa": rho, "instrument": "TM", "noise": (), "seed": 0, "noise_models": None, "min_valid": 0.1}
+    return {
+        "fife_site": {"cell": 30.0, "window": ((0, 2), (0, 2)), "datum": "NAD83"},
+        "grid_at": {"crs": "EPSG:26914", "west": 7e5, "north": 4.3e6, "width": 100.0, "height": 100.0, "cell": 10.0},
+        "Geometry": {"sza": 30.0, "saa": 120.0, "vza": 0.0, "vaa": 0.0, "earth_sun_distance": 1.0},
+        "sun_position": {"time": "1987-06-06T16:35Z", "latitude": 39.0, "longitude": -96.0, "altitude": 0.0},
+        "lai_scene": {"grid": grid, "distribution": "burned-grazed", "arp": 0.1, "seed": 1, "method": "streaming",
+                      "chunks": None},
+        "open_lai": {"path_or_raster": file, "grid": grid, "chunks": None, "allow_remote": False},
+        "lai_distribution": {"source": "burned-grazed"},
+        "correlation_length": {"arp": 0.1, "cell": 1.0},
+        "arp_for_length": {"length": 3.0, "cell": 1.0},
+        "Leaf": {"structure": 1.5, "chlorophyll": 30.0, "water": 0.01, "dry_matter": 0.01},
+        "Background": {"fractions": {"soil_dry": 1.0}},
+        "surface_reflectance": {
+            "lai": lai, "instrument": "TM", "bands": ["TM3", "TM4"], "dem": None, "horizon": None, "upwelling": True,
+            "atmosphere": None, "geometry": None, "leaf_optics": None, "background": None, "leaf_angles": "spherical",
+            "hotspot": 0.0, "exact": False,
+        },
+        "fpar": {"lai": lai, "geometry": None, "leaf_angles": "spherical", "fpar_inf": 0.94},
+        "fine_dem": {"path_or_raster": dem, "grid": grid, "fill": None, "vertical_units": None, "chunks": None},
+        "source_dem": {"path_or_raster": dem, "grid": grid[4:6, 4:6], "margin": 0.0, "fill": None},
+        "flint_hills": {"grid": grid, "seed": 0, "chunks": None},
+        "slope": {"dem": dem},
+        "aspect": {"dem": dem},
+        "horizon": {"dem": dem, "directions": 16, "reach": 50.0, "resolution": None, "beside": None},
+        "sky_view": {"dem": dem, "horizon": horizon},
+        "terrain_view": {"dem": dem, "horizon": horizon},
+        "illumination": {"dem": dem, "geometry": None, "horizon": horizon},
+        "shadow": {"dem": dem, "geometry": None, "horizon": horizon},
+        "kt": {"reflectance": rho, "dem": dem, "horizon": horizon, "atmosphere": None, "geometry": None,
+               "instrument": "TM"},
+        "Atmosphere": {"profile": "midlatitude-summer", "aerosol": "continental", "visibility": 45.0, "altitude": 0.4,
+                       "aot": None, "h2o": None, "o3": None, "engine": "5S"},
+        "read_aerosol": {"source": tables, "scale_height": None, "layer": None},
+        "aerosol_tables": {"aerosol": "continental"},
+        "to_toa": {"reflectance": rho, **surface, "surroundings": None},
+        "to_surface": {"reflectance": rho, **surface, "surroundings": None, "assume": False},
+        "compare_engines": {"setup": fifesim.Setup(bands=("TM3",)), "reflectance": 0.2, "engines": ("5S",)},
+        "sense": {**sensed, "onto": None, "interval": 20.0, "offset": (0.0, 0.0), "quantise": True, "geometry": None},
+        "scan_geometry": {"instrument": "TM", "grid": grid, "track": None, "nadir_offset": 0.0, "heading": 180.0,
+                          "chunks": None},
+        "Track": {"latitude": 39.0, "longitude": -96.0, "heading": 190.0},
+        "sense_swath": {**sensed, "track": None, "nadir_offset": 0.0, "heading": 180.0},
+        "compare": {"lai": lai, "instruments": ["TM"], "setup": fifesim.Setup(interval=20.0, min_valid=0.1),
+                    "bands": None},
+        "psf": {"instrument": "TM", "band": "TM3", "spacing": None},
+        "mtf": {"instrument": "TM", "band": "TM3", "frequency": None},
+        "NoiseModel": {"thermal": 1.0, "shot": 0.1, "detectors": 16, "gain_spread": 0.0, "offset_spread": 0.0,
+                       "along": "rows"},
+        "noise_equivalent_radiance": {"instrument": "MSI", "band": "MSI4", "radiance": 10.0},
+        "snr": {"instrument": "MSI", "band": "MSI4", "radiance": 10.0},
+        "to_radiance": {"image": image},
+        "to_reflectance": {"image": image},
+        "instrument": {"name": "TM"},
+        "read_instrument": {"path": "tm.toml"},
+        "Band": {"name": "b", "wavelength": (0.6, 0.65, 0.7), "response": (0.0, 1.0, 0.0)},
+        "aggregate": {"array": lai, "pixel": 30.0, "min_valid": 0.98, "lsf": None},
+        "ndvi": {"image": image},
+        "regress": {"y": lai, "x": ndvi, "pair": "coordinates"},
+        "relative_equivalent_noise": {"variable": lai, "ndvi": ndvi, "increment": 0.1, "slope": None, "min_count": 3,
+                                      "pair": "coordinates"},
+        "invert": {"ndvi": ndvi, "fit": fifesim.regress(lai, ndvi), "quantity": "lai", "level": 0.95},
+        "inversion_error": {"estimate": lai, "truth": lai, "pair": "coordinates"},
+        "share_kept": {"pixels": lai, "cells": lai},
+        "density": {"array": lai, "points": 32, "bandwidth": None},
+        "scale_bias": {"algorithm": np.sqrt, "array": lai, "pixel": 30.0},
+        "ndvi_linearity": {"reflectance": rho},
+        "ndvi_bias": {"reflectance": rho, "pixel": 30.0},
+        "fpar_bias": {"lai": lai, "extinction": 0.5, "fpar_inf": 0.94, "pixel": 30.0},
+        "autocovariance": {"array": lai, "reach": 30.0},
+        "variogram": {"array": lai, "reach": 30.0},
+        "regularized_variance": {"array": lai, "pixel": 30.0, "lsf": None},
+        "to_geotiff": {"raster": lai, "path": folder / "out.tif"},
+        "open_image": {"path": file, "chunks": None, "allow_remote": False},
+        "read_scenario": {"path": "scenario.toml"},
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def wrong(calls):
+    lai = calls["fpar"]["lai"]
+    elsewhere = fifesim.grid_at("EPSG:32633", 5e5, 5e6, 120, 120, 10)
+    return {
+        "numpy": np.ones((12, 12)),
+        "list": [1.0, 2.0],
+        "none": None,
+        "str": "nonsense",
+        "dataset": xr.Dataset({"a": lai, "b": lai}),
+        "empty": lai.isel(y=slice(0, 0)),
+        "1-d": lai.isel(y=0, drop=True),
+        "crs": placed(lai.values, elsewhere, "elsewhere"),
+    }
+
+
+def names_it(text, argument, kind):
+    """Whether a message names the argument; of a name that is none, or of grids that differ, it names these."""
+    stem = argument.replace("_", " ").rstrip("s")
+    others = {"str": ("nonsense",), "crs": ("raster", "grid", "lattice")}.get(kind, ())
+    also = {"leaf_optics": ("leaf reflectance", "leaf transmittance"), "source": ("aerosol",)}.get(argument, ())
+    return any(word in text.lower() for word in (argument.lower(), stem.lower(), *others, *also))
+
+
+@pytest.mark.parametrize("name", sorted(set(PUBLIC) - LEFT_OUT))
+def test_a_wrong_argument_is_named_in_a_line(calls, wrong, name, tmp_path, monkeypatch):
+    if name not in calls:
+        pytest.skip("has tests of its own")
+    monkeypatch.chdir(tmp_path)
+    function, given = getattr(fifesim, name), calls[name]
+    defaults = {key: each.default for key, each in inspect.signature(function).parameters.items()}
+    found = []
+    for argument in given:
+        for kind, value in wrong.items():
+            if value is defaults[argument]:
+                continue
+            # A Dataset of bands is a raster to some.
+            if kind == "dataset" and argument == next(iter(given)) and "Dataset" in PUBLIC[name].methods_of:
+                continue
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    function(**(given | {argument: value}))
+            except (ValueError, TypeError, FileNotFoundError) as error:
+                text, last = str(error), traceback.extract_tb(error.__traceback__)[-1].filename
+                short = len(text) <= 500 and text.count("\n") <= 2
+                if not (short and names_it(text, argument, kind) and last.startswith(PACKAGE)):
+                    found.append(f"{argument} = {kind}: {text[:150]} ({last})")
+    assert found == []
+
+
+@pytest.mark.parametrize("name", ["ndvi", "sense", "grid_at"])
+def test_a_function_that_looks_is_still_a_function(name):
+    """Its name, documentation and signature stay, and it goes to other processes."""
+    function = getattr(fifesim, name)
+    bare = inspect.unwrap(function)
+    assert bare is not function and function.__doc__ == bare.__doc__
+    assert inspect.signature(function) == inspect.signature(bare)
+    assert pickle.loads(pickle.dumps(function)) is function
+
+
+def test_what_a_user_typed(calls):
+    """Messages that were raw: each names the argument and what to type."""
+    lai, rho, grid = calls["fpar"]["lai"], calls["to_toa"]["reflectance"], calls["lai_scene"]["grid"]
+    masked = np.ma.masked_less(lai.values, 1)
+    typed = [
+        (lambda: fifesim.Geometry([30, 40], 100.0), "sza of a Geometry is one number, got an array: .*xarray.Dataset"),
+        (
+            lambda: fifesim.surface_reflectance(np.ones((3, 3))),
+            "lai must be an xarray.DataArray over .*numpy",
+        ),
+        (lambda: fifesim.slope(masked), r"dem must be .* got a masked numpy array .*filled\(numpy.nan\)"),
+        (
+            lambda: fifesim.slope(lai.to_dataset()),
+            r"dem must be .* variables, such as dataset\['lai'\]",
+        ),
+        (lambda: fifesim.slope("dem.tif"), "dem must be .*rioxarray.open_rasterio"),
+        (lambda: lai.fifesim.aggregate(grid), "pixel must be a number, got GeoBox"),
+        (lambda: lai.fifesim.aggregate("30"), "pixel must be a number, got '30'"),
+        (lambda: lai[:0].fifesim.fpar(), "lai has no cells, its sizes are y: 0, x: 12"),
+        (lambda: rho.fifesim.to_toa(surroundings="lake", adjacency=True), "surroundings must be a reflectance.*'lake'"),
+        (lambda: lai.fifesim.fpar(leaf_angles={30: 0.5, 60: 0.5}), "leaf_angles must be a name .*got a dict of 2"),
+        (lambda: fifesim.psf("TM", ["TM3"]), "band must be a name, got a list of 1"),
+        (lambda: fifesim.regress(np.ones(3), lai), "y must be an xarray.DataArray over"),
+        (lambda: lai.fifesim.regress(np.ones(3)), "x must be an xarray.DataArray over"),
+        (lambda: fifesim.lai_scene(lai), "grid must be .*GeoBox.*type raster.odc.geobox"),
+        (lambda: lai.fifesim.surface_reflectance(hotspot=lai), "hotspot must be a number, got .*one is for all cells"),
+        (lambda: lai.fifesim.surface_reflectance(exact="no"), "exact must be True or False, got 'no'"),
+        (lambda: lai.fifesim.surface_reflectance("TM", dems=1), r"surface_reflectance: .*'dems'"),
+        (lambda: rho.drop_vars(["band", "wavelength"]).drop_attrs(deep=False).fifesim.to_toa(), "neither.*wavelength"),
+    ]
+    for call, message in typed:
+        with pytest.raises((TypeError, ValueError), match=message) as caught:
+            call()
+        assert len(str(caught.value)) <= 500

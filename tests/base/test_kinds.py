@@ -1,0 +1,34 @@
+"""What a value is, and a few words for it, whatever its size."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.base import kinds
+
+
+@pytest.mark.parametrize(
+    ("kind", "fits", "others"),
+    [
+        (kinds.NUMBER, [1, 2.5, np.float32(1), np.array(3.0)], [True, "1", None, [1.0], np.ones(2), np.array("a")]),
+        (kinds.NUMBERS, [1, [1.0, 2.0], np.ones((2, 2)), xr.DataArray([1.0])], [None, "1", ["1"], np.array(["a"])]),
+        (kinds.PAIR, [30, (30, 15)], [(1, 2, 3), "30", np.ones((2, 2)), ("a", "b")]),
+        (kinds.FLAG, [True, np.bool_(False)], [1, 0, None, "no"]),
+        (kinds.CHUNKS, [256, "auto", "64MB", {"y": 2}, (2, 2), None], ["many", xr.Dataset(), np.ones(2)]),
+        (kinds.LEAF, [fifesim.Leaf(), {"TM3": (0.1, 0.1)}, (0.1, 0.1)], ["leaf", 0.1, (0.1,), xr.Dataset({"a": 1})]),
+        (kinds.INSTRUMENT, ["TM", fifesim.instrument("TM")], [None, ["TM"], 5]),
+    ],
+)
+def test_kinds_know_their_own(kind, fits, others):
+    assert all(kind.fits(value) for value in fits)
+    assert not any(kind.fits(value) for value in others)
+
+
+def test_a_value_is_told_in_a_few_words(lai):
+    values = [lai, lai.to_dataset(), lai.values, "x" * 900, list(range(900)), lai.odc.geobox, np.ma.ones(3), object]
+    for value in values:
+        text = kinds.described(value)
+        assert len(text) <= 120 and "\n" not in text
+    assert kinds.described(lai) == "an xarray.DataArray (y: 45, x: 54)"
+    assert kinds.described(np.ma.ones(3)) == "a masked numpy array (3,)"

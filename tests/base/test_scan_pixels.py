@@ -1,0 +1,98 @@
+"""Pixels of a scan on a map, against polygons and against all distances."""
+
+import numpy as np
+import pytest
+from shapely.geometry import Polygon, box
+
+from fifesim.base.scan_pixels import corners, covered_means, nearest_pixels, reach
+
+CELL = (20.0, 30.0)
+
+
+def swath(lines=7, samples=9):
+    """Centres on a map, turned and bent, off the lattice of its cells."""
+    line, sample = np.mgrid[0:lines, 0:samples]
+    row = 2.3 + 0.9 * line + 0.23 * sample + 0.01 * sample**2
+    return row, 3.1 - 0.31 * line + 1.21 * sample + 0.02 * sample**2
+
+
+def test_corners_lie_between_centres_and_tile_the_swath():
+    row, column = swath()
+    rows, columns = corners(row, column)
+    assert rows.shape == (8, 10)
+    assert rows[3, 4] == pytest.approx(row[2:4, 3:5].mean(), abs=1e-14)
+    np.testing.assert_allclose(rows[0], 2 * rows[1] - rows[2], rtol=0, atol=0.05)
+    assert columns[0, 0] < column[0, 0] < columns[1, 1]
+
+
+def test_reach_is_the_farthest_corner():
+    row, column = swath()
+    rows, columns = corners(row, column)
+    found = reach(row, column, CELL)
+    for line, sample in ((0, 0), (3, 4), (6, 8)):
+        away = [
+            np.hypot((rows[i, j] - row[line, sample]) * CELL[0], (columns[i, j] - column[line, sample]) * CELL[1])
+            for i in (line, line + 1)
+            for j in (sample, sample + 1)
+        ]
+        assert found[line, sample] == pytest.approx(max(away), rel=1e-14)
+
+
+def test_nearest_is_the_nearest_of_all():
+    row, column = swath()
+    far = reach(row, column, CELL)
+    found = nearest_pixels(row.ravel(), column.ravel(), far.ravel(), CELL, (1, 12), (0, 15))
+    i, j = np.mgrid[1:12, 0:15] + 0.5
+    away = np.hypot((i[..., None] - row.ravel()) * CELL[0], (j[..., None] - column.ravel()) * CELL[1])
+    away = np.where(away <= far.ravel(), away, np.inf)
+    expected = np.where(np.isfinite(away.min(-1)), away.argmin(-1), -1)
+    np.testing.assert_array_equal(found, expected)
+    assert (found == -1).any() and (found >= 0).sum() > 50
+
+
+def test_of_two_that_are_equally_near_the_first_is_taken():
+    row, column = np.array([0.5, 0.5]), np.array([0.0, 1.0])
+    assert nearest_pixels(row, column, np.array([30.0, 30.0]), (20.0, 20.0), (0, 1), (0, 1)) == 0
+
+
+def test_pixels_without_a_place_are_nowhere():
+    row, column = np.array([np.nan, 0.5]), np.array([0.5, np.nan])
+    found = nearest_pixels(row, column, np.array([30.0, 30.0]), CELL, (0, 2), (0, 2))
+    assert (found == -1).all()
+
+
+def test_means_go_by_the_area_that_polygons_share():
+    row, column = swath()
+    rows, columns = corners(row, column)
+    values = np.random.default_rng(3).uniform(0, 1, (2, *row.shape))
+    values[1, 2:4, 3] = np.nan
+    means, covered = covered_means(values, rows, columns, (1, 12), (0, 15))
+    total, area = np.zeros_like(means), np.zeros_like(means)
+    for line in range(row.shape[0]):
+        for sample in range(row.shape[1]):
+            around = [(line, sample), (line, sample + 1), (line + 1, sample + 1), (line + 1, sample)]
+            pixel = Polygon([(columns[at], rows[at]) for at in around])
+            for i in range(1, 12):
+                for j in range(15):
+                    share = pixel.intersection(box(j, i, j + 1, i + 1)).area
+                    for band in range(2):
+                        if np.isfinite(values[band, line, sample]):
+                            total[band, i - 1, j] += share * values[band, line, sample]
+                            area[band, i - 1, j] += share
+    np.testing.assert_allclose(covered, area, rtol=0, atol=1e-12)
+    inside = area > 1e-9
+    np.testing.assert_allclose(means[inside], (total / np.where(inside, area, 1))[inside], rtol=1e-9)
+    assert np.isnan(means[covered == 0]).all()
+
+
+def test_a_window_has_the_bits_of_the_whole():
+    rows, columns = corners(*swath())
+    values = np.random.default_rng(3).uniform(0, 1, (1, 7, 9))
+    whole = covered_means(values, rows, columns, (0, 12), (0, 15))[0]
+    part = covered_means(values[:, 1:], rows[1:], columns[1:], (5, 9), (4, 11))[0]
+    np.testing.assert_array_equal(part, whole[:, 5:9, 4:11])
+
+
+def test_one_line_does_not_tell_how_large_pixels_are():
+    with pytest.raises(ValueError, match="1 x 4 pixels does not tell"):
+        corners(np.zeros((1, 4)), np.zeros((1, 4)))

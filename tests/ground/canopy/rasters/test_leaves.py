@@ -1,0 +1,116 @@
+"""Leaves by cell: each cell as its own leaf would have it, lazily, and one line where they cannot be."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import check_raster_function
+
+import fifesim
+
+TM34 = ["TM3", "TM4"]
+CELLS = [(0, 0), (10, 20), (44, 53)]
+
+
+@pytest.fixture(scope="module")
+def by_cell(lai_values):
+    """A raster of even random numbers on the cells of the scene, one of them missing."""
+
+    def made(low, high, seed=0):
+        values = np.random.default_rng(seed).uniform(low, high, lai_values.shape)
+        values[3, 4] = np.nan
+        return lai_values.drop_attrs(deep=False).copy(data=values).rename(None)
+
+    return made
+
+
+def reflectance(lai, optics, **options):
+    return fifesim.surface_reflectance(lai, bands=TM34, leaf_optics=optics, **options)
+
+
+def test_optics_by_band_and_cell(lai, by_cell):
+    rasters = by_cell(0.02, 0.15), by_cell(0.02, 0.15, 1)
+    found = check_raster_function(
+        lambda area, rho, tau: reflectance(area, {"TM3": (rho, tau), "TM4": (0.45, 0.42)}, background=0.2),
+        lai, *rasters, quantity="surface_reflectance",
+    )  # fmt: skip
+    assert np.isnan(found[:, 3, 4]).values.tolist() == [True, False]
+    assert int(np.isnan(found).sum()) == 1
+    for cell in CELLS:
+        own = {"TM3": tuple(float(raster[cell]) for raster in rasters), "TM4": (0.45, 0.42)}
+        alone = reflectance(lai, own, background=0.2, exact=True)[(slice(None), *cell)]
+        np.testing.assert_allclose(found[(slice(None), *cell)], alone, rtol=0, atol=1e-12)
+
+
+def test_pair_of_rasters_has_all_bands(lai, by_cell):
+    one, other = by_cell(0.02, 0.1), by_cell(0.3, 0.45)
+    both = xr.concat([other, one], "band").assign_coords(band=["TM4", "TM3"])
+    xr.testing.assert_equal(
+        reflectance(lai, (both, both)), reflectance(lai, {"TM3": (one, one), "TM4": (other, other)})
+    )
+    xr.testing.assert_equal(reflectance(lai, (one, one)), reflectance(lai, dict.fromkeys(TM34, (one, one))))
+    with pytest.raises(ValueError, match="the leaf reflectance lacks band TM3, it has TM4"):
+        reflectance(lai, (both[:1], both))
+
+
+def test_one_content_by_cell(lai, by_cell):
+    """The table's bound on leaves is that on the canopy, which no leaf's change moves by more."""
+    chlorophyll = by_cell(5, 80)
+    found = check_raster_function(
+        lambda area, content: reflectance(area, fifesim.Leaf(chlorophyll=content)), lai, chlorophyll,
+        quantity="surface_reflectance",
+    )  # fmt: skip
+    exact = reflectance(lai, fifesim.Leaf(chlorophyll=chlorophyll), exact=True)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=2e-8)
+    assert np.isnan(found[:, 3, 4]).all() and int(np.isnan(found).sum()) == 2
+    for cell in CELLS:
+        alone = reflectance(lai, fifesim.Leaf(chlorophyll=float(chlorophyll[cell])), exact=True)
+        np.testing.assert_allclose(exact[(slice(None), *cell)], alone[(slice(None), *cell)], rtol=0, atol=1e-9)
+
+
+def test_kinds_of_leaf_by_cell(lai, by_cell):
+    """A map of two covers, made with `xr.where`, which drops the CRS."""
+    young = by_cell(0, 1) > 0.5
+    found = check_raster_function(
+        lambda area, which: reflectance(
+            area, fifesim.Leaf(chlorophyll=xr.where(which, 30.0, 50.0), brown=xr.where(which, 0.0, 0.5))
+        ),
+        lai, young, quantity="surface_reflectance",
+    )  # fmt: skip
+    for kind, chlorophyll, brown in ((True, 30.0, 0.0), (False, 50.0, 0.5)):
+        alone = reflectance(lai, fifesim.Leaf(chlorophyll=chlorophyll, brown=brown), exact=True)
+        mine = (young.values == kind) & np.isfinite(found.values)
+        np.testing.assert_allclose(found.values[mine], alone.values[mine], rtol=0, atol=1e-9)
+
+
+def test_goes_with_angles_and_terrain_by_cell(lai, by_cell):
+    leaf = fifesim.Leaf(water=by_cell(0.005, 0.02))
+    angles = xr.Dataset({"sza": by_cell(20, 40), "saa": 120.0})
+    found = reflectance(lai, leaf, geometry=angles)
+    cell = CELLS[1]
+    alone = reflectance(
+        lai, fifesim.Leaf(water=float(leaf.water[cell])),
+        geometry=fifesim.Geometry(float(angles["sza"][cell]), 120.0), exact=True,
+    )  # fmt: skip
+    np.testing.assert_allclose(found[(slice(None), *cell)], alone[(slice(None), *cell)], rtol=0, atol=2e-6)
+    level = lai.drop_attrs(deep=False) * 0 + 300.0
+    xr.testing.assert_allclose(reflectance(lai, leaf, dem=level), reflectance(lai, leaf), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("optics", "message"),
+    [
+        (lambda r: fifesim.Leaf(water=r.values), "Leaf: water must be a number, or a raster .* got ndarray"),
+        (lambda r: fifesim.Leaf(water=r.isel(x=0)), r"Leaf: water must be a number, .* got dimensions \('y',\)"),
+        (lambda r: {"TM3": r, "TM4": r}, "leaf_optics of TM3 are a pair"),
+        (lambda r: {"TM3": (r, r)}, "no leaf optics for band 'TM4'"),
+        (lambda r: {"TM3": (r.values, r), "TM4": (r, r)}, "TM3 must be a number, or one raster"),
+        (lambda r: {"TM3": (r * 100, r), "TM4": (r, r)}, r"leaf reflectance must be in \[0, 1\]"),
+        (lambda r: fifesim.Leaf(water=r * 100), r"Leaf: water must be in \[0, 0.2\] cm"),
+        (lambda r: {"TM3": (r, r.assign_coords(x=r["x"] + 9)), "TM4": (r, r)}, "different grids"),
+        (lambda r: (r, 0.1), "the leaf transmittance is a raster"),
+    ],
+)
+def test_what_cannot_be_is_one_line(lai, by_cell, optics, message):
+    with pytest.raises(ValueError, match=message) as caught:
+        reflectance(lai, optics(by_cell(0.02, 0.15)))
+    assert len(str(caught.value)) <= 500

@@ -1,0 +1,163 @@
+"""Pictures: what they draw, in which colours, where and under which title."""
+
+import subprocess
+import sys
+
+import dask.array as da
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.rasters import grid as grids
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    matplotlib.use("agg")
+    yield
+    plt.close("all")
+
+
+def drawn(axes):
+    return (axes.images or axes.collections)[0]
+
+
+def test_importing_fifesim_does_not_import_matplotlib():
+    code = "import sys, fifesim; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_an_image_is_drawn_in_colours_on_its_ground(whole):
+    axes = whole["image"].fifesim.plot(composite=("TM4", "TM3", "TM3"))
+    box = grids.geobox(whole["image"]).boundingbox
+    np.testing.assert_allclose(drawn(axes).get_extent(), [box.left, box.right, box.bottom, box.top])
+    assert axes.get_xlabel() == "Easting [m]" and axes.get_aspect() == 1
+    colours = whole["image"].fifesim.rgb(("TM4", "TM3", "TM3"))
+    np.testing.assert_array_equal(drawn(axes).get_array()[..., :3], colours)
+    assert axes.get_title().startswith("TM4, TM3, TM3 as red, green, blue\nLandsat-5 Thematic Mapper")
+    assert "earth_sun_distance" not in axes.get_title()
+
+
+def test_no_data_are_transparent_above_grey(whole):
+    image = whole["image"].copy(deep=True)
+    image[0, 1, 2] = 0
+    alpha = np.asarray(drawn(image.fifesim.plot()).get_array())[..., 3]
+    assert alpha[1, 2] == 0 and alpha.sum() == alpha.size - 1
+    one = np.ma.getmaskarray(drawn(image.fifesim.plot(band="TM3")).get_array())
+    assert one[1, 2] and one.sum() == 1
+
+
+def test_a_quantity_has_its_colours_and_a_bar_with_its_unit(whole):
+    axes = whole["lai"].fifesim.plot(stretch=(0, 100))
+    picture = drawn(axes)
+    assert picture.get_cmap().name == "YlGn"
+    assert picture.get_clim() == (float(whole["lai"].min()), float(whole["lai"].max()))
+    assert axes.figure.axes[1].get_ylabel() == "LAI [m² m⁻²]"
+    factor = (whole["lai"] * 0 + 1.0).rename("kt")
+    factor[0, 0], factor[0, 1] = 0.9, 1.3
+    picture = drawn(factor.fifesim.plot(stretch=(0, 100)))
+    assert picture.get_cmap().name == "RdBu_r" and picture.get_clim() == pytest.approx((0.7, 1.3))
+    picture = drawn(factor.fifesim.plot(cmap="magma", limits=(0, 2)))
+    assert picture.get_cmap().name == "magma" and picture.get_clim() == (0, 2)
+
+
+def test_axes_of_one_s_own_and_kilometres(whole):
+    figure, axes = plt.subplots()
+    large = whole["lai"].isel(y=slice(2), x=slice(2)).drop_attrs()
+    large = grids.place(large, fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 8000.0, 8000.0, 4000.0))
+    assert large.fifesim.plot(axes=axes) is axes and len(figure.axes) == 2
+    assert axes.get_ylabel() == "Northing [km]"
+    np.testing.assert_allclose(drawn(axes).get_extent(), [705, 713, 4326, 4334])
+
+
+def test_a_large_lazy_scene_is_not_loaded_whole():
+    """60 km in cells of 3 m, of which the picture takes chunks one by one."""
+    grid = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 60000.0, 60000.0, 3.0)
+    held = []
+
+    def make(block_info=None):
+        held.append(block_info[None]["chunk-shape"])
+        return np.full(held[-1], 0.5, np.float32)
+
+    cells = da.map_blocks(make, chunks=((4000,) * 5, (4000,) * 5), dtype=np.float32, meta=np.empty((0, 0), np.float32))
+    scene = grids.place(xr.DataArray(cells, dims=("y", "x"), name="ndvi"), grid)
+    picture = drawn(scene.fifesim.plot(size=100))
+    assert picture.get_array().shape == (100, 100)
+    # The middle of 200 cells is the edge of one: half a cell.
+    np.testing.assert_allclose(picture.get_extent(), [705, 765, 4274, 4334], rtol=0, atol=1.6e-3)
+    assert len(held) == 25
+
+
+def test_a_scan_is_drawn_where_its_pixels_lie(site):
+    lai = fifesim.lai_scene(site, "burned-grazed", seed=7)
+    image = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa()
+    image = image.fifesim.sense_swath("TM", heading=193.6)
+    for axes in (image.fifesim.plot(), image.fifesim.ndvi().fifesim.plot()):
+        corners = drawn(axes).get_coordinates()
+        assert corners.shape == (image.sizes["line"] + 1, image.sizes["sample"] + 1, 2)
+        inside = corners[1:-1, 1:-1].mean((0, 1))
+        np.testing.assert_allclose(inside, [image["x"].mean(), image["y"].mean()], rtol=0, atol=1e-2)
+
+
+def test_a_scan_that_knows_degrees_alone_is_drawn_in_them():
+    line, sample = np.mgrid[0:4, 0:5]
+    places = {"latitude": (("line", "sample"), 60 - line * 0.01), "longitude": (("line", "sample"), 9 + sample * 0.02)}
+    axes = xr.DataArray(line + 0.0, dims=("line", "sample"), coords=places, name="ndvi").fifesim.plot()
+    assert axes.get_ylabel() == "Latitude [°]" and axes.get_aspect() == pytest.approx(2, rel=1e-2)
+    np.testing.assert_allclose(drawn(axes).get_coordinates()[0, 0], [8.99, 60.005])
+
+
+def test_what_is_no_map_is_named(whole):
+    with pytest.raises(ValueError, match=r"there is no band 'TM1': the raster has TM3, TM4"):
+        whole["image"].fifesim.plot(band="TM1")
+    with pytest.raises(ValueError, match=r"a map has dimensions \(\[band\], y, x\)"):
+        whole["image"].expand_dims("scene").fifesim.plot()
+    with pytest.raises(TypeError, match=r"must be an xarray\.DataArray"):
+        fifesim.plot(whole["image"].to_dataset())
+
+
+def test_a_fit_is_drawn_with_its_pixels(whole):
+    fit = fifesim.regress(whole["truth"], whole["ndvi"])
+    axes = fit.plot(whole["truth"], whole["ndvi"])
+    assert axes.get_xlabel() == "Normalized difference vegetation index"
+    assert axes.get_ylabel() == "Leaf area index [m² m⁻²]"
+    x, y = axes.lines[0].get_data()
+    np.testing.assert_allclose(y, fit.predict(x))
+    values = whole["ndvi"].values
+    assert (x[0], x[-1]) == (np.nanmin(values), np.nanmax(values))
+    assert f"n = {fit.n}" in axes.get_title() and "R² = " in axes.get_title()
+    pixels = axes.collections[0].get_array()
+    assert pixels.sum() == fit.n
+
+
+def test_a_fit_is_drawn_of_a_part_of_many_pixels():
+    grid = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 90000.0, 60.0, 30.0)
+    x = grids.place(xr.DataArray(np.random.default_rng(1).uniform(0, 1, (2, 3000)), dims=("y", "x"), name="x"), grid)
+    y = (2 * x + 1).rename("y")
+    axes = fifesim.regress(y, x).plot(y, x)
+    assert axes.collections[0].get_array().sum() == 1500
+
+
+def test_a_fit_alone_is_a_line_about_the_mean(whole):
+    fit = fifesim.regress(whole["truth"], whole["ndvi"])
+    axes = fit.plot(level=0.9)
+    x, _ = axes.lines[0].get_data()
+    assert x.mean() == pytest.approx(fit.x_mean)
+    assert axes.get_legend().get_texts()[0].get_text() == "90 % prediction interval"
+    with pytest.raises(ValueError, match="give both rasters or none"):
+        fit.plot(whole["truth"])
+
+
+def test_instruments_stand_side_by_side_in_the_same_colours(lai):
+    images = fifesim.compare(lai, ["MSI", "TM"])
+    figure = images.fifesim.plot_comparison()
+    panels = [axes for axes in figure.axes if axes.images]
+    assert [axes.get_title().split(",")[0] for axes in panels] == ["MSI", "TM"]
+    assert panels[0].images[0].get_clim() == panels[1].images[0].get_clim()
+    mean = float(images["TM"]["dn"].fifesim.ndvi().mean())
+    assert f"mean {mean:.3f}" in panels[1].get_title() and "30 m" in panels[1].get_title()
+    with pytest.raises(ValueError, match="no image has a red and a near infrared band"):
+        xr.DataTree.from_dict({"/TM": images["TM/dn"].isel(band=[0]).to_dataset()}).fifesim.plot_comparison()

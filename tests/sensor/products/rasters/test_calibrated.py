@@ -1,0 +1,136 @@
+"""Digital numbers of one's own."""
+
+import numpy as np
+import pytest
+import rioxarray  # noqa: F401  registers .rio
+import xarray as xr
+from lazy import check_raster_function, in_chunks
+
+import fifesim
+from fifesim.base.geometry import Geometry
+from fifesim.rasters import grid as grids
+
+SUN = Geometry(35.0, 130.0, earth_sun_distance=1.0148)
+GRID = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 240.0, 180.0, 30.0)
+
+
+@pytest.fixture
+def dn():
+    values = np.random.default_rng(1).integers(10, 250, (2, *GRID.shape)).astype(np.uint8)
+    values[:, 2, 3] = 0
+    return grids.place(xr.DataArray(values, dims=("band", "y", "x"), coords={"band": ["TM3", "TM4"]}), GRID)
+
+
+def test_an_image_is_as_sense_makes_one(dn):
+    image = check_raster_function(lambda raster: fifesim.calibrate(raster, "TM", geometry=SUN), dn, quantity="dn")
+    np.testing.assert_array_equal(image, dn)
+    assert (image.dtype, image.attrs["instrument"], image.attrs["_FillValue"]) == (np.uint8, "TM", 0)
+    # Planetary reflectance by hand, from Table 1's radiances and Chander's solar irradiances.
+    gain, offset = np.array([(204.3 + 1.2) / 255, (206.2 + 1.5) / 255]), np.array([-1.2, -1.5])
+    radiance = gain[:, None, None] * np.where(dn == 0, np.nan, dn.values) + offset[:, None, None]
+    sun = np.array([1536.0, 1031.0])[:, None, None] * np.cos(np.radians(35.0)) / (np.pi * 1.0148**2)
+    np.testing.assert_allclose(image.fifesim.to_radiance(), radiance, rtol=1e-12)
+    np.testing.assert_allclose(image.fifesim.to_reflectance(), radiance / sun, rtol=1e-12)
+    red, nir = radiance / sun
+    np.testing.assert_allclose(image.fifesim.ndvi(), (nir - red) / (nir + red), rtol=0, atol=1e-12)
+    assert np.isnan(image.fifesim.to_surface()[:, 2, 3]).all()
+
+
+def test_the_sun_is_that_of_the_time_over_the_grid(dn):
+    image = fifesim.calibrate(dn, "TM", time="1987-06-06T16:35:00Z")
+    expected = fifesim.sun_position("1987-06-06T16:35:00Z", 39.1277, -96.6265)
+    assert float(image["sza"]) == pytest.approx(expected.sza, abs=0.01)
+    assert float(image["saa"]) == pytest.approx(expected.saa, abs=0.01)
+    assert float(image["earth_sun_distance"]) == pytest.approx(expected.earth_sun_distance, abs=1e-8)
+    assert image["time"].values == np.datetime64("1987-06-06T16:35:00")
+
+
+def test_a_time_zone_counts(dn):
+    one, two = (
+        fifesim.calibrate(dn, "TM", time=time) for time in ("1987-06-06T16:35:00Z", "1987-06-06T11:35:00-05:00")
+    )
+    xr.testing.assert_identical(one, two)
+    carried = fifesim.calibrate(dn.assign_coords(time=np.datetime64("1987-06-06T16:35:00", "ns")), "TM")
+    np.testing.assert_array_equal(carried["sza"], one["sza"])
+
+
+def test_what_the_raster_carries_of_the_sun_is_taken(dn):
+    carried = dn.assign_coords(sza=35.0, saa=130.0, vza=0.0, vaa=0.0, earth_sun_distance=1.0148)
+    xr.testing.assert_identical(fifesim.calibrate(carried, "TM"), fifesim.calibrate(dn, "TM", geometry=SUN))
+    assert float(fifesim.calibrate(carried, "TM", time="1987-06-06T18:00Z")["sza"]) != 35.0
+
+
+@pytest.mark.parametrize(
+    ("gain", "offset"), [([0.5, 0.25], [1.0, -2.0]), ({"TM3": 0.5, "TM4": 0.25}, {"TM4": -2.0, "TM3": 1.0})]
+)
+def test_a_calibration_may_be_given(dn, gain, offset):
+    image = fifesim.calibrate(dn, "TM", geometry=SUN, gain=gain, offset=offset)
+    expected = (
+        np.where(dn == 0, np.nan, dn) * np.array([0.5, 0.25])[:, None, None] + np.array([1.0, -2.0])[:, None, None]
+    )
+    np.testing.assert_allclose(image.fifesim.to_radiance(), expected, rtol=1e-14)
+
+
+def test_numbers_of_a_product_take_its_scale():
+    """Landsat 8's of 16 bits, where the instrument has 12."""
+    values = np.array([[[11000, 0], [20000, 65535]]], np.uint16)
+    place = fifesim.grid_at("EPSG:32610", 353700.0, 5374200.0, 60.0, 60.0, 30.0)
+    dn = grids.place(xr.DataArray(values, dims=("band", "y", "x"), coords={"band": ["OLI4"]}), place)
+    with pytest.raises(ValueError, match=r"digital number of 11000: whole ones from 0 to 4095 are recorded. .*gain="):
+        fifesim.calibrate(dn, "OLI", geometry=SUN)
+    image = fifesim.calibrate(dn, "OLI", geometry=SUN, gain=1.0288e-2, offset=-51.43874)
+    expected = 1.0288e-2 * np.array([11000, np.nan, 20000, 65535]) - 51.43874
+    np.testing.assert_allclose(image.fifesim.to_radiance().values.ravel(), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("dtype", [np.int16, np.float32])
+def test_other_types_and_no_data_become_0(dn, dtype):
+    raster = dn.astype(dtype)
+    raster[:, 0, 0] = -9999
+    if dtype == np.float32:
+        raster[:, 0, 1] = np.nan
+    image = fifesim.calibrate(raster, "TM", geometry=SUN, nodata=-9999)
+    assert (image.dtype, int(image[0, 0, 0])) == (np.uint8, 0)
+    np.testing.assert_array_equal(image[:, 1:], dn[:, 1:])
+    with pytest.raises(ValueError, match=r"digital number of -9999: .*nodata="):
+        fifesim.calibrate(raster, "TM", geometry=SUN)
+
+
+def test_lazy_numbers_are_checked_when_they_compute(dn):
+    lazy = in_chunks(dn.astype(np.int16) - 20, {"y": 2, "x": 3})
+    image = fifesim.calibrate(lazy, "TM", geometry=SUN)
+    with pytest.raises(ValueError, match="digital number of -"):
+        image.compute()
+
+
+def test_one_band_without_a_dimension(dn):
+    image = fifesim.calibrate(dn.isel(band=1), "TM", geometry=SUN)
+    assert image.dims == ("band", "y", "x") and image["band"].values.tolist() == ["TM4"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({}, "nothing says where the sun stands over the raster"),
+        ({"time": "noon"}, "time must be a date and time such as 1987-06-06T16:35:00Z, got 'noon'"),
+        ({"time": "1987-06-06T06:35"}, "the sun is below the horizon"),
+        ({"geometry": SUN, "gain": 1.0}, "give both, or neither"),
+        ({"geometry": SUN, "gain": -1.0, "offset": 0.0}, "gain must be above 0"),
+        (
+            {"geometry": SUN, "gain": [1.0, 2.0, 3.0], "offset": 0.0},
+            "gain must be a number, or one for each of 2 bands",
+        ),
+        ({"geometry": SUN, "gain": {"TM3": 1.0}, "offset": 0.0}, "gain has no number for TM4: it has TM3"),
+    ],
+)
+def test_what_is_missing_is_asked_for(dn, options, said):
+    with pytest.raises(ValueError, match=said):
+        fifesim.calibrate(dn, "TM", **options)
+
+
+def test_an_image_is_not_calibrated_twice(dn):
+    image = fifesim.calibrate(dn, "TM", geometry=SUN)
+    with pytest.raises(ValueError, match=r"carries a calibration already: drop it with \.drop_vars"):
+        image.fifesim.calibrate("TM")
+    with pytest.raises(TypeError, match=r"dn must be an xarray\.DataArray"):
+        fifesim.calibrate(dn.values, "TM")

@@ -1,0 +1,129 @@
+"""Any cube in: hyperspectral images and field spectra as the bands of an instrument."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import check_raster_function
+
+import fifesim
+from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
+from fifesim.rasters import grid as grids
+from fifesim.sensor.response.spectral import band_weights, covered_steps
+
+
+@pytest.fixture(scope="module")
+def leaf():
+    """Reflectance and transmittance of a leaf, as two field spectra."""
+    wavelength, reflectance, transmittance = leaf_spectrum(Leaf())
+    values = np.stack([reflectance, transmittance])
+    return xr.DataArray(values, dims=("sample", "wavelength"), coords={"wavelength": wavelength})
+
+
+@pytest.fixture(scope="module")
+def cube(site):
+    """A leaf's spectrum of changing brightness in steps of 20 nm."""
+    wavelength, reflectance, _ = leaf_spectrum(Leaf())
+    brightness = np.random.Generator(np.random.Philox(5)).uniform(0.2, 1, site.shape)
+    values = reflectance[::20, None, None] * brightness
+    coords = {"wavelength": ("band", wavelength[::20] * 1000, {"units": "nm"}), "sza": 30.0, "saa": 120.0}
+    return grids.place(xr.DataArray(values, dims=("band", "y", "x"), coords=coords), site)
+
+
+def test_cube_becomes_bands_lazily(cube):
+    image = check_raster_function(lambda each: each.fifesim.to_bands("OLI"), cube, quantity="surface_reflectance")
+    assert image["band"].values.tolist() == [band.name for band in fifesim.instrument("OLI").bands]
+    assert image.attrs["instrument"] == "OLI" and float(image["sza"]) == 30
+    assert image.attrs["history"] == "to_bands: OLI, 106 wavelengths weighted by response and sun"
+
+
+def test_bands_are_weighted_sums_of_samples(leaf):
+    image = leaf.fifesim.to_bands("TM", bands=["TM4", "TM2"])
+    wavelength = leaf["wavelength"].values
+    for name in ("TM4", "TM2"):
+        (band,) = fifesim.instrument("TM").select(name)
+        weights = band_weights(band.response, wavelength, covered_steps(wavelength)).weights
+        np.testing.assert_allclose(image.sel(band=name), leaf.values @ weights, rtol=1e-9)
+    assert image.dims == ("sample", "band") and image["band"].values.tolist() == ["TM4", "TM2"]
+
+
+@pytest.mark.parametrize("name", ["OLI", "MSI", "MODIS", "AVHRR"])
+def test_flat_spectrum_stays_flat(leaf, name):
+    np.testing.assert_allclose(xr.full_like(leaf, 0.3).fifesim.to_bands(name), 0.3, rtol=0, atol=1e-12)
+
+
+def test_order_of_the_samples_does_not_matter(leaf):
+    back = leaf.isel(wavelength=slice(None, None, -1))
+    np.testing.assert_allclose(back.fifesim.to_bands("OLI"), leaf.fifesim.to_bands("OLI"), rtol=1e-13)
+
+
+def test_bands_go_on_to_an_image(cube):
+    toa = cube.fifesim.to_bands("OLI", bands=["OLI4", "OLI5"]).fifesim.to_toa()
+    image = toa.fifesim.sense("OLI")
+    assert image.dtype == np.uint16 and np.isfinite(image.fifesim.ndvi()).all()
+
+
+def test_missing_sample_is_missing_in_its_bands_and_cell_alone(cube):
+    cube = cube.copy(deep=True)
+    cube[{"band": int(np.argmin(abs(cube["wavelength"].values - 865))), "y": 3, "x": 4}] = np.nan
+    image = cube.fifesim.to_bands("OLI")
+    missing = np.argwhere(np.isnan(image.values))
+    assert [image["band"].values[band] for band, *_ in missing] == ["OLI5"]
+    assert missing[0, 1:].tolist() == [3, 4]
+
+
+def test_radiance_is_weighted_by_the_response_alone():
+    wavelength = np.linspace(0.4, 1.0, 121)
+    radiance = xr.DataArray(100 * wavelength, dims="wavelength", coords={"wavelength": wavelength})
+    radiance.attrs["units"] = "W m-2 sr-1 um-1"
+    found = radiance.fifesim.to_bands("OLI", bands=["OLI4"])
+    assert found.name == "toa_radiance" and found.attrs["units"] == "W m-2 sr-1 um-1"
+    # The mean of the wavelength over the response is the band's centre.
+    assert float(found[0]) == pytest.approx(100 * fifesim.instrument("OLI").select("OLI4")[0].wavelength, rel=1e-5)
+    assert "solar_irradiance" in found.coords
+    reflectance = radiance.drop_attrs() / 100
+    assert float(reflectance.fifesim.to_bands("OLI", bands=["OLI4"])[0]) < float(found[0]) / 100 - 1e-5
+
+
+def test_reflectance_at_the_top_stays_what_it_is(cube):
+    toa = cube.assign_attrs(standard_name="toa_bidirectional_reflectance")
+    assert toa.fifesim.to_bands("OLI").name == "toa_reflectance"
+
+
+def without(leaf, low, high):
+    return leaf.isel(wavelength=(leaf["wavelength"].values < low) | (leaf["wavelength"].values > high))
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "said"),
+    [
+        (
+            lambda leaf: without(leaf, 1.58, 1.61),
+            {},
+            r"OLI6 [\d.]+%, without 1\.579 to 1\.611 um: pick others with bands=",
+        ),
+        (lambda leaf: without(leaf, 2.2, 9.0), {}, r"to 2\.199 um, and cover less than 0\.99 of OLI7 \d"),
+        (lambda leaf: without(leaf, 1.0, 9.0), {}, r"hold nothing of OLI6, OLI7, OLI9 of OLI: pick bands, .*'OLI8'\]"),
+        (lambda leaf: (leaf * 1e4).astype(np.int16), {}, "whole numbers"),
+        (lambda leaf: leaf, {"min_coverage": 99}, "min_coverage must be in"),
+        (lambda leaf: leaf.assign_attrs(units="%"), {}, "units '%'"),
+        (lambda leaf: leaf.assign_coords(wavelength=leaf["wavelength"] * 1000), {}, "without a unit"),
+    ],
+)
+def test_what_cannot_be_bands_is_refused(leaf, change, options, said):
+    with pytest.raises(ValueError, match=said) as error:
+        change(leaf).fifesim.to_bands("OLI", **options)
+    assert len(str(error.value)) <= 500
+
+
+def test_a_gap_may_be_accepted(leaf):
+    """What is missing then has no weight, and the rest keeps the mean of a flat spectrum."""
+    gap = without(xr.full_like(leaf, 0.3), 1.58, 1.61)
+    assert float(gap.fifesim.to_bands("OLI", bands="OLI6", min_coverage=0.5)[0, 0]) == pytest.approx(0.3, abs=1e-12)
+
+
+def test_widths_decide_what_a_gap_is(leaf):
+    sparse = leaf.isel(wavelength=slice(None, None, 20))
+    assert sparse.fifesim.to_bands("OLI", bands="OLI6").notnull().all()
+    narrow = sparse.assign_coords(fwhm=("wavelength", np.full(sparse.sizes["wavelength"], 0.005)))
+    with pytest.raises(ValueError, match="hold nothing of OLI6"):
+        narrow.fifesim.to_bands("OLI", bands="OLI6")

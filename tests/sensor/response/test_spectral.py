@@ -1,0 +1,118 @@
+"""Weights of samples in bands, beside quadrature, by hand and beside another library."""
+
+import numpy as np
+import pytest
+
+from fifesim.base.bands import Band, solar_spectrum
+from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.response.spectral import band_weights, covered_steps
+
+TRIANGLE = Band("triangle", (0.5, 0.6, 0.7), (0.0, 1.0, 0.0))
+BANDS = [band.response for name in ("OLI", "MSI", "TM") for band in instrument(name).bands]
+
+
+@pytest.fixture(scope="module")
+def spectrum():
+    """A leaf, in steps of 5 to 11 nm that never repeat where responses or the sun have nodes."""
+    wavelength, reflectance, _ = leaf_spectrum(Leaf())
+    uneven = 0.4 + np.cumsum([0.0, *np.linspace(0.005, 0.0111, 260)])
+    uneven = uneven[uneven < 2.5]
+    return uneven, np.interp(uneven, wavelength, reflectance)
+
+
+def by_quadrature(band, wavelength, values, sun):
+    """Gauss's rule with five nodes between all places where anything bends, on the interpolated spectrum itself."""
+    x, w = np.polynomial.legendre.leggauss(5)
+    low, high = band.limits
+    bends = np.concatenate([band.wavelength, wavelength, solar_spectrum()[0], [low, high]])
+    edges = np.unique(bends[(bends >= low) & (bends <= high)])
+    at = (edges[1:] + edges[:-1])[:, None] / 2 + np.diff(edges)[:, None] / 2 * x
+    density = np.interp(at, band.wavelength, band.response) * w * np.diff(edges)[:, None] / 2
+    density = density * np.interp(at, *solar_spectrum()) if sun else density
+    return np.sum(density * np.interp(at, wavelength, values)) / np.sum(density)
+
+
+@pytest.mark.parametrize("sun", [True, False])
+def test_mean_is_the_integral_of_the_straight_spectrum(spectrum, sun):
+    wavelength, values = spectrum
+    for band in BANDS:
+        found = band_weights(band, wavelength, covered_steps(wavelength), sun=sun)
+        assert found.coverage == pytest.approx(1, abs=1e-12)
+        assert found.weights @ values == pytest.approx(by_quadrature(band, wavelength, values, sun), rel=1e-9)
+
+
+def test_flat_spectrum_stays_flat(spectrum):
+    wavelength, _ = spectrum
+    sums = [band_weights(band, wavelength, covered_steps(wavelength)).weights.sum() for band in BANDS]
+    np.testing.assert_allclose(sums, 1, rtol=0, atol=1e-12)
+
+
+def test_mean_is_near_that_of_the_band_itself():
+    """`Band.mean` is the trapezoidal rule at 1 nm: it differs from the integral by its error alone."""
+    wavelength, values, _ = leaf_spectrum(Leaf())
+    sun = np.interp(wavelength, *solar_spectrum())
+    for band in BANDS:
+        found = band_weights(band, wavelength, covered_steps(wavelength)).weights @ values
+        assert found == pytest.approx(band.mean(values, wavelength, sun), abs=1e-4)
+
+
+def test_the_sun_draws_a_mean_to_where_it_is_strong():
+    """Between 0.5 and 0.7 um the sun falls with wavelength, so that a rising spectrum has a lower mean below it."""
+    rising = np.array([0.0, 0.5, 1.0])
+    wavelength = np.array([0.4, 0.6, 0.8])
+    with_sun, without = (band_weights(TRIANGLE, wavelength, [True, True], sun=sun).weights @ rising for sun in (1, 0))
+    assert without == pytest.approx(0.5, abs=1e-12)
+    assert 0.48 < with_sun < 0.4999
+
+
+def test_half_a_band_is_half_covered():
+    found = band_weights(TRIANGLE, [0.3, 0.6], [True], sun=False)
+    assert found.coverage == pytest.approx(0.5, abs=1e-12)
+    assert found.weights.sum() == pytest.approx(1, abs=1e-12)
+    np.testing.assert_allclose(found.missing, [(0.6, 0.7)])
+
+
+def test_a_gap_has_no_weight_and_is_named():
+    wavelength = np.round(np.arange(0.45, 0.755, 0.01), 3)
+    wavelength = wavelength[(wavelength <= 0.58) | (wavelength >= 0.63)]
+    covered = covered_steps(wavelength)
+    found = band_weights(TRIANGLE, wavelength, covered, sun=False)
+    # The response's integral from 0.58 to 0.63 um, over 0.1.
+    assert found.coverage == pytest.approx(1 - (0.02 * 0.9 + 0.03 * 0.85) / 0.1, abs=1e-12)
+    np.testing.assert_allclose(found.missing, [(0.58, 0.63)])
+    values = np.where(wavelength < 0.6, 0.1, 0.5)
+    left, right = 0.5 * 0.08 * 0.8, 0.5 * 0.07 * 0.7
+    assert found.weights @ values == pytest.approx((0.1 * left + 0.5 * right) / (left + right), abs=1e-12)
+
+
+def test_a_band_elsewhere_has_no_weights():
+    found = band_weights(TRIANGLE, [0.8, 0.9], [True])
+    assert (found.coverage, found.weights.tolist()) == (0.0, [0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("wavelength", "fwhm", "covered"),
+    [
+        ([0.50, 0.51, 0.52, 0.54, 0.55, 0.56], None, [True] * 5),  # one sample dropped
+        ([0.50, 0.51, 0.52, 0.55, 0.56, 0.57], None, [True, True, False, True, True]),  # two
+        ([0.5, 0.501, 0.502, 0.503, 0.513, 0.523, 0.533], None, [True] * 6),  # a coarser detector follows
+        ([0.5, 0.51, 0.52, 0.62, 0.72, 0.73, 0.74], None, [True, True, False, False, True, True]),  # one alone
+        ([0.50, 0.51, 0.53], [0.009, 0.011, 0.008], [True, False]),
+        ([0.50, 0.51, 0.53], [0.009, 0.011, 0.009], [True, True]),
+    ],
+)
+def test_steps_that_are_gaps(wavelength, fwhm, covered):
+    assert covered_steps(wavelength, fwhm).tolist() == covered
+
+
+def test_means_agree_with_spectral_python():
+    """SPy takes a band for a Gaussian cut off at half its maximum, and a spectrum for steps of one sample each."""
+    spectral = pytest.importorskip("spectral")
+    wavelength, values, _ = leaf_spectrum(Leaf())
+    for center, width in ((0.56, 0.06), (0.70, 0.04), (0.842, 0.115), (1.61, 0.09), (2.19, 0.18)):
+        theirs = spectral.BandResampler(wavelength, [center], fwhm2=[width])(values)[0]
+        nodes = np.linspace(center - width / 2, center + width / 2, 401)
+        gauss = np.exp(-4 * np.log(2) * ((nodes - center) / width) ** 2)
+        ours = band_weights(Band("gauss", nodes, gauss), wavelength, covered_steps(wavelength), sun=False)
+        assert ours.weights @ values == pytest.approx(theirs, rel=1e-4)
