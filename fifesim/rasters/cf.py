@@ -79,6 +79,12 @@ QUANTITIES = {
     "adjustment_error": Quantity("1", "", "standard error of the surface reflectance from another instrument's bands"),
     "gain": Quantity("W m-2 sr-1 um-1", "", "radiance of one digital count"),
     "offset": Quantity("W m-2 sr-1 um-1", "", "radiance of digital number 0"),
+    "compression": Quantity(
+        "1",
+        "",
+        "largest digital number of a scale of square roots",
+        "if not 0, (dn^2 + 1/4) / compression stands for dn",
+    ),
 }
 
 # What a result keeps of its inputs' attributes; everything else is replaced.

@@ -262,7 +262,8 @@ def _describe(sink, array, described):
     for number, name in enumerate(names, 1):
         sink.set_band_description(number, name)
         _describe_band(sink, number, array.isel(band=number - 1))
-    if "gain" in array.coords:
+    # A GIS has no scale of square roots.
+    if "gain" in array.coords and "compression" not in array.coords:
         sink.scales, sink.offsets = array["gain"].values.tolist(), array["offset"].values.tolist()
         sink.units = [cf.QUANTITIES["toa_radiance"].units] * len(names)
     else:

@@ -85,9 +85,10 @@ def sense(
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
         Digital numbers from 1; 0 is no data. ``gain``, ``offset``, ``wavelength`` and ``solar_irradiance`` are
-        coordinates along band. Without ``quantise``, radiance with the latter two. Of bands of several resolutions, an
-        `xarray.DataTree` with a node for each, such as ``/10m`` and ``/20m``, that holds its ``dn``, or
-        ``toa_radiance``. [1 or W m-2 sr-1 um-1]
+        coordinates along band, and ``compression`` where a band has a scale of square roots. Without ``quantise``,
+        radiance with ``wavelength`` and ``solar_irradiance``. Of bands of several resolutions, an `xarray.DataTree`
+        with a node for each, such as ``/10m`` and ``/20m``, that holds its ``dn``, or ``toa_radiance``.
+        [1 or W m-2 sr-1 um-1]
 
     Raises
     ------
@@ -181,11 +182,21 @@ def recorded(radiance, description, bands, quantise, product_geometry=None):
     if quantise:
         gain, offset, bits = digital_numbers.scale(description, bands, product_geometry)
         scales = [xr.DataArray(each, dims="band") for each in (gain, offset)]
+        # A product's numbers are linear, whatever the detector's are.
+        compression = [band.compressed_count(bits) if product_geometry is None else 0 for band in bands]
         dtype = np.uint8 if bits <= 8 else np.uint16
-        radiance = chunks.pointwise(calibration.radiance_to_dn, radiance, *scales, dtype=dtype, bits=bits)
+        kernel = calibration.radiance_to_dn if not any(compression) else _compressed
+        scales += [xr.DataArray(compression, dims="band")] if any(compression) else []
+        radiance = chunks.pointwise(kernel, radiance, *scales, dtype=dtype, bits=bits)
         along_band |= {"gain": gain, "offset": offset}
+        along_band |= {"compression": compression} if any(compression) else {}
     along_band["solar_irradiance"] = [band.solar_irradiance for band in bands]
     return radiance.assign_coords(cf.band_coordinates(**along_band))
+
+
+def _compressed(radiance, gain, offset, compression, bits):
+    """Digital numbers of bands of which some have a scale of square roots."""
+    return calibration.radiance_to_dn(radiance, gain, offset, bits, compression)
 
 
 def labelled(image, toa, description, history):
@@ -234,7 +245,7 @@ def to_radiance(image):
     Parameters
     ----------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
-        With coordinates ``gain`` and ``offset``, as `sense` makes it.
+        With coordinates ``gain`` and ``offset``, and ``compression`` where it has one, as `sense` makes it.
 
     Returns
     -------
@@ -253,8 +264,9 @@ def to_radiance(image):
     missing = {"gain", "offset"} - set(image.coords)
     if missing:
         raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
-    out = chunks.pointwise(calibration.dn_to_radiance, image, _along_band(image, "gain"), _along_band(image, "offset"))
-    out = swaths.placed_as(out.drop_vars(["gain", "offset"]), image)
+    names = [name for name in ("gain", "offset", "compression") if name in image.coords]
+    out = chunks.pointwise(calibration.dn_to_radiance, image, *[_along_band(image, name) for name in names])
+    out = swaths.placed_as(out.drop_vars(names), image)
     return cf.label(out, "toa_radiance", source=image, history="to_radiance")
 
 

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from fifesim.base import datasets
+from fifesim.sensor.description.band_names import band_called
 from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
 from fifesim.sensor.description.listing import instrument_in_words
 from fifesim.sensor.description.plausibility import check_units
@@ -32,6 +33,20 @@ def band(name, which):
 def test_registry_has_every_instrument_that_is_compared():
     expected = {"TM", "L4TM", "ETM+", "OLI", "OLI2", "MSI", "MSI-B", "HRV"}
     expected |= {"MODIS", "MODIS-Aqua", "AVHRR", "AVHRR10", "AVHRR11"}
+    expected |= {
+        "MSS",
+        "MSS2",
+        "MSS3",
+        "MSS4",
+        "MSS5",
+        "MSI-C",
+        "VIIRS",
+        "OLCI",
+        "EMIT",
+        "EnMAP",
+        "PRISMA",
+        "SuperDove",
+    }
     assert expected <= set(instrument_names())
 
 
@@ -56,6 +71,15 @@ def test_file_passes_the_check_that_users_files_get(path):
         ("Aqua MODIS", "MODIS-Aqua"),
         ("NOAA-9 AVHRR", "AVHRR"),
         ("NOAA-11", "AVHRR11"),
+        ("Landsat 1", "MSS"),
+        ("Landsat-2", "MSS2"),
+        ("Landsat 3 MSS", "MSS3"),
+        ("Landsat-4 MSS", "MSS4"),
+        ("Landsat 5 MSS", "MSS5"),
+        ("Sentinel-2C", "MSI-C"),
+        ("Suomi NPP", "VIIRS"),
+        ("Sentinel-3 OLCI", "OLCI"),
+        ("PlanetScope", "SuperDove"),
     ],
 )
 def test_aliases_are_found_in_any_case(alias, name):
@@ -96,7 +120,8 @@ def test_description_has_a_line_for_every_band_and_every_source(name):
 def test_bands_have_names_of_their_own_instrument(name):
     """A raster of one instrument's bands is never taken for another's, MODIS1 (red) for MSI1 (aerosol) say."""
     family = {"L4TM": "TM", "OLI2": "OLI", "MSI-B": "MSI", "MODIS-Aqua": "MODIS"}
-    family |= {"AVHRR10": "AVHRR", "AVHRR11": "AVHRR"}
+    family |= {"AVHRR10": "AVHRR", "AVHRR11": "AVHRR", "MSI-C": "MSI"}
+    family |= {f"MSS{number}": "MSS" for number in range(2, 6)}
     own = {each.name for each in instrument(name).bands}
     for other in instrument_names():
         if family.get(other, other) != family.get(name, name):
@@ -199,7 +224,11 @@ def test_responses_of_avhrr_rise_from_nothing_and_fall_to_it():
 # -------------------------------------------------------------------------------------------- solar irradiance
 
 
-@pytest.mark.parametrize(("name", "each"), bands_of(*instrument_names()))
+HYPERSPECTRAL = ("EMIT", "EnMAP", "PRISMA")
+MULTISPECTRAL = [name for name in instrument_names() if name not in HYPERSPECTRAL]
+
+
+@pytest.mark.parametrize(("name", "each"), bands_of(*MULTISPECTRAL))
 def test_agencys_irradiance_agrees_with_the_integral_of_a_solar_spectrum(name, each):
     """
     The agencies use other spectra than ASTM G173: within 4.5 % up to 2.4 um, but for the coastal and cirrus bands of
@@ -207,6 +236,15 @@ def test_agencys_irradiance_agrees_with_the_integral_of_a_solar_spectrum(name, e
     """
     apart = {"OLI1": 0.055, "OLI9": 0.05, "MODIS5": 0.06, "MODIS7": 0.06}
     np.testing.assert_allclose(each.solar_irradiance, each.spectrum_irradiance, rtol=apart.get(each.name, 0.045))
+
+
+@pytest.mark.parametrize("name", HYPERSPECTRAL)
+def test_irradiance_of_many_narrow_bands_is_that_of_the_spectrum_which_their_table_names(name):
+    """Two more digits of the responses move it by some 0.1 % where the spectrum has lines."""
+    for each in instrument(name).bands:
+        np.testing.assert_allclose(each.solar_irradiance, each.spectrum_irradiance, rtol=2e-4, err_msg=each.name)
+        np.testing.assert_allclose(each.full_scale_radiance * np.pi, each.solar_irradiance, rtol=2e-4)
+        assert each.min_radiance == 0
 
 
 @pytest.mark.parametrize("name", ["OLI", "OLI2"])
@@ -265,6 +303,18 @@ def test_avhrr_count_of_the_dark_is_no_albedo_and_full_scale_is_the_slope():
         ("MODIS", "MODIS1", 250.0, 250.0),
         ("MODIS-Aqua", "MODIS3", 500.0, 500.0),
         ("AVHRR", "AVHRR1", 1090.0, 791.0),
+        ("MSS", "MSS5", 79.0, 57.0),
+        ("MSS2", "MSS4", 79.0, 57.0),
+        ("MSS3", "MSS7", 79.0, 57.0),
+        ("MSS5", "MSS2", 82.0, 57.0),
+        ("MSI-C", "MSI8A", 20.0, 20.0),
+        ("VIIRS", "I1", 371.0, 371.0),
+        ("VIIRS", "M5", 742.0, 742.0),
+        ("OLCI", "Oa08", 300.0, 300.0),
+        ("EMIT", "EMIT36", 60.0, 60.0),
+        ("EnMAP", "EnMAP48", 30.0, 30.0),
+        ("PRISMA", "PRISMA33", 30.0, 30.0),
+        ("SuperDove", "PS6", 3.7, 3.7),
     ],
 )
 def test_ground_interval_is_the_published_one(name, which, along, across):
@@ -280,7 +330,9 @@ def test_avhrr_oversamples_by_the_published_1_362_and_its_field_is_1_09_km():
     np.testing.assert_allclose(field.across, np.radians(0.07449) * 833e3, rtol=1e-3)
 
 
-@pytest.mark.parametrize(("name", "bits"), [("TM", 8), ("ETM+", 8), ("HRV", 8), ("AVHRR", 10), ("MODIS", 12)])
+@pytest.mark.parametrize(
+    ("name", "bits"), [("TM", 8), ("ETM+", 8), ("HRV", 8), ("AVHRR", 10), ("MODIS", 12), ("MSS", 6), ("MSS5", 6)]
+)
 def test_bits(name, bits):
     assert instrument(name).bits == bits
     assert instrument("OLI").bits == instrument("MSI").bits == 12
@@ -399,6 +451,20 @@ def test_noise_of_modis_is_that_of_its_specification(number):
     assert model.detectors == (40 if number < 3 else 20)
 
 
+# Noise of Aqua MODIS in flight, c0 + c1 L [W m-2 sr-1 um-1], from NASA's l2gen; band 6 has broken detectors.
+AQUA = {1: (0.104069, 8.533e-05), 2: (0.040559, 1.9755e-04), 3: (0.119315, 8.195e-05), 4: (0.0876954, 7e-05)}
+AQUA |= {5: (0.0787773, 4.994e-04), 7: (0.00628912, 2.116e-04)}
+
+
+@pytest.mark.parametrize("number", AQUA)
+def test_noise_of_aqua_modis_is_that_in_flight_from_half_to_twice_its_radiance(number):
+    each, (c0, c1) = band("MODIS-Aqua", f"MODIS{number}"), AQUA[number]
+    radiance = each.noise.radiance * np.array([0.5, 1.0, 2.0])
+    found = instrument("MODIS-Aqua").noise_model(each).noise_equivalent_radiance(radiance)
+    np.testing.assert_allclose(found, c0 + c1 * radiance, rtol=6e-3)
+    assert radiance[1] == MODIS_SNR[number][0]
+
+
 def test_noise_of_msi_is_that_of_its_requirement():
     """ESA: 154, 168, 142 and 174 at 128, 128, 108 and 103 W m-2 sr-1 um-1; nearly all of it is shot noise."""
     item = instrument("MSI")
@@ -415,6 +481,78 @@ def test_what_was_not_found_is_left_out_and_said_so():
     for path in FILES:
         text = " ".join(path.read_text(encoding="utf-8").replace("\n#", " ").split())
         assert path.name == "tm.toml" or "left out" in text, path.name
+
+
+# -------------------------------------------------------------------------------------------- Landsat's first scanners
+
+
+@pytest.mark.parametrize("name", ["MSS", "MSS2", "MSS3", "MSS4", "MSS5"])
+def test_mss_compresses_its_photomultipliers_and_takes_six_lines_at_once(name):
+    item = instrument(name)
+    assert [each.compression for each in item.bands] == ["square-root"] * 3 + [None]
+    assert [each.compressed_count(item.bits) for each in item.bands] == [63, 63, 63, 0]
+    assert (item.detectors, item.scan.lines, item.scan.kind) == (6, 6, "whiskbroom")
+    assert instrument_in_words(item).count("square-root scale") == 3
+
+
+def test_mss_has_the_bands_of_its_time_in_the_count_of_its_products():
+    for name, numbers in (("MSS", "4567"), ("MSS3", "4567"), ("MSS4", "1234"), ("MSS5", "1234")):
+        item = instrument(name)
+        assert [each.name for each in item.bands] == [f"MSS{number}" for number in numbers]
+        for each, (low, high) in zip(item.bands, [(0.5, 0.6), (0.6, 0.7), (0.7, 0.8), (0.8, 1.1)], strict=True):
+            assert each.limits == (low, high) and low < each.wavelength < high
+
+
+def test_mss_of_landsat_5_passes_half_at_its_effective_field_of_view():
+    """Markham 1985, abstract: 70-75 m along and 79-82 m across the track."""
+    along, across = instrument("MSS5").line_spreads(band("MSS5", "MSS2"))
+    np.testing.assert_allclose([along.mtf(0.5 / 72.5), across.mtf(0.5 / 80.5)], 0.5, rtol=1e-3)
+
+
+# -------------------------------------------------------------------------------------------- later instruments
+
+# Transfer at the Nyquist frequency along and across the track, measured in flight in 2024.
+SENTINEL_2C = {"MSI2": (0.31, 0.35), "MSI4": (0.21, 0.31), "MSI8": (0.18, 0.26), "MSI8A": (0.26, 0.43)}
+SENTINEL_2C |= {"MSI1": (0.39, 0.25), "MSI12": (0.22, 0.28)}
+
+
+@pytest.mark.parametrize("which", SENTINEL_2C)
+def test_sentinel_2c_blurs_as_it_was_measured(which):
+    np.testing.assert_allclose(nyquist("MSI-C", which), SENTINEL_2C[which], rtol=1e-9)
+
+
+def test_enmap_passes_what_its_specification_asks():
+    np.testing.assert_allclose(nyquist("EnMAP", "EnMAP48"), (0.16, 0.25), rtol=1e-9)
+
+
+# Noise of EMIT at radiances [W m-2 sr-1 um-1]: c0 sqrt(c1 + L), from isofit's table at its own wavelengths.
+EMIT = {0.4923: (0.0160903, 22.9974), 0.6115: (0.0144721, 18.6044), 0.8651: (0.0126073, 14.1187)}
+
+
+@pytest.mark.parametrize("wavelength", EMIT)
+def test_noise_of_emit_is_that_of_isofit_at_every_radiance(wavelength):
+    item = instrument("EMIT")
+    each = min(item.bands, key=lambda one: abs(one.wavelength - wavelength))
+    (c0, c1), radiance = EMIT[wavelength], np.array([5.0, 40.0, 150.0])
+    found = item.noise_model(each).noise_equivalent_radiance(radiance)
+    np.testing.assert_allclose(found, c0 * np.sqrt(c1 + radiance), rtol=2e-3)
+
+
+def test_bands_of_spectrometers_lie_beside_each_other():
+    emit, enmap, prisma = (instrument(name) for name in HYPERSPECTRAL)
+    assert (len(emit.bands), len(enmap.bands), len(prisma.bands)) == (285, 224, 238)
+    np.testing.assert_allclose(np.diff([each.wavelength for each in emit.bands]), 7.43e-3, atol=5e-5)
+    for item, first in ((enmap, 91), (prisma, 66)):
+        for part in (item.bands[:first], item.bands[first:]):
+            assert np.all(np.diff([each.wavelength for each in part]) > 0)
+    widths = np.array([each.srf.width for each in emit.bands])
+    assert widths[0] == 0.008415 and widths[-1] == 0.008809
+
+
+def test_a_number_alone_means_no_band_of_viirs():
+    viirs = instrument("VIIRS")
+    assert [band_called(name, viirs).name for name in ("M03", "i3", "red", "M11")] == ["M3", "I3", "M5", "M11"]
+    assert band_called("B3", viirs) is None and band_called(11, viirs).name == "M11"
 
 
 def test_check_of_units_passes_every_gain_state():

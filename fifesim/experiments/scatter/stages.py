@@ -253,8 +253,9 @@ def _recorded(scene, means, counts, grains):
     radiance = radiance.values
     if counts:
         gain, offset = calibration.gain_offset(full_scale, lowest, setup.instrument.bits)
-        dn = calibration.radiance_to_dn(radiance, gain, offset, setup.instrument.bits)
-        radiance = calibration.dn_to_radiance(dn, gain, offset)
+        compression = np.array([band.compressed_count(setup.instrument.bits) for band in bands])[:, None, None]
+        dn = calibration.radiance_to_dn(radiance, gain, offset, setup.instrument.bits, compression)
+        radiance = calibration.dn_to_radiance(dn, gain, offset, compression)
     distance = geometry.earth_sun_distance
     red, nir = calibration.radiance_to_reflectance(radiance, irradiance, geometry.mu_s, distance)
     return indices.normalized_difference(nir, red)

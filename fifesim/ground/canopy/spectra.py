@@ -202,7 +202,8 @@ def band_means(bands, wavelength, values):
         if band.limits[0] < wavelength[0] or band.limits[1] > wavelength[-1]:
             raise ValueError(
                 f"no leaf or background spectrum for band {band.name}, {band.limits[0]:g} to {band.limits[1]:g} um: it "
-                f"has {wavelength[0]:g} to {wavelength[-1]:g} um; give leaf_optics= and background= by band"
+                f"has {wavelength[0]:g} to {wavelength[-1]:g} um; give leaf_optics= and background= by band, or "
+                "bands= without it"
             )
     sun_wavelength, sun = solar_spectrum()
     inside = (sun_wavelength > wavelength[0]) & (sun_wavelength < wavelength[-1])

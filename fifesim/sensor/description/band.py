@@ -14,7 +14,9 @@ from fifesim.sensor.description.spectral_response import SpectralResponse
 # Numbers that must be there and those that may; each that is there has a source.
 INSTRUMENT_NUMBERS = ("altitude", "gsd", "interval", "bits", "lsf")
 BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance")
-OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "product", "noise", "gains", "limits", "geolocation")
+OPTIONAL_NUMBERS = (
+    "ifov", "detectors", "scan", "product", "noise", "gains", "limits", "geolocation", "compression"
+)  # fmt: skip
 
 # Publications by number.
 Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]
@@ -47,6 +49,8 @@ class InstrumentBand:
         Name of the gain state that the radiances belong to.
     gains : dict of Gain, optional
         Other gain states by name.
+    compression : "square-root", optional
+        Scale of the digital numbers, which meets the linear one at both ends; that is linear by default.
     sources : dict
         Key of the instrument's references for each number that has another source than the instrument says.
 
@@ -70,6 +74,7 @@ class InstrumentBand:
     noise: Noise | None = None
     gain: Name = "nominal"
     gains: dict[str, Gain] = field(default_factory=dict, repr=False, hash=False)
+    compression: Literal["square-root"] | None = None
     sources: Sources = field(default_factory=dict, repr=False, hash=False)
 
     def __post_init__(self):
@@ -97,6 +102,22 @@ class InstrumentBand:
     def spectrum_irradiance(self):
         """Solar irradiance that ASTM G173 has over the response, beside the agency's [W m-2 um-1]."""
         return solar_irradiance(self.response)
+
+    def compressed_count(self, bits):
+        """
+        Digital number at which the band's scale meets the linear one.
+
+        Parameters
+        ----------
+        bits : int
+            Of its instrument.
+
+        Returns
+        -------
+        count : int
+            The largest of a scale of square roots, 0 for a linear one.
+        """
+        return 2**bits - 1 if self.compression else 0
 
     def with_gain(self, gain):
         """

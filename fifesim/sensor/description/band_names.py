@@ -28,9 +28,16 @@ def band_called(name, instrument):
         found = nearest([band.wavelength for band in instrument.bands], COMMON_NAMES[wanted])
         return None if found is None else instrument.bands[found]
     for band in instrument.bands:
-        if wanted == key(band.name) or _number(wanted) == _number(band.name):
+        if _plain(wanted) == _plain(key(band.name)):
             return band
-    return None
+    # VIIRS counts two kinds of bands, I1 and M1: a number alone means neither.
+    numbered = [band for band in instrument.bands if _number(wanted) == _number(band.name)]
+    return numbered[0] if len(numbered) == 1 else None
+
+
+def _plain(name):
+    """Letters and number of a name, without leading zeros."""
+    return re.sub(r"(?<=[a-z])0+(?=[1-9])", "", name)
 
 
 def _number(name):

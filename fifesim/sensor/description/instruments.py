@@ -31,7 +31,8 @@ def instrument(name, response=None):
         Name or alias in any case, such as ``"TM"`` or ``"Landsat 8"``; or the path of a file, which ends in
         ``.toml``. An Instrument passes through.
     response : {"system", "detector", "paper"}, optional
-        Spatial response, as `fifesim.sensor.description.responses.with_response` takes it; by default what the file has.
+        Spatial response, as `fifesim.sensor.description.responses.with_response` takes it; by default what the file
+        has.
 
     Returns
     -------

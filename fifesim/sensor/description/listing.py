@@ -158,6 +158,7 @@ def _radiometry(instrument):
         if band.noise is not None:
             noise = f"{band.noise.radiance / band.noise.equivalent_radiance:>9.0f} at {band.noise.radiance:g}"
         gain = f"  {band.gain} gain; also {', '.join(band.gains)}" if band.gains else ""
+        gain += f"  {band.compression} scale" if band.compression else ""
         lines.append(
             f"  {band.name:<8}{band.wavelength:>12.4f}{low:>9.3f} - {high:.3f}{band.min_radiance:>18.2f}"
             f"{band.full_scale_radiance:>16.2f}{step:>12.4f}{band.solar_irradiance:>11.1f} "

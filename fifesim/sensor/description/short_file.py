@@ -22,7 +22,11 @@ _REFERENCES = {
     _SPECTRUM: "ASTM G173-03, extraterrestrial spectrum, as distributed with pvlib, over the band's response",
     _WHITE: "taken for a white surface below an overhead sun of ASTM G173-03, and 0 for digital number 0",
 }
-_RESPONSE, _NOISE = ("center", "width", "shape"), {"snr": "snr", "snr_radiance": "radiance"}
+_RESPONSE = ("center", "width", "shape")
+_NOISE = {"snr": "snr", "snr_radiance": "radiance", "snr_shot": "shot"}
+
+# Made once: making it takes longer than what it does.
+_ADAPTER = TypeAdapter(SpectralResponse)
 
 
 def completed(content, path):
@@ -121,7 +125,7 @@ def _irradiance(band, folder):
     srf = band.get("srf")
     srf = srf | {"folder": str(folder)} if isinstance(srf, dict) and "table" in srf else srf
     try:
-        return solar_irradiance(TypeAdapter(SpectralResponse).validate_python(srf).read("band"))
+        return solar_irradiance(_ADAPTER.validate_python(srf).read("band"))
     except (ValidationError, ValueError, TypeError, OSError):
         return 1.0
 

@@ -51,11 +51,16 @@ def gain_offset(full_scale_radiance, min_radiance, bits):
     return (full - low) / _largest_dn(bits), np.broadcast_to(low, np.broadcast_shapes(full.shape, low.shape))
 
 
-def radiance_to_dn(radiance, gain, offset, bits):
+def radiance_to_dn(radiance, gain, offset, bits, compression=0):
     r"""
     Digital numbers that an instrument records.
 
-    .. math:: DN = \mathrm{round}\left(\frac{L - o}{g}\right), \qquad 1 \le DN \le 2^b - 1
+    .. math:: DN = \mathrm{round}(x), \qquad x = \frac{L - o}{g}, \qquad 1 \le DN \le 2^b - 1
+
+    on a linear scale. On one of square roots, which meets the linear one at 0 and at its count c, with finer steps up
+    to a quarter of c,
+
+    .. math:: DN = \mathrm{round}(\sqrt{c \, x})
 
     Halves go to the even number. What is darker or brighter than the range is clipped, never wrapped.
 
@@ -67,6 +72,8 @@ def radiance_to_dn(radiance, gain, offset, bits):
         Such as shape (band, 1, 1) for (band, y, x), from `gain_offset`.
     bits : int
         Number of radiometric bits, 2 to 16.
+    compression : array, broadcastable, optional
+        Count c of a scale of square roots, :math:`2^b - 1`; 0 for a linear scale. [1]
 
     Returns
     -------
@@ -86,18 +93,30 @@ def radiance_to_dn(radiance, gain, offset, bits):
     --------
     >>> radiance_to_dn([-9.0, 100.2, 1e4, float("nan")], 1.0, -5.0, bits=8).tolist()
     [1, 105, 255, 0]
+
+    A quarter of the range is half of the counts where they go with its square root:
+
+    >>> int(radiance_to_dn(15.75, 1.0, 0.0, bits=6)), int(radiance_to_dn(15.75, 1.0, 0.0, bits=6, compression=63))
+    (16, 32)
     """
     largest = _largest_dn(bits)
     _check_positive(gain, "gain", "from gain_offset")
-    counts = np.rint((np.asarray(radiance, float) - offset) / gain)
+    counts = (np.asarray(radiance, float) - offset) / gain
+    if np.any(compression):
+        counts = np.where(compression, np.sqrt(np.maximum(counts, 0.0) * compression), counts)
+    counts = np.rint(counts)
     # NaN has no integer: it is replaced before the cast, whose result would depend on the machine.
     counts = np.where(np.isnan(counts), 0.0, np.clip(counts, 1, largest))
     return counts.astype(np.uint8 if largest < 256 else np.uint16)
 
 
-def dn_to_radiance(dn, gain, offset):
-    """
+def dn_to_radiance(dn, gain, offset, compression=0):
+    r"""
     Radiance of digital numbers.
+
+    .. math:: L = o + g \, DN, \qquad L = o + g \, \frac{DN^2 + 1/4}{c}
+
+    on a linear scale, and on one of square roots: in the middle of the radiances that the number stands for.
 
     Parameters
     ----------
@@ -105,6 +124,8 @@ def dn_to_radiance(dn, gain, offset):
         0 is no data. [1]
     gain, offset : array, broadcastable
         Such as shape (band, 1, 1) for (band, y, x), from `gain_offset`.
+    compression : array, broadcastable, optional
+        Count c of a scale of square roots; 0 for a linear scale. [1]
 
     Returns
     -------
@@ -119,9 +140,15 @@ def dn_to_radiance(dn, gain, offset):
     --------
     >>> dn_to_radiance([0, 105], 1.0, -5.0).tolist()
     [nan, 100.0]
+    >>> dn_to_radiance([32], 1.0, 0.0, compression=63).round(3).tolist()
+    [16.258]
     """
     dn = np.asarray(dn)
-    return np.where(dn == 0, np.nan, dn * np.asarray(gain, float) + offset)
+    counts = dn
+    if np.any(compression):
+        squares = (dn.astype(float) ** 2 + 0.25) / np.where(compression, compression, 1)
+        counts = np.where(compression, squares, dn)
+    return np.where(dn == 0, np.nan, counts * np.asarray(gain, float) + offset)
 
 
 def reflectance_to_radiance(reflectance, solar_irradiance, mu_s, earth_sun_distance=1.0):

@@ -70,6 +70,11 @@ def test_bands_may_stand_in_a_table_beside_the_file(tmp_path):
     assert nir.wavelength == pytest.approx(0.840, abs=1e-9)
 
 
+def test_share_of_shot_noise_stands_beside_the_ratio(tmp_path):
+    red, _ = read(tmp_path, CAMERA.replace("snr_radiance = 100.0", "snr_radiance = 100.0, snr_shot = 0.75")).bands
+    assert (red.noise.equivalent_radiance, red.noise.shot) == (0.5, 0.75)
+
+
 def test_scenario_sees_through_a_short_file(tmp_path):
     path = tmp_path / "camera.toml"
     path.write_text(CAMERA, encoding="utf-8")

@@ -100,3 +100,53 @@ def test_mistakes_are_named():
         reflectance_to_radiance(0.3, 1536.0, -0.1)
     with pytest.raises(ValueError, match="earth_sun_distance"):
         radiance_to_reflectance(50.0, 1536.0, 0.9, 0.0)
+
+
+# ------------------------------------------------------------------------------------------ a scale of square roots
+
+
+def test_square_roots_by_hand():
+    """Range 0 to 63 in 6 bits: 63 sqrt(x / 63) for x = 1, 7, 28 and 63 is 7.94, 21, 42 and 63."""
+    assert radiance_to_dn([1.0, 7.0, 28.0, 63.0], 1.0, 0.0, 6, 63).tolist() == [8, 21, 42, 63]
+    np.testing.assert_allclose(dn_to_radiance([21, 42], 1.0, 0.0, 63), [7 + 0.25 / 63, 28 + 0.25 / 63], rtol=1e-14)
+
+
+def test_every_compressed_count_returns_to_itself_and_the_ends_are_the_linear_ones():
+    gain, offset = gain_offset(FULL, LOW, 6)
+    counts = np.broadcast_to(np.arange(1, 64), (2, 63)).astype(np.uint8)
+    radiance = dn_to_radiance(counts, gain, offset, 63)
+    np.testing.assert_array_equal(radiance_to_dn(radiance, gain, offset, 6, 63), counts)
+    np.testing.assert_allclose(radiance[:, -1:], FULL, atol=0.005 * gain.max())
+    assert np.isnan(dn_to_radiance([0], 1.0, 0.0, 63)).all()
+
+
+def test_radiance_of_a_compressed_count_lies_in_the_middle_of_those_it_stands_for():
+    """Edges of count n, found by search: half of their sum is what it decodes to."""
+    fine = np.linspace(0.0, 63.0, 2_000_001)
+    dn = radiance_to_dn(fine, 1.0, 0.0, 6, 63)
+    for count in (2, 10, 31, 62):
+        seen = fine[dn == count]
+        np.testing.assert_allclose(dn_to_radiance(count, 1.0, 0.0, 63), (seen[0] + seen[-1]) / 2, atol=1e-4)
+
+
+def test_compression_is_finer_than_the_linear_scale_in_the_dark_and_coarser_in_the_light():
+    radiance = np.linspace(2.0, 63.0, 50_001)
+    off = {c: np.abs(dn_to_radiance(radiance_to_dn(radiance, 1.0, 0.0, 6, c), 1.0, 0.0, c) - radiance) for c in (0, 63)}
+    dark, light = radiance < 63 / 4.5, radiance > 63 / 3.5
+    assert off[63][dark].max() < off[0][dark].max() and off[63][light].max() > off[0][light].max()
+
+
+def test_scale_is_by_band_and_a_linear_one_keeps_its_bits():
+    gain, offset = gain_offset(FULL[..., None], LOW[..., None], 6)
+    radiance = np.random.default_rng(3).uniform(-2, 210, (2, 30, 40))
+    mixed = radiance_to_dn(radiance, gain, offset, 6, np.array([63, 0])[:, None, None])
+    linear = radiance_to_dn(radiance, gain, offset, 6)
+    np.testing.assert_array_equal(mixed[1], linear[1])
+    np.testing.assert_array_equal(mixed[0], radiance_to_dn(radiance, gain, offset, 6, 63)[0])
+    assert (mixed[0] > linear[0]).mean() > 0.9
+    decoded = dn_to_radiance(mixed, gain, offset, np.array([63, 0])[:, None, None])
+    np.testing.assert_array_equal(decoded[1], dn_to_radiance(linear, gain, offset)[1])
+
+
+def test_what_is_beyond_a_compressed_range_is_clipped():
+    assert radiance_to_dn([-np.inf, -5.0, 0.0, 1e9, np.inf, np.nan], 1.0, 0.0, 6, 63).tolist() == [1, 1, 1, 63, 63, 0]

@@ -33,7 +33,7 @@ def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=Non
         Sun and view, instead of those of the time; without both, those that the raster carries.
     gain, offset : float, sequence over the bands, or mapping of band name to float, optional
         Radiance of one count, and of digital number 0: RADIANCE_MULT and RADIANCE_ADD of Landsat's metadata. By default
-        those of the instrument's description. [W m-2 sr-1 um-1]
+        those of the instrument's description, with its scale of square roots if it has one. [W m-2 sr-1 um-1]
     nodata : int, optional
         Digital number of no data.
 
@@ -64,8 +64,10 @@ def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=Non
     geometry, time = _sun_and_time(geometry, time, dn)
     if (gain is None) != (offset is None):
         raise ValueError("gain and offset make radiance of a digital number together: give both, or neither")
+    compression = [0]
     if gain is None:
         gain, offset, bits = digital_numbers.scale(description, bands)
+        compression = [band.compressed_count(bits) for band in bands]
     else:
         gain, offset = (_by_band(given, bands, name) for name, given in (("gain", gain), ("offset", offset)))
         bits = 16 if dn.dtype.itemsize > 1 else 8
@@ -75,6 +77,7 @@ def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=Non
     out = chunks.pointwise(kernel, dn.drop_vars("band", errors="ignore"), dtype=np.uint8 if bits <= 8 else np.uint16)
     along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
     along_band |= {"gain": gain, "offset": offset, "solar_irradiance": [band.solar_irradiance for band in bands]}
+    along_band |= {"compression": compression} if any(compression) else {}
     out = directions.with_geometry(grids.place(out, grids.geobox(dn)), geometry).assign_coords(
         cf.band_coordinates(**along_band)
     )

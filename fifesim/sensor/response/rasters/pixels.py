@@ -32,10 +32,13 @@ def matching_bands(array, instrument):
     """
     known = {band.name.lower() for band in instrument.bands}
     names = [str(name) for name in np.atleast_1d(array["band"].values)] if "band" in array.coords else []
+    wavelengths = np.atleast_1d(array["wavelength"].values).astype(float) if "wavelength" in array.coords else None
     if names and {name.lower() for name in names} <= known:
-        return instrument.select(names)
-    if "wavelength" in array.coords:
-        wavelengths = np.atleast_1d(array["wavelength"].values).astype(float)
+        found = instrument.select(names)
+        # The fourth band of Landsat's first scanners is green, that of the later ones near infrared.
+        if wavelengths is None or all(map(_spans, found, wavelengths)):
+            return found
+    if wavelengths is not None:
         return instrument.select([_band_at(value, instrument).name for value in wavelengths])
     if names:
         called = [(name, band_called(name, instrument)) for name in names]
@@ -44,6 +47,12 @@ def matching_bands(array, instrument):
         f"the raster's bands have neither names of {instrument.name} ({', '.join(b.name for b in instrument.bands)}) "
         "nor a wavelength: assign a coordinate 'band' or 'wavelength' [um] along band"
     )
+
+
+def _spans(band, wavelength):
+    """Whether a wavelength, where it is known, lies among those that a band responds to."""
+    low, high = band.response.limits
+    return not (wavelength < low or wavelength > high)
 
 
 def _band_at(wavelength, instrument):

@@ -178,3 +178,19 @@ def test_point_spread_wider_than_the_scene_is_named():
     ):
         sensed(scene(), wide)
     assert np.isfinite(sensed(scene(), wide, min_valid=0.01)).all()
+
+
+def test_names_that_two_instruments_share_hold_where_the_wavelength_is_the_bands():
+    """MSS4 is green on Landsat-1, near infrared on Landsat-5; MSI4 is red on each Sentinel-2."""
+    values = xr.DataArray(np.zeros((2, 1, 1)), dims=("band", "y", "x"))
+    first = values.assign_coords(band=["MSS4", "MSS5"], wavelength=("band", [0.55, 0.65]))
+    assert [band.name for band in matching_bands(first, instrument("MSS"))] == ["MSS4", "MSS5"]
+    assert [band.name for band in matching_bands(first, instrument("MSS5"))] == ["MSS1", "MSS2"]
+    fourth = values.isel(band=[0]).assign_coords(band=["MSS4"])
+    for wavelength, names in ((0.553, ("MSS4", "MSS1")), (0.93, ("MSS7", "MSS4"))):
+        seen = fourth.assign_coords(wavelength=("band", [wavelength]))
+        assert tuple(matching_bands(seen, instrument(name))[0].name for name in ("MSS", "MSS5")) == names
+    unknown = first.assign_coords(wavelength=("band", [np.nan, np.nan]))
+    assert [band.name for band in matching_bands(unknown, instrument("MSS"))] == ["MSS4", "MSS5"]
+    nominal = values.assign_coords(band=["MSI4", "MSI8"], wavelength=("band", [0.665, 0.842]))
+    assert [band.name for band in matching_bands(nominal, instrument("MSI-B"))] == ["MSI4", "MSI8"]

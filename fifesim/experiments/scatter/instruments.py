@@ -1,0 +1,84 @@
+"""The same ground through every instrument: what blur, noise, registration, counts and air take from each."""
+
+import math
+
+import pandas as pd
+
+from fifesim.experiments.scatter.shares import budget, table
+from fifesim.scenario.scenario import Scenario
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.responses import knows_blur
+
+_CELL = 30 / 9  # of the ground [m]
+_PIXELS = 12  # along a window of a coarse instrument, at least
+_CELLS = 333  # along a window of any
+
+
+def instrument_scenario(name, *, arp=0.15):
+    """
+    The paper's ground on level land as an instrument sees it.
+
+    Parameters
+    ----------
+    name : str
+        Of the instrument, or a file.
+    arp : float, optional
+        Of the ground. [1]
+
+    Returns
+    -------
+    scenario : fifesim.scenario.scenario.Scenario
+        Red and near infrared on the grid of its product, with its noise, and displaced along both axes by the root mean
+        square error of the product's place: each where its file has them.
+
+    Raises
+    ------
+    ValueError
+        If there is no such instrument, or it has no red and no near infrared band.
+    """
+    description = instrument(name)
+    bands = description.red_and_near_infrared()
+    shift = (description.geolocation or 0.0) / description.pixel(bands[0])
+    noise = ["shot", "thermal"] if all(band.noise for band in bands) else []
+    sensor = {"instrument": name, "bands": [band.name for band in bands], "noise": noise, "offset": [shift, shift]}
+    return Scenario(sensor=sensor, ground={"arp": arp}, terrain={"dem": "flat"})
+
+
+def compare_instruments(names, *, arps=(0.05, 0.15, 0.24), realisations=20, each=iter):
+    """
+    Where the scatter comes from in the image of each instrument over the same ground.
+
+    Parameters
+    ----------
+    names : sequence of str
+    arps : sequence of float, optional
+        Of the ground. [1]
+    realisations : int, optional
+        Of each.
+    each : callable, optional
+        Wraps the sequence of cases, to show how far it is.
+
+    Returns
+    -------
+    table : pandas.DataFrame
+        Rows of `fifesim.experiments.scatter.shares.table`, with ``instrument``, ``arp``, the ``pixel`` [m], and whether
+        the file knows the instrument's ``blur``, ``noise`` and ``place``.
+
+    Raises
+    ------
+    ValueError
+        As `instrument_scenario`.
+    """
+    found = []
+    for name, arp in each([(name, arp) for name in names for arp in arps]):
+        scenario, description = instrument_scenario(name, arp=arp), instrument(name)
+        bands, pixel = description.select(scenario.sensor.bands), scenario.sensor.size
+        cells = max(_CELLS, math.ceil(_PIXELS * pixel / _CELL))
+        rows = table(budget(scenario, realisations=realisations, cells=cells))
+        known = {
+            "blur": all(knows_blur(description, band) for band in bands),
+            "noise": bool(scenario.sensor.noise),
+            "place": description.geolocation is not None,
+        }
+        found.append(rows.assign(instrument=description.name, arp=arp, pixel=pixel, **known))
+    return pd.concat(found, ignore_index=True)

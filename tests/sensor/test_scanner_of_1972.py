@@ -1,0 +1,101 @@
+"""Landsat's first scanner: counts of six bits on a scale of square roots, lines and samples, stripes."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import check_raster_function
+
+import fifesim
+from fifesim.base.geometry import Geometry
+from fifesim.rasters import directions
+from fifesim.rasters import grid as grids
+from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.response.calibration import radiance_to_dn
+from fifesim.sensor.response.noise import NoiseModel
+
+MSS = instrument("MSS")
+NAMES = [band.name for band in MSS.bands]
+FULL = np.array([band.full_scale_radiance for band in MSS.bands])
+
+
+@pytest.fixture(scope="module")
+def radiance():
+    """From the dark to full scale, in every band."""
+    grid = fifesim.fife_site(20.0, window=((0, 60), (0, 66)))
+    values = np.random.default_rng(4).uniform(0.02, 0.98, (4, *grid.shape)) * FULL[:, None, None]
+    array = xr.DataArray(values, dims=("band", "y", "x"), coords={"band": NAMES}, attrs={"units": "W m-2 sr-1 um-1"})
+    return directions.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
+
+
+@pytest.fixture(scope="module")
+def image(radiance):
+    return fifesim.sense(radiance, "MSS")
+
+
+def test_counts_have_six_bits_and_carry_their_scale(image):
+    assert image.dtype == np.uint8 and int(image.max()) <= 63 and (image[:, 1:-1, 1:-1] > 0).all()
+    assert "(dn^2 + 1/4) / compression" in image["compression"].attrs["comment"]
+    assert image["compression"].values.tolist() == [63, 63, 63, 0]
+    assert "compression" not in fifesim.sense(image.fifesim.to_radiance().isel(band=[3]), "MSS").coords
+
+
+def test_counts_are_those_of_the_kernel_under_any_chunks(radiance, image):
+    check_raster_function(lambda toa: fifesim.sense(toa, "MSS"), radiance, quantity="dn")
+    means = fifesim.sense(radiance, "MSS", quantise=False).values
+    for i, full in enumerate(FULL):
+        counts = np.sqrt(63 * means[i] * 63 / full) if i < 3 else means[i] * 63 / full
+        np.testing.assert_array_equal(image.values[i], np.nan_to_num(np.rint(counts)))
+
+
+def test_radiance_comes_back_within_half_a_count(radiance, image):
+    means = fifesim.sense(radiance, "MSS", quantise=False).values
+    back = check_raster_function(fifesim.to_radiance, image, quantity="toa_radiance").values
+    assert not {"gain", "offset", "compression"} & set(fifesim.to_radiance(image).coords)
+    step = np.broadcast_to(FULL[:, None, None] / 63, back.shape).copy()
+    # The counts n - 1/2 and n + 1/2 lie 2 n / 63 linear steps apart.
+    step[:3] *= 2 * image.values[:3] / 63
+    seen = image.values > 0
+    assert (np.abs(back - means) <= 0.5 * step * (1 + 1e-9))[seen].all() and np.isnan(back[~seen]).all()
+    again = radiance_to_dn(back, FULL[:, None, None] / 63, 0.0, 6, image["compression"].values[:, None, None])
+    np.testing.assert_array_equal(again, image)
+
+
+def test_file_brings_the_scale_back_and_tells_a_gis_no_linear_one(image, tmp_path):
+    path = fifesim.to_geotiff(image, tmp_path / "mss.tif")
+    xr.testing.assert_identical(fifesim.open_image(path), image)
+    rasterio = pytest.importorskip("rasterio")
+    with rasterio.open(path) as file:
+        assert set(file.scales) == {1.0} and set(file.offsets) == {0.0}
+
+
+def test_own_lines_are_79_m_and_samples_57_m(radiance):
+    native = fifesim.sense(radiance, "MSS", interval="native")
+    np.testing.assert_allclose(grids.cell_size(grids.geobox(native)), (79.0, 57.0), rtol=1e-4)
+
+
+def test_six_detectors_stripe_every_sixth_line():
+    grid = fifesim.fife_site(20.0, window=((0, 120), (0, 12)))
+    array = xr.DataArray(np.full((1, *grid.shape), 90.0), dims=("band", "y", "x"), coords={"band": ["MSS5"]})
+    array.attrs["units"] = "W m-2 sr-1 um-1"
+    flat = directions.with_geometry(grids.place(array, grid), Geometry(40.0, 120.0))
+    model = NoiseModel(thermal=0.0, shot=0.0, detectors=6, gain_spread=0.02)
+    seen = fifesim.sense(flat, "MSS", noise="fixed-pattern", seed=1, noise_models=model, quantise=False)
+    inside = seen.values[0, 1:-1, 1:-1]
+    np.testing.assert_allclose(inside, np.broadcast_to(inside[:, :1], inside.shape), rtol=1e-12)
+    assert len(np.unique(inside[:, 0].round(6))) == 6
+    np.testing.assert_allclose(inside[6:], inside[:-6], rtol=1e-12)
+
+
+def test_fourth_band_of_the_first_scanner_is_not_that_of_the_last(image):
+    """MSS4 is green on Landsat-1 and near infrared on Landsat-5: the wavelength decides."""
+    seen = fifesim.sense(fifesim.to_radiance(image), "MSS5")
+    assert seen["band"].values.tolist() == ["MSS1", "MSS2", "MSS3", "MSS4"]
+
+
+def test_own_counts_are_calibrated_by_the_scale_of_square_roots(image):
+    counts = image.drop_vars(["gain", "offset", "compression"])
+    again = fifesim.calibrate(counts, "MSS")
+    np.testing.assert_array_equal(fifesim.to_radiance(again), fifesim.to_radiance(image))
+    linear = fifesim.calibrate(counts, "MSS", gain=1.0, offset=0.0)
+    assert "compression" not in linear.coords
+    np.testing.assert_array_equal(fifesim.to_radiance(linear), counts.where(counts > 0))
