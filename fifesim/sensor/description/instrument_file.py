@@ -264,22 +264,31 @@ class Instrument:
         Returns
         -------
         bands : (InstrumentBand, InstrumentBand)
+            Of the finest grid that has both.
 
         Raises
         ------
         ValueError
             If the instrument lacks one of them.
         """
-        found = []
-        for window in (RED, NEAR_INFRARED):
-            number = nearest([band.wavelength for band in self.bands], window)
-            if number is None:
+        for pixel in sorted({self.pixel(band) for band in self.bands}):
+            pair = [self._showing(window, pixel) for window in (RED, NEAR_INFRARED)]
+            if all(pair):
+                return tuple(pair)
+        pair = {window: self._showing(window) for window in (RED, NEAR_INFRARED)}
+        for window, band in pair.items():
+            if band is None:
                 raise ValueError(
                     f"{self.name} has no {window.name} band, {window.low:g} to {window.high:g} um: say which of its "
                     f"bands are meant: {', '.join(band.name for band in self.bands)}"
                 )
-            found.append(self.bands[number])
-        return tuple(found)
+        return tuple(pair.values())
+
+    def _showing(self, window, pixel=None):
+        """The band that shows best what a window is for, among those of a size of pixels."""
+        bands = [band for band in self.bands if pixel is None or self.pixel(band) == pixel]
+        number = nearest([band.wavelength for band in bands], window)
+        return None if number is None else bands[number]
 
     def source(self, number, band=None):
         """
