@@ -5,6 +5,9 @@ import re
 from fifesim.base.bands import COMMON_NAMES, nearest
 from fifesim.sensor.description.names import key
 
+# What agencies write before the number of a band.
+_PREFIXES = {"", "b", "band", "srb", "surreflb"}
+
 
 def band_called(name, instrument):
     """
@@ -13,8 +16,8 @@ def band_called(name, instrument):
     Parameters
     ----------
     name : str or int
-        The instrument's own name, its number (``3``, ``"B3"``, ``"B03"``, ``"B8A"``, ``"SR_B3"``), or a common name of
-        STAC such as ``"red"`` or ``"nir"``.
+        The instrument's own name, its number (``3``, ``"B3"``, ``"B03"``, ``"B8A"``, ``"SR_B3"``), or a common name
+        such as ``"red"``, ``"nir"`` or ``"swir16"``.
     instrument : fifesim.sensor.description.instrument_file.Instrument
 
     Returns
@@ -27,13 +30,16 @@ def band_called(name, instrument):
     if wanted in COMMON_NAMES:
         found = nearest([band.wavelength for band in instrument.bands], COMMON_NAMES[wanted])
         return None if found is None else instrument.bands[found]
+    own = {key(band.name): _parts(band.name) for band in instrument.bands}
+    prefixes = _PREFIXES | {prefix for prefix, _ in own.values()}
+    prefix, number = _parts(wanted)
     for band in instrument.bands:
-        if wanted == key(band.name) or _number(wanted) == _number(band.name):
+        if wanted == key(band.name) or (number and prefix in prefixes and number == own[key(band.name)][1]):
             return band
     return None
 
 
-def _number(name):
-    """Number that a name ends in, with its letter, without leading zeros; the name itself where there is none."""
-    found = re.fullmatch(r"(?:|.*[a-z])0*([1-9]\d*a?)", key(name))
-    return found.group(1) if found else key(name)
+def _parts(name):
+    """What stands before the number that a name ends in, and that number with its letter, without leading zeros."""
+    found = re.fullmatch(r"(|.*[a-z])0*([1-9]\d*a?)", key(name))
+    return found.groups() if found else (key(name), "")
