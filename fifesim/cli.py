@@ -4,6 +4,7 @@ import gc
 import json
 import os
 import sys
+import warnings
 from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
@@ -40,7 +41,9 @@ class _Door(TyperGroup):
 
     def main(self, *arguments, **options):
         try:
-            sys.exit(super().main(*arguments, **options | {"standalone_mode": False}))
+            with warnings.catch_warnings():
+                warnings.showwarning = _tell
+                sys.exit(super().main(*arguments, **options | {"standalone_mode": False}))
         except _UsageError as error:
             error.message = in_a_line(error.message)
             error.show()
@@ -259,6 +262,11 @@ def _say(*texts, err=False):
     """Print texts, in which names and values from elsewhere cannot steer a terminal."""
     for text in texts:
         typer.echo("\n".join(in_a_line(line, sys.maxsize) for line in str(text).split("\n")), err=err)
+
+
+def _tell(message, *_):
+    """A warning is a line too."""
+    _say(in_a_line(f"fifesim: warning: {message}"), err=True)
 
 
 def _stop(error, code):

@@ -39,7 +39,7 @@ SHORTWAVE_INFRARED = Window("shortwave infrared", 1.53, 1.75, 1.62)
 
 # Common names of bands in catalogues of images, with the wavelengths between which they lie by the table of STAC's
 # extension for electro-optical data (its README, github.com/stac-extensions/eo), and where Landsat or Sentinel-2 has
-# them; rededge1 to 3 are Earth Search's names of the same. [um]
+# them; rededge1 to 3, swir1 and swir2 are usual names of the same. [um]
 COMMON_NAMES = {
     name: Window(name, *limits)
     for name, limits in {
@@ -60,6 +60,8 @@ COMMON_NAMES = {
         "cirrus": (1.35, 1.40, 1.375),
         "swir16": (1.55, 1.75, 1.61),
         "swir22": (2.10, 2.30, 2.20),
+        "swir1": (1.55, 1.75, 1.61),
+        "swir2": (2.10, 2.30, 2.20),
     }.items()
 }
 

@@ -1,5 +1,6 @@
 """Directions of sun and sensor."""
 
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -159,7 +160,7 @@ def sun_position(time, latitude, longitude, altitude=0.0):
     ----------
     NREL solar position algorithm, as implemented in pvlib; true (not refracted) zenith
     """
-    times = _utc(time)
+    times = utc(time)
     sun = pvlib.solarposition.get_solarposition(times, latitude, longitude, altitude=altitude).iloc[0]
     return Geometry(float(sun["zenith"]), float(sun["azimuth"]), earth_sun_distance=earth_sun_distance(time))
 
@@ -188,7 +189,7 @@ def sun_positions(times, latitude, longitude, altitude=0.0):
     ValueError
         If one is no time, or the shapes differ.
     """
-    stamps = pd.DatetimeIndex([_utc(time)[0] for time in times])
+    stamps = pd.DatetimeIndex([utc(time)[0] for time in times])
     numbers = [np.asarray(each, float) for each in (latitude, longitude, altitude)]
     if any(each.shape not in ((), (1,), stamps.shape) for each in numbers):
         shapes = " and ".join(str(each.shape) for each in numbers)
@@ -229,10 +230,29 @@ def earth_sun_distance(time):
     >>> round(earth_sun_distance("1987-06-06T16:35:00Z"), 3)
     1.015
     """
-    return float(pvlib.solarposition.nrel_earthsun_distance(_utc(time)).iloc[0])
+    return float(pvlib.solarposition.nrel_earthsun_distance(utc(time)).iloc[0])
 
 
-def _utc(time):
+def utc(time):
+    """
+    A time in UTC.
+
+    Parameters
+    ----------
+    time : str or datetime
+        Taken as UTC where it names no time zone; a text with the time of day.
+
+    Returns
+    -------
+    time : pandas.DatetimeIndex, shape (1,)
+
+    Raises
+    ------
+    ValueError
+        If it is no time, or a date alone: midnight is another sun.
+    """
+    if isinstance(time, str) and re.fullmatch(r"\s*\d{4}-?\d{2}-?\d{2}\s*", time):
+        raise ValueError(f"time = {time!r} is a date alone: add the time of day, such as {time.strip()}T17:10Z")
     try:
         # A number would be taken for nanoseconds since 1970.
         stamp = pd.NaT if isinstance(time, int | float | np.number) else pd.Timestamp(time)

@@ -136,7 +136,7 @@ def as_seen_by(
 
     Returns
     -------
-    image : xarray.DataArray of unsigned integers, dims (band, y, x)
+    image : xarray.DataArray of unsigned integers, dims (band, y, x), or xarray.DataTree
         As from `sense`, with ``adjustment_error`` of the surface reflectance along band.
 
     Raises
@@ -151,11 +151,20 @@ def as_seen_by(
     description = find_instrument(instrument)
     reflectance = as_bands_of(reflectance, source, "surface_reflectance")
     geometry = _geometry(reflectance, time, geometry)
+    reflectance = directions.dated(reflectance, time)
     surface = adjust_bands(reflectance, description, bands=bands, source=source, uncertainty=uncertainty)
     toa = to_toa(surface, atmosphere, geometry=geometry, instrument=description)
     image = sensor.sense(toa, description, onto=onto, noise=noise, seed=seed, geometry=geometry)
-    # As a variable: a DataArray would bring the sun that it had with it.
-    return image.assign_coords(adjustment_error=surface["adjustment_error"].variable)
+    if isinstance(image, xr.DataTree):
+        found = {node.path: _with_error(node.to_dataset(), surface) for node in image.leaves}
+        return xr.DataTree.from_dict(found)
+    return _with_error(image, surface)
+
+
+def _with_error(image, surface):
+    """The adjustment's error of the bands of an image; as a variable, for a DataArray would bring its sun with it."""
+    error = surface["adjustment_error"].sel(band=image["band"].values)
+    return image.assign_coords(adjustment_error=error.variable)
 
 
 def spectral_adjustment(source, target, *, bands=None):

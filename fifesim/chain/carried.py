@@ -11,7 +11,7 @@ from fifesim.rasters.own_rasters import incoming
 from fifesim.rasters.sites import is_fife
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import carried_instrument
-from fifesim.sensor.response.rasters.pixels import matching_bands
+from fifesim.sensor.response.rasters.pixels import matching_bands, warn_of_others
 
 # Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
 # tables. [um]
@@ -118,9 +118,13 @@ def as_bands_of(raster, instrument, name):
     """
     array = incoming(raster, name)
     description = carried_instrument(array) if instrument is None else find_instrument(instrument)
-    if description is None or "wavelength" in array.coords or "band" not in array.coords:
+    if description is None or "band" not in array.coords:
+        return array
+    other = array.attrs.get("instrument") not in (None, description.name)
+    if "wavelength" in array.coords and not other:
         return array
     bands = matching_bands(array, description)
+    warn_of_others(array, description, bands)
     names, centres = [band.name for band in bands], [band.wavelength for band in bands]
     along_band = cf.band_coordinates(band=names, wavelength=centres)
     return array.assign_coords({key: each if array["band"].ndim else each[0] for key, each in along_band.items()})

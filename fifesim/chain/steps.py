@@ -98,9 +98,9 @@ def surface_reflectance(
     if dem is None and horizon is not None:
         raise ValueError("a horizon stands around a dem: give dem= too")
     lai = north_up(lai)
-    atmosphere = air_of(atmosphere, lai)
-    geometry = directions.given_geometry(geometry, lai, time)
     description = given_instrument(instrument, lai)
+    geometry = directions.given_geometry(geometry, lai, time)
+    atmosphere, lai = air_of(atmosphere, lai), directions.dated(lai, time)
     selected = description.select(bands)
     responses = tuple(band.response for band in selected)
     leaf_reflectance, leaf_transmittance = leaves.leaf_optics(responses, leaf_optics, lai, exact=exact)
@@ -162,7 +162,7 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, time=N
     """
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     light = _sunlight(*air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time), "kt")
-    return terrain.kt_on_slopes(reflectance, dem, horizon=horizon, **light)
+    return terrain.kt_on_slopes(directions.dated(reflectance, time), dem, horizon=horizon, **light)
 
 
 @by_date
@@ -231,7 +231,7 @@ def to_toa(
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
-    return _of(instrument, atmosphere_raster.to_toa(reflectance, *light, **scene))
+    return _of(instrument, atmosphere_raster.to_toa(directions.dated(reflectance, time), *light, **scene))
 
 
 @by_date
@@ -279,7 +279,7 @@ def to_surface(
     reflectance = as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance")
     light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time, assume=assume)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
-    return _of(instrument, atmosphere_raster.to_surface(reflectance, *light, **scene))
+    return _of(instrument, atmosphere_raster.to_surface(directions.dated(reflectance, time), *light, **scene))
 
 
 def _of(instrument, array):

@@ -39,7 +39,8 @@ def rgb(image, composite="false colour", *, stretch=(2, 98)):
     """
     names = composite_bands(image, composite)
     low, high = _percentiles(stretch)
-    layers = [valid(image.sel(band=name)) for name in names]
+    have = [str(name) for name in image["band"].values]
+    layers = [valid(image.isel(band=have.index(name))) for name in names]
     values = [
         np.asarray(each, float)[np.isfinite(each)] for each in computed(*(thinned(each, _SAMPLE) for each in layers))
     ]

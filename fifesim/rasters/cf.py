@@ -99,13 +99,22 @@ PROVENANCE = (
     "atmosphere",
     "instrument",
     "instrument_description",
+    "composite",
     "references",
 )
 
 # Other spellings of units.
-_SAME_UNITS = dict.fromkeys(("", "m2 m-2", "dimensionless"), "1") | dict.fromkeys(
+_SAME_UNITS = dict.fromkeys(("", "m2 m-2", "dimensionless", "unitless", "reflectance"), "1") | dict.fromkeys(
     ("metre", "metres", "meter", "meters"), "m"
 )
+
+
+# What leads from a standard name to a quantity.
+_STEPS = {
+    ("toa_bidirectional_reflectance", "surface_reflectance"): ".fifesim.to_surface(atmosphere) of it first",
+    ("surface_bidirectional_reflectance", "toa_reflectance"): ".fifesim.to_toa(atmosphere) of it first",
+    ("leaf_area_index", "surface_reflectance"): ".fifesim.surface_reflectance(instrument) of it first",
+}
 
 
 def attributes(name):
@@ -187,8 +196,8 @@ def check_quantity(array, *names):
     if says in known and says not in {QUANTITIES[name].standard_name for name in names}:
         raise ValueError(
             f"{array.name or 'the array'} is {known[says]} by its standard_name, where "
-            f"{QUANTITIES[names[0]].long_name} is needed: take the step between, or drop .attrs['standard_name'] "
-            "if it is mistaken"
+            f"{QUANTITIES[names[0]].long_name} is needed: take {_STEPS.get((says, names[0]), 'the step between')}, or "
+            "drop .attrs['standard_name'] if it is mistaken"
         )
 
 

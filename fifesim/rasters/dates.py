@@ -1,6 +1,8 @@
 """Rasters over time: a step of one date, taken for each date by itself."""
 
+from dataclasses import fields, is_dataclass, replace
 from functools import wraps
+from hashlib import blake2b
 from inspect import signature
 
 import numpy as np
@@ -31,8 +33,10 @@ def by_date(step):
         if not args and first in options:
             args = (options.pop(first),)
         if not args or "time" not in getattr(args[0], "dims", ()):
+            _check_no_dates(step, options)
             return step(*args, **options)
         raster, *args = args
+        _check_dates(raster, options.get("time"))
         dates = []
         for number in range(raster.sizes["time"]):
             others = [_at(each, number, raster) for each in args]
@@ -82,12 +86,17 @@ def epoch(raster):
     Returns
     -------
     epoch : int
-        Seconds from the year 1 to its scalar coordinate ``time``; 0 where it has none.
+        Seconds from the year 1 to its scalar coordinate ``time``, a number of its own where that is no date of the
+        usual calendar, 0 where there is none.
     """
     time = raster.coords.get("time")
-    if time is None or time.ndim or time.dtype.kind != "M":
+    if time is None or time.ndim:
         return 0
-    return int((time.values - np.datetime64("0001-01-01")) / np.timedelta64(1, "s"))
+    if time.dtype.kind != "M":
+        # Dates of another calendar, and what else tells images apart.
+        return int.from_bytes(blake2b(str(time.item()).encode(), digest_size=7).digest(), "big") + 1
+    # In nanoseconds the year 1 is out of reach.
+    return int((time.values.astype("M8[s]") - np.datetime64("0001-01-01", "s")).astype(int))
 
 
 def _along_time(name, dates):
@@ -101,8 +110,35 @@ def _differs(name, dates):
     return {"y", "x"} <= set(first.dims) or not all(first.identical(other) for other in others)
 
 
+def _check_dates(raster, time):
+    if "time" not in raster.coords:
+        raise ValueError(
+            "the raster's dimension time has no coordinate: type .assign_coords(time=['2022-06-03T17:10', ...])"
+        )
+    if time is not None:
+        raise ValueError("the raster has dates of its own: leave time= out, or select one date with .isel(time=0)")
+
+
+def _check_no_dates(step, options):
+    """Refuse dates beside a raster of one."""
+    for name, other in options.items():
+        if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
+            raise ValueError(
+                f"{name} has dates and the raster of {step.__name__} has none: give the raster a dimension time, or "
+                "select one date with .isel(time=0)"
+            )
+
+
 def _at(other, number, raster):
-    """That date of something which has the dimension too."""
+    """That date of something which has the dimension too, or holds what has."""
+    if isinstance(other, dict | tuple | list):
+        parts = other.items() if isinstance(other, dict) else enumerate(other)
+        found = {name: _at(each, number, raster) for name, each in parts}
+        return found if isinstance(other, dict) else type(other)(found.values())
+    if is_dataclass(other):
+        own = {field.name: getattr(other, field.name) for field in fields(other) if field.init}
+        dated = {name: each for name, each in own.items() if isinstance(each, xr.DataArray) and "time" in each.dims}
+        return replace(other, **{name: _at(each, number, raster) for name, each in dated.items()}) if dated else other
     if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
         if not np.array_equal(other["time"].values, raster["time"].values):
             raise ValueError(f"the times of {getattr(other, 'name', None) or 'a Dataset'} are not those of the raster")

@@ -3,12 +3,14 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import ANGLES, Geometry, fife_geometry, sun_position
+from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_position, utc
+from fifesim.base.warned import warn
 from fifesim.rasters import cf, whereabouts
 from fifesim.rasters import grid as grids
 from fifesim.rasters.sites import is_fife
 
 _GEOMETRY = (*ANGLES, "earth_sun_distance")
+_TIME = {"standard_name": "time", "long_name": "time, UTC"}
 
 
 def with_geometry(array, geometry, names=_GEOMETRY):
@@ -50,6 +52,9 @@ def geometry_of(array):
         return None
     names = [name for name in (*_GEOMETRY, "y", "x", "spatial_ref") if name in array.coords]
     carried = {name: array.coords[name].variable for name in names}
+    time = array.coords.get("time")
+    if "earth_sun_distance" not in carried and time is not None and time.ndim == 0 and time.dtype.kind == "M":
+        carried["earth_sun_distance"] = xr.Variable((), earth_sun_distance(time.values))
     return checked_geometry(xr.Dataset(carried).set_coords(["spatial_ref"] if "spatial_ref" in carried else []))
 
 
@@ -117,8 +122,37 @@ def known_geometry(given, array, time=None):
     if time is None and "time" in array.coords and array.coords["time"].ndim == 0:
         time = array.coords["time"].values
     if time is not None:
+        _warn_of_midnight(array, time)
         return sun_over(grids.geobox(array), time)
     return fife_geometry() if is_fife(array) else None
+
+
+def dated(array, time):
+    """
+    A raster of a time that is given.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    time : str, datetime or None
+
+    Returns
+    -------
+    array : xarray.DataArray
+        With the scalar coordinate ``time``, in UTC; of None as it is.
+    """
+    if time is None:
+        return array
+    return array.assign_coords(time=((), utc(time)[0].tz_localize(None).to_datetime64(), _TIME))
+
+
+def _warn_of_midnight(array, time):
+    """Dates without a time of day are midnight to numpy."""
+    if not isinstance(time, str) and utc(time)[0] == utc(time)[0].normalize():
+        warn(
+            f"time of {array.name or 'the raster'} is midnight in UTC, {utc(time)[0]:%Y-%m-%d}: where it is a date "
+            "alone, give the time of day, time='2022-06-03T17:10Z'"
+        )
 
 
 def sun_over(grid, time):

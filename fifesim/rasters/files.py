@@ -5,7 +5,6 @@ import json
 import os
 import shutil
 import tempfile
-import warnings
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from rasterio.windows import Window
 
 from fifesim.base.foreign import in_a_line
 from fifesim.base.geometry import ANGLES
+from fifesim.base.warned import warn
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
@@ -90,10 +90,9 @@ def to_geotiff(raster, path, *, overwrite=False):
     _check_room(array, path)
     varying = [name for name in ANGLES if name in array.coords and array.coords[name].ndim]
     if varying:
-        warnings.warn(
+        warn(
             f"{path.name} leaves out {', '.join(varying)}, which vary over the cells, and another geometry would be "
-            "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()",
-            stacklevel=2,
+            "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()"
         )
     with _whole(path) as (streamed, finished), ErrorsOfGdal(f"cannot write {path}"):
         _stream(array, grid, streamed, described=raster)

@@ -62,7 +62,7 @@ def tags_of(array):
     tags = {tag: f"{float(scalars[name]):.9g}" for name, tag in _TAGS.items() if name in scalars}
     if "sza" in scalars:
         tags["SUN_ELEVATION"] = f"{90 - float(scalars['sza']):.9g}"
-    imagery = {"SATELLITEID": str(array.attrs["instrument"])} if "instrument" in array.attrs else {}
+    imagery = {}
     time = scalars.get("time")
     if isinstance(time, np.datetime64) and not np.isnat(time):
         date, clock = np.datetime_as_string(time, unit="s").split("T")

@@ -1,19 +1,25 @@
 """A raster as its owner has it, made one that the stages take: bands in order, north up, in its physical unit."""
 
+import re
+
 import numpy as np
 import xarray as xr
 
+from fifesim.base.warned import warn
 from fifesim.rasters import cf, chunks
 from fifesim.rasters.axes import check_axes, is_scan, north_up
-from fifesim.rasters.packed import STORAGE, scale_and_offset, unpacked
+from fifesim.rasters.packed import STORAGE, has_no_data, scale_and_offset, unpacked
 
 # A reflectance factor beyond these is none: glint, snow and slopes in low sun stay within. [1]
 LOWEST, HIGHEST = -0.5, 5.0
 
 # Wavelengths of light that the Sun sends, in micrometres, end before they would begin in nanometres.
-_LONGEST = 100.0
-_NANOMETRES = {"nm", "nanometer", "nanometers", "nanometre", "nanometres"}
-_MICROMETRES = {"um", "µm", "μm", "micron", "microns", "micrometer", "micrometers", "micrometre", "micrometres"}
+LONGEST = 100.0
+
+PER_MICROMETRE = dict.fromkeys(
+    ("um", "µm", "μm", "micrometer", "micrometers", "micrometre", "micrometres", "micron", "microns"), 1.0
+) | dict.fromkeys(("nm", "nanometer", "nanometers", "nanometre", "nanometres"), 1000.0)
+"""Spellings of units of wavelengths, in lower case, and how many of them are a micrometre."""
 
 
 def incoming(raster, name):
@@ -73,12 +79,11 @@ def in_micrometres(array):
     if "wavelength" not in array.coords:
         return array
     given = array.coords["wavelength"]
-    values, unit = np.asarray(given.values, float), str(given.attrs.get("units", "um")).strip()
-    if unit in _NANOMETRES:
-        values = values / 1000
-    elif unit not in _MICROMETRES:
+    unit = str(given.attrs.get("units", "um")).strip()
+    if unit.lower() not in PER_MICROMETRE:
         raise ValueError(f"wavelength has units {unit!r}: they are to be um or nm")
-    if values.size and not np.max(values) <= _LONGEST:
+    values = np.asarray(given.values, float) / PER_MICROMETRE[unit.lower()]
+    if values.size and not np.max(values) <= LONGEST:
         raise ValueError(
             f"wavelength reaches {np.max(values):g} um: where these are nanometres, say so by "
             "raster.wavelength.attrs['units'] = 'nm'"
@@ -131,31 +136,49 @@ def _bands_as_one(raster, name):
         raise ValueError(f"the Dataset has no variables over (y, x): {', '.join(map(str, raster.data_vars)) or 'none'}")
     for key in bands:
         check_axes(raster[key])
-    said = {repr([raster[key].attrs.get(each) for each in STORAGE]) for key in bands}
-    parts = [raster[key] if len(said) == 1 else _physical(raster[key], name) for key in bands]
-    index = xr.DataArray([str(key) for key in bands], dims="band", name="band")
+    # What is said of all of them, a band may say otherwise.
+    shared = {key: raster.attrs[key] for key in STORAGE if key in raster.attrs}
+    own = [raster[key].assign_attrs(shared | raster[key].attrs) for key in bands]
+    said = {repr([each.attrs.get(key) for key in STORAGE]) for each in own}
+    parts = own if len(said) == 1 else [_physical(each, name) for each in own]
+    index = xr.DataArray([_called(each) for each in own], dims="band", name="band")
     joined = xr.concat(parts, dim=index, combine_attrs="drop_conflicts", coords="minimal", compat="override")
     return joined.transpose(..., "band", "y", "x").rename(name)
 
 
+def _called(band):
+    """Name of a variable, or of what it says that it is where rioxarray has counted it."""
+    said = band.attrs.get("long_name")
+    return said if re.fullmatch(r"band_\d+", str(band.name)) and isinstance(said, str) and said else str(band.name)
+
+
 def _named(array):
-    """Bands by the names in ``long_name``, where the coordinate has none but numbers."""
+    """Bands by the names in ``long_name``, where the coordinate has none but numbers, which count the names from 1."""
     names = array.attrs.get("long_name")
-    if "band" not in array.dims or isinstance(names, str) or len(names or ()) != array.sizes["band"]:
+    if "band" not in array.coords or array["band"].dtype.kind not in "iu" or isinstance(names, str) or not names:
         return array
-    if "band" in array.coords and array["band"].dtype.kind not in "iu":
+    numbers = array["band"].values
+    if np.min(numbers) < 1 or np.max(numbers) > len(names):
         return array
     attrs = {key: value for key, value in array.attrs.items() if key != "long_name"}
-    return array.assign_coords(band=[str(each) for each in names]).drop_attrs(deep=False).assign_attrs(attrs)
+    called = np.asarray([str(each) for each in names])[numbers - 1]
+    return array.assign_coords(band=(array["band"].dims, called)).drop_attrs(deep=False).assign_attrs(attrs)
 
 
 def _physical(array, name):
     """Values in their unit, NaN where there are no data; looked at when they are computed."""
     if array.dtype.kind in "iub" and scale_and_offset(array) == (1.0, 0.0):
+        scaled = "for scaled reflectance type .assign_attrs(scale_factor=0.0001, _FillValue=0), as its product says"
+        counts = "calibrate digital numbers with fifesim.calibrate"
+        cures = f"{counts}; {scaled}" if array.dtype.itemsize < 2 else f"{scaled}; {counts}"
         raise ValueError(
             f"{array.name or 'the raster'} holds whole numbers ({array.dtype}) without a scale, where "
-            f"{cf.QUANTITIES[name].long_name} is needed: type .assign_attrs(scale_factor=0.0001) for what scales them, "
-            "or calibrate digital numbers with fifesim.calibrate"
+            f"{cf.QUANTITIES[name].long_name} is needed: {cures}"
+        )
+    if array.dtype.kind in "iu" and not has_no_data(array):
+        warn(
+            f"{array.name or 'the raster'} says no value for cells without data: where there are any, such as 0, add "
+            ".assign_attrs(_FillValue=0), else they count as reflectance"
         )
     plain = unpacked(array)
     out = chunks.pointwise(check_reflectance, plain, dtype=np.float32 if plain.dtype == np.float32 else float)

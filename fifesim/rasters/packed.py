@@ -27,6 +27,21 @@ def scale_and_offset(raster):
     return float(said.get("scale_factor", 1.0)), float(said.get("add_offset", 0.0))
 
 
+def has_no_data(raster):
+    """
+    Whether a raster says which value stands for no data.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray
+
+    Returns
+    -------
+    says : bool
+    """
+    return any(name in _said(raster) for name in NO_DATA)
+
+
 def unpacked(raster):
     """
     Values of a raster in their unit, NaN where there are no data.

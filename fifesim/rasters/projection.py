@@ -11,6 +11,7 @@ from pyproj.exceptions import CRSError
 from pyproj.transformer import TransformerGroup
 
 from fifesim.base.foreign import in_a_line, shown
+from fifesim.base.warned import warn
 
 # By how much a metre of a grid may differ from one on the ground. [1]
 _SCALE_BOUND = 0.035
@@ -211,11 +212,10 @@ def check_metres(crs, bounds):
 @lru_cache(maxsize=1024)
 def _warn_of_scale(name, scale, longitude, latitude):
     """Once for a place, for a chain asks at every step."""
-    warnings.warn(
+    warn(
         f"the scale of {name} is {scale:.2f} near longitude {longitude}, latitude {latitude}: a cell of 30 m is "
         f"{30 / scale:.1f} m on the ground, where slopes, footprints and distances are taken as if it were 30 m; "
-        f"{_undistorted(longitude, latitude)} is within 1 %",
-        stacklevel=5,
+        f"{_undistorted(longitude, latitude)} is within 1 %"
     )
 
 

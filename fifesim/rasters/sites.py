@@ -6,9 +6,11 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.base import fife
 from fifesim.base.kinds import described
+from fifesim.rasters import grid as grids
 from fifesim.rasters import whereabouts
 
 _NAME = "FIFE"
+_FAR = 1.0  # from the site a scene is another place [degree]
 
 
 def fife_site(cell, window=None, datum="NAD83"):
@@ -104,7 +106,11 @@ def is_fife(array):
     -------
     made : bool
     """
-    return array.attrs.get("site") == _NAME
+    if array.attrs.get("site") != _NAME or not {"y", "x"} <= set(array.dims):
+        return False
+    # Arithmetic spreads attributes, so that the place counts too.
+    longitude, latitude = whereabouts.middle(grids.geobox(array))
+    return max(abs(longitude - fife.LONGITUDE), abs(latitude - fife.LATITUDE)) < _FAR
 
 
 def _window(site, window):

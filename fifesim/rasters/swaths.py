@@ -10,6 +10,7 @@ import xarray as xr
 from fifesim.base import scan_pixels
 from fifesim.rasters import chunks, projection
 from fifesim.rasters import grid as grids
+from fifesim.rasters.dates import by_date
 
 DIMS = ("line", "sample")
 
@@ -47,6 +48,7 @@ def placed_as(array, image):
     return array
 
 
+@by_date
 def grid_swath(image, grid, method="nearest", *, min_valid=0.5):
     """
     Image of a scan put onto a map.

@@ -95,12 +95,14 @@ class Scenario(Keys):
         return latitude, longitude if given.longitude is None else given.longitude
 
     def _check_place(self):
-        """The paper's overpass and altitude are those of its site: elsewhere they are asked for."""
+        """The paper's overpass, altitude and hills are those of its site: elsewhere they are asked for."""
         wanted = []
         if self.geometry.time is None and self.geometry.sza is None:
             wanted.append('geometry.time, such as "2022-06-01T10:05:00Z", or geometry.sza and saa')
         if "altitude" not in self.atmosphere.model_fields_set:
             wanted.append("atmosphere.altitude, of the ground [km]")
+        if "dem" not in self.terrain.model_fields_set:
+            wanted.append('terrain.dem, a file of elevation or "flat"')
         if wanted and not on_fife_site(self.geobox()):
             where = whereabouts.place_in_words(*whereabouts.middle(self.geobox()))
             raise ValueError(f"grid: its middle, {where}, is not on the site of FIFE: give {'; and '.join(wanted)}")

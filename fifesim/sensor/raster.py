@@ -19,6 +19,7 @@ from fifesim.sensor.response.rasters.pixels import (
     matching_bands,
     means_by_band,
     pixel_grid,
+    warn_of_others,
 )
 
 # Share of its footprint's weight that a pixel needs on valid cells. The paper's footprint of 30.32 m leaves a
@@ -106,6 +107,7 @@ def sense(
     # A radiance is recorded whatever the sun.
     needed = not _is_radiance(toa) or scaling == "product"
     geometry = (directions.given_geometry if needed else directions.known_geometry)(geometry, toa, time)
+    toa = directions.dated(toa, time)
     groups = bands_by_grid(description, bands, onto, interval)
     if len(groups) > 1:
         options = {"offset": offset, "noise": noise, "seed": seed, "noise_models": noise_models, "geometry": geometry}
@@ -145,12 +147,16 @@ def by_bands(toa, instrument):
     ValueError
         If the array is something else, or the instrument is unknown or has none of the bands.
     """
+    if "composite" in toa.attrs:
+        raise ValueError("a composite is of many dates, and nothing records it: sense each date, and composite those")
     if not _is_radiance(toa):
         toa = incoming(toa, "toa_reflectance")
     cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
     description = given_instrument(instrument, toa)
     toa = toa if "band" in toa.dims else toa.expand_dims("band")
-    return toa, description, matching_bands(toa, description)
+    bands = matching_bands(toa, description)
+    warn_of_others(toa, description, bands)
+    return toa, description, bands
 
 
 def _is_radiance(array):

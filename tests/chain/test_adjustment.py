@@ -195,3 +195,13 @@ def test_pairs_that_nobody_published_have_no_line_of_others():
     assert np.isnan(lines["published_slope"].values).all() and set(lines["reference"].values) == {""}
     with pytest.raises(ValueError, match="no band of the source lies where TM7 of TM responds"):
         fifesim.spectral_adjustment("AVHRR", "TM", bands=["TM7"])
+
+
+def test_an_instrument_of_several_pixels_gives_a_tree(lai):
+    scene = lai.fifesim.surface_reflectance("MSI")
+    tree = scene.fifesim.as_seen_by("OLI", bands=["OLI4", "OLI8"])
+    assert sorted(node.path for node in tree.leaves) == ["/15m", "/30m"]
+    surface = scene.fifesim.adjust_bands("OLI", bands=["OLI4", "OLI8"])
+    for node, band in (("15m", "OLI8"), ("30m", "OLI4")):
+        error = tree[f"{node}/dn"]["adjustment_error"]
+        assert float(error[0]) == float(surface["adjustment_error"].sel(band=band))

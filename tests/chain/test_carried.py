@@ -96,7 +96,7 @@ def test_air_of_a_raster_of_ones_own_is_no_silent_assumption(site, lai):
     theirs = lai.drop_attrs(deep=False)
     with pytest.warns(UserWarning, match="what air lies over") as said:
         theirs.fifesim.surface_reflectance("TM", time="1987-06-06T16:35Z")
-    assert said[0].filename == __file__
+    assert __file__ in {each.filename for each in said}
     with pytest.raises(ValueError, match="which instrument looks at"):
         theirs.fifesim.surface_reflectance(time="1987-06-06T16:35Z", atmosphere=AIR)
     with pytest.raises(ValueError, match="where the sun stands over"):

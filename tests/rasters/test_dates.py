@@ -83,3 +83,29 @@ def test_epochs_are_seconds():
     at = [xr.DataArray(1.0, coords={"time": np.datetime64(f"2022-05-01T17:00:0{s}")}) for s in (0, 1)]
     assert epoch(at[1]) - epoch(at[0]) == 1 and epoch(at[0]) > 0
     assert epoch(xr.DataArray(1.0)) == 0
+    days = (np.datetime64("2022-05-01") - np.datetime64("0001-01-01")).astype(int)
+    for unit in ("s", "us", "ns"):
+        time = np.datetime64("2022-05-01T17:00:00").astype(f"M8[{unit}]")
+        assert epoch(xr.DataArray(1.0, coords={"time": time})) == days * 86400 + 17 * 3600
+    others = {epoch(xr.DataArray(1.0, coords={"time": label})) for label in (0, 1, "May")}
+    assert len(others) == 3 and 0 not in others
+
+
+def test_dates_may_lie_within_what_is_given(season):
+    season = season[:, :9, :9]
+    background = xr.zeros_like(season) + xr.DataArray([0.1, 0.2, 0.3], dims="time")
+    leaf = fifesim.Leaf(chlorophyll=background.drop_attrs(deep=False) * 200)
+    given = {"background": {"TM3": background}, "bands": ["TM3"], "leaf_optics": leaf}
+    rho = season.fifesim.surface_reflectance("TM", **given)
+    leaf = fifesim.Leaf(chlorophyll=leaf.chlorophyll[1])
+    given |= {"background": {"TM3": background[1]}, "leaf_optics": leaf}
+    np.testing.assert_array_equal(rho[1], season[1].fifesim.surface_reflectance("TM", **given))
+
+
+def test_dates_that_do_not_fit_are_told(season):
+    with pytest.raises(ValueError, match=r"dimension time has no coordinate.*assign_coords\(time="):
+        season.drop_vars("time").fifesim.surface_reflectance("TM")
+    with pytest.raises(ValueError, match="the raster has dates of its own: leave time= out"):
+        season.fifesim.surface_reflectance("TM", time="2022-05-01T17:00Z")
+    with pytest.raises(ValueError, match="background has dates and the raster of surface_reflectance has none"):
+        season[0].fifesim.surface_reflectance("TM", background=season / 30)

@@ -59,11 +59,11 @@ def test_a_dataset_of_numbers_is_a_geometry():
     assert directions.checked_geometry(numbers) == Geometry(40.0, 10.0, 5.0)
 
 
-def test_given_wins_over_carried_and_that_over_the_papers():
-    carried = directions.with_geometry(raster(site="FIFE"), Geometry(30.0, 100.0))
+def test_given_wins_over_carried_and_that_over_the_papers(lai):
+    carried = directions.with_geometry(lai, Geometry(30.0, 100.0))
     assert directions.given_geometry(Geometry(50.0, 90.0), carried) == Geometry(50.0, 90.0)
     assert directions.given_geometry(None, carried) == Geometry(30.0, 100.0)
-    assert directions.given_geometry(None, raster(site="FIFE")) == fife_geometry()
+    assert directions.given_geometry(None, lai) == fife_geometry()
 
 
 CAPE = fifesim.grid_at("EPSG:32734", 261000.0, 6244000.0, 300.0, 300.0, 30.0)  # beside Cape Town
@@ -124,3 +124,29 @@ def test_cosine_of_the_sun_is_a_number_or_by_cell():
     assert directions.mu_s(Geometry(60.0, 0.0)).item() == pytest.approx(0.5, abs=1e-15)
     by_cell = directions.checked_geometry(xr.Dataset({"sza": ramp(0.0, 60.0), "saa": 0.0}))
     np.testing.assert_allclose(directions.mu_s(by_cell)[0, [0, -1]], [1.0, 0.5], atol=1e-15)
+
+
+def test_a_time_that_is_given_stays_with_the_raster(lai):
+    """Else a file would say one date and the sun of another."""
+    then = np.datetime64("2022-07-03T17:00")
+    made = lai.assign_coords(time=np.datetime64("2022-01-03T17:00"))
+    rho = made.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], time="2022-07-03T17:00Z")
+    images = rho, rho.fifesim.to_toa(), rho.fifesim.to_toa().fifesim.sense()
+    assert all(each["time"].values == then for each in images)
+    later = rho.fifesim.to_toa(time="2022-08-03T17:00Z")
+    assert later["time"].values == np.datetime64("2022-08-03T17:00") and later["sza"] > rho["sza"]
+    assert made["time"].values == np.datetime64("2022-01-03T17:00")
+
+
+def test_a_date_alone_is_no_time():
+    """Midnight in UTC is another sun."""
+    with pytest.raises(ValueError, match=r"'2022-12-21' is a date alone.*2022-12-21T17:10Z"):
+        directions.given_geometry(None, on_the_cape(), "2022-12-21")
+    with pytest.warns(UserWarning, match="midnight in UTC, 2022-12-21"), pytest.raises(ValueError, match="horizon"):
+        directions.given_geometry(None, on_the_cape(time=np.datetime64("2022-12-21T00:00")))
+
+
+def test_a_carried_sun_has_the_distance_of_its_time():
+    known = on_the_cape(sza=20.0, saa=30.0, time=np.datetime64("2022-01-04T10:00"))
+    assert directions.geometry_of(known).earth_sun_distance == pytest.approx(0.9833, abs=2e-4)
+    assert directions.geometry_of(known.drop_vars("time")).earth_sun_distance == 1.0

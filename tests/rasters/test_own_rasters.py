@@ -132,7 +132,7 @@ def test_a_file_of_rioxarray(fractions, tmp_path):
             assert toa["band"].values.tolist() == ["MSI4", "MSI8"]
 
 
-@pytest.mark.parametrize("unit", ["nm", "nanometers"])
+@pytest.mark.parametrize("unit", ["nm", "Nanometers"])
 def test_wavelengths_in_nanometres(fractions, unit):
     there = fractions.drop_vars("band").assign_coords(wavelength=("band", [665.0, 833.0], {"units": unit}))
     np.testing.assert_allclose(in_micrometres(there)["wavelength"], [0.665, 0.833], rtol=1e-12)
@@ -145,3 +145,56 @@ def test_wavelengths_that_cannot_be(fractions):
         fractions.assign_coords(wavelength=("band", [665.0, 833.0])).fifesim.to_toa(AIR, time=TIME)
     with pytest.raises(ValueError, match="units 'angstrom': they are to be um or nm"):
         in_micrometres(fractions.assign_coords(wavelength=("band", [6650.0, 8330.0], {"units": "angstrom"})))
+
+
+def test_names_are_those_of_the_numbers(fractions, tmp_path):
+    """A selection of bands keeps the numbers, and the file's names of all."""
+    path = tmp_path / "six.tif"
+    six = xr.concat([fractions * share for share in (1.0, 0.5, 0.25)], "band").drop_vars("band")
+    six.rio.to_raster(path)
+    names = ("B02", "B03", "B04", "B08", "B11", "B12")
+    with rasterio.open(path, "r+") as file:
+        file.descriptions = names
+    with rioxarray.open_rasterio(path) as mine:
+        for chosen in ([2, 3], [5, 4, 3], [0]):
+            taken = incoming(mine.isel(band=chosen), "surface_reflectance")
+            assert taken["band"].values.tolist() == [names[number] for number in chosen]
+        assert incoming(mine.sel(band=3), "surface_reflectance")["band"].item() == "B04"
+    with rioxarray.open_rasterio(path, band_as_variable=True) as mine:
+        assert incoming(mine, "surface_reflectance")["band"].values.tolist() == list(names)
+
+
+def test_counted_bands_are_no_silent_assumption(fractions):
+    with pytest.warns(UserWarning, match="counts its bands 1 to 2, taken for TM1 to TM2: name them"):
+        fractions.assign_coords(band=[1, 2]).fifesim.to_toa(AIR, time=TIME, instrument="TM")
+
+
+def test_a_dataset_says_its_scale_once(fractions):
+    """As `ds.assign_attrs` puts it, where the message says what to type."""
+    whole = stored(fractions)
+    dataset = xr.Dataset({"red": whole.sel(band="B04", drop=True), "nir": whole.sel(band="B08", drop=True)})
+    taken = incoming(dataset.assign_attrs(scale_factor=1e-4, nodata=-9999), "surface_reflectance")
+    np.testing.assert_allclose(taken, with_hole(fractions), rtol=0, atol=1e-12)
+
+
+def test_no_data_that_nobody_marks_is_told(fractions):
+    """Digital number 0 of Landsat's Level 2 would be a reflectance of -0.2."""
+    mine = stored(fractions.fillna(0), scale_factor=2.75e-5, add_offset=-0.2)
+    with pytest.warns(UserWarning, match=r"no value for cells without data.*_FillValue=0"):
+        incoming(mine, "surface_reflectance")
+
+
+def test_ndvi_of_red_and_nir_by_name(fractions):
+    named = fractions.assign_coords(band=["red", "nir"])
+    expected = (fractions[1] - fractions[0]) / (fractions[1] + fractions[0])
+    np.testing.assert_allclose(named.fifesim.ndvi(), expected, rtol=1e-12)
+
+
+def test_bands_of_another_instrument_are_no_silent_assumption(lai):
+    toa = lai.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"]).fifesim.to_toa()
+    with pytest.warns(UserWarning, match=r"MSI4, MSI8 of MSI are taken for TM3, TM4 of TM.*adjust_bands\('TM'\)"):
+        toa.fifesim.sense("TM")
+    rho = lai.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"])
+    with pytest.warns(UserWarning, match="are taken for TM3, TM4"):
+        as_tm = rho.fifesim.to_toa(instrument="TM")
+    assert as_tm["band"].values.tolist() == ["TM3", "TM4"] and as_tm.attrs["instrument"] == "TM"

@@ -70,3 +70,8 @@ def test_the_site_is_the_site_in_any_reference_system(datum):
     geodetic = fifesim.grid_at("EPSG:5070", -50000.0, 1788000.0, 300.0, 300.0, 30)
     assert on_fife_site(geodetic)
     assert not on_fife_site(fifesim.grid_at("EPSG:32735", 712000.0, 4327000.0 + 1e6, 300.0, 300.0, 30))
+
+
+def test_the_site_is_where_it_is(lai):
+    """Arithmetic spreads attributes, and coordinates may be changed."""
+    assert is_fife(lai) and not is_fife(lai.assign_coords(x=lai.x + 500e3))

@@ -240,10 +240,15 @@ def test_place_of_a_grid_is_its_own_and_what_holds_for_fife_is_asked_for():
         parse_scenario({"grid": SOUTH}).complete()
     said = str(caught.value)
     assert said.startswith("grid: its middle, latitude -25.13, longitude 28.19, is not on the site of FIFE: give ")
-    assert "geometry.time" in said and "geometry.sza and saa" in said and "atmosphere.altitude" in said
+    assert (
+        "geometry.time" in said
+        and "geometry.sza and saa" in said
+        and "atmosphere.altitude" in said
+        and "terrain.dem" in said
+    )
     with pytest.raises(ValueError, match=r"FIFE: give geometry.time, such as [^;]*$"):
-        parse_scenario({"grid": SOUTH, "atmosphere": {"altitude": 1.3}}).complete()
-    air = {"atmosphere": {"altitude": 1.3}}
+        parse_scenario({"grid": SOUTH, "atmosphere": {"altitude": 1.3}, "terrain": {"dem": "flat"}}).complete()
+    air = {"atmosphere": {"altitude": 1.3}, "terrain": {"dem": "flat"}}
     overpass = parse_scenario({"grid": SOUTH, "geometry": {"time": "2022-06-01T08:05Z"}} | air).complete()
     longitude, latitude = pyproj.Transformer.from_crs(32735, 4326, always_xy=True).transform(620150, 7219850)
     sun = sun_position("2022-06-01T08:05Z", latitude, longitude, 1300)

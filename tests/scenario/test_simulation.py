@@ -315,7 +315,8 @@ def test_polar_scene_is_simulated(crs, west, north):
     grid = {"crs": crs, "west": west, "north": north, "width": 120.0, "height": 90.0, "cell": 10.0}
     sun = {"sza": 60.0, "saa": 0.0}
     case = parse_scenario(
-        {"grid": grid, "geometry": sun, "terrain": {"horizon_reach": 300}, "atmosphere": {"altitude": 0.4}}
+        {"grid": grid, "geometry": sun, "terrain": {"dem": "flint-hills", "horizon_reach": 300}}
+        | {"atmosphere": {"altitude": 0.4}}
     )
     image = fifesim.simulate(case)["image"]["dn"].compute()
     assert image.rio.crs == crs and image.shape == (2, 3, 4) and (image[:, 1, 1:3] > 0).all()

@@ -32,7 +32,8 @@ def composite(images, method="maximum-value", *, by=None):
     -------
     composite : xarray.DataArray, dims (y, x) or (band, y, x)
         With ``date``, that of each cell, as coordinate over (y, x), and so the angles of sun and view where they differ
-        among the dates. NaN, or 0 in unsigned integers, where no date has data. Lazy where the images are.
+        among the dates. The distance of the sun is none of a composite. NaN where no date has data. Lazy where the
+        images are.
 
     Raises
     ------
@@ -49,6 +50,11 @@ def composite(images, method="maximum-value", *, by=None):
     """
     if method not in _METHODS:
         raise ValueError(f"method must be one of {', '.join(_METHODS)}, got {method!r}")
+    if images.dtype.kind != "f" or cf.QUANTITIES["toa_radiance"].units == images.attrs.get("units"):
+        raise ValueError(
+            "a composite is made of reflectance or NDVI: digital numbers and radiance have another sun at each date, "
+            "take .fifesim.to_reflectance() of them first"
+        )
     if "time" not in images.dims:
         raise ValueError(
             f"a composite is made of images along time, got dimensions {images.dims}: join dates with "
@@ -60,8 +66,7 @@ def composite(images, method="maximum-value", *, by=None):
         raise ValueError(f"by has dimensions (time, y, x) with the dates of the images, got {dict(index.sizes)}")
     chosen = _along_time(_METHODS[method], index.drop_vars(list(index.coords)), dtype=np.int64)
     plain = images.drop_vars(list(images.coords))
-    missing = 0 if images.dtype.kind == "u" else np.nan
-    out = _along_time(values_of_date, plain, chosen, dtype=images.dtype, missing=missing)
+    out = _along_time(values_of_date, plain, chosen, dtype=images.dtype, missing=np.nan)
     out = out.transpose(*(name for name in images.dims if name != "time"))
     kept = {name: value for name, value in images.coords.items() if not {"time", "y", "x"} & set(value.dims)}
     out = grids.place(out.assign_coords(kept), grid).assign_coords(_of_date(images, chosen))
@@ -84,8 +89,13 @@ def _index(images):
 def _of_date(images, chosen):
     """Coordinates that each cell has of its date."""
     named = {"date": images["time"]}
-    named |= {name: images[name] for name in ANGLES if name in images.coords and images[name].dims == ("time",)}
+    angles = {name: images[name] for name in ANGLES if name in images.coords and "time" in images[name].dims}
+    named |= {name: values for name, values in angles.items() if values.dims == ("time",)}
     found = {}
+    for name in set(angles) - set(named):
+        plain = angles[name].drop_vars(list(angles[name].coords))
+        found[name] = _along_time(values_of_date, plain, chosen, dtype=plain.dtype, missing=np.nan)
+        found[name].attrs = cf.attributes(name)
     for name, values in named.items():
         dated = values.dtype.kind == "M"
         dates = values.variable.values if dated else values.variable.values.astype(float)

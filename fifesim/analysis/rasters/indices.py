@@ -3,7 +3,7 @@
 import numpy as np
 
 from fifesim.analysis import indices
-from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED, nearest
+from fifesim.base.bands import BLUE, COMMON_NAMES, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED, nearest
 from fifesim.rasters import cf, chunks, swaths
 
 # The kernel of each index, and the bands that it takes. Names are those of the spyndex catalogue.
@@ -114,12 +114,23 @@ def _bands(reflectance, windows, what):
     return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
 
 
+def _wavelengths(reflectance):
+    """Wavelengths of the bands, or where bands of their common names lie. [um]"""
+    if "wavelength" in reflectance.coords:
+        return np.atleast_1d(reflectance["wavelength"].values)
+    names = [str(name).lower() for name in reflectance["band"].values] if "band" in reflectance.coords else []
+    if names and set(names) <= set(COMMON_NAMES):
+        return np.array([COMMON_NAMES[name].best for name in names])
+    raise ValueError(
+        "the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords, or call its bands "
+        "'red', 'nir' and the like"
+    )
+
+
 def _nearest_band(reflectance, window, what):
     if "band" not in reflectance.dims:
         raise ValueError(f"{what} needs a {window.name} and other bands along band, got a raster of one band")
-    if "wavelength" not in reflectance.coords:
-        raise ValueError("the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords")
-    wavelengths = np.atleast_1d(reflectance["wavelength"].values)
+    wavelengths = _wavelengths(reflectance)
     number = nearest(wavelengths, window)
     if number is None:
         found = ", ".join(f"{value:.3f}" for value in wavelengths)

@@ -34,7 +34,8 @@ def matched(y, x, pair="coordinates"):
     for array in (y, x):
         check_no_counts(array)
         if set(array.dims) != {"y", "x"}:
-            cure = "put a scan onto a map with .fifesim.grid_swath(grid)" if "line" in array.dims else "select one band"
+            cure = "select one band" if "time" not in array.dims else "select one date with .isel(time=0)"
+            cure = "put a scan onto a map with .fifesim.grid_swath(grid)" if "line" in array.dims else cure
             raise ValueError(f"pairs are of rasters over (y, x), got {array.dims}: {cure} first")
     return (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
 

@@ -207,10 +207,12 @@ def unexplained(truth, ndvi):
     """
     truth = truth - truth.mean(axis=-1, keepdims=True)
     ndvi = ndvi - ndvi.mean(axis=-1, keepdims=True)
-    squares = (truth**2).sum(axis=-1) * (ndvi**2).sum(axis=-1)
-    if not np.all(squares > 0):
-        raise ValueError("LAI, FPAR or NDVI does not vary over the pixels: there is no scatter to share")
-    return 1 - (truth * ndvi).sum(axis=-1) ** 2 / squares
+    of_truth, of_ndvi = (truth**2).sum(axis=-1), (ndvi**2).sum(axis=-1)
+    if not np.all(of_truth > 0):
+        raise ValueError("LAI or FPAR does not vary over the pixels: there is no scatter to share")
+    # Of NDVI that is one number, as counts of six bits may be, a line explains nothing.
+    explained = (truth * ndvi).sum(axis=-1) ** 2 / np.where(of_ndvi > 0, of_truth * of_ndvi, np.inf)
+    return 1 - explained
 
 
 def _one(scenario):

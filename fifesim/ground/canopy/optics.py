@@ -10,9 +10,10 @@ from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
 from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, did_you_mean, is_mixture
 
 LARGEST_LAI = 100.0
-# Of measured canopies, and a little more: a map beyond is in another scale. [m2 m-2]
-LARGEST_OF_MAPS = 20.0
 """Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
+
+LARGEST_OF_MAPS = 20.0
+"""Of measured canopies, and a little more: a map beyond is in another scale [m2 m-2]."""
 
 # What the tables of the TM bands were modelled with; see data/README.md.
 _DEFAULT_BACKGROUND = {"soil_dry": 0.475, "shade": 0.525}

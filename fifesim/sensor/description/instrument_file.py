@@ -9,6 +9,7 @@ from pydantic.dataclasses import dataclass
 
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
+from fifesim.sensor.description.band_names import band_called
 from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
 from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.performance import Product, Scan
@@ -230,7 +231,7 @@ class Instrument:
         Parameters
         ----------
         bands : str or sequence of str, optional
-            Names in any case; all bands by default.
+            Names in any case, or as `fifesim.sensor.description.band_names.band_called` knows them; all by default.
 
         Returns
         -------
@@ -250,7 +251,11 @@ class Instrument:
         """
         known = {key(band.name): band for band in self.bands}
         names = known if bands is None else [bands] if isinstance(bands, str) else bands
-        found = tuple(lookup(name, known, f"band of {self.name}") for name in names)
+        called = [band_called(name, self) if isinstance(name, str) else None for name in names]
+        found = tuple(
+            lookup(name, known, f"band of {self.name}") if band is None else band
+            for name, band in zip(names, called, strict=True)
+        )
         if not found or len(set(found)) < len(found):
             raise ValueError(
                 f"bands of {self.name} must be at least one, each once, got {', '.join(map(str, names)) or 'none'}"

@@ -61,6 +61,27 @@ def _found(name):
         # A file that has changed is read again; one that is not there is an error of reading.
         state = path.stat() if path.exists() else None
         return _read_again(path, state and (state.st_mtime_ns, state.st_size))
+    return catalogued(name)
+
+
+def catalogued(name):
+    """
+    An instrument that fifesim has.
+
+    Parameters
+    ----------
+    name : str
+        Name or alias in any case.
+
+    Returns
+    -------
+    instrument : Instrument
+
+    Raises
+    ------
+    ValueError
+        If no instrument has this name.
+    """
     return lookup(name, _catalogue(), "instrument")
 
 

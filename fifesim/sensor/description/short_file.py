@@ -134,7 +134,7 @@ def _table(folder, name):
     """Bands of a CSV file, each a dict of what its row has."""
     path = Path(folder) / name
     try:
-        if not os.path.isfile(path):
+        if Path(name).name != name or not os.path.isfile(path):
             raise FileNotFoundError
         check_regular(path)
         table = pd.read_csv(path, comment="#", skipinitialspace=True, dtype={"name": str, "shape": str})

@@ -25,6 +25,7 @@ _INSTRUMENTS = {
 
 # Neither shows the ground on the 30 m grid: panchromatic, and the cirrus band of OLI.
 _ASIDE = ("8", "9")
+_LAST_BAND = 11  # of Landsat 8 and 9
 
 # Groups of the metadata with the scale of each level.
 _SCALES = {1: "LEVEL1_RADIOMETRIC_RESCALING", 2: "LEVEL2_SURFACE_REFLECTANCE_PARAMETERS"}
@@ -230,7 +231,7 @@ def _band(groups, level, letters, number, distance):
 
 def _flag(letters, number):
     """Bits of QA_RADSAT: 0 for band 1 up to 6 for band 7, 8 for OLI's band 9; 9 where TM and ETM+ have no value."""
-    if number == "8":
+    if number == "8" or int(number) not in range(1, _LAST_BAND + 1):
         return 0
     return 1 << (int(number) - 1) | (0 if letters == "OLI" else 1 << 9)
 

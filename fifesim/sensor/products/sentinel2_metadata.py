@@ -181,7 +181,7 @@ def sentinel2_product(path):
         classes=_classes(files),
         clouds=str(granule / "QI_DATA" / "MSK_CLASSI_B00.jp2") if with_masks else None,
         tile=str(granule / "MTD_TL.xml"),
-        earth_sun_distance=_number(root, ".//Reflectance_Conversion/U") ** -0.5,
+        earth_sun_distance=_positive(root, ".//Reflectance_Conversion/U") ** -0.5,
     )
 
 
@@ -322,6 +322,13 @@ def _part(element, path):
 
 def _text(element, path):
     return (_part(element, path).text or "").strip()
+
+
+def _positive(element, path):
+    number = _number(element, path)
+    if not number > 0:
+        raise ValueError(f"{path.rpartition('/')[2]} must be above 0, got {number:g}")
+    return number
 
 
 def _number(element, path):

@@ -46,7 +46,7 @@ def test_composite_is_lazy_and_the_same_in_chunks(stack, chunks):
 
 
 def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
-    """All bands of a cell are of one date; digital numbers go by an index that is given."""
+    """All bands of a cell are of one date, by their own NDVI or by an index that is given."""
     red = 0.05 + 0 * stack
     images = xr.concat([red, red * (1 + stack) / (1 - stack)], xr.DataArray(["TM3", "TM4"], dims="band", name="band"))
     images = images.assign_coords(wavelength=("band", [0.66, 0.83])).transpose("time", "band", "y", "x")
@@ -55,15 +55,15 @@ def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
     found = images.fifesim.composite()
     assert found.dims == ("band", "y", "x") and found["wavelength"].values.tolist() == [0.66, 0.83]
     np.testing.assert_allclose(found.fifesim.ndvi(), fifesim.composite(stack), rtol=0, atol=1e-14)
-    counts = (images.fillna(0) * 100).round().astype(np.uint8)
-    kept = fifesim.composite(counts, by=stack)
-    assert kept.dtype == np.uint8 and (kept[:, 2, 3] == 0).all()
+    kept = fifesim.composite(images.astype("float32"), by=stack)
+    assert kept.dtype == np.float32 and kept[:, 2, 3].isnull().all()
     np.testing.assert_array_equal(kept["date"], fifesim.composite(stack)["date"])
 
 
 @pytest.mark.parametrize(
     ("change", "options", "said"),
     [
+        (lambda ndvi: ndvi.fillna(0).astype(np.uint8), {}, r"another sun at each date, take \.fifesim\.to_reflectance"),
         (lambda ndvi: ndvi.isel(time=0), {}, "images along time, got dimensions"),
         (lambda ndvi: ndvi, {"method": "median"}, "method must be one of maximum-value, got 'median'"),
         (lambda ndvi: ndvi, {"by": xr.DataArray(np.zeros((2, 2, 2)), dims=("time", "y", "x"))}, "dates of the images"),
@@ -73,3 +73,20 @@ def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
 def test_what_makes_no_composite_is_refused(stack, change, options, said):
     with pytest.raises(ValueError, match=said):
         fifesim.composite(change(stack), **options)
+
+
+def test_angles_by_cell_are_those_of_the_date(stack):
+    """As a product opened by pixel has them."""
+    sza = stack.copy(data=np.random.default_rng(3).uniform(20, 60, stack.shape)).drop_vars("date", errors="ignore")
+    found = fifesim.composite(stack.assign_coords(sza=(stack.dims, sza.values)))
+    for number, date in enumerate(stack["time"].values):
+        there = (found["date"] == date).values
+        np.testing.assert_array_equal(found["sza"].values[there], sza.values[number][there])
+
+
+def test_nothing_records_a_composite(lai):
+    toa = lai.fifesim.surface_reflectance().fifesim.to_toa()
+    times = xr.DataArray(np.array(["2022-06-01T17:00", "2022-06-11T17:00"], "M8[ns]"), dims="time", name="time")
+    clear = xr.concat([toa, toa], times).fifesim.composite()
+    with pytest.raises(ValueError, match="a composite is of many dates, and nothing records it"):
+        clear.fifesim.sense()

@@ -22,6 +22,8 @@ from fifesim.sensor.description.instruments import instrument
         ("Landsat 8", "SR_B4", "OLI4"),
         ("Landsat 8", "red", "OLI4"),
         ("Landsat 8", "cirrus", "OLI9"),
+        ("Landsat 8", "swir1", "OLI6"),
+        ("Landsat 8", "swir2", "OLI7"),
         ("landsat_5", "blue", "TM1"),
         ("Landsat-5", 7, "TM7"),
         ("Landsat 7", "swir22", "ETM7"),
@@ -32,6 +34,11 @@ from fifesim.sensor.description.instruments import instrument
 )
 def test_names_that_people_have(sensor, name, band):
     assert band_called(name, instrument(sensor)).name == band
+
+
+@pytest.mark.parametrize("name", ["nir1", "NIR_2", "re1", "tir1", "pan1", "vis06", "wvp2"])
+def test_a_number_behind_another_word_is_no_band(name):
+    assert all(band_called(name, instrument(each)) is None for each in ("OLI", "MSI", "MODIS", "TM"))
 
 
 @pytest.mark.parametrize("name", ["B6", "QA_PIXEL", "pan", "cirrus", "", "TM33"])

@@ -1,10 +1,9 @@
 """Whether an elevation model covers a grid, what it lacks, and what its numbers are worth."""
 
-import warnings
-
 import numpy as np
 from scipy import ndimage
 
+from fifesim.base.warned import warn
 from fifesim.ground.terrain.rasters.model import looked_up
 from fifesim.ground.terrain.rasters.source import check_heights
 from fifesim.ground.terrain.units import terrace_step
@@ -179,8 +178,7 @@ def warn_of_terraces(model, grid):
     values = model.source.read(top - around, left - around, height + 2 * around, width + 2 * around)
     step = terrace_step(values / model.source.metres)
     if step is not None:
-        warnings.warn(
+        warn(
             f"the elevations of {model.source.name} are whole numbers that lie in terraces, with a vertical resolution "
-            f"of {step * model.source.metres:g} m: slope and aspect will show the terraces' edges",
-            stacklevel=3,
+            f"of {step * model.source.metres:g} m: slope and aspect will show the terraces' edges"
         )

@@ -1,10 +1,9 @@
 """What raster functions take for an elevation model: its grid, its unit, and how finely it was known."""
 
-import warnings
-
 import numpy as np
 import xarray as xr
 
+from fifesim.base.warned import warn
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 
@@ -71,7 +70,7 @@ def beside_altitude(dem, altitude):
     Returns
     -------
     dem : xarray.DataArray, dims (y, x)
-        The same; where it is lazy, it warns when it computes, of each block by itself.
+        The same; where it is lazy, it warns when it computes, of the first such block.
 
     Warns
     -----
@@ -82,21 +81,25 @@ def beside_altitude(dem, altitude):
     if dem.chunks is None:
         _look(dem.values, altitude)
         return dem
-    return dem.copy(data=dem.data.map_blocks(_look, altitude, dtype=dem.dtype, meta=np.empty((0, 0), dem.dtype)))
+    told = []
+    data = dem.data.map_blocks(_look, altitude, told, dtype=dem.dtype, meta=np.empty((0, 0), dem.dtype))
+    return dem.copy(data=data)
 
 
-def _look(cells, altitude):
-    """The cells, after a warning where they lie elsewhere."""
+def _look(cells, altitude, told=()):
+    """The cells, after a warning where they lie elsewhere: one of all blocks in a process."""
     low, high, at = np.fmin.reduce(cells, axis=None), np.fmax.reduce(cells, axis=None), 1000 * altitude
     in_feet = low > at + _NOT_FEET and _FOOT * low - _APART / 5 < at < _FOOT * high + _APART / 5
-    if in_feet or low > at + _APART or high < at - _APART:
+    if not told and (in_feet or low > at + _APART or high < at - _APART):
+        told += [True] if isinstance(told, list) else ()
         feet = (
-            "where they are feet, type vertical_units='ft', or dem * 0.3048; where they are metres, " if in_feet else ""
+            "where they are feet, take dem * 0.3048 (vertical_units = 'ft' of a file); where metres, "
+            if in_feet
+            else ""
         )
-        warnings.warn(
+        warn(
             f"the dem has elevations of {low:.0f} to {high:.0f} m beside an altitude of the atmosphere of {altitude:g} "
-            f"km: {feet}type altitude={np.clip((low + high) / 2000, 0, None):.1f}",
-            stacklevel=3,
+            f"km: {feet}give fifesim.Atmosphere(altitude={np.clip((low + high) / 2000, 0, None):.1f})"
         )
     return cells
 

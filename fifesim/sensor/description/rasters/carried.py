@@ -6,8 +6,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from fifesim.rasters.sites import is_fife
 from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.instruments import catalogued, instrument_names
 from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.description.instruments import instrument_names
 from fifesim.sensor.description.spectral_response import ResponseList
 
 _ADAPTER = TypeAdapter(Instrument)
@@ -63,9 +63,14 @@ def carried_instrument(array):
                 f"the raster's instrument_description is no instrument ({error.error_count()} mistakes): give "
                 "instrument="
             ) from None
-    if name is None or name in instrument_names():
-        return name and find_instrument(name)
-    raise ValueError(f"the raster was made for an instrument {name!r}, which fifesim does not have: give instrument=")
+    if name is None:
+        return None
+    try:
+        return catalogued(name)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"the raster was made for an instrument {name!r}, which fifesim does not have: give instrument="
+        ) from None
 
 
 def given_instrument(given, array):

@@ -4,11 +4,13 @@ from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
+from fifesim.base.geometry import utc
 from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
+from fifesim.rasters.axes import north_up
+from fifesim.rasters.dates import by_date
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
 from fifesim.sensor.products.rasters.layers import TIME
@@ -17,6 +19,7 @@ from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.pixels import matching_bands
 
 
+@by_date
 def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=None, nodata=0):
     """
     Make an image of digital numbers: with calibration, wavelengths and sun, as `sense` makes one.
@@ -59,7 +62,7 @@ def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=Non
     if "gain" in dn.coords:
         raise ValueError("the raster carries a calibration already: drop it with .drop_vars(['gain', 'offset'])")
     description = find_instrument(instrument)
-    dn = (dn if "band" in dn.dims else dn.expand_dims("band")).transpose("band", "y", "x")
+    dn = north_up(dn if "band" in dn.dims else dn.expand_dims("band")).transpose("band", "y", "x")
     bands = matching_bands(dn, description)
     geometry, time = _sun_and_time(geometry, time, dn)
     if (gain is None) != (offset is None):
@@ -104,15 +107,7 @@ def _by_band(given, bands, name):
 def _sun_and_time(geometry, time, dn):
     """Sun and view as given, else of the time that is given, else as carried; and the time, or None."""
     carried = dn.coords["time"].values if "time" in dn.coords and not dn.coords["time"].ndim else None
-    known = _utc(time) if time is not None else carried
+    known = utc(time)[0].tz_localize(None).to_datetime64() if time is not None else carried
     if geometry is not None:
         return directions.checked_geometry(geometry), known
     return directions.given_geometry(None, dn, time), known
-
-
-def _utc(time):
-    try:
-        stamp = pd.Timestamp(time)
-    except (ValueError, TypeError):
-        raise ValueError(f"time must be a date and time such as 1987-06-06T16:35:00Z, got {time!r}") from None
-    return (stamp if stamp.tzinfo is None else stamp.tz_convert("UTC").tz_localize(None)).to_datetime64()

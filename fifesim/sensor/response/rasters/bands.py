@@ -1,9 +1,12 @@
 """Hyperspectral images and field spectra as the bands of an instrument."""
 
 import numpy as np
+import xarray as xr
 
 from fifesim.rasters import cf
 from fifesim.rasters.combination import combined
+from fifesim.rasters.own_rasters import check_reflectance
+from fifesim.rasters.packed import unpacked
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
 from fifesim.sensor.response.rasters.wavelengths import spectral_axis
@@ -62,10 +65,11 @@ def to_bands(spectra, instrument, *, bands=None, min_coverage=MIN_COVERAGE):
     fifesim.sensor.response.spectral.band_weights
     """
     cf.check_quantity(spectra, "surface_reflectance", "toa_reflectance", "toa_radiance")
+    spectra = unpacked(spectra)
     if spectra.dtype.kind != "f":
         raise ValueError(
-            f"spectra must be reflectance or radiance, got whole numbers ({spectra.dtype}): scale them, "
-            "for instance with cube * 1e-4"
+            f"spectra must be reflectance or radiance, got whole numbers ({spectra.dtype}) without a scale: type "
+            ".assign_attrs(scale_factor=0.0001) for what scales them"
         )
     if not 0 < min_coverage <= 1:
         raise ValueError(f"min_coverage must be in (0, 1], got {min_coverage:g}: it is a share, such as 0.95")
@@ -76,6 +80,10 @@ def to_bands(spectra, instrument, *, bands=None, min_coverage=MIN_COVERAGE):
     found = _weights(axis, selected, sun=quantity != "toa_radiance")
     _check_coverage(found, selected, description, axis, min_coverage)
     image = combined(spectra, axis.dim, [each.weights for each in found])
+    if quantity != "toa_radiance":
+        image = xr.apply_ufunc(
+            check_reflectance, image, dask="parallelized", output_dtypes=[image.dtype], keep_attrs=True
+        )
     along_band = {"band": [band.name for band in selected], "wavelength": [band.wavelength for band in selected]}
     if quantity == "toa_radiance":
         along_band["solar_irradiance"] = [band.solar_irradiance for band in selected]

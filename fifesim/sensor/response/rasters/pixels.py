@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.kinds import described
+from fifesim.base.warned import warn
 from fifesim.rasters import directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
@@ -42,6 +43,7 @@ def matching_bands(array, instrument):
         return instrument.select([_band_at(value, instrument).name for value in wavelengths])
     if names:
         called = [(name, band_called(name, instrument)) for name in names]
+        _warn_of_counted(array, instrument)
         return instrument.select([name if band is None else band.name for name, band in called])
     raise ValueError(
         f"the raster's bands have neither names of {instrument.name} ({', '.join(b.name for b in instrument.bands)}) "
@@ -53,6 +55,39 @@ def _spans(band, wavelength):
     """Whether a wavelength, where it is known, lies among those that a band responds to."""
     low, high = band.response.limits
     return not (wavelength < low or wavelength > high)
+
+
+def warn_of_others(array, instrument, bands):
+    """
+    Warn where the bands of one instrument are taken for those of another.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    instrument : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
+        Of the instrument, one for each of the array.
+    """
+    carried, names = array.attrs.get("instrument"), [band.name for band in bands]
+    own = [str(name) for name in np.atleast_1d(array["band"].values)] if "band" in array.coords else names
+    if carried not in (None, instrument.name) and own != names:
+        warn(
+            f"bands {', '.join(own)} of {carried} are taken for {', '.join(names)} of {instrument.name}, as they are: "
+            f".fifesim.adjust_bands({instrument.name!r}) of surface reflectance brings them there"
+        )
+
+
+def _warn_of_counted(array, instrument):
+    """Files opened by rioxarray count their bands from 1: numbers of the instrument's bands by chance only."""
+    numbers = np.atleast_1d(array["band"].values)
+    counted = numbers.dtype.kind in "iu" and np.array_equal(numbers, np.arange(1, numbers.size + 1))
+    if counted and numbers.size < len(instrument.bands):
+        first, last = (band_called(number, instrument) for number in numbers[[0, -1]])
+        if first and last:
+            warn(
+                f"the raster counts its bands 1 to {numbers.size}, taken for {first.name} to {last.name}: name them "
+                "with .assign_coords(band=['red', 'nir']) where they are others"
+            )
 
 
 def _band_at(wavelength, instrument):

@@ -4,13 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Spellings of units, in lower case, and how many of them are a micrometre.
-_UNITS = dict.fromkeys(
-    ("um", "µm", "μm", "micrometer", "micrometers", "micrometre", "micrometres", "micron", "microns"), 1.0
-) | dict.fromkeys(("nm", "nanometer", "nanometers", "nanometre", "nanometres"), 1000.0)
-
-# No reflected light is beyond this. [um]
-_LONGEST = 100.0
+from fifesim.rasters.own_rasters import LONGEST, PER_MICROMETRE
 
 
 class SpectralAxis(NamedTuple):
@@ -64,10 +58,10 @@ def spectral_axis(array):
 def _per_micrometre(coordinate, name):
     """How many of a coordinate's unit are a micrometre."""
     said = str(coordinate.attrs.get("units", "")).strip()
-    if said and said.lower() not in _UNITS:
+    if said and said.lower() not in PER_MICROMETRE:
         raise ValueError(f"{name} is in {said!r}, it must be in 'um' or 'nm': convert it, then set .attrs['units']")
-    scale, largest = _UNITS.get(said.lower(), 1.0), float(np.max(coordinate.values))
-    if largest / scale > _LONGEST:
+    scale, largest = PER_MICROMETRE.get(said.lower(), 1.0), float(np.max(coordinate.values))
+    if largest / scale > LONGEST:
         raise ValueError(
             f"{name} reaches {largest:g}{' ' + said if said else ' without a unit'}: if these are nanometres, "
             f"set cube[{name!r}].attrs['units'] = 'nm'"

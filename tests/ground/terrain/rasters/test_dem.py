@@ -55,10 +55,15 @@ def test_resolution_of_the_source_is_given_or_carried_or_thirty_metres(dem):
 @pytest.mark.parametrize(
     ("low", "high", "altitude", "said"),
     [
-        (1239, 1393, 0.4, r"1239 to 1393 m beside .* of 0.4 km: where they are feet, type vertical_units='ft'.*=1.3"),
+        (
+            1239,
+            1393,
+            0.4,
+            r"1239 to 1393 m beside .* of 0.4 km: where they are feet, take dem .*Atmosphere.altitude=1.3",
+        ),
         (656, 700, 0.2, "feet"),
-        (2500, 3100, 1.5, "1.5 km: type altitude=2.8"),
-        (0, 100, 2.0, "2 km: type altitude=0.1"),
+        (2500, 3100, 1.5, "1.5 km: give fifesim.Atmosphere.altitude=2.8"),
+        (0, 100, 2.0, "2 km: give fifesim.Atmosphere.altitude=0.1"),
         (320, 440, 0.4, None),
         (300, 2000, 0.4, None),
         (-50, 120, 0.0, None),

@@ -37,10 +37,10 @@ def test_one_of_fifesims_is_a_name():
     assert carried_instrument(raster(**attributes_of(other))).bits == 10, "another instrument of the same name"
 
 
-def test_given_wins_over_carried():
+def test_given_wins_over_carried(lai):
     assert given_instrument("MSI", raster(instrument="TM")).name == "MSI"
     assert given_instrument(None, raster(instrument="OLI")).name == "OLI"
-    assert given_instrument(None, raster(site="FIFE")).name == "TM"
+    assert given_instrument(None, lai).name == "TM"
 
 
 def test_what_nobody_says_is_asked_for():

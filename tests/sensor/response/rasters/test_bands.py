@@ -127,3 +127,13 @@ def test_widths_decide_what_a_gap_is(leaf):
     narrow = sparse.assign_coords(fwhm=("wavelength", np.full(sparse.sizes["wavelength"], 0.005)))
     with pytest.raises(ValueError, match="hold nothing of OLI6"):
         narrow.fifesim.to_bands("OLI", bands="OLI6")
+
+
+def test_packed_cubes_are_unpacked_and_looked_at(leaf):
+    whole = (leaf * 10000).round().fillna(-1).astype("int16").drop_attrs(deep=False)
+    packed = whole.assign_attrs(scale_factor=1e-4, _FillValue=-1).assign_coords(wavelength=leaf["wavelength"])
+    unpacked = (whole * 1e-4).drop_attrs(deep=False).assign_coords(wavelength=leaf["wavelength"])
+    found, known = (each.fifesim.to_bands("OLI", bands="OLI4") for each in (packed, unpacked))
+    np.testing.assert_allclose(found, known, rtol=1e-12)
+    with pytest.raises(ValueError, match="it is a fraction"):
+        (unpacked * 100).fifesim.to_bands("OLI", bands="OLI4")
