@@ -157,21 +157,29 @@ def budget(
     scenario: Annotated[Path | None, typer.Argument(help="TOML file; the paper's case by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("budget"),
     realisations: Annotated[int, typer.Option(help="How many scenes.")] = 20,
-    cells: Annotated[int, typer.Option(help="Along the edge of a scene.")] = 333,
+    cells: Annotated[int | None, typer.Option(help="Along the edge of a scene; 333, or 12 large pixels.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the first scene; the scenario's by default.")] = None,
+    sensor: Annotated[str | None, typer.Option(help="An instrument over level ground, instead of a file.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
     allow_remote: _AllowRemote = False,
 ):
     """Find where the scatter comes from, stage by stage: budget.csv, budget.png, report.html, scenario.toml."""
     _check_spelling(scenario)
+    if sensor and scenario:
+        raise ValueError("--sensor stands for a scenario of its own: type either that or a file")
 
     with _importing():
         from fifesim.experiments.scatter.folder import budget_to_folder
+        from fifesim.experiments.scatter.instruments import instrument_scenario, window_cells
         from fifesim.scenario.scenario import read_scenario
 
     if allow_remote:
         _open_remote(context)
     found = None if scenario is None else read_scenario(scenario)
+    if sensor:
+        found = instrument_scenario(sensor)
+    if cells is None:
+        cells = window_cells(found) if sensor else 333
     options = {"realisations": realisations, "cells": cells, "seed": seed}
     _say(*budget_to_folder(found, output, overwrite=overwrite, **options))
 

@@ -9,7 +9,6 @@ from fifesim.scenario.scenario import Scenario
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.responses import knows_blur
 
-_CELL = 30 / 9  # of the ground [m]
 _PIXELS = 12  # along a window of a coarse instrument, at least
 _CELLS = 333  # along a window of any
 
@@ -44,6 +43,22 @@ def instrument_scenario(name, *, arp=0.15):
     return Scenario(sensor=sensor, ground={"arp": arp}, terrain={"dem": "flat"})
 
 
+def window_cells(scenario):
+    """
+    Cells along the edge of a window that holds enough pixels of an instrument.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Returns
+    -------
+    cells : int
+        333, or 12 pixels.
+    """
+    return max(_CELLS, math.ceil(_PIXELS * scenario.sensor.size / scenario.grid.cell))
+
+
 def compare_instruments(names, *, arps=(0.05, 0.15, 0.24), realisations=20, each=iter):
     """
     Where the scatter comes from in the image of each instrument over the same ground.
@@ -73,8 +88,7 @@ def compare_instruments(names, *, arps=(0.05, 0.15, 0.24), realisations=20, each
     for name, arp in each([(name, arp) for name in names for arp in arps]):
         scenario, description = instrument_scenario(name, arp=arp), instrument(name)
         bands, pixel = description.select(scenario.sensor.bands), scenario.sensor.size
-        cells = max(_CELLS, math.ceil(_PIXELS * pixel / _CELL))
-        rows = table(budget(scenario, realisations=realisations, cells=cells))
+        rows = table(budget(scenario, realisations=realisations, cells=window_cells(scenario)))
         known = {
             "blur": all(knows_blur(description, band) for band in bands),
             "noise": bool(scenario.sensor.noise),
