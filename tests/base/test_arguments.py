@@ -94,7 +94,7 @@ def calls(tmp_path_factory):
         "compare": {"lai": lai, "instruments": ["TM"], "setup": fifesim.Setup(interval=20.0, min_valid=0.1),
                     "bands": None},
         "psf": {"instrument": "TM", "band": "TM3", "spacing": None},
-        "mtf": {"instrument": "TM", "band": "TM3", "frequency": None},
+        "mtf": {"instrument": "TM", "bands": "TM3", "frequency": None},
         "NoiseModel": {"thermal": 1.0, "shot": 0.1, "detectors": 16, "gain_spread": 0.0, "offset_spread": 0.0,
                        "along": "rows"},
         "noise_equivalent_radiance": {"instrument": "MSI", "band": "MSI4", "radiance": 10.0},
