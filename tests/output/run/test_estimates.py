@@ -3,6 +3,8 @@
 import json
 import time
 
+import pytest
+
 from fifesim.output.run.estimates import estimate, estimate_in_words
 from fifesim.output.run.folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
