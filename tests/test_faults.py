@@ -163,6 +163,7 @@ def test_a_half_written_block_is_made_again(scenario, whole, tmp_path):
     assert resumed(scenario, out)[0] == whole
 
 
+@pytest.mark.slow
 def test_a_killed_worker_changes_nothing(scenario, whole, tmp_path):
     out = tmp_path / "out"
     process = start(scenario, "-o", out, "--workers", 2)

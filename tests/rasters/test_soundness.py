@@ -85,6 +85,7 @@ def test_heights_take_no_part_in_places(tmp_path):
     np.testing.assert_array_equal(fifesim.open_lai(compound, GRID), fifesim.open_lai(plain, GRID))
 
 
+@pytest.mark.slow
 def test_a_small_file_of_huge_size_is_read_by_parts_only(tmp_path):
     path = tmp_path / "huge.tif"
     profile = {"driver": "GTiff", "width": 1_000_000, "height": 1_000_000, "count": 1, "dtype": "uint8"}

@@ -24,6 +24,7 @@ def only(monkeypatch):
     return lambda area: monkeypatch.setattr(areas, "AREAS", {area: areas.AREAS[area]})
 
 
+@pytest.mark.slow
 def test_installation_is_within_all_bounds():
     result = run()
     *lines, last = result.stdout.splitlines()

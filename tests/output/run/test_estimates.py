@@ -3,6 +3,8 @@
 import json
 import time
 
+import pytest
+
 from fifesim.output.run.estimates import estimate, estimate_in_words
 from fifesim.output.run.folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
@@ -18,6 +20,7 @@ def test_cells_and_pixels_are_those_of_the_scenario():
     assert found["threads"] == 1 and found["seconds"] > 0 and found["memory"] > 0
 
 
+@pytest.mark.slow
 def test_time_is_that_of_the_whole_run_with_start_and_report(tmp_path):
     """A scene no larger than the piece takes as long as its run, within what a busy machine makes of it."""
     scenario = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
