@@ -19,8 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-here = Path(__file__).parent if "__file__" in globals() else Path("docs/gallery_src")
-table = pd.read_csv(here.parent / "instruments.csv")
+table = pd.read_csv(next(path for path in map(Path, ("../instruments.csv", "docs/instruments.csv")) if path.exists()))
 table = table[table["variable"] == "lai"]
 
 STAGES = {
