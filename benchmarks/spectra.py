@@ -27,8 +27,11 @@ def cube(size, chunks):
         (bands, rows, columns) = block_info[None]["array-location"]
         wavelength = np.linspace(FIRST, LAST, BANDS, dtype=np.float32)[slice(*bands), None, None]
         row, column = (np.arange(*each, dtype=np.float32) for each in (rows, columns))
-        texture = np.sin(row[:, None] / 17) * np.cos(column / 23)
-        return 0.2 + 0.1 * np.sin(3 * wavelength) + 0.05 * texture
+        # One array of the block's size, as a reader makes it.
+        values = np.empty((wavelength.size, row.size, column.size), np.float32)
+        np.multiply(np.sin(row / 17)[:, None], 0.05 * np.cos(column / 23), out=values)
+        values += 0.2 + 0.1 * np.sin(3 * wavelength)
+        return values
 
     sizes = tuple(da.core.normalize_chunks(chunks, (BANDS, size, size)))
     data = da.map_blocks(block, chunks=sizes, dtype=np.float32, meta=np.empty((0, 0, 0), np.float32))

@@ -3,11 +3,16 @@
 import dask.array as da
 import numpy as np
 import xarray as xr
+from dask.graph_manipulation import bind
+from dask.highlevelgraph import HighLevelGraph
 from numba import vectorize
 from scipy.sparse.csgraph import connected_components
 
 # Bytes of the sums that one task makes, from which bands are summed by themselves.
 _LARGEST_SUM = 2**26
+
+# Bytes of a sum from which its chunks are read in turn.
+_IN_TURN = 2**24
 
 
 def combined(array, dim, weights, name="band"):
@@ -74,12 +79,31 @@ def _split(rows, largest):
 
 def _chain(data, weights, edges, numbers):
     """The sums of one group, from one chunk after the other: each is read by one task, and may go then."""
+    if 8 * np.prod([max(sizes) for sizes in data.chunks[1:]]) < _IN_TURN:
+        return _links(data, weights, edges, numbers)
+    # Large chunks are read in turn: an idle thread would read on, and all of a cube would wait to be added.
+    parts = np.empty(data.numblocks[1:], object)
+    for place in np.ndindex(*parts.shape):
+        parts[place] = _links(data.blocks[(slice(None), *place)], weights, edges, numbers, in_turn=True)
+    return da.block(parts[None].tolist())
+
+
+def _alone(chunk):
+    """The same array with no more of its graph than it needs."""
+    graph = {chunk.name: chunk.dask.cull(chunk.__dask_keys__()).to_dict()}
+    return da.Array(HighLevelGraph(graph, {chunk.name: set()}), chunk.name, chunk.chunks, meta=chunk._meta)
+
+
+def _links(data, weights, edges, numbers, in_turn=False):
+    """One chain, each chunk of which is read when the sum before is there, or whenever there is time."""
     rest = tuple(range(1, data.ndim))
     sums, rows = (data.ndim, *rest), {data.ndim: len(weights)}
     total = ()
     for number in numbers if len(numbers) else [0]:
-        part = weights[:, edges[number] : edges[number + 1]]
-        arguments = (part, None, data.blocks[number], (0, *rest), *total)
+        part, chunk = weights[:, edges[number] : edges[number + 1]], data.blocks[number]
+        if in_turn and total:
+            chunk = bind(_alone(chunk), total[0])
+        arguments = (part, None, chunk, (0, *rest), *total)
         meta = np.empty((0,) * data.ndim)
         made = da.blockwise(_add, sums, *arguments, concatenate=True, new_axes=rows, dtype=float, meta=meta)
         total, rows = (made, sums), None

@@ -1,10 +1,14 @@
 """Weighted sums along a dimension are those of the matrix, whatever the chunks."""
 
+import threading
+import time
+
 import numpy as np
 import pytest
 import xarray as xr
 from lazy import no_compute
 
+from fifesim.rasters import combination
 from fifesim.rasters.combination import combined
 
 WEIGHTS = np.array([[0.5, 0.25, 0.0, 0.0, 0.25], [0.0, 0.0, 2.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0]])
@@ -24,12 +28,42 @@ def test_sums_are_those_of_the_matrix(cube):
     assert set(found.coords) == {"sza", "y"}
 
 
+@pytest.mark.parametrize("in_turn", [0, combination._IN_TURN])
 @pytest.mark.parametrize("chunks", [(5, 6, 7), (1, 6, 7), (2, 4, 3), (3, 1, 1)])
-def test_chunks_give_the_same_bits_and_stay_lazy(cube, chunks):
+def test_chunks_give_the_same_bits_and_stay_lazy(cube, chunks, in_turn, monkeypatch):
+    monkeypatch.setattr(combination, "_IN_TURN", in_turn)
     with no_compute():
         lazy = combined(cube.chunk(dict(zip(cube.dims, chunks, strict=True))), "band", WEIGHTS)
     xr.testing.assert_identical(lazy.compute(), combined(cube, "band", WEIGHTS))
     assert lazy.chunks[1:] == cube.chunk(dict(zip(cube.dims, chunks, strict=True))).chunks[1:]
+
+
+def test_large_chunks_wait_until_the_one_before_is_added(cube, monkeypatch):
+    """With more threads than chunks in a row, no two of a chain are in memory together."""
+    held = {"now": 0, "most": 0}
+    lock, add = threading.Lock(), combination._add
+
+    def read(block):
+        with lock:
+            held["now"] += block.size > 0
+            held["most"] = max(held["most"], held["now"])
+        return block
+
+    def slow_add(*arguments):
+        time.sleep(0.02)
+        out = add(*arguments)
+        with lock:
+            held["now"] -= 1
+        return out
+
+    monkeypatch.setattr(combination, "_IN_TURN", 0)
+    monkeypatch.setattr(combination, "_add", slow_add)
+    chunked = cube.chunk(band=1)
+    chunked = chunked.copy(data=chunked.data.map_blocks(read, meta=np.empty((0, 0, 0))))
+    lazy = combined(chunked, "band", np.ones((1, 5)))
+    held.update(now=0, most=0)
+    lazy.compute(scheduler="threads", num_workers=5)
+    assert held["most"] == 1
 
 
 def test_what_has_no_weight_is_not_read(cube):
