@@ -8,7 +8,7 @@ from fifesim.output.figures import NAMES, detail_figure, fit_figure, histogram_f
 from fifesim.rasters import grid as grids
 from fifesim.scenario.keys import Keys
 from fifesim.scenario.simulation import setup_of
-from fifesim.sensor.description.listing import blur_in_words
+from fifesim.sensor.description.listing import blur_in_words, noise_in_words
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
 _DPI = 130
@@ -133,6 +133,7 @@ def _summary(scenario, image, truth, fits, reasons):
         ("Scene", f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m, {grid.crs}"),
         ("Image", f"{size} pixels of {scenario.sensor.pixel:g} m, {100 * valid:.1f} % of them with data"),
         ("Blur", blur_in_words(own.description, own.bands)),
+        ("Noise", noise_in_words(own.description, own.bands, own.noise)),
         ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
     ]
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:

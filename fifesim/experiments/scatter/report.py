@@ -12,7 +12,7 @@ from fifesim.output.pages import fixed, plus_minus
 from fifesim.output.report import title
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.listing import blur_in_words
+from fifesim.sensor.description.listing import blur_in_words, noise_in_words
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
 
@@ -144,7 +144,7 @@ def _setting(scenario, run):
         ("Distance between pixels", interval + (f"; the last lie {beyond:.1f} m from their blocks" if beyond else "")),
         ("Registration error", f"{own.offset[0]:g} and {own.offset[1]:g} pixels southward and eastward"),
         ("Blur", blur_in_words(own.description, own.bands)),
-        ("Noise", ", ".join(own.noise) or "none"),
+        ("Noise", noise_in_words(own.description, own.bands, own.noise)),
         ("Ground", "level" if scenario.terrain.dem == "flat" else Path(scenario.terrain.dem).name),
         ("Air", f"{air.profile}, {air.aerosol} aerosol, {amount}, {air.engine}"),
     ]

@@ -1,7 +1,7 @@
 """Description of an instrument: bands, sampling, spatial response and radiometry, each number with its source."""
 
 from dataclasses import field, replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -49,6 +49,8 @@ class Instrument:
         Error of the gridded product's place, root mean square along each axis. [m]
     product : Product, optional
         Scale of the agency's product.
+    not_found : dict, optional
+        What is left out of ``noise`` and ``blur``, and who published it.
     aliases : tuple of str, optional
         Other names.
 
@@ -74,6 +76,7 @@ class Instrument:
     scan: Scan | None = None
     geolocation: Positive | None = None
     product: Product | None = None
+    not_found: dict[Literal["noise", "blur"], str] = field(default_factory=dict, repr=False, hash=False)
     aliases: tuple[Name, ...] = ()
 
     def __post_init__(self):

@@ -57,6 +57,7 @@ def instrument_in_words(instrument):
     lines += _product(instrument)
     lines += _sampling(instrument)
     lines += _radiometry(instrument)
+    lines += [f"  not known: {name}, {text}" for name, text in instrument.not_found.items()]
     lines += ["  sources", *(f"    {text}" for text in instrument.references.values())]
     return "\n".join(lines)
 
@@ -142,7 +143,44 @@ def blur_in_words(instrument, bands):
     unknown = [band.name for band in chosen if not knows_blur(instrument, band)]
     if unknown:
         text += f"; of {', '.join(unknown)} the detector alone is known: the image is sharper than the instrument's"
+        text += _published(instrument, "blur")
     return text
+
+
+def noise_in_words(instrument, bands, kinds=()):
+    """
+    Which noise is added to some bands, or that it is not known, in a line.
+
+    Parameters
+    ----------
+    instrument : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of str
+    kinds : sequence of str, optional
+        Kinds of noise that are added.
+
+    Returns
+    -------
+    text : str
+
+    Examples
+    --------
+    >>> from fifesim.sensor.description.instruments import instrument
+    >>> noise_in_words(instrument("L4TM"), ["TM3", "TM4"])
+    'none is added'
+    >>> noise_in_words(instrument("VIIRS"), ["I1"])
+    'none is added; that of I1 is not known, by band: Twedt, Lei and Xiong (2017), doi:10.1117/12.2274025'
+    """
+    if kinds:
+        return ", ".join(kinds)
+    unknown = [band.name for band in instrument.select(bands) if band.noise is None]
+    if not unknown:
+        return "none is added"
+    return f"none is added; that of {', '.join(unknown)} is not known{_published(instrument, 'noise')}"
+
+
+def _published(instrument, quantity):
+    """Who published what an instrument's file does not know."""
+    return f", {instrument.not_found[quantity]}" if quantity in instrument.not_found else ""
 
 
 def _radiometry(instrument):

@@ -2,9 +2,12 @@
 
 import dataclasses
 
+import pytest
+
 from fifesim.sensor.description.fields import Angles
 from fifesim.sensor.description.instruments import instrument, instrument_names
-from fifesim.sensor.description.listing import instrument_in_words, list_instruments
+from fifesim.sensor.description.listing import blur_in_words, instrument_in_words, list_instruments, noise_in_words
+from fifesim.sensor.description.responses import knows_blur
 
 
 def test_thematic_mapper_in_words():
@@ -45,3 +48,29 @@ def test_the_scale_of_a_product_is_said():
     assert said in instrument_in_words(instrument("MSI")).splitlines()
     assert "is reflectance x cosine of the solar zenith angle, 16 bits" in instrument_in_words(instrument("OLI2"))
     assert "Level-1 product" not in instrument_in_words(instrument("TM"))
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_what_a_file_does_not_know_it_says_with_who_does(name):
+    described = instrument(name)
+    lacking = {
+        "noise": any(band.noise is None for band in described.bands),
+        "blur": not all(knows_blur(described, band) for band in described.bands),
+    }
+    for quantity, lacks in lacking.items():
+        assert not lacks or quantity in described.not_found
+    text = instrument_in_words(described)
+    assert text.count("not known: ") == len(described.not_found)
+    assert all(who in text for who in described.not_found.values())
+
+
+def test_a_line_says_which_bands_lack_noise_or_blur_and_who_published_it():
+    oli = instrument("OLI")
+    assert noise_in_words(oli, ["OLI4"]) == "none is added"
+    assert noise_in_words(oli, ["OLI4", "OLI6"]).startswith("none is added; that of OLI6 is not known, of bands 1 and 6")
+    assert noise_in_words(oli, ["OLI6"], ["thermal", "shot"]) == "thermal, shot"
+    assert blur_in_words(oli, ["OLI4"]).endswith(f"sharper than the instrument's, {oli.not_found['blur']}")
+    assert "sharper" not in blur_in_words(instrument("MSI"), ["MSI4"])
+    # A file of one's own need not say it.
+    own = dataclasses.replace(oli, not_found={})
+    assert noise_in_words(own, ["OLI6"]).endswith("that of OLI6 is not known")
