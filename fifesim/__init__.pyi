@@ -19,9 +19,13 @@ from .ground.landscape.distribution import lai_distribution as lai_distribution
 from .ground.landscape.distribution import treatments as treatments
 from .ground.landscape.autoregression import correlation_length as correlation_length
 from .ground.landscape.autoregression import arp_for_length as arp_for_length
+from .ground.landscape.rasters.scenes import landscape as landscape
+from .ground.landscape.cover import Patches as Patches
+from .ground.landscape.classes import CoverClass as CoverClass
+from .ground.landscape.classes import fife_classes as fife_classes
 from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
-from .chain.steps import surface_reflectance as surface_reflectance  # method
+from .chain.steps import surface_reflectance as surface_reflectance  # method, of a Dataset too
 from .ground.canopy.raster import fpar as fpar  # method
 
 # Terrain

@@ -1,5 +1,7 @@
 """The canopy on labelled rasters: its reflectance on level ground, and the light that it absorbs."""
 
+from functools import partial
+
 import numpy as np
 import xarray as xr
 
@@ -72,30 +74,91 @@ def level_reflectance(
     --------
     fifesim.ground.canopy.sail_model.sail
     """
+    lai = checked_scene(lai)
+    said = {"leaf_angles": leaf_angles, "hotspot": hotspot, "exact": exact}
+    optics = {"leaf_reflectance": leaf_reflectance, "leaf_transmittance": leaf_transmittance, "background": background}
+    light = {"diffuse_fraction": diffuse_fraction, "geometry": geometry}
+    kernel, rasters = canopy_kernel(bands, **optics, **light, **said)
+    out = chunking.pointwise(kernel, lai.drop_vars(ANGLES, errors="ignore"), *rasters, bands=len(bands))
+    described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
+    said = {"leaf_angles": str(leaf_angle_classes(leaf_angles)), "background": described}
+    return labelled(out, lai, bands, wavelengths, geometry, **said, **provenance)
+
+
+def canopy_kernel(
+    bands,
+    *,
+    leaf_reflectance,
+    leaf_transmittance,
+    background,
+    diffuse_fraction,
+    geometry,
+    leaf_angles="spherical",
+    hotspot=0.0,
+    exact=False,
+):
+    """
+    What gives the reflectance of cells of one canopy, and the rasters that it takes.
+
+    Parameters
+    ----------
+    bands : sequence of str
+    leaf_reflectance, leaf_transmittance, background, diffuse_fraction, geometry, leaf_angles, hotspot, exact
+        As in `level_reflectance`.
+
+    Returns
+    -------
+    kernel : callable
+        ``kernel(lai, *blocks)`` gives reflectance, shape (band, ...), from leaf area of shape (...) and blocks of the
+        rasters, of shape (..., [band]).
+    rasters : list of xarray.DataArray
+
+    Raises
+    ------
+    ValueError
+        As in `level_reflectance`.
+    """
     if not 0 <= hotspot < np.inf:
         raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
-    angles = leaf_angle_classes(leaf_angles)
-    parameters = {"leaf_angles": angles, "hotspot": float(hotspot)}
-    lai = _checked_scene(lai)
-    described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
-    if described == "raster":
+    parameters = {"leaf_angles": leaf_angle_classes(leaf_angles), "hotspot": float(hotspot)}
+    if isinstance(background, xr.DataArray):
         cf.check_units(background, "surface_reflectance")
         background = _background_bands(background, bands)
     background = _per_band(background)
     leaves = leaf_reflectance, leaf_transmittance
     if directions.varying(geometry) or any(isinstance(each, xr.DataArray) for each in leaves):
-        out = _by_cell(lai, background, diffuse_fraction, leaves, geometry, parameters)
-    else:
-        names = "leaf_reflectance", "leaf_transmittance"
-        parameters |= {name: tuple(map(float, values)) for name, values in zip(names, leaves, strict=True)}
-        parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
-        parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
-        out = chunking.pointwise(_reflectance, lai, background, bands=len(bands), **parameters)
-    out = out.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
+        by_band = [_per_band(each) for each in (background, diffuse_fraction, *leaves)]
+        return partial(_by_cell, parameters), [*by_band, *directions.angles(geometry)]
+    names = "leaf_reflectance", "leaf_transmittance"
+    parameters |= {name: tuple(map(float, values)) for name, values in zip(names, leaves, strict=True)}
+    parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
+    parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
+    return partial(_reflectance, parameters), [background]
+
+
+def labelled(reflectance, lai, bands, wavelengths, geometry, *, leaf_angles, **provenance):
+    """
+    Reflectance of a scene with its bands, place, directions and attributes.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+    lai : xarray.DataArray, dims (y, x)
+    bands, wavelengths, geometry
+        As in `level_reflectance`.
+    leaf_angles : str
+        In words.
+    **provenance : str or number
+        Further attributes.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+    """
+    out = reflectance.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
     out = directions.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
-    said = f"surface_reflectance: SAIL, {angles} leaves, {_directions(geometry)}"
-    provenance = {"leaf_angles": str(angles), "background": described, **provenance}
-    return cf.label(out, "surface_reflectance", source=lai, history=said, **provenance)
+    said = f"surface_reflectance: SAIL, {leaf_angles} leaves, {_directions(geometry)}"
+    return cf.label(out, "surface_reflectance", source=lai, history=said, leaf_angles=leaf_angles, **provenance)
 
 
 @by_date
@@ -140,14 +203,30 @@ def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=abs
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "fpar")
     extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))
-    lai = _checked_scene(lai)
+    lai = checked_scene(lai)
     out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
     out = grids.place(out, grids.geobox(lai))
     return cf.label(out, "fpar", source=lai, history=f"fpar: Beer's law, K {extinction:.4f}, limit {fpar_inf:g}")
 
 
-def _checked_scene(lai):
-    """Leaf area of a scene, in its unit; of what is in memory, with data."""
+def checked_scene(lai):
+    """
+    Leaf area of a scene in its unit.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+
+    Raises
+    ------
+    ValueError
+        If it is another quantity, has other dimensions or no grid; of what is in memory, if it has no data.
+    """
     cf.check_quantity(lai, "lai")
     if set(lai.dims) != {"y", "x"}:
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
@@ -165,22 +244,16 @@ def _per_band(values):
     return xr.DataArray(np.asarray(values, float), dims="band")
 
 
-def _reflectance(lai, background, **parameters):
+def _reflectance(parameters, lai, background):
     # apply_ufunc hands the bands over as the last axis.
     return canopy_reflectance(check_map(lai), background=np.moveaxis(background, -1, 0), **parameters)
 
 
-def _by_cell(lai, background, diffuse_fraction, leaves, geometry, parameters):
+def _by_cell(parameters, cells, ground, sky, reflectance, transmittance, sza, saa, vza, vaa):
     """Reflectance where the directions of sun or sensor, or the leaves, vary over the scene."""
-
-    def kernel(cells, ground, sky, reflectance, transmittance, sza, saa, vza, vaa):
-        directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
-        light = {"background": ground, "diffuse_fraction": sky, **directions}
-        return directional_reflectance(check_map(cells), reflectance, transmittance, **light, **parameters)
-
-    plain = lai.drop_vars(ANGLES, errors="ignore")
-    by_band = [_per_band(each) for each in (background, diffuse_fraction, *leaves)]
-    return chunking.pointwise(kernel, plain, *by_band, *directions.angles(geometry), bands=len(by_band[2]["band"]))
+    towards = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
+    light = {"background": ground, "diffuse_fraction": sky, **towards}
+    return directional_reflectance(check_map(cells), reflectance, transmittance, **light, **parameters)
 
 
 def _directions(geometry):
