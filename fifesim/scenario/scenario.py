@@ -2,7 +2,7 @@
 
 import os
 
-from pydantic import ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from fifesim.atmosphere.schemes import six_s
 from fifesim.atmosphere.schemes.engines import check_zenith
@@ -15,6 +15,9 @@ from fifesim.rasters.sites import on_fife_site
 from fifesim.scenario.keys import EXTENT, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.scenario.toml import load_values, mistakes
+
+# Shares of classes may miss 1 by rounding.
+_WHOLE = 1e-6
 
 
 class Scenario(Keys):
@@ -33,7 +36,7 @@ class Scenario(Keys):
     """
 
     ground: Ground = Ground()
-    classes: dict[str, CoverStand] = {}
+    classes: dict[str, CoverStand] = Field({})
     terrain: Terrain = Terrain()
     atmosphere: Air = Air()
     sensor: Sensor = Sensor()
@@ -47,7 +50,17 @@ class Scenario(Keys):
     @model_validator(mode="after")
     def _classes_of_a_cover(self):
         if self.landscape.cover == "none" and self.classes:
-            raise ValueError("classes: are given, and landscape.cover is none: say how they lie, such as \"pastures\"")
+            raise ValueError('classes: are given, and landscape.cover is none: say how they lie, such as "pastures"')
+        if self.landscape.cover != "none" and self.ground.method == "periodic":
+            raise ValueError(
+                'ground.method = "periodic" is for one stand: type method = "streaming", or cover = "none"'
+            )
+        shares = [stand.share for stand in self.classes.values()]
+        if any(shares) and not all(shares):
+            lacking = ", ".join(name for name, stand in self.classes.items() if stand.share is None)
+            raise ValueError(f"classes: {lacking} has no share, others have: give it to all, or to none")
+        if any(shares) and abs(sum(shares) - 1) > _WHOLE:
+            raise ValueError(f"classes: their shares sum to {sum(shares):g}: they must sum to 1")
         return self
 
     def geobox(self):

@@ -16,7 +16,8 @@ from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
 from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.terrain.units import metres_per_unit
-from fifesim.scenario.keys import AirKeys, ClassKeys, GroundKeys, SensorKeys, StandKeys, TerrainKeys
+from fifesim.scenario.ground_keys import ClassKeys, GroundKeys, StandKeys
+from fifesim.scenario.keys import AirKeys, SensorKeys, TerrainKeys
 from fifesim.scenario.section import nearest
 from fifesim.sensor.description.instruments import instrument, noise_of
 from fifesim.sensor.response.noise import NoiseModel, check_kinds
@@ -138,21 +139,22 @@ class CoverStand(Stand, ClassKeys):
 
     def cover_class(self, name, ground):
         """
-        The class, with what it leaves out.
+        The class; what it leaves out of its canopy is said by the call of `surface_reflectance`.
 
         Parameters
         ----------
         name : str
         ground : Ground
+            Whose leaf area it has where it says none.
 
         Returns
         -------
         cover_class : fifesim.ground.landscape.classes.CoverClass
         """
-        stand = ground.model_copy(update={key: getattr(self, key) for key in self.model_fields_set - {"share", "code"}})
-        optics = {"leaf": stand.leaf_optics(), "brown_leaf": stand.dead_leaf(), "background": stand.below_canopy()}
-        numbers = {key: getattr(stand, key) for key in _OF_A_CLASS}
-        return CoverClass(name, lai=stand.distribution, code=self.code, **optics, **numbers)
+        optics = {"leaf": self.leaf_optics(), "brown_leaf": self.dead_leaf(), "background": self.below_canopy()}
+        numbers = {key: getattr(self, key) for key in _OF_A_CLASS if key in self.model_fields_set}
+        lai = (self if "distribution" in self.model_fields_set else ground).distribution
+        return CoverClass(name, lai=lai, code=self.code, **optics, **numbers)
 
 
 def _by_band(names, values):

@@ -10,7 +10,10 @@ from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.ground.canopy import raster as ground
+from fifesim.ground.landscape.classes import fife_classes
+from fifesim.ground.landscape.cover import PATTERNS, Patches
 from fifesim.ground.landscape.raster import lai_scene, lai_window
+from fifesim.ground.landscape.rasters.scenes import landscape
 from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
 from fifesim.scenario.land import elevation
@@ -43,20 +46,22 @@ def simulate(scenario, chunks="auto"):
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
-    grid, land, setup = scenario.geobox(), scenario.ground, setup_of(scenario)
+    grid, own, setup = scenario.geobox(), scenario.ground, setup_of(scenario)
 
     def means(array):
         return aggregate(array, scenario.sensor.size, min_valid=setup.min_valid)
 
-    lai = leaf_area(scenario, grid, chunks)
-    fpar = ground.fpar(lai, geometry=setup.geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
-    level = reflectance_of(setup, lai)
-    nodes = {"scene": {"lai": lai}, "truth": {"lai": means(lai), "fpar": means(fpar)}}
+    land = ground_scene(scenario, grid, chunks)
+    scene = dict(land.data_vars) if isinstance(land, xr.Dataset) else {"lai": land}
+    lai = scene["lai"]
+    fpar = ground.fpar(lai, geometry=setup.geometry, leaf_angles=own.leaf_angles, fpar_inf=own.fpar_inf)
+    level = reflectance_of(setup, land)
+    nodes = {"scene": scene, "truth": {"lai": means(lai), "fpar": means(fpar)}}
     dem, horizon, reach = elevation(scenario, grid, chunks)
     if dem is None:
         reflectance = level
     else:
-        reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), lai)
+        reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land)
         kt = chain.kt(level, dem, horizon=horizon)
         dem, slope = _cut(dem, grid), _cut(slopes.slope(dem), grid)
         nodes["scene"]["dem"] = dem
@@ -71,9 +76,9 @@ def simulate(scenario, chunks="auto"):
     return tree
 
 
-def leaf_area(scenario, grid, chunks=None):
+def ground_scene(scenario, grid, chunks=None):
     """
-    Leaf area of a scenario.
+    The ground of a scenario.
 
     Parameters
     ----------
@@ -85,13 +90,30 @@ def leaf_area(scenario, grid, chunks=None):
 
     Returns
     -------
-    lai : xarray.DataArray, dims (y, x)
-        [m2 m-2]
+    land : xarray.DataArray, dims (y, x), or xarray.Dataset
+        Leaf area; or a landscape, where the scenario has classes of cover or properties that vary. [m2 m-2]
     """
-    land = scenario.ground
-    if land.lai_file:
-        return lai_window(land.lai_file, grid, chunks=chunks)
-    return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+    land, own = scenario.ground, scenario.landscape
+    if own.cover == "none":
+        if land.lai_file:
+            return lai_window(land.lai_file, grid, chunks=chunks)
+        return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+    classes = {name: stand.cover_class(name, land) for name, stand in scenario.classes.items()} or fife_classes()
+    return landscape(
+        grid,
+        cover=Patches(own.cover, own.size, _shares(scenario)) if own.cover in PATTERNS else own.cover,
+        classes=classes,
+        lai=land.lai_file,
+        arp=land.arp,
+        seed=land.seed,
+        chunks=chunks,
+    )
+
+
+def _shares(scenario):
+    """Shares of the classes that are drawn, None where they are equal."""
+    shares = {name: stand.share for name, stand in scenario.classes.items()}
+    return shares if any(shares.values()) else None
 
 
 def setup_of(scenario):

@@ -19,7 +19,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, operators
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
-from fifesim.scenario.simulation import leaf_area, setup_of
+from fifesim.scenario.simulation import ground_scene, setup_of
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters.noise import noisy
@@ -150,7 +150,7 @@ def _scene(scenario):
     bands = _red_and_nir(setup.instrument.select(setup.bands))
     blocks = grids.aligned(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
-    lai = leaf_area(scenario, grid).compute()
+    lai = ground_scene(scenario, grid).compute()
     middle = _spread_out(aggregate(lai, grids.cell_size(blocks)[0], min_valid=setup.min_valid), lai)
     dem, horizon, _ = elevation(scenario, grid)
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, lai, middle, blocks, image)

@@ -70,7 +70,7 @@ def inputs_of(scenario):
         Size [byte] and time of the last change [ns] by path.
     """
     found = {}
-    for (_, key), name in scenario.files.items():
+    for (*_, key), name in scenario.files.items():
         for path in filter(os.path.isfile, _read_with(key, name) if os.path.isfile(name) else ()):
             status = os.stat(path)
             found[str(path)] = [status.st_size, status.st_mtime_ns]
@@ -81,7 +81,7 @@ def _read_with(key, name):
     if key == "instrument":
         responses = [band.srf for band in instrument(name).bands]
         return [name, *(Path(each.folder) / each.table for each in responses if hasattr(each, "table"))]
-    if key in ("lai_file", "dem"):
+    if key in ("lai_file", "dem", "cover"):
         with raster_file(name).opened() as source:
             return [name, *source.files]
     return [name]
