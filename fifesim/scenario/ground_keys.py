@@ -76,6 +76,11 @@ class ClassKeys(StandKeys):
     share: float | None = number(None, "1", "of the ground, where cover is drawn; by default that of all", gt=0, le=1)
     code: int | None = text(None, "in the map of cover; by default classes count from 1")
 
+    @property
+    def said(self):
+        """Keys that differ from the ground's."""
+        return {key: known for key, known in super().said.items() if key in self.model_fields_set}
+
 
 class LandscapeKeys(Section):
     """Classes of cover, and properties of the ground that vary; without them one stand is everywhere."""

@@ -8,6 +8,7 @@ from fifesim.atmosphere.schemes import six_s
 from fifesim.atmosphere.schemes.engines import check_zenith
 from fifesim.base import fife, geometry
 from fifesim.base.foreign import shown
+from fifesim.ground.landscape.classes import fife_classes
 from fifesim.rasters import grid as grids
 from fifesim.rasters import whereabouts
 from fifesim.rasters.covering import covering_grid
@@ -62,6 +63,10 @@ class Scenario(Keys):
         if any(shares) and abs(sum(shares) - 1) > _WHOLE:
             raise ValueError(f"classes: their shares sum to {sum(shares):g}: they must sum to 1")
         return self
+
+    def class_table(self):
+        """Classes of cover by name, a dict of `CoverClass`; those of FIFE where the keys say none."""
+        return {name: stand.cover_class(name, self.ground) for name, stand in self.classes.items()} or fife_classes()
 
     def geobox(self):
         """

@@ -10,7 +10,6 @@ from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.ground.canopy import raster as ground
-from fifesim.ground.landscape.classes import fife_classes
 from fifesim.ground.landscape.cover import PATTERNS, Patches
 from fifesim.ground.landscape.raster import lai_scene, lai_window
 from fifesim.ground.landscape.rasters.scenes import landscape
@@ -98,11 +97,10 @@ def ground_scene(scenario, grid, chunks=None):
         if land.lai_file:
             return lai_window(land.lai_file, grid, chunks=chunks)
         return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
-    classes = {name: stand.cover_class(name, land) for name, stand in scenario.classes.items()} or fife_classes()
     return landscape(
         grid,
         cover=Patches(own.cover, own.size, _shares(scenario)) if own.cover in PATTERNS else own.cover,
-        classes=classes,
+        classes=scenario.class_table(),
         lai=land.lai_file,
         arp=land.arp,
         seed=land.seed,

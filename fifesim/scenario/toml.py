@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from fifesim.base.foreign import in_a_line, read_toml, shown
-from fifesim.scenario.keys import ClassKeys, Keys
+from fifesim.scenario.keys import Keys
 from fifesim.scenario.section import nearest
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -146,11 +146,9 @@ def write_scenario(scenario):
 
 
 def _table(name, section):
-    """Lines of a table and of those in it; of a class, the keys that differ from the ground's."""
+    """Lines of a table and of those in it."""
     lines, tables = [f"[{name}]  # {inspect.getdoc(type(section)).splitlines()[0]}"], []
-    for key, known in type(section).model_fields.items():
-        if isinstance(section, ClassKeys) and key not in section.model_fields_set:
-            continue
+    for key, known in section.said.items():
         value, unit = getattr(section, key), section.unit(key)
         meaning = f"{unit}; {known.description}" if unit else known.description
         if isinstance(value, dict):
