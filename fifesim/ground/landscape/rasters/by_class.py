@@ -1,0 +1,88 @@
+"""What differs by class of cover, on labelled rasters: each class is evaluated on its own cells alone."""
+
+from functools import partial
+
+import numpy as np
+
+from fifesim.base.geometry import ANGLES
+from fifesim.ground.landscape.compression import cells_by_class, check_codes
+from fifesim.rasters import chunks as chunking
+
+
+def by_class(kernels, cover, *scene, bands=None):
+    """
+    A raster of which each class of cover has its own kernel.
+
+    Parameters
+    ----------
+    kernels : dict of int to (callable, sequence of xarray.DataArray)
+        Of each code: ``kernel(*cells)`` gives values of shape ([band], n) from n cells of the scene and of the rasters
+        beside it. What has bands has them as last axis; what is no raster is given as it is.
+    cover : xarray.DataArray, dims (y, x)
+        Codes; -1 and NaN give NaN.
+    *scene : xarray.DataArray, dims (y, x)
+        Rasters that all kernels take first.
+    bands : int, optional
+        Of the result.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims ([band], y, x)
+        Lazy where an input is; one task for a chunk, and the same bits as of each class alone.
+
+    Raises
+    ------
+    ValueError
+        If the rasters lie on different grids; when computed, if a cell has another code.
+    """
+    rasters, parts = [], []
+    for kernel, taken in kernels.values():
+        parts.append((kernel, tuple(_index(rasters, each) for each in taken)))
+    banded = tuple("band" in each.dims for each in (*scene, *rasters))
+    plain = [each.drop_vars(ANGLES, errors="ignore") for each in (cover, *scene, *rasters)]
+    kernel = partial(_of_classes, tuple(kernels), tuple(parts), banded, bands, len(scene))
+    return chunking.pointwise(kernel, *plain, bands=bands)
+
+
+def _index(rasters, wanted):
+    """Place of a raster among others, of which it becomes one; what classes share is there once."""
+    for index, each in enumerate(rasters):
+        if _same(each, wanted):
+            return index
+    rasters.append(wanted)
+    return len(rasters) - 1
+
+
+def _same(one, other):
+    """Whether two rasters are known to be the same without a look at their cells."""
+    if one.dims != other.dims or one.shape != other.shape:
+        return False
+    if one.chunks is not None or other.chunks is not None:
+        return getattr(one.data, "name", None) == getattr(other.data, "name", "")
+    lie = [(each.data.__array_interface__["data"], each.data.strides) for each in (one, other)]
+    return lie[0] == lie[1] or (one.ndim < 2 and one.equals(other))
+
+
+def _of_classes(codes, parts, banded, bands, first, cover, *blocks):
+    """A block of cells: those of each class are put together, evaluated and put back."""
+    shape = np.broadcast_shapes(cover.shape, *(block.shape[:2] for block in blocks[:first]))
+    cover = np.broadcast_to(cover, shape).ravel()
+    blocks = [_flat(block, has_bands, shape) for block, has_bands in zip(blocks, banded, strict=True)]
+    scene, rasters = blocks[:first], blocks[first:]
+    out = np.full(((bands,) if bands else ()) + cover.shape, np.nan)
+    for cells, (kernel, taken) in zip(cells_by_class(check_codes(cover, codes), codes), parts, strict=True):
+        if not cells.size:
+            continue
+        # Of one class alone nothing need be put together.
+        chosen = slice(None) if cells.size == cover.size else cells
+        read = (*scene, *(rasters[index] for index in taken))
+        out[..., chosen] = kernel(*(block[chosen] if varies else block for block, varies in read))
+    return out.reshape(out.shape[:-1] + shape)
+
+
+def _flat(block, has_bands, shape):
+    """A block by cells, shape (n, [band]), and whether it is by cells at all."""
+    if block.ndim == int(has_bands):
+        return block, False
+    end = block.shape[-1:] if has_bands else ()
+    return np.broadcast_to(block, shape + end).reshape(-1, *end), True
