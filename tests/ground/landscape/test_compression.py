@@ -42,7 +42,7 @@ def test_other_codes_are_named(dtype, wrong):
 
 
 def test_fractions_and_many_codes_are_told_in_a_line():
-    with pytest.raises(ValueError, match="codes without a class: 1.5, in 1 of 1"):
+    with pytest.raises(ValueError, match=r"codes without a class: 1\.5, in 1 of 1"):
         check_codes(np.array([1.5]), (1, 2))
     with pytest.raises(ValueError, match=r"1, 2, 3, 4, 5, 6, 7, 8, \.\.\., in") as told:
         check_codes(np.arange(1, 1001), tuple(range(2000, 3000)))

@@ -2,7 +2,7 @@
 
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.raster import canopy_kernel, checked_scene, labelled
-from fifesim.ground.landscape.rasters.by_class import by_class
+from fifesim.ground.landscape.rasters.evaluation import by_class
 
 
 def reflectance_of_classes(lai, cover, canopies, *, bands, wavelengths, geometry, diffuse_fraction, exact, **said):

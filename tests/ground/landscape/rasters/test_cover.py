@@ -111,13 +111,13 @@ def test_code_without_a_class_is_named_when_it_computes(tmp_path, site, codes):
 def test_map_that_is_of_no_use_is_refused(tmp_path, site, codes):
     with pytest.raises(ValueError, match="allow_remote=True"):
         cover_map("/vsicurl/https://example.org/cover.tif", site, TABLE)
-    with pytest.raises(ValueError, match="missing.tif"):
+    with pytest.raises(ValueError, match=r"missing\.tif"):
         cover_map(tmp_path / "missing.tif", site, TABLE)
     elsewhere = write(tmp_path / "far.tif", codes, site.affine * Affine.translation(5000, 0))
-    with pytest.raises(ValueError, match="far.tif does not overlap the grid"):
+    with pytest.raises(ValueError, match=r"far\.tif does not overlap the grid"):
         cover_map(elsewhere, site, TABLE)
     empty = write(tmp_path / "none.tif", np.full(site.shape, np.nan), site.affine)
-    with pytest.raises(ValueError, match="none.tif has no data on the grid"):
+    with pytest.raises(ValueError, match=r"none\.tif has no data on the grid"):
         cover_map(empty, site, TABLE)
     two = rioxarray.open_rasterio(write(tmp_path / "cover.tif", codes, site.affine))
     with pytest.raises(ValueError, match="select one layer"):

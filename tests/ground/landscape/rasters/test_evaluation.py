@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
-from fifesim.ground.landscape.rasters.by_class import _index, by_class
+from fifesim.ground.landscape.rasters.evaluation import _index, by_class
 
 
 @pytest.fixture
