@@ -92,11 +92,11 @@ def level_reflectance(land, bands, canopy, *, exact, **scene):
     """
     responses = tuple(band.response for band in bands)
     named = {"bands": [band.name for band in bands], "wavelengths": [band.wavelength for band in bands]}
+    optics = _Optics(responses, land.lai, exact)
     if land.cover is None:
-        told = _resolved(canopy, responses, land.lai, exact)
-        return ground.level_reflectance(land.lai, **told, **named, exact=exact, **scene)
+        return ground.level_reflectance(land.lai, **optics.of(canopy), **named, exact=exact, **scene)
     _check_used(land.classes, canopy)
-    canopies = {each.code: _resolved(_told(each, canopy), responses, land.lai, exact) for each in land.classes}
+    canopies = {each.code: optics.of(_told(each, canopy)) for each in land.classes}
     return reflectance_of_classes(land.lai, land.cover, canopies, **named, exact=exact, **scene)
 
 
@@ -106,12 +106,26 @@ def _told(kind, canopy):
     return {name: canopy[name] if own[name] is None else own[name] for name in canopy}
 
 
-def _resolved(canopy, responses, lai, exact):
-    """A canopy by its numbers in each band."""
-    reflectance, transmittance = leaves.leaf_optics(responses, canopy["leaf_optics"], lai, exact=exact)
-    background = soils.background(responses, canopy["background"], lai)
-    others = {name: value for name, value in canopy.items() if name not in ("leaf_optics", "background")}
-    return {"leaf_reflectance": reflectance, "leaf_transmittance": transmittance, "background": background, **others}
+class _Optics:
+    """Canopies by their numbers in each band; what several have is looked up once."""
+
+    def __init__(self, responses, lai, exact):
+        self._responses, self._lai, self._exact = responses, lai, exact
+        self._known = {}
+
+    def of(self, canopy):
+        """What `ground.canopy.raster.canopy_kernel` takes of a canopy."""
+        leaf = self._once("leaf_optics", leaves.leaf_optics, canopy["leaf_optics"], exact=self._exact)
+        below = self._once("background", soils.background, canopy["background"])
+        others = {name: value for name, value in canopy.items() if name not in ("leaf_optics", "background")}
+        return {"leaf_reflectance": leaf[0], "leaf_transmittance": leaf[1], "background": below, **others}
+
+    def _once(self, name, function, given, **options):
+        # What is given is kept beside, so that its identity stays its own.
+        key = name, id(given)
+        if key not in self._known:
+            self._known[key] = given, function(self._responses, given, self._lai, **options)
+        return self._known[key][1]
 
 
 def _check_used(classes, canopy):
