@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from fifesim.base.geometry import ANGLES
-from fifesim.ground.landscape.compression import cells_by_class, check_codes
+from fifesim.ground.landscape.compression import NO_CLASS, cells_by_class, check_codes
 from fifesim.rasters import chunks as chunking
 
 
@@ -62,17 +62,19 @@ def _of_classes(codes, parts, banded, bands, first, cover, *blocks):
     cover = np.broadcast_to(cover, shape).ravel()
     blocks = [_flat(block, has_bands, shape) for block, has_bands in zip(blocks, banded, strict=True)]
     scene, rasters = blocks[:first], blocks[first:]
+    codes_of_cells = check_codes(cover, codes)
+    if codes_of_cells.size and (alone := codes_of_cells[0]) != NO_CLASS and (codes_of_cells == alone).all():
+        kernel, taken = parts[codes.index(alone)]
+        found = kernel(*(block for block, _ in (*scene, *(rasters[index] for index in taken))))
+        return np.reshape(found, ((bands,) if bands else ()) + shape)
     out = np.full((bands or 1, cover.size), np.nan)
-    for cells, (kernel, taken) in zip(cells_by_class(check_codes(cover, codes), codes), parts, strict=True):
-        if not cells.size:
-            continue
-        # Of one class alone nothing need be put together.
-        chosen = slice(None) if cells.size == cover.size else cells
-        read = (*scene, *(rasters[index] for index in taken))
-        found = kernel(*(block[chosen] if varies else block for block, varies in read))
-        # Band by band: numpy puts cells of several rows at once back at half the speed.
-        for band, values in zip(out, found if bands else [found], strict=True):
-            band[chosen] = values
+    for cells, (kernel, taken) in zip(cells_by_class(codes_of_cells, codes), parts, strict=True):
+        if cells.size:
+            read = (*scene, *(rasters[index] for index in taken))
+            found = kernel(*(block[cells] if varies else block for block, varies in read))
+            # Band by band: numpy puts cells of several rows at once back at half the speed.
+            for band, values in zip(out, found if bands else [found], strict=True):
+                band[cells] = values
     return out.reshape(((bands,) if bands else ()) + shape)
 
 

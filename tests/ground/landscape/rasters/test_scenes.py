@@ -118,12 +118,22 @@ def test_map_of_cover_lies_below_the_leaf_area(tmp_path, site, land):
     assert np.isnan(of_map.lai.values[~known]).all() and (of_map.cover.values[~known] == -1).all()
 
 
+def test_cover_that_carries_its_classes_needs_no_others(site, land):
+    again = fifesim.landscape(site, cover=land.cover, arp=0.1, seed=7)
+    xr.testing.assert_equal(again, land)
+
+
 @pytest.mark.parametrize(
     "options, error, message",
     [
         ({"classes": CLASSES}, ValueError, "nothing says how the 3 classes lie: give cover= a map"),
         ({"cover": fifesim.Patches("voronoi", 9, (0.5, 0.5))}, ValueError, "2 shares for 3 classes"),
-        ({"cover": 3}, TypeError, "cover must be a fifesim.Patches, the path of a map or a raster, got 3"),
+        ({"cover": "map.tif"}, ValueError, "a map of cover needs classes="),
+        (
+            {"cover": 3, "classes": CLASSES},
+            TypeError,
+            "cover must be a fifesim.Patches, the path of",
+        ),
         ({"cover": PATCHES, "classes": fifesim.CoverClass("water")}, ValueError, "class water has no leaf area"),
         ({"brown": 1.5}, ValueError, r"brown must be in \[0, 1\], got 1.5"),
         (
