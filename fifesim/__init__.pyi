@@ -26,7 +26,7 @@ from .ground.landscape.classes import fife_classes as fife_classes
 from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
 from .chain.steps import surface_reflectance as surface_reflectance  # method, of a Dataset too
-from .ground.canopy.raster import fpar as fpar  # method
+from .chain.landscapes import fpar as fpar  # method, of a Dataset too
 
 # Terrain
 from .ground.terrain.rasters.elevation import fine_dem as fine_dem
@@ -75,7 +75,7 @@ from .sensor.description.instrument_file import Instrument as Instrument
 from .base.bands import Band as Band
 
 # Analysis
-from .analysis.rasters.means import aggregate as aggregate  # method
+from .chain.landscapes import aggregate as aggregate  # method, of a Dataset too
 from .chain.images import ndvi as ndvi  # method, of a Dataset too
 from .analysis.rasters.composites import composite as composite  # method
 from .analysis.rasters.regression import regress as regress  # method

@@ -91,6 +91,7 @@ KINDS = (
 """What an argument may be, by its name, which means the same everywhere."""
 
 OF_FUNCTION = {
+    "landscape": _of(FILE_OR_RASTER, "lai"),
     "arp_for_length": _of(NUMBER, "length"),
     "sense": _of(OFFSET, "offset"),
     "read_aerosol": _of(TWO, "layer") | _of(TABLES, "source"),

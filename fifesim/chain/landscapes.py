@@ -1,15 +1,24 @@
-"""Landscapes in the chain: what a Dataset says of the ground, and each class with its own canopy."""
+"""Landscapes in the chain: what a Dataset says of the ground, each class with its own canopy, and its true means."""
 
+from functools import partial
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
 
+from fifesim.analysis.rasters import means
+from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.canopy.rasters import leaves, soils
 from fifesim.ground.canopy.rasters.classes import reflectance_of_classes
 from fifesim.ground.landscape.classes import CoverClass
+from fifesim.ground.landscape.compression import NO_CLASS
 from fifesim.ground.landscape.rasters.cover import classes_of
+from fifesim.ground.landscape.rasters.evaluation import by_class
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
 from fifesim.rasters.axes import north_up
+from fifesim.rasters.dates import by_date
 
 _DEFAULTS = {"leaf_optics": None, "background": None, "leaf_angles": "spherical", "hotspot": 0.0}
 """Of what a canopy is told, where nothing is said."""
@@ -83,11 +92,11 @@ def level_reflectance(land, bands, canopy, *, exact, **scene):
     """
     responses = tuple(band.response for band in bands)
     named = {"bands": [band.name for band in bands], "wavelengths": [band.wavelength for band in bands]}
+    optics = _Optics(responses, land.lai, exact)
     if land.cover is None:
-        told = _resolved(canopy, responses, land.lai, exact)
-        return ground.level_reflectance(land.lai, **told, **named, exact=exact, **scene)
+        return ground.level_reflectance(land.lai, **optics.of(canopy), **named, exact=exact, **scene)
     _check_used(land.classes, canopy)
-    canopies = {each.code: _resolved(_told(each, canopy), responses, land.lai, exact) for each in land.classes}
+    canopies = {each.code: optics.of(_told(each, canopy)) for each in land.classes}
     return reflectance_of_classes(land.lai, land.cover, canopies, **named, exact=exact, **scene)
 
 
@@ -97,12 +106,26 @@ def _told(kind, canopy):
     return {name: canopy[name] if own[name] is None else own[name] for name in canopy}
 
 
-def _resolved(canopy, responses, lai, exact):
-    """A canopy by its numbers in each band."""
-    reflectance, transmittance = leaves.leaf_optics(responses, canopy["leaf_optics"], lai, exact=exact)
-    background = soils.background(responses, canopy["background"], lai)
-    others = {name: value for name, value in canopy.items() if name not in ("leaf_optics", "background")}
-    return {"leaf_reflectance": reflectance, "leaf_transmittance": transmittance, "background": background, **others}
+class _Optics:
+    """Canopies by their numbers in each band; what several have is looked up once."""
+
+    def __init__(self, responses, lai, exact):
+        self._responses, self._lai, self._exact = responses, lai, exact
+        self._known = {}
+
+    def of(self, canopy):
+        """What `ground.canopy.raster.canopy_kernel` takes of a canopy."""
+        leaf = self._once("leaf_optics", leaves.leaf_optics, canopy["leaf_optics"], exact=self._exact)
+        below = self._once("background", soils.background, canopy["background"])
+        others = {name: value for name, value in canopy.items() if name not in ("leaf_optics", "background")}
+        return {"leaf_reflectance": leaf[0], "leaf_transmittance": leaf[1], "background": below, **others}
+
+    def _once(self, name, function, given, **options):
+        # What is given is kept beside, so that its identity stays its own.
+        key = name, id(given)
+        if key not in self._known:
+            self._known[key] = given, function(self._responses, given, self._lai, **options)
+        return self._known[key][1]
 
 
 def _check_used(classes, canopy):
@@ -114,3 +137,109 @@ def _check_used(classes, canopy):
             raise ValueError(
                 f"{name} is given, and all classes of the landscape say theirs: leave it out, or out of the classes"
             )
+
+
+@by_date
+def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=absorption.FPAR_INF):
+    """
+    Fraction of photosynthetically active radiation that a canopy absorbs.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x), or xarray.Dataset
+        Leaf area index, or a landscape that has it as ``lai``, whose classes may say their leaf angles. [m2 m-2]
+    geometry : fifesim.base.geometry.Geometry, optional
+        The sun's; by default that which the array carries, else at its time and place.
+    time : str or datetime, optional
+        In the place of ``geometry``.
+    leaf_angles : optional
+        As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
+    fpar_inf : float, optional
+        Of an infinitely thick canopy. [1]
+
+    Returns
+    -------
+    fpar : xarray.DataArray, dims (y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If LAI is negative.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 6
+
+    See Also
+    --------
+    fifesim.ground.canopy.absorption.fpar
+    """
+    land = land_of(lai)
+    said = {"geometry": geometry, "time": time, "fpar_inf": fpar_inf}
+    angles = {each.code: leaf_angles if each.leaf_angles is None else each.leaf_angles for each in land.classes}
+    if len(set(map(repr, angles.values()))) < 2:
+        return ground.fpar(land.lai, leaf_angles=next(iter(angles.values()), leaf_angles), **said)
+    by_angles = {repr(each): ground.fpar(land.lai, leaf_angles=each, **said) for each in angles.values()}
+    kernels = {code: (np.positive, [by_angles[repr(each)]]) for code, each in angles.items()}
+    out = grids.place(by_class(kernels, land.cover), grids.geobox(land.lai))
+    return cf.label(out, "fpar", source=land.lai, history="fpar: Beer's law, leaf angles by class")
+
+
+@by_date
+def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
+    """
+    Means over square blocks of ground: the truth that a pixel is compared with.
+
+    Parameters
+    ----------
+    array : xarray.DataArray, dims (..., y, x), or xarray.Dataset
+        Of a landscape, ``brown`` is that of the leaf area of a block, and the codes of ``cover`` are counted.
+    pixel : float, optional
+        Size of the blocks, any multiple of the cell or not. [m]
+    min_valid : float, optional
+        Share of its area that a block needs on valid cells; below it is NaN. [1]
+    lsf : line spread function, optional
+        As `fifesim.base.footprints` has it, to weight the cells about each block's middle; all within the block count
+        the same by default.
+
+    Returns
+    -------
+    means : xarray.DataArray, dims (..., y, x), or xarray.Dataset
+        On the grid of whole blocks from the upper left corner. Of a landscape, ``class_share`` over (class, y, x) is in
+        the place of ``cover``.
+
+    Raises
+    ------
+    ValueError
+        If the array has no grid, or no block fits.
+    TypeError
+        If the size is no number.
+
+    See Also
+    --------
+    fifesim.base.footprints.regularize
+    """
+    mean = partial(means.aggregate, pixel=pixel, min_valid=min_valid, lsf=lsf)
+    if not isinstance(array, xr.Dataset):
+        return mean(array)
+    by_cell = {name: each for name, each in array.data_vars.items() if {"y", "x"} <= set(each.dims)}
+    kept = {name: each for name, each in array.data_vars.items() if name != "cover"}
+    out = {name: mean(each) if name in by_cell else each for name, each in kept.items()}
+    if "brown" in by_cell and "lai" in by_cell:
+        dead = mean(array["lai"] * array["brown"]) / out["lai"]
+        out["brown"] = out["brown"].copy(data=dead.where(out["lai"] != 0, 0.0).data)
+    if "cover" in by_cell:
+        out["class_share"] = _class_shares(array["cover"], mean)
+    return xr.Dataset(out, attrs=array.attrs)
+
+
+def _class_shares(cover, mean):
+    """Share of the ground of each class."""
+    table = classes_of(cover)
+    known = cover.where(cover != NO_CLASS)
+    shares = [mean((known == each.code).where(known.notnull())) for each in table]
+    names = xr.Variable("class", [each.name for each in table])
+    out = xr.concat(shares, dim=names, coords="minimal", compat="override", combine_attrs="override")
+    out = grids.place(out, grids.geobox(shares[0]))
+    return cf.label(out, "class_share", source=cover, history="aggregate: shares of classes")

@@ -19,6 +19,7 @@ class Quantity:
 QUANTITIES = {
     "lai": Quantity("1", "leaf_area_index", "leaf area index", "one-sided leaf area per ground area"),
     "cover": Quantity("1", "", "class of cover"),
+    "class_share": Quantity("1", "area_fraction", "share of the ground of a class"),
     "brown": Quantity("1", "", "share of dead leaf area"),
     "crown_cover": Quantity("1", "", "share of the ground below crowns"),
     "fpar": Quantity(

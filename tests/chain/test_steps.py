@@ -9,7 +9,6 @@ import fifesim
 from fifesim.atmosphere.schemes import engines
 from fifesim.base.geometry import Geometry
 from fifesim.chain import landscapes
-from fifesim.chain import steps as chain
 from fifesim.ground.canopy import optics
 from fifesim.rasters import directions
 from fifesim.rasters import grid as grids

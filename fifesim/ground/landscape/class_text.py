@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import fields
+from functools import lru_cache
 
 import numpy as np
 from scipy import stats
@@ -36,6 +37,7 @@ def table_text(table):
     return json.dumps([{name: value for name, value in row.items() if value is not None} for row in said])
 
 
+@lru_cache(maxsize=16)
 def read_table(text):
     """
     Table of classes from its text.

@@ -34,11 +34,11 @@ def check_codes(codes, table):
     [1, -1, 7]
     """
     codes = np.asarray(codes)
+    if codes.dtype == np.int16 and not _others(codes.ravel(), _numbers(table)):
+        return codes
     if codes.dtype.kind == "f":
         codes = np.where(np.isnan(codes), NO_CLASS, codes)
-    allowed = np.sort(np.asarray([NO_CLASS, *table], codes.dtype))
-    found = np.minimum(np.searchsorted(allowed, codes), allowed.size - 1)
-    wrong = allowed[found] != codes
+    wrong = ~np.isin(codes, [NO_CLASS, *table])
     if wrong.any():
         values, counts = np.unique(codes[wrong], return_counts=True)
         most = values[np.argsort(-counts, kind="stable")][:8]
@@ -74,15 +74,29 @@ def cells_by_class(codes, table):
     >>> [cells.tolist() for cells in cells_by_class(np.array([2, 5, 2, -1], np.int16), (5, 2))]
     [[1], [0, 2]]
     """
+    order, ends = _sorted(np.asarray(codes, np.int16), _numbers(table), len(table))
+    return np.split(order[: ends[-1]], ends[:-1]) if len(table) else []
+
+
+def _numbers(table):
+    """Place of each code in a table, the number of its codes for all others; -1 is the last, beyond the codes."""
     numbers = np.full(2**15 + 1, len(table), np.int16)
     numbers[list(table)] = np.arange(len(table))
-    order, ends = _sorted(np.asarray(codes, np.int16), numbers, len(table))
-    return np.split(order[: ends[-1]], ends[:-1]) if len(table) else []
+    return numbers
+
+
+@njit(nogil=True, cache=True)
+def _others(codes, numbers):
+    """How many codes are in no table, but for -1."""
+    count, none = 0, numbers[-1]
+    for i in range(codes.size):
+        count += (codes[i] < NO_CLASS) | ((codes[i] >= 0) & (numbers[codes[i]] == none))
+    return count
 
 
 @njit(nogil=True, cache=True)
 def _sorted(codes, numbers, classes):
-    """Cells in the order of their classes, and where each class ends; codes of none, -1 among them, come last."""
+    """Cells in the order of their classes, and where each class ends; those of no class come last."""
     counts = np.zeros(classes + 1, np.int64)
     for i in range(codes.size):
         counts[numbers[codes[i]]] += 1

@@ -291,9 +291,20 @@ def _square(seed, stream, index, row, column):
 def _nearest(down, across, top, left, points, out):
     for i in range(down.size):
         row = int(np.floor(down[i])) - top
+        below = down[i] - np.floor(down[i])
         for j in range(across.size):
             column = int(np.floor(across[j])) - left
+            beside = across[j] - np.floor(across[j])
             least = np.inf
+            for k in range(row - 1, row + 2):
+                for m in range(column - 1, column + 2):
+                    away = (points[0, k, m] - down[i]) ** 2 + (points[1, k, m] - across[j]) ** 2
+                    if away < least:
+                        least = away
+                        out[i, j] = points[2, k, m]
+            # Squares further out are at least so far away.
+            if least <= (1.0 + min(min(below, 1.0 - below), min(beside, 1.0 - beside))) ** 2:
+                continue
             for k in range(row - 2, row + 3):
                 for m in range(column - 2, column + 3):
                     away = (points[0, k, m] - down[i]) ** 2 + (points[1, k, m] - across[j]) ** 2

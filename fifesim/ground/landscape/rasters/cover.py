@@ -79,7 +79,7 @@ def cover_map(path_or_raster, grid, table, chunks=None, *, allow_remote=False):
     """
     if isinstance(path_or_raster, xr.DataArray):
         name = in_a_line(str(path_or_raster.name or "raster"), 150)
-        found = _on_grid(unpacked(_one_layer(path_or_raster)), grid, chunks)
+        found = raster_onto_grid(unpacked(_one_layer(path_or_raster)), grid, chunks, classes=True)
     else:
         name = in_a_line(Path(path_or_raster).name, 150)
         found = file_onto_grid(path_or_raster, grid, chunks, allow_remote, classes=True)
@@ -117,18 +117,6 @@ def classes_of(cover):
             "cover=raster, classes=...)"
         )
     return read_table(cover.attrs["classes"])
-
-
-def _on_grid(raster, grid, chunks):
-    """A raster on a grid; as it is where these are its cells."""
-    if raster.odc.crs is not None and grids.same_grid(grids.geobox(raster), grid):
-        raster = raster.transpose("y", "x")
-        return raster if chunks is None else raster.chunk(dict(zip("yx", _sizes(grid, chunks), strict=True)))
-    return raster_onto_grid(raster, grid, chunks, classes=True)
-
-
-def _sizes(grid, chunks):
-    return places.chunk_sizes(grid, chunks, tile=_TILE)
 
 
 def _one_layer(raster):

@@ -15,7 +15,7 @@ from fifesim.ground.landscape.cover import Patches
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
 from fifesim.ground.landscape.field import streaming_field
 from fifesim.ground.landscape.raster import lai_window
-from fifesim.ground.landscape.rasters.cover import cover_map, drawn_cover
+from fifesim.ground.landscape.rasters.cover import classes_of, cover_map, drawn_cover
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -54,7 +54,7 @@ def landscape(
         opened, in any CRS; cells no larger than the map's have its nearest class, larger ones the most frequent. By
         default one class is everywhere, and FIFE's three treatments lie in pastures.
     classes : CoverClass, sequence of CoverClass, or mapping of str to CoverClass, optional
-        What the classes are; by default `fife_classes`.
+        What the classes are; by default those that a raster of cover carries, or `fife_classes` of what is drawn.
     lai : xarray.DataArray, str or path, optional
         Your own leaf area, as `open_lai` takes it, in the place of the classes' distributions. [m2 m-2]
     arp : float, optional
@@ -105,7 +105,7 @@ def landscape(
     seed = check_seed(seed)
     variables = {}
     if classes is not None or cover is not None or lai is None:
-        table = class_table(fife_classes() if classes is None else classes)
+        table = class_table(_default_classes(cover) if classes is None else classes)
         variables["cover"] = _cover(grid, cover, table, seed, chunks, allow_remote)
     if lai is None:
         variables["lai"] = _lai(grid, variables["cover"], table, arp, seed)
@@ -117,6 +117,15 @@ def landscape(
     # Fields that are drawn, and that go with the ground, have their place here.
     order = ["lai", *(name for name in variables if name != "lai")]
     return xr.Dataset({name: variables[name] for name in order}, attrs=made_on_site(grid))
+
+
+def _default_classes(cover):
+    """Classes of a cover where none are given: its own, or FIFE's where it is drawn."""
+    if cover is None or isinstance(cover, Patches):
+        return fife_classes()
+    if isinstance(cover, xr.DataArray) and "classes" in cover.attrs:
+        return classes_of(cover)
+    raise ValueError("a map of cover needs classes=, such as [fifesim.CoverClass('grass', lai=1.2, code=1), ...]")
 
 
 def _cover(grid, cover, table, seed, chunks, allow_remote):
