@@ -6,7 +6,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from fifesim.atmosphere.schemes import six_s
 from fifesim.atmosphere.schemes.engines import check_zenith
-from fifesim.base import fife, geometry
+from fifesim.base import datasets, fife, geometry
 from fifesim.base.foreign import shown
 from fifesim.ground.landscape.classes import fife_classes
 from fifesim.rasters import grid as grids
@@ -23,7 +23,7 @@ _WHOLE = 1e-6
 
 class Scenario(Keys):
     """
-    What a run simulates; the defaults are the paper's case on the whole FIFE site.
+    What a run simulates; the defaults are the paper's case, one stand of plants on the whole FIFE site.
 
     Parameters
     ----------
@@ -205,6 +205,17 @@ class Scenario(Keys):
     def files(self):
         """Paths of the files that the scenario reads, by the names of table and key, a dict of tuple to str."""
         return {(*place, key): path for place, table in self.sections().items() for key, path in table.files.items()}
+
+
+def default_landscape():
+    """
+    The landscape of the FIFE site that a run without a scenario simulates, ``data/fife.toml``.
+
+    Returns
+    -------
+    scenario : Scenario
+    """
+    return read_scenario(datasets.path("fife.toml"))
 
 
 def grid_keys(box):
