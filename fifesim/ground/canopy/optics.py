@@ -226,6 +226,69 @@ def check_background(reflectance):
     _check_fraction("background reflectance", values)
 
 
+def check_share(name, values):
+    """
+    Refuse a share outside 0 to 1; NaN passes.
+
+    Parameters
+    ----------
+    name : str
+        Of the argument.
+    values : array
+        [1]
+
+    Returns
+    -------
+    values : array
+        What was given.
+
+    Raises
+    ------
+    ValueError
+        If one is outside 0 to 1.
+
+    Examples
+    --------
+    >>> check_share("brown", 0.4)
+    0.4
+    """
+    cells = np.asarray(values, float)
+    if np.fmin.reduce(cells, axis=None, initial=0.0) < 0 or np.fmax.reduce(cells, axis=None, initial=1.0) > 1:
+        wrong = cells[(cells < 0) | (cells > 1)].flat[0]
+        raise ValueError(f"{name} must be in [0, 1], got {wrong:g}: give a fraction, not percent or digital numbers")
+    return values
+
+
+def check_crowns(lai, crown_cover):
+    """
+    Refuse crowns that hold more leaves than any canopy; NaN passes, and so does a cover of 0, bare ground.
+
+    Parameters
+    ----------
+    lai : array
+        Of the ground. [m2 m-2]
+    crown_cover : array
+        Broadcasts against it. [1]
+
+    Raises
+    ------
+    ValueError
+        If the cover is outside 0 to 1, or the leaf area index within the crowns above 100.
+
+    Examples
+    --------
+    >>> check_crowns(1.5, 0.5)
+    """
+    check_share("crown_cover", crown_cover)
+    lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
+    if np.any((lai > LARGEST_LAI * cover) & (cover > 0)):
+        inside = lai / np.where(cover > 0, cover, np.inf)
+        raise ValueError(
+            f"leaf area index within the crowns is lai / crown_cover, at most {LARGEST_LAI:g}, got up to "
+            f"{np.nanmax(inside):g}: where crowns cover that little lower the leaf area, or give crown_cover 0"
+        )
+
+
 def check_lai(lai):
     """
     Refuse a leaf area index that is negative or above 100; NaN passes.

@@ -1,0 +1,155 @@
+"""Leaves in crowns with gaps between: what sun and observer see of a clumped canopy."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fifesim.ground.canopy.hot_spot import apart
+
+SHAPE = 1.0
+"""Crown diameter over height of round crowns [1]."""
+
+
+class CrownShares(NamedTuple):
+    """Shares of the ground, each 1 where crowns cover all of it. [1]"""
+
+    cover: np.ndarray
+    """Below crowns, by the vertical: Cv."""
+    sun: np.ndarray
+    """Whose sunbeam goes through a crown: Cs."""
+    view: np.ndarray
+    """Whose view does: Co."""
+    both: np.ndarray
+    """Of which both do: Cso."""
+    apart: np.ndarray
+    """What both share beyond chance: Cso - Cs Co."""
+    lit: np.ndarray
+    """Weight of the crowns in sunlight that an observer sees."""
+
+
+def crown_shares(crown_cover, crown_shape, sza, vza, raa):
+    r"""
+    Shares of the ground that crowns cover, as sun and observer see them.
+
+    .. math::
+
+        C_s &= 1 - (1 - C_v)^{1 / \mu_s}, \quad C_o = 1 - (1 - C_v)^{1 / \mu_v} \\
+        C_{so} &= C_s C_o + \min[C_s (1 - C_o), C_o (1 - C_s)] \, e^{-\Delta / \zeta}
+
+    Parameters
+    ----------
+    crown_cover : array
+        Share of the ground below crowns, :math:`C_v`, 0 to 1. [1]
+    crown_shape : array
+        Crown diameter over height, :math:`\zeta`: the flatter, the wider the hot spot of the crowns; 0 is none. [1]
+    sza, vza, raa : array
+        [degree]
+
+    Returns
+    -------
+    shares : CrownShares
+
+    Notes
+    -----
+    :math:`\Delta` is the distance of the two directions on a plane one unit below. The chance of a gap between crowns
+    is that of crowns placed at random (Nilson 1971): :math:`1 - C_v = e^{-n A}` for n crowns of area A, and a slant
+    beam meets the shadow of each, :math:`A / \mu` of a round crown. Crowns that are lit and seen weigh
+    :math:`1 - (1 - C_{so})^{(1 / \mu_s + 1 / \mu_v) / 2}`, which goes to 1 toward the horizon.
+
+    References
+    ----------
+    [Verhoef2007b]_; [Nilson1971]_
+
+    Examples
+    --------
+    >>> crown_shares(1.0, 1.0, 60.0, 0.0, 0.0).both
+    np.float64(1.0)
+    """
+    gap = 1 - np.asarray(crown_cover, float)
+    sun_path, view_path = (1 / np.cos(np.radians(np.asarray(angle, float))) for angle in (sza, vza))
+    sun, view = 1 - gap**sun_path, 1 - gap**view_path
+    shape = np.asarray(crown_shape, float)
+    close = np.where(shape > 0, np.exp(-apart(sza, vza, raa) / np.where(shape > 0, shape, 1)), 0)
+    beyond = np.minimum(sun * (1 - view), view * (1 - sun)) * close
+    both = sun * view + beyond
+    lit = 1 - (1 - both) ** ((sun_path + view_path) / 2)
+    return CrownShares(1 - gap, sun, view, both, beyond, lit)
+
+
+def clumped(canopy, shares):
+    r"""
+    Reflectances and transmittances of crowns with gaps between them.
+
+    .. math::
+
+        \tau_{ss}' &= 1 - C_s + C_s \tau_{ss} \\
+        \tau_{ssoo}' &= C_{so} \tau_{ssoo} + (C_o - C_{so}) \tau_{oo} + (C_s - C_{so}) \tau_{ss}
+            + 1 - C_s - C_o + C_{so}
+
+    Parameters
+    ----------
+    canopy : Canopy
+        Of the crowns, whose leaf area index is that of the ground over the crown cover.
+    shares : CrownShares
+
+    Returns
+    -------
+    canopy : Canopy
+        Of crowns and gaps together. [1]
+
+    References
+    ----------
+    [Verhoef2007b]_
+
+    Examples
+    --------
+    Crowns that cover the ground are the canopy itself:
+
+    >>> from fifesim.ground.canopy.sail_model import sail
+    >>> canopy = sail(2.0, 0.45, 0.42, sza=30)
+    >>> bool(clumped(canopy, crown_shares(1.0, 1.0, 30, 0, 0)).rso == canopy.rso)
+    True
+    """
+    c, s = canopy, shares
+    return c._replace(
+        rso=s.lit * c.rso,
+        rdo=s.view * c.rdo,
+        rsd=s.sun * c.rsd,
+        rdd=s.cover * c.rdd,
+        tss=1 - s.sun + s.sun * c.tss,
+        too=1 - s.view + s.view * c.too,
+        tsd=s.sun * c.tsd,
+        tdo=s.view * c.tdo,
+        tdd=1 - s.cover + s.cover * c.tdd,
+        tsstoo=s.both * c.tsstoo
+        + (s.view - s.both) * c.too
+        + (s.sun - s.both) * c.tss
+        + (1 - s.sun - s.view + s.both),
+        rdd_below=s.cover * c.rdd_below,
+    )
+
+
+def lai_in_crowns(lai, crown_cover):
+    """
+    Leaf area index within crowns.
+
+    Parameters
+    ----------
+    lai : array
+        Of the ground. [m2 m-2]
+    crown_cover : array
+        [1]
+
+    Returns
+    -------
+    lai : array
+        0 where there are no crowns. [m2 m-2]
+
+    Examples
+    --------
+    >>> float(lai_in_crowns(1.5, 0.5))
+    3.0
+    """
+    lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
+    # NaN of the leaf area stays.
+    return np.where(cover > 0, lai / np.where(cover > 0, cover, 1), 0 * lai)
