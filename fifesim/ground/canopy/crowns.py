@@ -3,7 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 
+from fifesim.ground.canopy.background import over_background
 from fifesim.ground.canopy.hot_spot import apart
 
 SHAPE = 1.0
@@ -127,6 +129,89 @@ def clumped(canopy, shares):
         + (1 - s.sun - s.view + s.both),
         rdd_below=s.cover * c.rdd_below,
     )
+
+
+class CrownTerms(NamedTuple):
+    """Of leaves within crowns, what `crowns_over_background` needs of a band; 0 without leaves. [1]"""
+
+    seen: np.ndarray
+    """Sunlight's share times rso."""
+    seen_in_skylight: np.ndarray
+    """Skylight's share times rdo."""
+    kept: np.ndarray
+    """Sunlight's share times that which does not come through, 1 - tss - tsd."""
+    kept_of_skylight: np.ndarray
+    """Skylight's share times 1 - tdd."""
+    hidden: np.ndarray
+    """Of the ground's light, 1 - too - tdo."""
+    rdd_below: np.ndarray
+    hot: np.ndarray
+    """Sunlight's share times what sun and observer see together of the ground beyond chance, tsstoo - tss too."""
+    missed: np.ndarray
+    """Sunlight's share times (1 - tss) (1 - too)."""
+
+
+def crown_terms(canopy, sky):
+    """
+    Terms of `crowns_over_background`.
+
+    Parameters
+    ----------
+    canopy : Canopy
+        Of the crowns.
+    sky : array
+        Share of skylight. [1]
+
+    Returns
+    -------
+    terms : CrownTerms
+    """
+    c, sun = canopy, 1 - sky
+    return CrownTerms(
+        seen=sun * c.rso,
+        seen_in_skylight=sky * c.rdo,
+        kept=sun * (1 - c.tss - c.tsd),
+        kept_of_skylight=sky * (1 - c.tdd),
+        hidden=1 - c.too - c.tdo,
+        rdd_below=c.rdd_below,
+        hot=sun * (c.tsstoo - c.tss * c.too),
+        missed=sun * (1 - c.tss) * (1 - c.too),
+    )
+
+
+@register_jitable
+def crowns_over_background(terms, shares, background):
+    r"""
+    Reflectance factor of crowns and gaps over a background, from terms of the crowns.
+
+    Parameters
+    ----------
+    terms : sequence of 8 arrays
+        Those of `CrownTerms`. [1]
+    shares : sequence of 5 arrays
+        Fields ``cover``, ``sun``, ``view``, ``apart`` and ``lit`` of `CrownShares`. [1]
+    background : array
+        [1]
+
+    Returns
+    -------
+    reflectance : array
+        That of `clumped` `with_background` to rounding, mixed by `reflectance_factor`. [1]
+
+    References
+    ----------
+    [Verhoef2007b]_
+
+    Examples
+    --------
+    >>> crowns_over_background((0.0,) * 8, (0.5, 0.5, 0.5, 0.0, 0.5), 0.15)
+    0.15
+    """
+    seen, seen_in_skylight, kept, kept_of_skylight, hidden, rdd, gaps, missed = terms
+    cover, sun, view, apart, lit = shares
+    hot = (sun * view + apart) * gaps + apart * missed
+    through = (1 - sun * kept - cover * kept_of_skylight) * (1 - view * hidden)
+    return over_background(lit * seen + view * seen_in_skylight, hot, through, cover * rdd, background)
 
 
 def lai_in_crowns(lai, crown_cover):

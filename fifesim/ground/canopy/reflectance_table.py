@@ -4,8 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from fifesim.ground.canopy.absorption import extinction_coefficient
 from fifesim.ground.canopy.background import over_background, reflectance_factor
+from fifesim.ground.canopy.cell_reflectance import varied_reflectance
 from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.lai_table import interpolate, interpolate_over, tabulate
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
@@ -16,7 +16,7 @@ from fifesim.ground.canopy.optics import (
     check_leaf_optics,
     check_share,
 )
-from fifesim.ground.canopy.scene import Scene, canopy_of, cell_by_cell, reflectance_of, sky_of
+from fifesim.ground.canopy.scene import Scene, canopy_of, cell_by_cell, decay, reflectance_of, sky_of
 
 def canopy_reflectance(
     lai,
@@ -109,9 +109,12 @@ def canopy_reflectance(
     dead = brown_reflectance, brown_transmittance
     scene = scene._replace(**_kinds(lai, brown, dissociation, dead, bands), **_crowns(lai, crown_cover, crown_shape))
     if exact or scene.varies():
-        ground = np.reshape(background, (-1,) + (1,) * lai.ndim) if uniform else background
-        ground = np.broadcast_to(ground, bands + lai.shape).reshape(*bands, -1)
-        return cell_by_cell(lai.reshape(-1), ground, scene).reshape(bands + lai.shape)
+        if uniform:
+            ground = np.broadcast_to(background, bands)[:, None]
+        else:
+            ground = np.broadcast_to(background, bands + lai.shape).reshape(*bands, -1)
+        kernel = cell_by_cell if exact else varied_reflectance
+        return kernel(lai.reshape(-1), ground, scene).reshape(bands + lai.shape)
     if uniform:
         return interpolate(_surface_table(_per_band(background, bands), scene), lai)
     return interpolate_over(_layer_table(scene), lai, background)
@@ -242,17 +245,11 @@ def _per_band(values, bands):
     return tuple(np.broadcast_to(np.asarray(values, float), bands).tolist())
 
 
-def _rate(scene):
-    """Fastest decay with leaf area: sunbeam and view together, or diffuse light; within crowns there is more of it."""
-    down, up = (extinction_coefficient(angle, scene.leaf_angles) for angle in (scene.sza, scene.vza))
-    return max(1.0, down + up) / (scene.crown_cover or 1.0)
-
-
 @lru_cache(maxsize=32)
 def _surface_table(background, scene):
     """Table of the reflectance of each band."""
     ground = np.array(background)[:, None]
-    return tabulate(lambda lai: reflectance_of(lai, ground, scene), _rate(scene))
+    return tabulate(lambda lai: reflectance_of(lai, ground, scene), decay(scene) / (scene.crown_cover or 1.0))
 
 
 @lru_cache(maxsize=32)
@@ -271,4 +268,4 @@ def _layer_table(scene):
         alone, hot, through, rdd = values.reshape(-1, 4, values.shape[1]).swapaxes(0, 1)
         return np.stack([over_background(alone, hot, through, rdd, r) for r in (0.0, 0.5, 1.0)])
 
-    return tabulate(terms, _rate(scene), reflectances)
+    return tabulate(terms, decay(scene) / (scene.crown_cover or 1.0), reflectances)

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fifesim.ground.canopy.absorption import extinction_coefficient
 from fifesim.ground.canopy.background import reflectance_factor, with_background
 from fifesim.ground.canopy.crowns import SHAPE, clumped, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.layers import two_layers
@@ -135,7 +136,7 @@ def cell_by_cell(lai, background, scene):
     ----------
     lai : array, shape (n,)
         [m2 m-2]
-    background : array, shape (band, n)
+    background : array, shape (band, n) or (band, 1)
         [1]
     scene : Scene
 
@@ -144,11 +145,30 @@ def cell_by_cell(lai, background, scene):
     reflectance : array, shape (band, n)
         [1]
     """
+    background = np.broadcast_to(background, (len(background), lai.size))
     out = np.empty(background.shape)
     for start in range(0, lai.size, _BLOCK):
         block = slice(start, start + _BLOCK)
         out[:, block] = reflectance_of(lai[block], background[:, block], scene.part(block))
     return out
+
+
+def decay(scene):
+    """
+    Fastest decay with leaf area: sunbeam and view together, or diffuse light.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of numbers.
+
+    Returns
+    -------
+    rate : float
+        Per leaf area within crowns. [1]
+    """
+    down, up = (extinction_coefficient(angle, scene.leaf_angles) for angle in (scene.sza, scene.vza))
+    return max(1.0, down + up)
 
 
 def _is(value, number):
