@@ -7,6 +7,8 @@ from numba.extending import register_jitable
 
 from fifesim.ground.canopy.background import over_background
 from fifesim.ground.canopy.hot_spot import apart
+from fifesim.ground.canopy.optics import LARGEST_LAI
+from fifesim.ground.canopy.ranges import check_share
 
 SHAPE = 1.0
 """Crown diameter over height of round crowns [1]."""
@@ -123,10 +125,7 @@ def clumped(canopy, shares):
         tsd=s.sun * c.tsd,
         tdo=s.view * c.tdo,
         tdd=1 - s.cover + s.cover * c.tdd,
-        tsstoo=s.both * c.tsstoo
-        + (s.view - s.both) * c.too
-        + (s.sun - s.both) * c.tss
-        + (1 - s.sun - s.view + s.both),
+        tsstoo=s.both * c.tsstoo + (s.view - s.both) * c.too + (s.sun - s.both) * c.tss + (1 - s.sun - s.view + s.both),
         rdd_below=s.cover * c.rdd_below,
     )
 
@@ -238,3 +237,34 @@ def lai_in_crowns(lai, crown_cover):
     lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
     # NaN of the leaf area stays.
     return np.where(cover > 0, lai / np.where(cover > 0, cover, 1), 0 * lai)
+
+
+def check_crowns(lai, crown_cover):
+    """
+    Refuse crowns that hold more leaves than any canopy; NaN passes, and so does a cover of 0, bare ground.
+
+    Parameters
+    ----------
+    lai : array
+        Of the ground. [m2 m-2]
+    crown_cover : array
+        Broadcasts against it. [1]
+
+    Raises
+    ------
+    ValueError
+        If the cover is outside 0 to 1, or the leaf area index within the crowns above 100.
+
+    Examples
+    --------
+    >>> check_crowns(1.5, 0.5)
+    """
+    check_share("crown_cover", crown_cover)
+    lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
+    # Seldom are there any; then ground without crowns, which holds no leaves, is told from crowns with too many.
+    if np.any(lai > LARGEST_LAI * cover) and np.any((lai > LARGEST_LAI * cover) & (cover > 0)):
+        inside = lai / np.where(cover > 0, cover, np.inf)
+        raise ValueError(
+            f"leaf area index within the crowns is lai / crown_cover, at most {LARGEST_LAI:g}, got up to "
+            f"{np.nanmax(inside):g}: where crowns cover that little lower the leaf area, or give crown_cover 0"
+        )

@@ -224,7 +224,8 @@ def interpolate_crowned(table, crowns, lai, brown, crown_cover, background):
 def _weights(share):
     """Six times the weights of four neighbouring B-splines."""
     rest = 1 - share
-    return rest * rest * rest, 4 + share * share * (3 * share - 6), 4 + rest * rest * (3 * rest - 6), share * share * share
+    square, other = share * share, rest * rest
+    return rest * other, 4 + square * (3 * share - 6), 4 + other * (3 * rest - 6), share * square
 
 
 @register_jitable
@@ -266,7 +267,7 @@ def _blend(flat, start, length, leaves, browns, wide, out):
 
 @njit(nogil=True, cache=True)
 def _foliage(lai, brown, background, table, values):
-    rows, browns, columns = table.coefficients.shape
+    _, browns, columns = table.coefficients.shape
     flat, wide, terms = table.coefficients.reshape(-1), np.zeros(4 * columns), np.zeros(columns)
     of_ground, beyond = int(background.shape[1] > 1), 0
     for i in range(lai.size):
@@ -287,7 +288,7 @@ def _foliage(lai, brown, background, table, values):
 
 @njit(nogil=True, cache=True)
 def _crowned(lai, brown, cover, background, table, crowns, values):
-    rows, browns, columns = table.coefficients.shape
+    _, browns, columns = table.coefficients.shape
     flat, rooms = table.coefficients.reshape(-1), crowns.reshape(-1)
     wide, terms, parts = np.zeros(4 * columns), np.zeros(columns), np.zeros(4)
     of_brown, of_ground, beyond = int(brown.size > 1), int(background.shape[1] > 1), 0

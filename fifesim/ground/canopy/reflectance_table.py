@@ -6,17 +6,13 @@ import numpy as np
 
 from fifesim.ground.canopy.background import over_background, reflectance_factor
 from fifesim.ground.canopy.cell_reflectance import varied_reflectance
-from fifesim.ground.canopy.crowns import SHAPE
+from fifesim.ground.canopy.crowns import SHAPE, check_crowns
 from fifesim.ground.canopy.lai_table import interpolate, interpolate_over, tabulate
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.optics import (
-    check_background,
-    check_crowns,
-    check_lai,
-    check_leaf_optics,
-    check_share,
-)
+from fifesim.ground.canopy.optics import check_background, check_lai, check_leaf_optics
+from fifesim.ground.canopy.ranges import check_share
 from fifesim.ground.canopy.scene import Scene, canopy_of, cell_by_cell, decay, reflectance_of, sky_of
+
 
 def canopy_reflectance(
     lai,
