@@ -1,6 +1,8 @@
 """Landscapes in the chain: what a Dataset says of the ground, each class with its own canopy, and its true means."""
 
+from collections.abc import Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +11,8 @@ import xarray as xr
 from fifesim.analysis.rasters import means
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy import raster as ground
+from fifesim.ground.canopy.crowns import SHAPE
+from fifesim.ground.canopy.optics import DEAD_LEAF
 from fifesim.ground.canopy.rasters import leaves, soils
 from fifesim.ground.canopy.rasters.classes import reflectance_of_classes
 from fifesim.ground.landscape.classes import CoverClass
@@ -21,18 +25,26 @@ from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
 
 _DEFAULTS = {"leaf_optics": None, "background": None, "leaf_angles": "spherical", "hotspot": 0.0}
+_DEFAULTS |= {"brown": 0.0, "dissociation": 0.0, "brown_leaf": None, "crown_cover": 1.0, "crown_shape": SHAPE}
 """Of what a canopy is told, where nothing is said."""
 
 _OF_CLASS = {"leaf_optics": "leaf"}
 """What `surface_reflectance` and `CoverClass` call by different names."""
 
+_BY_BAND = ("leaf_optics", "background", "brown_leaf")
+"""What is resolved into numbers of each band."""
+
+_OF_CELLS = ("brown", "dissociation", "crown_cover")
+"""Variables of a landscape that say what its canopy is in each cell."""
+
 
 class Land(NamedTuple):
-    """A scene: leaf area, and where it has classes, their codes and what they are."""
+    """A scene: leaf area; codes of its classes and what they are; and what else its cells say."""
 
     lai: xr.DataArray
     cover: xr.DataArray | None = None
     classes: tuple[CoverClass, ...] = ()
+    cells: Mapping = MappingProxyType({})
 
 
 def land_of(scene):
@@ -60,10 +72,11 @@ def land_of(scene):
             f"a landscape has a variable lai, this Dataset has {', '.join(map(str, scene.data_vars)) or 'none'}: "
             "make it with fifesim.landscape(grid, ...), or rename one with .rename(LAI='lai')"
         )
-    lai = scene["lai"]
+    cells = {name: scene[name] for name in _OF_CELLS if name in scene.data_vars}
+    cells = {name: each if each.ndim else float(each) for name, each in cells.items()}
     if "cover" not in scene.data_vars:
-        return Land(lai)
-    return Land(lai, north_up(scene["cover"]), classes_of(scene["cover"]))
+        return Land(scene["lai"], cells=cells)
+    return Land(scene["lai"], north_up(scene["cover"]), classes_of(scene["cover"]), cells)
 
 
 def level_reflectance(land, bands, canopy, *, exact, **scene):
@@ -93,17 +106,17 @@ def level_reflectance(land, bands, canopy, *, exact, **scene):
     responses = tuple(band.response for band in bands)
     named = {"bands": [band.name for band in bands], "wavelengths": [band.wavelength for band in bands]}
     optics = _Optics(responses, land.lai, exact)
+    _check_used(land, canopy)
     if land.cover is None:
-        return ground.level_reflectance(land.lai, **optics.of(canopy), **named, exact=exact, **scene)
-    _check_used(land.classes, canopy)
-    canopies = {each.code: optics.of(_told(each, canopy)) for each in land.classes}
+        return ground.level_reflectance(land.lai, **optics.of({**canopy, **land.cells}), **named, exact=exact, **scene)
+    canopies = {each.code: optics.of(_told(each, canopy, land.cells)) for each in land.classes}
     return reflectance_of_classes(land.lai, land.cover, canopies, **named, exact=exact, **scene)
 
 
-def _told(kind, canopy):
-    """What is said of the canopy of a class: by itself, else by the call."""
+def _told(kind, canopy, cells):
+    """What is said of the canopy of a class: by the cells, else by itself, else by the call."""
     own = {name: getattr(kind, _OF_CLASS.get(name, name)) for name in canopy}
-    return {name: canopy[name] if own[name] is None else own[name] for name in canopy}
+    return {name: canopy[name] if own[name] is None else own[name] for name in canopy} | dict(cells)
 
 
 class _Optics:
@@ -117,8 +130,13 @@ class _Optics:
         """What `ground.canopy.raster.canopy_kernel` takes of a canopy."""
         leaf = self._once("leaf_optics", leaves.leaf_optics, canopy["leaf_optics"], exact=self._exact)
         below = self._once("background", soils.background, canopy["background"])
-        others = {name: value for name, value in canopy.items() if name not in ("leaf_optics", "background")}
-        return {"leaf_reflectance": leaf[0], "leaf_transmittance": leaf[1], "background": below, **others}
+        dead = None
+        if isinstance(canopy["brown"], xr.DataArray) or canopy["brown"] != 0:
+            given = DEAD_LEAF if canopy["brown_leaf"] is None else canopy["brown_leaf"]
+            dead = self._once("leaf_optics", leaves.leaf_optics, given, exact=self._exact)
+        others = {name: value for name, value in canopy.items() if name not in _BY_BAND}
+        by_band = {"leaf_reflectance": leaf[0], "leaf_transmittance": leaf[1], "background": below}
+        return {**by_band, "brown_optics": dead, **others}
 
     def _once(self, name, function, given, **options):
         # What is given is kept beside, so that its identity stays its own.
@@ -128,26 +146,40 @@ class _Optics:
         return self._known[key][1]
 
 
-def _check_used(classes, canopy):
+def _check_used(land, canopy):
     """Refuse an argument that would change nothing."""
     for name, value in canopy.items():
         default = _DEFAULTS[name]
-        given = value is not default and not (isinstance(value, str | int | float) and value == default)
-        if given and all(getattr(each, _OF_CLASS.get(name, name)) is not None for each in classes):
+        if value is default or (isinstance(value, str | int | float) and value == default):
+            continue
+        if name in land.cells:
+            raise ValueError(f"{name} is given, and the landscape has a variable {name}: leave out one of the two")
+        if land.classes and all(getattr(each, _OF_CLASS.get(name, name)) is not None for each in land.classes):
             raise ValueError(
                 f"{name} is given, and all classes of the landscape say theirs: leave it out, or out of the classes"
             )
 
 
 @by_date
-def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=absorption.FPAR_INF):
+def fpar(
+    lai,
+    *,
+    geometry=None,
+    time=None,
+    leaf_angles="spherical",
+    fpar_inf=absorption.FPAR_INF,
+    leaves="all",
+    brown=0.0,
+    dissociation=0.0,
+    crown_cover=1.0,
+):
     """
-    Fraction of photosynthetically active radiation that a canopy absorbs.
+    Fraction of photosynthetically active radiation that a canopy absorbs, or its green leaves.
 
     Parameters
     ----------
     lai : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area index, or a landscape that has it as ``lai``, whose classes may say their leaf angles. [m2 m-2]
+        Leaf area index, or a landscape that has it as ``lai``. [m2 m-2]
     geometry : fifesim.base.geometry.Geometry, optional
         The sun's; by default that which the array carries, else at its time and place.
     time : str or datetime, optional
@@ -156,6 +188,10 @@ def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=abs
         As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
     fpar_inf : float, optional
         Of an infinitely thick canopy. [1]
+    leaves : {"all", "green"}, optional
+        Which leaves absorb it: all of them, dead ones too, or those alone that can use it.
+    brown, dissociation, crown_cover : float or xarray.DataArray, dims (y, x), optional
+        As in `surface_reflectance`. [1]
 
     Returns
     -------
@@ -165,7 +201,12 @@ def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=abs
     Raises
     ------
     ValueError
-        If LAI is negative.
+        If LAI is negative, or a share outside 0 to 1.
+
+    Notes
+    -----
+    Both kinds of leaf absorb alike here, as in Eq. 6. SAIL's own shares, of each wavelength, are in
+    `ground.canopy.light_budget`.
 
     References
     ----------
@@ -173,17 +214,21 @@ def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=abs
 
     See Also
     --------
-    fifesim.ground.canopy.absorption.fpar
+    fifesim.ground.canopy.absorption.fpar, fifesim.ground.canopy.absorption.green_fpar
     """
     land = land_of(lai)
-    said = {"geometry": geometry, "time": time, "fpar_inf": fpar_inf}
-    angles = {each.code: leaf_angles if each.leaf_angles is None else each.leaf_angles for each in land.classes}
-    if len(set(map(repr, angles.values()))) < 2:
-        return ground.fpar(land.lai, leaf_angles=next(iter(angles.values()), leaf_angles), **said)
-    by_angles = {repr(each): ground.fpar(land.lai, leaf_angles=each, **said) for each in angles.values()}
-    kernels = {code: (np.positive, [by_angles[repr(each)]]) for code, each in angles.items()}
+    said = {"geometry": geometry, "time": time, "fpar_inf": fpar_inf, "leaves": leaves}
+    canopy = {"leaf_angles": leaf_angles, "brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
+    _check_used(land, canopy)
+    if land.cover is None:
+        return ground.fpar(land.lai, **said, **{**canopy, **land.cells})
+    told = {each.code: _told(each, canopy, land.cells) for each in land.classes}
+    # Of classes with the same canopy once.
+    made = {repr(each): ground.fpar(land.lai, **said, **each) for each in {repr(v): v for v in told.values()}.values()}
+    kernels = {code: (np.positive, [made[repr(each)]]) for code, each in told.items()}
     out = grids.place(by_class(kernels, land.cover), grids.geobox(land.lai))
-    return cf.label(out, "fpar", source=land.lai, history="fpar: Beer's law, leaf angles by class")
+    history = next(iter(made.values())).attrs["history"].splitlines()[-1] if len(made) == 1 else "fpar: by class"
+    return cf.label(out, "fpar", source=land.lai, history=history)
 
 
 @by_date

@@ -208,3 +208,37 @@ def test_light_absorbed_goes_by_the_leaf_angles_of_a_class(land):
     assert (planophile.values[grass] == fpar.values[grass]).all() and (planophile != fpar).any()
     assert fpar.name == "fpar"
     xr.testing.assert_identical(land[["lai"]].fifesim.fpar(), land.lai.fifesim.fpar())
+
+
+DEAD = {"brown": 0.4, "dissociation": 0.5, "crown_cover": 0.7, "crown_shape": 0.5}
+
+
+def test_dead_leaves_and_crowns_are_those_of_a_class(site, land):
+    """What a class says of them has the bits of a scene of it alone, and other classes go on without."""
+    dead = fifesim.CoverClass(lai="burned-grazed", brown_leaf={"TM3": (0.3, 0.1), "TM4": (0.4, 0.3)}, **DEAD)
+    table = CLASSES | {"grass": dead}
+    scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7)
+    made = scene.fifesim.surface_reflectance("TM", bands=TM34)
+    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, brown_leaf=dead.brown_leaf, **DEAD)
+    grass = (land.cover == 1).values
+    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
+    others = land.fifesim.surface_reflectance("TM", bands=TM34)
+    np.testing.assert_array_equal(made.values[:, ~grass], others.values[:, ~grass])
+    green = scene.fifesim.fpar(leaves="green")
+    shares = {name: DEAD[name] for name in ("brown", "dissociation", "crown_cover")}
+    expected = scene.lai.fifesim.fpar(leaves="green", **shares)
+    np.testing.assert_array_equal(green.values[grass], expected.values[grass])
+
+
+def test_variables_of_a_landscape_win_over_its_classes(site, land):
+    brown = (land.lai / 5).drop_attrs(deep=False).rename("brown")
+    table = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed", brown=0.9)}
+    scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7, brown=brown)
+    made = scene.fifesim.surface_reflectance("TM", bands=TM34)
+    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, brown=scene.brown)
+    grass = (land.cover == 1).values
+    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
+    with pytest.raises(ValueError, match="brown is given, and the landscape has a variable brown"):
+        scene.fifesim.surface_reflectance("TM", bands=TM34, brown=0.1)
+    number = fifesim.landscape(site, lai=land.lai, brown=0.3).fifesim.surface_reflectance("TM", bands=TM34)
+    xr.testing.assert_equal(number, land.lai.fifesim.surface_reflectance("TM", bands=TM34, brown=0.3))

@@ -1,19 +1,17 @@
 """The canopy on labelled rasters: its reflectance on level ground, and the light that it absorbs."""
 
-from functools import partial
-
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import ANGLES, relative_azimuth
 from fifesim.ground.canopy import absorption
+from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_map
-from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
+from fifesim.ground.canopy.rasters import canopy_shares
+from fifesim.ground.canopy.rasters.evaluation import canopy_kernel
 from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-from fifesim.rasters.dates import by_date
 from fifesim.rasters.packed import unpacked
 
 
@@ -29,6 +27,11 @@ def level_reflectance(
     geometry,
     leaf_angles="spherical",
     hotspot=0.0,
+    brown=0.0,
+    dissociation=0.0,
+    brown_optics=None,
+    crown_cover=1.0,
+    crown_shape=SHAPE,
     exact=False,
     **provenance,
 ):
@@ -55,6 +58,13 @@ def level_reflectance(
         As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
     hotspot : float, optional
         Leaf size over canopy height; 0 is none. [1]
+    brown, dissociation, crown_cover : float or xarray.DataArray, dims (y, x), optional
+        Dead share of the leaf area, how far it lies below the rest, and the share of the ground below crowns. Where the
+        dissociation is a raster, SAIL is evaluated at every cell. [1]
+    brown_optics : (reflectance, transmittance), optional
+        Of dead leaves, each as those of the leaves are given; where some are dead they are needed. [1]
+    crown_shape : float, optional
+        Crown diameter over height. [1]
     exact : bool, optional
         Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it.
     **provenance : str or number
@@ -68,75 +78,27 @@ def level_reflectance(
     Raises
     ------
     ValueError
-        If the optics or the hotspot are not possible, or LAI is negative.
+        If the optics, the hotspot or a share are not possible, or LAI is negative.
 
     See Also
     --------
-    fifesim.ground.canopy.sail_model.sail
+    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.layers.two_layers,
+    fifesim.ground.canopy.crowns.clumped
     """
     lai = checked_scene(lai)
-    said = {"leaf_angles": leaf_angles, "hotspot": hotspot, "exact": exact}
     optics = {"leaf_reflectance": leaf_reflectance, "leaf_transmittance": leaf_transmittance, "background": background}
-    light = {"diffuse_fraction": diffuse_fraction, "geometry": geometry}
-    kernel, rasters = canopy_kernel(bands, **optics, **light, **said)
-    out = chunking.pointwise(kernel, lai.drop_vars(ANGLES, errors="ignore"), *rasters, bands=len(bands))
+    shares = {"brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
+    how = {"leaf_angles": leaf_angles, "hotspot": hotspot, "brown_optics": brown_optics, "crown_shape": crown_shape}
+    light = {"diffuse_fraction": diffuse_fraction, "geometry": geometry, "exact": exact}
+    kernel, rasters = canopy_kernel(lai, bands, **optics, **shares, **how, **light)
+    varies = directions.varying(geometry)
+    out = chunking.pointwise(kernel, lai.drop_vars(varies, errors="ignore"), *rasters, bands=len(bands))
     described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
     said = {"leaf_angles": str(leaf_angle_classes(leaf_angles)), "background": described}
-    return labelled(out, lai, bands, wavelengths, geometry, **said, **provenance)
+    return labelled(out, lai, bands, wavelengths, geometry, told=canopy_shares.in_words(shares), **said, **provenance)
 
 
-def canopy_kernel(
-    bands,
-    *,
-    leaf_reflectance,
-    leaf_transmittance,
-    background,
-    diffuse_fraction,
-    geometry,
-    leaf_angles="spherical",
-    hotspot=0.0,
-    exact=False,
-):
-    """
-    What gives the reflectance of cells of one canopy, and the rasters that it takes.
-
-    Parameters
-    ----------
-    bands : sequence of str
-    leaf_reflectance, leaf_transmittance, background, diffuse_fraction, geometry, leaf_angles, hotspot, exact
-        As in `level_reflectance`.
-
-    Returns
-    -------
-    kernel : callable
-        ``kernel(lai, *blocks)`` gives reflectance, shape (band, ...), from leaf area of shape (...) and blocks of the
-        rasters, of shape (..., [band]).
-    rasters : list of xarray.DataArray
-
-    Raises
-    ------
-    ValueError
-        As in `level_reflectance`.
-    """
-    if not 0 <= hotspot < np.inf:
-        raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
-    parameters = {"leaf_angles": leaf_angle_classes(leaf_angles), "hotspot": float(hotspot)}
-    if isinstance(background, xr.DataArray):
-        cf.check_units(background, "surface_reflectance")
-        background = _background_bands(background, bands)
-    background = _per_band(background)
-    leaves = leaf_reflectance, leaf_transmittance
-    if directions.varying(geometry) or any(isinstance(each, xr.DataArray) for each in leaves):
-        by_band = [_per_band(each) for each in (background, diffuse_fraction, *leaves)]
-        return partial(_by_cell, parameters), [*by_band, *directions.angles(geometry)]
-    names = "leaf_reflectance", "leaf_transmittance"
-    parameters |= {name: tuple(map(float, values)) for name, values in zip(names, leaves, strict=True)}
-    parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
-    parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
-    return partial(_reflectance, parameters), [background]
-
-
-def labelled(reflectance, lai, bands, wavelengths, geometry, *, leaf_angles, **provenance):
+def labelled(reflectance, lai, bands, wavelengths, geometry, *, leaf_angles, told="", **provenance):
     """
     Reflectance of a scene with its bands, place, directions and attributes.
 
@@ -146,8 +108,8 @@ def labelled(reflectance, lai, bands, wavelengths, geometry, *, leaf_angles, **p
     lai : xarray.DataArray, dims (y, x)
     bands, wavelengths, geometry
         As in `level_reflectance`.
-    leaf_angles : str
-        In words.
+    leaf_angles, told : str
+        Leaf angles, and what else there is to tell, for a line of the history.
     **provenance : str or number
         Further attributes.
 
@@ -157,27 +119,31 @@ def labelled(reflectance, lai, bands, wavelengths, geometry, *, leaf_angles, **p
     """
     out = reflectance.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
     out = directions.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
-    said = f"surface_reflectance: SAIL, {leaf_angles} leaves, {_directions(geometry)}"
+    said = f"surface_reflectance: SAIL, {leaf_angles} leaves, {told}{_directions(geometry)}"
     return cf.label(out, "surface_reflectance", source=lai, history=said, leaf_angles=leaf_angles, **provenance)
 
 
-@by_date
-def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=absorption.FPAR_INF):
+def fpar(
+    lai,
+    *,
+    geometry=None,
+    time=None,
+    leaf_angles="spherical",
+    fpar_inf=absorption.FPAR_INF,
+    leaves="all",
+    brown=0.0,
+    dissociation=0.0,
+    crown_cover=1.0,
+):
     """
-    Fraction of photosynthetically active radiation that a canopy absorbs.
+    Fraction of photosynthetically active radiation that a canopy absorbs, or its green leaves.
 
     Parameters
     ----------
     lai : xarray.DataArray, dims (y, x)
         [m2 m-2]
-    geometry : fifesim.base.geometry.Geometry, optional
-        The sun's; by default that which the array carries, else at its time and place.
-    time : str or datetime, optional
-        In the place of ``geometry``.
-    leaf_angles : optional
-        As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
-    fpar_inf : float, optional
-        Of an infinitely thick canopy. [1]
+    geometry, time, leaf_angles, fpar_inf, leaves, brown, dissociation, crown_cover : optional
+        As in `fifesim.fpar`.
 
     Returns
     -------
@@ -187,7 +153,7 @@ def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=abs
     Raises
     ------
     ValueError
-        If LAI is negative.
+        If LAI is negative, or a share outside 0 to 1.
 
     References
     ----------
@@ -195,18 +161,28 @@ def fpar(lai, *, geometry=None, time=None, leaf_angles="spherical", fpar_inf=abs
 
     See Also
     --------
-    fifesim.ground.canopy.absorption.fpar
+    fifesim.ground.canopy.absorption.fpar, fifesim.ground.canopy.absorption.green_fpar
     """
     if not 0 < fpar_inf <= 1:
         raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
+    if leaves not in ("all", "green"):
+        raise ValueError(f"leaves must be 'all' or 'green', got {leaves!r}: which of them absorb the light")
     geometry = directions.given_geometry(geometry, lai, time)
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "fpar")
     extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))
     lai = checked_scene(lai)
-    out = chunking.pointwise(_fpar, lai, extinction=extinction, fpar_inf=fpar_inf)
+    shares = {"crown_cover": canopy_shares.share("crown_cover", crown_cover, lai)}
+    if leaves == "green":
+        shares |= {"brown": canopy_shares.share("brown", brown, lai)}
+        shares |= {"dissociation": canopy_shares.share("dissociation", dissociation, lai)}
+    kernel, rasters = canopy_shares.with_shares(_fpar, shares)
+    light = {"extinction": extinction, "fpar_inf": fpar_inf, "sza": float(geometry.sza)}
+    out = chunking.pointwise(kernel, lai, *rasters, **light)
     out = grids.place(out, grids.geobox(lai))
-    return cf.label(out, "fpar", source=lai, history=f"fpar: Beer's law, K {extinction:.4f}, limit {fpar_inf:g}")
+    of = "" if leaves == "all" else "green leaves, "
+    said = f"fpar: Beer's law, {of}{canopy_shares.in_words(shares)}K {extinction:.4f}, limit {fpar_inf:g}"
+    return cf.label(out, "fpar", source=lai, history=said)
 
 
 def checked_scene(lai):
@@ -237,25 +213,6 @@ def checked_scene(lai):
     return lai
 
 
-def _per_band(values):
-    """A raster, or values of each band, without the names of the bands."""
-    if isinstance(values, xr.DataArray):
-        return values.drop_vars("band", errors="ignore")
-    return xr.DataArray(np.asarray(values, float), dims="band")
-
-
-def _reflectance(parameters, lai, background):
-    # apply_ufunc hands the bands over as the last axis.
-    return canopy_reflectance(check_map(lai), background=np.moveaxis(background, -1, 0), **parameters)
-
-
-def _by_cell(parameters, cells, ground, sky, reflectance, transmittance, sza, saa, vza, vaa):
-    """Reflectance where the directions of sun or sensor, or the leaves, vary over the scene."""
-    towards = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
-    light = {"background": ground, "diffuse_fraction": sky, **towards}
-    return directional_reflectance(check_map(cells), reflectance, transmittance, **light, **parameters)
-
-
 def _directions(geometry):
     """The zenith angles in words."""
     return ", ".join(
@@ -264,17 +221,10 @@ def _directions(geometry):
     )
 
 
-def _fpar(lai, **parameters):
-    return absorption.fpar(check_map(lai), **parameters)
-
-
-def _background_bands(background, bands):
-    """A background raster with one band for each of the canopy's."""
-    if "band" not in background.dims:
-        return background.expand_dims(band=list(bands))
-    missing = [name for name in bands if name not in background["band"].to_numpy().tolist()]
-    if missing:
-        raise ValueError(
-            f"the background lacks band {', '.join(missing)}, it has {', '.join(map(str, background['band'].values))}"
-        )
-    return background.sel(band=list(bands))
+def _fpar(lai, *, extinction, fpar_inf, sza, crown_cover, **kinds):
+    lai, light = check_map(lai), {"extinction": extinction, "fpar_inf": fpar_inf}
+    if not isinstance(crown_cover, np.ndarray) and crown_cover == 1:
+        return absorption.green_fpar(lai, **light, **kinds) if kinds else absorption.fpar(lai, **light)
+    check_crowns(lai, crown_cover)
+    inside, lit = lai_in_crowns(lai, crown_cover), crown_shares(crown_cover, SHAPE, sza, 0.0, 0.0).sun
+    return lit * (absorption.green_fpar(inside, **light, **kinds) if kinds else absorption.fpar(inside, **light))

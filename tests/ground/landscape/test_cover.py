@@ -1,20 +1,9 @@
-"""Patches of cover: places, shares and sizes."""
+"""Patches of cover: places and shares."""
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
-from scipy.stats import norm
 
-from fifesim.ground.landscape.cover import (
-    PATTERNS,
-    Patches,
-    _drawn,
-    _fenced,
-    pastures,
-    patch_classes,
-    smooth_field,
-    voronoi,
-)
+from fifesim.ground.landscape.cover import PATTERNS, Patches, patch_classes
 
 SHARES = (0.2, 0.3, 0.5)
 
@@ -49,70 +38,11 @@ def test_whole_shares_leave_nothing_to_others(pattern):
     assert (patch_classes(Patches(pattern, 50.0), (0.0, 1.0, 0.0), 1, *axes(60, 60)) == 1).all()
 
 
-@pytest.mark.parametrize("make", [voronoi, pastures])
-def test_patches_have_the_mean_area_asked_for(make):
-    """1600 patches of area 1: those that the border cuts count by half, and their squared sizes vary by half."""
-    place = (np.arange(1200) + 0.5) / 30
-    numbers = make(5, place, place)
-    assert 1600 < np.unique(numbers).size < 1600 + 4 * 40 * 1.3
-    inner = np.unique(numbers[60:-60, 60:-60])
-    cut = np.unique(np.concatenate([numbers[0], numbers[-1], numbers[:, 0], numbers[:, -1]]))
-    areas = np.array([np.sum(numbers == each) for each in np.setdiff1d(inner, cut)[:200]]) / 900
-    assert abs(areas.mean() - 1) < 4 * areas.std() / np.sqrt(areas.size)
-    assert areas.std() > 0.15
-
-
-def test_voronoi_cells_are_those_of_a_search_tree():
-    down, across = np.linspace(-7.3, -1.2, 61), np.linspace(3.1, 9.4, 57)
-    points = _drawn(11, 8, -11, 0, (14, 13), 3)
-    points[0] += np.arange(-11, 3)[:, None]
-    points[1] += np.arange(13)
-    tree = cKDTree(points[:2].reshape(2, -1).T)
-    _, nearest = tree.query(np.stack(np.meshgrid(down, across, indexing="ij"), -1).reshape(-1, 2))
-    np.testing.assert_array_equal(voronoi(11, down, across).ravel(), points[2].ravel()[nearest])
-
-
-def test_points_of_patches_are_even_over_their_squares():
-    drawn = _drawn(2, 8, 0, 0, (64, 64), 3).reshape(3, -1)
-    np.testing.assert_allclose(drawn.mean(axis=1), 0.5, rtol=0, atol=4 / np.sqrt(12 * 4096))
-    assert np.abs(np.corrcoef(drawn) - np.eye(3)).max() < 4 / 64
-
-
-def test_smooth_field_is_standard_normal_and_has_its_length():
-    """Sixty fields of 12 x 12 lengths; correlation of a Gaussian of 1/e at distance 1, the same down and across."""
-    place = np.arange(48) / 4
-    fields = np.stack([smooth_field(seed, place - 30, place + 800) for seed in range(60)])
-    # A field of area A has some A / pi independent values.
-    independent = 60 * 144 / np.pi
-    assert abs(fields.mean()) < 4 / np.sqrt(independent)
-    assert abs(fields.var() - 1) < 4 * np.sqrt(2 / independent)
-    for lag in (2, 4, 6):
-        expected = np.exp(-((lag / 4) ** 2))
-        across = np.mean(fields[:, :, lag:] * fields[:, :, :-lag])
-        down = np.mean(fields[:, lag:] * fields[:, :-lag])
-        np.testing.assert_allclose([across, down], expected, rtol=0, atol=4 / np.sqrt(independent))
-    below = np.mean(fields < norm.ppf(0.2))
-    assert abs(below - 0.2) < 4 * np.sqrt(0.16 / independent)
-
-
 def test_levels_follow_each_other_in_the_order_of_the_classes():
     """A smooth field passes through the class between: fences of the first and the last class do not meet."""
     classes = patch_classes(Patches("levels", 400.0), (0.3, 0.4, 0.3), 4, *axes(300, 300, 5.0))
     assert set(np.unique(np.abs(np.diff(classes, axis=1)))) == {0, 1}
     assert np.unique(classes).size == 3
-
-
-def test_pastures_are_rectangles_that_fill_their_block():
-    parts = [part for part, _ in _fenced(7, 3, -4)]
-    areas = [(bottom - top) * (right - left) for top, left, bottom, right in parts]
-    assert len(parts) == 9 and abs(sum(areas) - 1) < 1e-12
-    # The largest is parted first, at 3/8 to 5/8: no pasture is 8 / 3 as large as one that was parted.
-    assert max(areas) / min(areas) < (8 / 3) ** 2
-    place = (np.arange(90) + 0.5) / 30
-    inside = pastures(7, place + 9, place - 12)
-    for (top, left, bottom, right), number in _fenced(7, 3, -4):
-        rows, columns = ((place >= 3 * low) & (place < 3 * high) for low, high in ((top, bottom), (left, right)))
-        assert (inside[np.ix_(rows, columns)] == number).all()
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
 """Canopies of several classes in one scene, on labelled rasters."""
 
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.raster import canopy_kernel, checked_scene, labelled
+from fifesim.ground.canopy.raster import checked_scene, labelled
+from fifesim.ground.canopy.rasters.evaluation import canopy_kernel
 from fifesim.ground.landscape.rasters.evaluation import by_class
 
 
@@ -16,7 +17,7 @@ def reflectance_of_classes(lai, cover, canopies, *, bands, wavelengths, geometry
     cover : xarray.DataArray, dims (y, x)
         Codes; -1 and NaN give NaN.
     canopies : dict of int to dict
-        Of each code, what `ground.canopy.raster.canopy_kernel` takes of a canopy.
+        Of each code, what `ground.canopy.rasters.evaluation.canopy_kernel` takes of a canopy.
     bands, wavelengths, geometry, diffuse_fraction, exact
         As in `ground.canopy.raster.level_reflectance`.
     **said : str or number
@@ -38,7 +39,7 @@ def reflectance_of_classes(lai, cover, canopies, *, bands, wavelengths, geometry
     """
     lai = checked_scene(lai)
     light = {"geometry": geometry, "diffuse_fraction": diffuse_fraction, "exact": exact}
-    kernels = {code: canopy_kernel(bands, **canopy, **light) for code, canopy in canopies.items()}
+    kernels = {code: canopy_kernel(lai, bands, **canopy, **light) for code, canopy in canopies.items()}
     out = by_class(kernels, cover, lai, bands=len(bands))
     angles = dict.fromkeys(str(leaf_angle_classes(each.get("leaf_angles", "spherical"))) for each in canopies.values())
     said = {"leaf_angles": " and ".join(angles), "background": "by class", **said}
