@@ -28,6 +28,7 @@ QUANTITIES = {
         "fraction_of_surface_downwelling_photosynthetic_radiative_flux_absorbed_by_vegetation",
         "fraction of absorbed photosynthetically active radiation",
     ),
+    "green_fpar": Quantity("1", "", "fraction of photosynthetically active radiation that green leaves absorb"),
     "surface_reflectance": Quantity(
         "1", "surface_bidirectional_reflectance", "surface reflectance factor", "direct and diffuse light mixed"
     ),

@@ -4,17 +4,14 @@ from dataclasses import replace
 
 import xarray as xr
 
-from fifesim.analysis.rasters.means import aggregate
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi
+from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, image_of, reflectance_of
-from fifesim.ground.canopy import raster as ground
-from fifesim.ground.landscape.cover import PATTERNS, Patches
-from fifesim.ground.landscape.raster import lai_scene, lai_window
-from fifesim.ground.landscape.rasters.scenes import landscape
 from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
+from fifesim.scenario.ground_scene import canopy_of, ground_scene, truth_of
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
 
@@ -45,17 +42,15 @@ def simulate(scenario, chunks="auto"):
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
-    grid, own, setup = scenario.geobox(), scenario.ground, setup_of(scenario)
+    grid, setup = scenario.geobox(), setup_of(scenario)
 
-    def means(array):
-        return aggregate(array, scenario.sensor.size, min_valid=setup.min_valid)
+    def means(rasters):
+        return aggregate(rasters, scenario.sensor.size, min_valid=setup.min_valid)
 
     land = ground_scene(scenario, grid, chunks)
-    scene = dict(land.data_vars) if isinstance(land, xr.Dataset) else {"lai": land}
-    lai = scene["lai"]
-    fpar = ground.fpar(lai, geometry=setup.geometry, leaf_angles=own.leaf_angles, fpar_inf=own.fpar_inf)
+    land = land if isinstance(land, xr.Dataset) else land.to_dataset(name="lai")
     level = reflectance_of(setup, land)
-    nodes = {"scene": scene, "truth": {"lai": means(lai), "fpar": means(fpar)}}
+    nodes = {"scene": dict(land.data_vars), "truth": dict(means(truth_of(scenario, setup, land)).data_vars)}
     dem, horizon, reach = elevation(scenario, grid, chunks)
     if dem is None:
         reflectance = level
@@ -73,45 +68,6 @@ def simulate(scenario, chunks="auto"):
     if reach:
         tree["terrain"].attrs = {f"reach_{side}": distance for side, distance in reach.items()}
     return tree
-
-
-def ground_scene(scenario, grid, chunks=None):
-    """
-    The ground of a scenario.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    grid : odc.geo.geobox.GeoBox
-        Of ground cells.
-    chunks : mapping or int, optional
-        Makes it lazy.
-
-    Returns
-    -------
-    land : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area; or a landscape, where the scenario has classes of cover or properties that vary. [m2 m-2]
-    """
-    land, own = scenario.ground, scenario.landscape
-    if own.cover == "none":
-        if land.lai_file:
-            return lai_window(land.lai_file, grid, chunks=chunks)
-        return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
-    return landscape(
-        grid,
-        cover=Patches(own.cover, own.size, _shares(scenario)) if own.cover in PATTERNS else own.cover,
-        classes=scenario.class_table(),
-        lai=land.lai_file,
-        arp=land.arp,
-        seed=land.seed,
-        chunks=chunks,
-    )
-
-
-def _shares(scenario):
-    """Shares of the classes that are drawn, None where they are equal."""
-    shares = {name: stand.share for name, stand in scenario.classes.items()}
-    return shares if any(shares.values()) else None
 
 
 def setup_of(scenario):
@@ -132,17 +88,14 @@ def setup_of(scenario):
     ValueError
         If the instrument or its bands are unknown.
     """
-    land, own = scenario.ground, scenario.sensor
+    own = scenario.sensor
     aligned = own.interval == "product"
     return Setup(
         instrument=own.description,
         bands=tuple(own.bands),
         atmosphere=scenario.model_atmosphere(),
         geometry=scenario.sun_and_view(),
-        leaf_optics=land.leaf_optics(),
-        background=land.below_canopy(),
-        leaf_angles=land.leaf_angles,
-        hotspot=land.hotspot,
+        **canopy_of(scenario),
         upwelling=scenario.terrain.upwelling,
         adjacency=scenario.atmosphere.adjacency,
         onto=grids.aligned(scenario.geobox(), own.size) if aligned else None,

@@ -9,8 +9,8 @@ from fifesim.analysis.attribution import by_itself, shapley, taken_away
 from fifesim.base.seeds import check_seed
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
 from fifesim.rasters import grid as grids
+from fifesim.scenario.ground_scene import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
-from fifesim.scenario.simulation import ground_scene
 
 # Rows of the table beside the stages: what is left when all of them are ideal, and all together.
 CURVATURE, TOTAL = "curvature", "total"
