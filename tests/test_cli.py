@@ -12,6 +12,7 @@ import rasterio
 from typer.testing import CliRunner
 
 from fifesim.base import datasets
+from fifesim.base.warned import warn
 from fifesim.cli import app
 from fifesim.output.run.folder import FILES
 from fifesim.scenario.scenario import read_scenario
@@ -247,6 +248,19 @@ def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
     result = invoke(command)
     assert result.exit_code == 130
     assert "interrupted; nothing is written" in result.stderr and "Traceback" not in result.stderr
+
+
+def test_a_warning_is_a_line_of_its_own(invoke, small, monkeypatch):
+    """Without the line of code that Python shows, and without what steers a terminal."""
+
+    def told(*arguments, **options):
+        warn("the sun is taken for that of June\x1b[31m")
+        return []
+
+    monkeypatch.setattr("fifesim.output.run.folder.simulate_to_folder", told)
+    result = invoke("simulate", small)
+    assert result.exit_code == 0
+    assert result.stderr == "fifesim: warning: the sun is taken for that of June\\x1b[31m\n"
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that takes nothing is Linux's")

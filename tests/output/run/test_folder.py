@@ -1,5 +1,6 @@
 """The report of a run says what its rasters say."""
 
+import html
 import re
 
 import numpy as np
@@ -13,7 +14,7 @@ import fifesim
 from fifesim.output.folders import UNFINISHED
 from fifesim.output.run import folder as run_folder
 from fifesim.output.run.folder import FILES, simulate_to_folder
-from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.scenario import parse_scenario, read_scenario
 
 FLAT = {"dem": "flat"}
 SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}, "terrain": FLAT}
@@ -53,6 +54,14 @@ def test_report_gives_the_regressions_of_its_files(folder):
         assert f"{fit.r2:.4f}" in page
 
 
+BLUR = '<th>Blur</th><td class="number">modulation transfer at the Nyquist frequency {}</td>'
+
+
+def test_report_says_how_much_the_instrument_blurs(folder):
+    """The paper's cosine passes 0.69 at the Nyquist frequency."""
+    assert BLUR.format("0.69") in (folder / "report.html").read_text(encoding="utf-8")
+
+
 def test_report_is_self_contained(folder):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
@@ -71,9 +80,15 @@ def test_all_bands_of_an_instrument_make_a_report(tmp_path):
     assert all(path.stat().st_size > 0 for path in files)
 
 
-def test_a_single_band_has_no_ndvi_and_still_a_report(tmp_path):
-    simulate_to_folder(parse_scenario(SMALL | {"sensor": {"bands": ["TM5"]}}), tmp_path / "one")
-    assert "What NDVI tells" not in (tmp_path / "one" / "report.html").read_text(encoding="utf-8")
+def test_a_single_band_through_its_detector_alone_has_no_ndvi_and_still_a_report(tmp_path):
+    """A detector as wide as the interval passes 2 / pi."""
+    scenario = parse_scenario(SMALL | {"sensor": {"bands": ["TM5"], "response": "detector"}})
+    simulate_to_folder(scenario, tmp_path / "one")
+    page = html.unescape((tmp_path / "one" / "report.html").read_text(encoding="utf-8"))
+    assert "What NDVI tells" not in page
+    said = "0.64; of TM5 the detector alone is known: the image is sharper than the instrument's"
+    assert BLUR.format(said) in page
+    assert read_scenario(tmp_path / "one" / "scenario.toml").sensor.response == "detector"
 
 
 def test_a_report_with_terrain_shows_it_and_says_how_far_it_is_known(tmp_path):

@@ -109,6 +109,16 @@ def test_mistake_in_a_short_file_is_one_line(tmp_path, old, new, said):
     assert "\n" not in str(caught.value) and len(str(caught.value)) <= 500
 
 
+@pytest.mark.parametrize("name", ["../bands.csv", "/bands.csv", "bands.csv/"])
+def test_table_lies_beside_its_file(tmp_path, name):
+    (tmp_path / "bands.csv").write_text(TABLE)
+    folder = tmp_path / "own"
+    folder.mkdir()
+    name = str(tmp_path) + name if name.startswith("/") else name
+    with pytest.raises(ValueError, match="no such file beside it; type a CSV file of bands"):
+        read(folder, f'name = "Camera"\naltitude = 120.0\ngsd = 0.1\nbits = 12\nbands = "{name}"\n')
+
+
 @pytest.mark.parametrize(
     ("table", "said"),
     [(None, "bands = 'bands.csv': no such file beside it"), ("name,center\nred,0.6\n", "lacks the columns width")],
