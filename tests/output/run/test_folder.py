@@ -54,7 +54,7 @@ def test_report_gives_the_regressions_of_its_files(folder):
         assert f"{fit.r2:.4f}" in page
 
 
-BLUR = '<th>Blur</th><td class="number">modulation transfer at the Nyquist frequency {}</td>'
+BLUR = '<th>Blur</th><td class="number">modulation transfer at the Nyquist frequency {}'
 
 
 def test_report_says_how_much_the_instrument_blurs(folder):
