@@ -11,6 +11,7 @@ import xarray as xr
 import zarr
 
 import fifesim
+from fifesim.output import pages
 from fifesim.output.folders import UNFINISHED
 from fifesim.output.run import folder as run_folder
 from fifesim.output.run.folder import FILES, simulate_to_folder
@@ -108,9 +109,11 @@ HILLS = {
 
 @pytest.fixture(scope="module")
 def hills(tmp_path_factory):
-    """A scene of several chunks on terrain, with its cells."""
+    """A scene of several chunks on terrain, with its cells; nobody looks at its pictures."""
     folder = tmp_path_factory.mktemp("hills") / "out"
-    simulate_to_folder(parse_scenario(HILLS), folder, scene=True, threads=2)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pages, "png", lambda figure, dpi: b"")
+        simulate_to_folder(parse_scenario(HILLS), folder, scene=True, threads=2)
     return folder
 
 
@@ -139,8 +142,9 @@ def test_nothing_unfinished_stays(hills):
     assert sorted(path.name for path in hills.iterdir()) == sorted([*FILES, "scene.zarr"])
 
 
-def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_path):
+def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_path, monkeypatch):
     """The image lies 30.315 m apart and the truth 30 m, so that no coordinate of one is in the other."""
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     scenario = parse_scenario(SMALL | {"sensor": {"interval": "native"}, "terrain": {"dem": "flat"}})
     simulate_to_folder(scenario, tmp_path / "own")
     assert "What NDVI tells" in (tmp_path / "own" / "report.html").read_text(encoding="utf-8")
@@ -172,6 +176,7 @@ def test_an_image_without_a_valid_pixel_is_an_error_that_says_why(tmp_path, valu
 
 
 def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     scenario = parse_scenario(lai_map(tmp_path / "lai.tif", 2.0))
     write_files = run_folder._write_files
 
@@ -186,6 +191,7 @@ def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
 
 
 def test_a_shard_that_changed_is_made_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "whole", scene=True)
 
     def full(*given):
