@@ -41,6 +41,7 @@ html_theme = "furo"
 html_title = f"fifesim {version}"
 html_theme_options = {name: {"code-font-size": "75%"} for name in ("light_css_variables", "dark_css_variables")}
 html_static_path = ["_static"]
+html_css_files = ["gallery.css"]
 html_copy_source = False
 
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]

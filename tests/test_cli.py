@@ -12,7 +12,9 @@ import rasterio
 from typer.testing import CliRunner
 
 from fifesim.base import datasets
+from fifesim.base.warned import warn
 from fifesim.cli import app
+from fifesim.output import pages
 from fifesim.output.run.folder import FILES
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.toml import write_scenario
@@ -45,27 +47,33 @@ def small(tmp_path):
     return path
 
 
-def test_simulate_writes_its_five_files_and_names_them(invoke, small, tmp_path):
-    result = invoke("simulate", small, "-o", "out")
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    """A run of it, and what it said."""
+    folder = tmp_path_factory.mktemp("first")
+    (folder / "small.toml").write_text(SMALL)
+    return folder / "out", CliRunner().invoke(app, ["simulate", str(folder / "small.toml"), "-o", str(folder / "out")])
+
+
+def test_simulate_writes_its_five_files_and_names_them(first):
+    out, result = first
     assert result.exit_code == 0, result.output
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(FILES)
+    assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
     assert all(name in result.output for name in FILES)
 
 
-def test_image_lies_where_the_scenario_says(invoke, small, tmp_path):
-    invoke("simulate", small, "-o", "out")
-    with rasterio.open(tmp_path / "out" / "image.tif") as image:
+def test_image_lies_where_the_scenario_says(first):
+    with rasterio.open(first[0] / "image.tif") as image:
         assert image.crs.to_epsg() == 26914
         assert tuple(image.bounds) == (704970.0, 4333620.0, 705870.0, 4334220.0)
         assert image.descriptions == ("TM3", "TM4")
         assert image.read().min() > 0
 
 
-def test_running_the_written_scenario_gives_the_same_files(invoke, small, tmp_path):
-    invoke("simulate", small, "-o", "out")
-    assert invoke("simulate", "out/scenario.toml", "-o", "again").exit_code == 0
+def test_running_the_written_scenario_gives_the_same_files(first, invoke, tmp_path):
+    assert invoke("simulate", first[0] / "scenario.toml", "-o", "again").exit_code == 0
     for name in FILES:
-        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "again" / name).read_bytes(), name
+        assert (first[0] / name).read_bytes() == (tmp_path / "again" / name).read_bytes(), name
 
 
 def test_printed_scenario_is_the_default_one(invoke, tmp_path):
@@ -154,7 +162,8 @@ def test_a_mistake_is_named_with_exit_code_2_and_nothing_is_written(invoke, tmp_
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_in_use_is_not_touched_without_overwrite(invoke, small, tmp_path):
+def test_a_folder_in_use_is_not_touched_without_overwrite(invoke, small, tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     kept = tmp_path / "out" / "notes.txt"
     kept.parent.mkdir()
     kept.write_text("mine")
@@ -179,7 +188,8 @@ def test_negative_lai_leaves_no_output_behind(invoke, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_dry_run_estimates_and_writes_nothing(invoke, small, tmp_path):
+def test_dry_run_estimates_and_writes_nothing(invoke, small, tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     result = invoke("simulate", small, "-o", "out", "--dry-run", "--json")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
@@ -189,7 +199,8 @@ def test_dry_run_estimates_and_writes_nothing(invoke, small, tmp_path):
     assert "million" in invoke("simulate", small, "--dry-run").stdout
 
 
-def test_json_says_how_far_it_is(invoke, small):
+def test_json_says_how_far_it_is(invoke, small, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     lines = [json.loads(line) for line in invoke("simulate", small, "-o", "out", "--json").stdout.splitlines()]
     assert {line["event"] for line in lines[:-1]} == {"progress"}
     assert lines[-1]["event"] == "finished"
@@ -247,6 +258,19 @@ def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
     result = invoke(command)
     assert result.exit_code == 130
     assert "interrupted; nothing is written" in result.stderr and "Traceback" not in result.stderr
+
+
+def test_a_warning_is_a_line_of_its_own(invoke, small, monkeypatch):
+    """Without the line of code that Python shows, and without what steers a terminal."""
+
+    def told(*arguments, **options):
+        warn("the sun is taken for that of June\x1b[31m")
+        return []
+
+    monkeypatch.setattr("fifesim.output.run.folder.simulate_to_folder", told)
+    result = invoke("simulate", small)
+    assert result.exit_code == 0
+    assert result.stderr == "fifesim: warning: the sun is taken for that of June\\x1b[31m\n"
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that takes nothing is Linux's")

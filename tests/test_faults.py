@@ -11,7 +11,9 @@ import numpy as np
 import psutil
 import pytest
 import rasterio
+from typer.testing import CliRunner
 
+from fifesim.cli import app
 from fifesim.output.folders import UNFINISHED
 from fifesim.output.run.folder import FILES
 
@@ -33,6 +35,11 @@ PATIENCE = 300
 
 def run(*arguments):
     return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE)
+
+
+def run_here(*arguments):
+    """The same in this process, which has imported what takes longest."""
+    return CliRunner().invoke(app, ["simulate", *map(str, arguments)])
 
 
 def start(*arguments):
@@ -64,14 +71,14 @@ def scenario(tmp_path_factory):
 def whole(scenario, tmp_path_factory):
     """Files of a run that nothing happened to."""
     folder = tmp_path_factory.mktemp("whole") / "out"
-    done = run(scenario, "-o", folder, "--threads", 1)
-    assert done.returncode == 0, done.stderr
+    done = run_here(scenario, "-o", folder, "--threads", 1)
+    assert done.exit_code == 0, done.stderr
     return contents(folder)
 
 
 def resumed(scenario, folder):
-    done = run(scenario, "-o", folder, "--resume", "--json")
-    assert done.returncode == 0, done.stderr
+    done = run_here(scenario, "-o", folder, "--resume", "--json")
+    assert done.exit_code == 0, done.stderr
     assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
     return contents(folder), [json.loads(line) for line in done.stdout.splitlines()]
 
@@ -238,8 +245,8 @@ def test_a_file_that_cannot_grow_is_not_there(scenario, whole, tmp_path):
 
 def test_an_unwritable_place_is_named(scenario, small_disk):
     place = small_disk("ro")
-    done = run(scenario, "-o", place / "out")
-    assert done.returncode == 1
+    done = run_here(scenario, "-o", place / "out")
+    assert done.exit_code == 1
     assert "Read-only file system" in done.stderr and str(place) in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
 
@@ -260,8 +267,8 @@ def broken_dem(tmp_path_factory):
 def test_a_dem_that_cannot_be_read_is_named(scenario, broken_dem, tmp_path):
     broken = tmp_path / "broken.toml"
     broken.write_text(SCENARIO + f'dem = "{broken_dem}"\n')
-    done = run(broken, "-o", tmp_path / "out")
-    assert done.returncode == 1, done.stdout
+    done = run_here(broken, "-o", tmp_path / "out")
+    assert done.exit_code == 1, done.stdout
     assert "broken.tif" in done.stderr and "Traceback" not in done.stderr
     assert not any((tmp_path / "out" / name).exists() for name in FILES)
 

@@ -48,7 +48,7 @@ for axis, arp in zip(axes, arps, strict=True):
     axis.errorbar([row["share"] for row in totals], names, xerr=error, fmt="none", ecolor="#222222", elinewidth=1)
     axis.set(title=f"arp {arp:g}", xlim=(0, 1.05), xlabel="share of the variance of LAI left")
     axis.spines[["top", "right"]].set_visible(False)
-axes[0].invert_yaxis()
+axes[0].set_ylim(len(names) - 0.4, -0.6)
 known = table.drop_duplicates("instrument").set_index("instrument")
 labels = []
 for name in names:

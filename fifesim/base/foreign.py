@@ -41,6 +41,38 @@ def check_regular(path):
         raise ValueError(f"{in_a_line(str(path), 200)} is {_KINDS.get(stat.S_IFMT(mode), 'a device')}: name a file")
 
 
+def read_bounded(path, largest, what):
+    """
+    Bytes of a regular file of bounded size.
+
+    Parameters
+    ----------
+    path : str or path
+    largest : int
+        [byte]
+    what : str
+        What a file of that size at most is, for messages.
+
+    Returns
+    -------
+    content : bytes
+
+    Raises
+    ------
+    ValueError
+        If it is no regular file, or larger.
+    OSError
+        If it is missing, or cannot be read.
+    """
+    path = Path(path)
+    check_regular(path)
+    size = path.stat().st_size
+    if size > largest:
+        name = in_a_line(path.name)
+        raise ValueError(f"{name} has {size} bytes: {what} has at most {largest}; is it another file?")
+    return path.read_bytes()
+
+
 def read_toml(path):
     """
     Values of a TOML file.
@@ -60,13 +92,9 @@ def read_toml(path):
     OSError
         If it is missing, or cannot be read.
     """
-    path = Path(path)
-    check_regular(path)
-    name, size = in_a_line(path.name), path.stat().st_size
-    if size > _LARGEST:
-        raise ValueError(f"{name} has {size} bytes: a file of keys has at most {_LARGEST}; is it another file?")
+    content, name = read_bounded(path, _LARGEST, "a file of keys"), in_a_line(Path(path).name)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = content.decode("utf-8")
         if any(len(_DOT_OF_KEY.findall(part)) > _DEEPEST for part in re.split(r"[=,\n]", text)):
             raise RecursionError
         return tomllib.loads(text)

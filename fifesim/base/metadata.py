@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from fifesim.base.foreign import check_regular, in_a_line, shown
+from fifesim.base.foreign import in_a_line, read_bounded, shown
 
 # Larger than the metadata of any image. [byte]
 _LARGEST = 20_000_000
@@ -31,15 +31,10 @@ def read_metadata(path):
     OSError
         If it is missing, or cannot be read.
     """
-    path = Path(path)
-    check_regular(path)
-    name, size = in_a_line(path.name), path.stat().st_size
-    if size > _LARGEST:
-        raise ValueError(f"{name} has {size} bytes: metadata has at most {_LARGEST}; is it another file?")
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return read_bounded(path, _LARGEST, "metadata").decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ValueError(f"{name} is no text: is it another file?") from None
+        raise ValueError(f"{in_a_line(Path(path).name)} is no text: is it another file?") from None
 
 
 def read_xml(path):

@@ -93,6 +93,9 @@ QUANTITIES = {
     ),
 }
 
+TIME = {"standard_name": "time", "long_name": "time, UTC"}
+"""Attributes of a coordinate of times; units are the dates' own."""
+
 # What a result keeps of its inputs' attributes; everything else is replaced.
 PROVENANCE = (
     "site",

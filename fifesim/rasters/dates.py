@@ -26,14 +26,15 @@ def by_date(step):
         a coordinate along time.
     """
 
-    first = next(iter(signature(step).parameters))
+    parameters = list(signature(step).parameters)
+    first = parameters[0]
 
     @wraps(step)
     def each_date(*args, **options):
         if not args and first in options:
             args = (options.pop(first),)
         if not args or "time" not in getattr(args[0], "dims", ()):
-            _check_no_dates(step, options)
+            _check_no_dates(step, dict(zip(parameters, args, strict=False)) | options)
             return step(*args, **options)
         raster, *args = args
         _check_dates(raster, options.get("time"))

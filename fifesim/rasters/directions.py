@@ -10,7 +10,6 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters.sites import is_fife
 
 _GEOMETRY = (*ANGLES, "earth_sun_distance")
-_TIME = {"standard_name": "time", "long_name": "time, UTC"}
 
 
 def with_geometry(array, geometry, names=_GEOMETRY):
@@ -143,7 +142,7 @@ def dated(array, time):
     """
     if time is None:
         return array
-    return array.assign_coords(time=((), utc(time)[0].tz_localize(None).to_datetime64(), _TIME))
+    return array.assign_coords(time=((), utc(time)[0].tz_localize(None).to_datetime64(), cf.TIME))
 
 
 def _warn_of_midnight(array, time):

@@ -25,6 +25,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
 from fifesim.rasters.gis import colours, tags_of
 from fifesim.rasters.opening import ErrorsOfGdal, raster_file, stored_cells
+from fifesim.rasters.packed import no_data_of
 from fifesim.rasters.soundness import check_memory, check_raster, horizontal_crs
 from fifesim.rasters.tags import TAG, read_tag, tag_of
 
@@ -217,7 +218,7 @@ def _stream(array, grid, path, described):
         "crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
         "transform": grid.affine,
         "photometric": "minisblack",  # three bytes a pixel would be red, green and blue
-        "nodata": 0 if dtype.kind == "u" else np.nan if dtype.kind == "f" else None,
+        "nodata": no_data_of(array),
     }
     with rasterio.open(path, "w", **_TILED, **profile) as sink:
         _describe(sink, array, described)

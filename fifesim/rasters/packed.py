@@ -42,6 +42,34 @@ def has_no_data(raster):
     return any(name in _said(raster) for name in NO_DATA)
 
 
+def no_data_of(raster):
+    """
+    Number that stands for no data in a file of a raster.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray
+
+    Returns
+    -------
+    number : float or None
+        What the raster says and its type can hold; else 0 in digital numbers with a calibration, NaN in fractions, and
+        none in other whole numbers.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> no_data_of(xr.DataArray([35, 255], attrs={"_FillValue": 255})), no_data_of(xr.DataArray([0, 1]))
+    (255, None)
+    """
+    said, whole = _said(raster), raster.dtype.kind in "iu"
+    marks = [np.ravel(said[name])[0].item() for name in NO_DATA if name in said]
+    if whole:
+        limits = np.iinfo(raster.dtype)
+        marks = [mark for mark in marks if limits.min <= mark <= limits.max]
+    return marks[0] if marks else 0 if "gain" in raster.coords else None if raster.dtype.kind != "f" else np.nan
+
+
 def unpacked(raster):
     """
     Values of a raster in their unit, NaN where there are no data.

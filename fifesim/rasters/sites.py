@@ -1,5 +1,7 @@
 """Study sites: their grids, and which scenes were made on them."""
 
+from functools import lru_cache
+
 import pyproj
 from affine import Affine
 from odc.geo.geobox import GeoBox
@@ -69,13 +71,7 @@ def on_fife_site(grid):
     >>> on_fife_site(fife_site(300.0)), on_fife_site(fife_site(300.0).pad(50)[:50, :50])
     (True, False)
     """
-    longitude, latitude = whereabouts.middle(grid)
-    if max(abs(longitude - fife.LONGITUDE), abs(latitude - fife.LATITUDE)) > 1:
-        return False
-    crs, west, north = fife.CORNERS["NAD83"]
-    x, y = pyproj.Transformer.from_crs(4326, crs, always_xy=True).transform(longitude, latitude)
-    # The corner of one datum is 9 m from that of the other.
-    return max(abs(x - west - fife.SIZE / 2), abs(y - north + fife.SIZE / 2)) <= fife.SIZE / 2 + 10
+    return _within(*whereabouts.middle(grid))
 
 
 def made_on_site(grid):
@@ -124,3 +120,14 @@ def _window(site, window):
     if not (0 <= top < bottom <= rows and 0 <= left < right <= columns):
         raise ValueError(f"window must lie within {rows} rows and {columns} columns, got {window!r}")
     return site[top:bottom, left:right]
+
+
+@lru_cache(maxsize=256)
+def _within(longitude, latitude):
+    """Whether a place lies on the site: it is asked of one grid many times, and a transformer takes milliseconds."""
+    if max(abs(longitude - fife.LONGITUDE), abs(latitude - fife.LATITUDE)) > 1:
+        return False
+    crs, west, north = fife.CORNERS["NAD83"]
+    x, y = pyproj.Transformer.from_crs(4326, crs, always_xy=True).transform(longitude, latitude)
+    # The corner of one datum is 9 m from that of the other.
+    return max(abs(x - west - fife.SIZE / 2), abs(y - north + fife.SIZE / 2)) <= fife.SIZE / 2 + 10

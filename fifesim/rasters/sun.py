@@ -56,4 +56,4 @@ def sun_position(time, latitude, longitude, altitude=0.0):
     utc, *found = geometry.sun_positions(times, *places)
     names = "sza", "saa", "earth_sun_distance"
     data = {name: ("time", each, cf.attributes(name)) for name, each in zip(names, found, strict=True)}
-    return xr.Dataset(data, {"time": ("time", utc, {"standard_name": "time", "long_name": "time, UTC"})})
+    return xr.Dataset(data, {"time": ("time", utc, cf.TIME)})

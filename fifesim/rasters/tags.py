@@ -48,7 +48,7 @@ def tag_of(array, dims):
     return {
         "name": array.name,
         "dims": [str(dim) for dim in dims],
-        "attrs": {key: _plain(value) for key, value in array.attrs.items() if key != "_FillValue"},
+        "attrs": {key: _plain(value) for key, value in array.attrs.items() if not _is_implied(key, value, array)},
         "coords": {
             name: {
                 "dims": list(value.dims),
@@ -130,6 +130,11 @@ def _variable(name, item, count):
     if len(values) != (count if item.dims else 1):
         raise ValueError(f"{len(values)} values of {name} for {count} bands")
     return xr.DataArray(np.array(values, dtype).reshape(shape), dims=item.dims, attrs=item.attrs)
+
+
+def _is_implied(key, value, array):
+    """Whether an attribute follows from the rest: no data are 0 in digital numbers, and NaN, which JSON has not."""
+    return key == "_FillValue" and ("gain" in array.coords or bool(np.any(value != value)))
 
 
 def _plain(value):

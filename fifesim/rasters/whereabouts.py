@@ -1,5 +1,7 @@
 """Where on the Earth grids and files lie, as numbers and in words."""
 
+from functools import lru_cache
+
 import numpy as np
 import pyproj
 
@@ -23,6 +25,7 @@ def middle(grid):
     return degrees_at(grid.crs.to_wkt(), float(x), float(y))
 
 
+@lru_cache(maxsize=256)
 def degrees_at(crs, x, y):
     """
     Longitude and latitude of a place.

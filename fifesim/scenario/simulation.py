@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import xarray as xr
 
-from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.chain import steps as chain
+from fifesim.chain.comparison import shows_ndvi
 from fifesim.chain.images import ndvi
 from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, image_of, reflectance_of
@@ -63,7 +63,7 @@ def simulate(scenario, chunks="auto"):
         nodes["level"] = {"dn": image_of(setup, level)}
     nodes["scene"]["surface_reflectance"] = reflectance
     image = image_of(setup, reflectance)
-    nodes["image"] = {"dn": image} | ({"ndvi": ndvi(image)} if _has_ndvi(image) else {})
+    nodes["image"] = {"dn": image} | ({"ndvi": ndvi(image)} if shows_ndvi(image) else {})
     tree = xr.DataTree.from_dict({name: xr.Dataset(arrays) for name, arrays in nodes.items()})
     if reach:
         tree["terrain"].attrs = {f"reach_{side}": distance for side, distance in reach.items()}
@@ -112,7 +112,3 @@ def _cut(raster, grid):
     """A raster cut to a grid of its cells."""
     rows, columns = grids.lattice_offset(grids.geobox(raster), grid)
     return raster.isel(y=slice(rows, rows + grid.shape.y), x=slice(columns, columns + grid.shape.x))
-
-
-def _has_ndvi(image):
-    return all(nearest(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))

@@ -214,6 +214,9 @@ def test_what_a_user_typed(calls):
         (lambda: fifesim.lai_scene(lai), "grid must be .*GeoBox.*type raster.odc.geobox"),
         (lambda: lai.fifesim.surface_reflectance(hotspot=lai), "hotspot must be a number, got .*one is for all cells"),
         (lambda: lai.fifesim.surface_reflectance(exact="no"), "exact must be True or False, got 'no'"),
+        (lambda: fifesim.to_geotiff(lai, "lai.tif", overwrite="no"), "overwrite must be True or False, got 'no'"),
+        (lambda: fifesim.open_landsat("x_MTL.txt", quality="yes"), "quality must be True or False, got 'yes'"),
+        (lambda: fifesim.open_sentinel2("x.SAFE", quality=1), "quality must be True or False, got 1"),
         (lambda: lai.fifesim.surface_reflectance("TM", dems=1), r"surface_reflectance: .*'dems'"),
         (lambda: rho.drop_vars(["band", "wavelength"]).drop_attrs(deep=False).fifesim.to_toa(), "neither.*wavelength"),
     ]

@@ -57,6 +57,14 @@ def test_bands_that_are_missing_are_named(bands, composite, message):
         rgb(image(bands), composite)
 
 
+def test_bands_that_are_numbers_are_named_by_them():
+    numbered = image().assign_coords(band=[2, 3, 4, 8])
+    found = rgb(numbered, (8, 4, 3))
+    np.testing.assert_array_equal(found, rgb(image(), ("B8", "B4", "B3")))
+    assert found.attrs["long_name"] == "8, 4, 3 as red, green, blue"
+    np.testing.assert_array_equal(rgb(numbered), found)
+
+
 def test_other_mistakes_are_named():
     with pytest.raises(ValueError, match="stretch must be two percentiles"):
         rgb(image(), stretch=(98, 2))

@@ -67,16 +67,30 @@ def test_numbers_along_band_have_units():
 
 
 @pytest.mark.parametrize(
-    ("step", "said"),
+    ("step", "said", "cure"),
     [
-        (lambda rho: rho.fifesim.sense("TM"), "surface reflectance factor by its standard_name"),
-        (lambda rho: rho.fifesim.to_toa().fifesim.to_toa(), "apparent reflectance at the top"),
-        (lambda rho: rho.fifesim.to_toa().fifesim.sense("TM").fifesim.sense("TM"), "digital numbers"),
-        (lambda rho: rho.isel(band=0, drop=True).fifesim.fpar(), "leaf area index is needed"),
+        (
+            lambda rho: rho.fifesim.sense("TM"),
+            "surface reflectance factor by its standard_name",
+            r"take \.fifesim\.to_toa\(atmosphere\) of it first",
+        ),
+        (
+            lambda rho: rho.fifesim.to_toa().fifesim.to_toa(),
+            "apparent reflectance at the top",
+            r"take \.fifesim\.to_surf",
+        ),
+        (lambda rho: rho.fifesim.to_toa().fifesim.sense("TM").fifesim.sense("TM"), "digital numbers", "to_reflectance"),
+        (lambda rho: rho.isel(band=0, drop=True).fifesim.fpar(), "leaf area index is needed", "take the step between"),
+        (
+            lambda rho: rho.isel(band=0).assign_attrs(cf.attributes("lai")).fifesim.to_toa(),
+            "leaf area index by its standard_name",
+            r"take \.fifesim\.surface_reflectance\(instrument\) of it first",
+        ),
     ],
 )
-def test_a_raster_of_another_quantity_is_refused(step, said):
+def test_a_raster_of_another_quantity_is_refused(step, said, cure):
     """All have units of 1: only the standard name tells that a step was left out or taken twice."""
     lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 45), (0, 45))))
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=f"{said}.*{cure}") as caught:
         step(lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]))
+    assert len(str(caught.value)) <= 500

@@ -107,5 +107,7 @@ def test_dates_that_do_not_fit_are_told(season):
         season.drop_vars("time").fifesim.surface_reflectance("TM")
     with pytest.raises(ValueError, match="the raster has dates of its own: leave time= out"):
         season.fifesim.surface_reflectance("TM", time="2022-05-01T17:00Z")
+    with pytest.raises(ValueError, match="dem has dates and the raster of kt has none"):
+        fifesim.kt(season[0].fifesim.surface_reflectance("TM"), season * 0)
     with pytest.raises(ValueError, match="background has dates and the raster of surface_reflectance has none"):
         season[0].fifesim.surface_reflectance("TM", background=season / 30)

@@ -76,6 +76,9 @@ def test_raster_comes_back_as_it_was(image, lai, tmp_path, name, chunks):
         "one-band": image.sel(band=["TM4"]),
         "single-precision": fifesim.ndvi(image).astype(np.float32),
     }[name]
+    if chunks and name == "lai":
+        # Of cells there are more than of pixels.
+        chunks = {"y": 20, "x": 17}
     path = tmp_path / "raster.tif"
     fifesim.to_geotiff(raster if chunks is None else in_chunks(raster, ODD_CHUNKS | {"band": 1}), path)
     with no_compute():
@@ -249,6 +252,31 @@ def test_values_of_others_are_masked_and_in_their_unit(tmp_path, dtype, stored, 
         np.testing.assert_allclose(found[0, 1], value, rtol=1e-7)
         assert np.isnan(found[0, 0, 0]) == (nodata is not None)
         assert "gain" not in found.coords
+
+
+@pytest.mark.parametrize(
+    ("dtype", "attrs", "nodata"),
+    [
+        (np.uint8, {"_FillValue": 220, "scale_factor": 0.1}, 220),
+        (np.int16, {"nodata": -3}, -3),
+        (np.float32, {"_FillValue": -3.0}, -3),
+        (np.float32, {"_FillValue": np.nan}, None),
+        (np.uint8, {"_FillValue": -9999}, None),
+        (np.uint8, {}, None),
+    ],
+)
+def test_what_stands_for_no_data_is_what_the_raster_says(tmp_path, dtype, attrs, nodata):
+    """A mask of zeros and ones has no cell without data."""
+    grid = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 120.0, 90.0, 30.0)
+    values = np.arange(-3, 9).reshape(3, 4).astype(dtype)
+    raster = grids.place(xr.DataArray(values, dims=("y", "x"), name="own", attrs=attrs), grid)
+    path = fifesim.to_geotiff(raster, tmp_path / "own.tif")
+    with rasterio.open(path) as source:
+        # NaN is what fractions have without being asked.
+        assert source.nodata == nodata or np.isnan(attrs["_FillValue"])
+    again = fifesim.open_image(path)
+    assert again.equals(raster)
+    assert again.attrs == {key: value for key, value in attrs.items() if value == value}
 
 
 def test_a_time_comes_back_as_a_time(image, tmp_path):

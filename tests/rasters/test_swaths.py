@@ -142,3 +142,13 @@ def test_results_lie_where_their_image_does():
     assert placed_as(bare, image).encoding == {"grid_mapping": "spatial_ref"}
     with pytest.raises(ValueError, match="dimensions y and x"):
         placed_as(bare, bare.rename(line="row", sample="column"))
+
+
+def test_each_date_of_a_scan_comes_to_its_place():
+    times = np.array(["2022-05-01T17:00", "2022-06-01T17:00"], "M8[ns]")
+    passes = [swath().assign_coords(sza=sza) * share for sza, share in ((31.0, 1.0), (27.0, 2.0))]
+    season = xr.concat(passes, dim=xr.IndexVariable("time", times), coords="different", compat="equals")
+    out = season.fifesim.grid_swath(GRID)
+    assert out.dims == ("time", "band", "y", "x") and out["sza"].values.tolist() == [31.0, 27.0]
+    for number, one in enumerate(passes):
+        np.testing.assert_array_equal(out[number], grid_swath(one, GRID))

@@ -88,6 +88,18 @@ def test_pixels_are_those_of_the_bands_as_in_python():
         Sensor(instrument="MSI", bands=["MSI4", "MSI11"])
 
 
+def test_response_of_a_scenario_is_that_of_python():
+    sharp = Sensor(response="detector").description
+    assert sharp == fifesim.instrument("TM", response="detector") != Sensor().description
+    assert Sensor(response="system").description == Sensor(response="paper").description == Sensor().description
+    for name, response, said in (
+        ("TM", "sharp", "response must be one of system, detector, paper, got 'sharp'"),
+        ("MSI", "paper", "MSI has no 'paper' response: type response='detector'"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            Sensor(instrument=name, response=response)
+
+
 def test_noise_of_a_scenario_is_that_of_python():
     given = {"thermal": 0.4, "shot": 0.005, "detectors": 16, "gain_spread": 0.005}
     assert Sensor(noise=["shot"], noise_model=given).given_noise() == fifesim.NoiseModel(**given)

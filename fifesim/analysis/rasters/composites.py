@@ -8,8 +8,9 @@ import xarray as xr
 from fifesim.analysis.compositing import date_of_maximum, values_of_date
 from fifesim.analysis.rasters.indices import ndvi
 from fifesim.base.geometry import ANGLES
-from fifesim.rasters import cf
+from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
+from fifesim.rasters.crs import with_crs_of
 
 _METHODS = {"maximum-value": date_of_maximum}
 _REFERENCE = "Holben (1986), doi:10.1080/01431168608948945"
@@ -61,9 +62,7 @@ def composite(images, method="maximum-value", *, by=None):
             "xarray.concat([...], dim='time')"
         )
     grid = grids.geobox(images.isel(time=0))
-    index = _index(images) if by is None else by
-    if index.dims != ("time", "y", "x") or index.sizes["time"] != images.sizes["time"]:
-        raise ValueError(f"by has dimensions (time, y, x) with the dates of the images, got {dict(index.sizes)}")
+    index = _index(images) if by is None else _checked(by, images)
     chosen = _along_time(_METHODS[method], index.drop_vars(list(index.coords)), dtype=np.int64)
     plain = images.drop_vars(list(images.coords))
     out = _along_time(values_of_date, plain, chosen, dtype=images.dtype, missing=np.nan)
@@ -84,6 +83,17 @@ def _index(images):
     dates = [ndvi(images.isel(time=number, drop=True)) for number in range(images.sizes["time"])]
     # The angles of each date would have to agree.
     return xr.concat([each.drop_vars(list(each.coords)) for each in dates], "time")
+
+
+def _checked(by, images):
+    """What is largest, of the dates and cells of the images."""
+    if by.dims != ("time", "y", "x") or by.sizes["time"] != images.sizes["time"]:
+        raise ValueError(f"by has dimensions (time, y, x) with the dates of the images, got {dict(by.sizes)}")
+    if {"time"} <= set(by.coords) & set(images.coords) and not np.array_equal(by["time"], images["time"]):
+        raise ValueError("by has other dates than the images, or in another order: sort both with .sortby('time')")
+    one = images.isel(time=0, drop=True)
+    chunks.aligned([one, with_crs_of(by.isel(time=0, drop=True), one).rename("by")])
+    return by
 
 
 def _of_date(images, chosen):

@@ -9,7 +9,7 @@ from fifesim.output.provenance import versions
 from fifesim.rasters.opening import raster_file
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.toml import write_scenario
-from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.description.instruments import tables_of
 
 _STATE = "run.json"
 
@@ -79,8 +79,7 @@ def inputs_of(scenario):
 
 def _read_with(key, name):
     if key == "instrument":
-        responses = [band.srf for band in instrument(name).bands]
-        return [name, *(Path(each.folder) / each.table for each in responses if hasattr(each, "table"))]
+        return [name, *tables_of(name)]
     if key in ("lai_file", "dem", "cover"):
         with raster_file(name).opened() as source:
             return [name, *source.files]

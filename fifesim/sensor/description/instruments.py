@@ -58,9 +58,10 @@ def instrument(name, response=None):
 def _found(name):
     if isinstance(name, Path) or (isinstance(name, str) and Path(name).suffix.lower() == ".toml"):
         path = Path(name).absolute()
-        # A file that has changed is read again; one that is not there is an error of reading.
-        state = path.stat() if path.exists() else None
-        return _read_again(path, state and (state.st_mtime_ns, state.st_size))
+        # A file that has changed is read again, with its tables; one that is not there is an error of reading.
+        state = _state(path)
+        tables = () if state is None else _tables(path, state)
+        return _read_again(path, (state, *map(_state, tables)))
     return catalogued(name)
 
 
@@ -131,6 +132,28 @@ def read_instrument(path):
     except ValueError as error:
         raise ValueError(f"{path.name}: {error}") from None
     return found
+
+
+def tables_of(path):
+    """
+    Tables that an instrument's file names, of its bands and of their responses.
+
+    Parameters
+    ----------
+    path : str or path-like
+        TOML file.
+
+    Returns
+    -------
+    paths : tuple of pathlib.Path
+        Beside it, where they are to lie.
+    """
+    bands, folder = read_toml(path).get("bands"), Path(path).absolute().parent
+    if isinstance(bands, str):
+        return (folder / bands,)
+    responses = [band.get("srf") for band in bands if isinstance(band, dict)] if isinstance(bands, list) else []
+    names = [each["table"] for each in responses if isinstance(each, dict) and isinstance(each.get("table"), str)]
+    return tuple(folder / name for name in dict.fromkeys(names))
 
 
 def noise_of(description, band):
@@ -229,5 +252,19 @@ def _catalogue():
 
 
 @lru_cache(maxsize=32)
-def _read_again(path, changed):
+def _read_again(path, states):
     return read_instrument(path)
+
+
+@lru_cache(maxsize=32)
+def _tables(path, state):
+    return tables_of(path)
+
+
+def _state(path):
+    """By which a file is told from what it was; None where it is not there."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
+    return found.st_mtime_ns, found.st_size

@@ -60,7 +60,7 @@ def product_reflectance(dn, gain, offset, largest, flag=0, flags=0, mu_s=1.0):
     Returns
     -------
     reflectance : array of float32
-        NaN where there are no data, and where the band is saturated. [1]
+        NaN where there are no data, where the band is saturated, and where the sun is down. [1]
 
     References
     ----------
@@ -74,6 +74,7 @@ def product_reflectance(dn, gain, offset, largest, flag=0, flags=0, mu_s=1.0):
     """
     dn = np.asarray(dn)
     usable = (dn != 0) & (dn < largest) & (np.bitwise_and(flags, flag) == 0)
+    mu_s = np.where(np.asarray(mu_s) > 0, mu_s, np.nan)
     return np.where(usable, (dn * np.asarray(gain, float) + offset) / mu_s, np.nan).astype(np.float32)
 
 

@@ -75,6 +75,21 @@ def test_what_makes_no_composite_is_refused(stack, change, options, said):
         fifesim.composite(change(stack), **options)
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda by: by.isel(time=[1, 0, 2]), r"other dates than the images, or in another order: .*\.sortby\('time'\)"),
+        (lambda by: by.assign_coords(x=by["x"] + 30.0), "lie on different grids"),
+    ],
+)
+def test_what_decides_has_the_dates_and_cells_of_the_images(stack, change, said):
+    """Of as many dates and cells it would choose wrong ones in silence."""
+    with pytest.raises(ValueError, match=said):
+        fifesim.composite(stack, by=change(stack))
+    plain = stack.drop_vars("spatial_ref").drop_attrs(deep=False) * 2
+    np.testing.assert_array_equal(fifesim.composite(stack, by=plain), fifesim.composite(stack))
+
+
 def test_angles_by_cell_are_those_of_the_date(stack):
     """As a product opened by pixel has them."""
     sza = stack.copy(data=np.random.default_rng(3).uniform(20, 60, stack.shape)).drop_vars("date", errors="ignore")

@@ -28,17 +28,17 @@ def test_every_view_of_the_references_is_compared():
 
 
 @pytest.mark.parametrize(
-    "name, column, row, factor, said",
+    "check, name, column, row, factor, said",
     [
-        ("iprt", "I", 3, 1.002, "IPRT A1a, intensity of air and sky"),
-        ("iprt", "U", 290, 1.01, "IPRT B1, Q and U"),
-        ("molecules_stokes", "I", 7, 1.00001, "I, Q and U of molecules, many layers"),
-        ("rami4atm", "reflectance", 80, 1.05, "white ground below molecules"),
-        ("rami4atm", "reflectance", 10, 1.1, "ground below aerosol and gases"),
-        ("rami4atm", "reflectance", -1, 1.1, "HOM45, toward the sun, 65 to 75 degrees"),
+        (benchmarks._iprt, "iprt", "I", 3, 1.002, "IPRT A1a, intensity of air and sky"),
+        (benchmarks._iprt, "iprt", "U", 290, 1.01, "IPRT B1, Q and U"),
+        (benchmarks._molecules, "molecules_stokes", "I", 7, 1.00001, "I, Q and U of molecules, many layers"),
+        (benchmarks._rami, "rami4atm", "reflectance", 80, 1.05, "white ground below molecules"),
+        (benchmarks._rami, "rami4atm", "reflectance", 10, 1.1, "ground below aerosol and gases"),
+        (benchmarks._canopy, "rami4atm", "reflectance", -1, 1.1, "HOM45, toward the sun, 65 to 75 degrees"),
     ],
 )
-def test_a_reference_changed_in_one_place_is_named(monkeypatch, name, column, row, factor, said):
+def test_a_reference_changed_in_one_place_is_named(monkeypatch, check, name, column, row, factor, said):
     right = datasets.table
 
     def wrong(path):
@@ -49,7 +49,7 @@ def test_a_reference_changed_in_one_place_is_named(monkeypatch, name, column, ro
         return table
 
     monkeypatch.setattr(benchmarks.datasets, "table", wrong)
-    monkeypatch.setattr(areas, "AREAS", {"atmosphere": benchmarks.CHECKS, "canopy": benchmarks.CANOPY})
+    monkeypatch.setattr(areas, "AREAS", {"atmosphere": [check]})
     result = CliRunner().invoke(app, ["verify"])
     assert result.exit_code == 1
     assert said in result.stdout.splitlines()[-1]

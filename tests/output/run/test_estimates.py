@@ -5,6 +5,7 @@ import time
 
 import pytest
 
+from fifesim.output import pages
 from fifesim.output.run.estimates import estimate, estimate_in_words
 from fifesim.output.run.folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
@@ -12,7 +13,8 @@ from fifesim.scenario.scenario import parse_scenario
 FOUND = {"cells": 72900, "pixels": 900, "tasks": 12, "threads": 2, "memory": 2**30, "disk": 2**20, "seconds": 90.0}
 
 
-def test_cells_and_pixels_are_those_of_the_scenario():
+def test_cells_and_pixels_are_those_of_the_scenario(monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     scenario = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
     found, with_scene = estimate(scenario, threads=1), estimate(scenario, threads=1, scene=True)
     assert found["cells"] == 90 * 90 and found["pixels"] == 100

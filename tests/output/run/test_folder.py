@@ -1,5 +1,6 @@
 """The report of a run says what its rasters say."""
 
+import html
 import re
 
 import numpy as np
@@ -10,10 +11,11 @@ import xarray as xr
 import zarr
 
 import fifesim
+from fifesim.output import pages
 from fifesim.output.folders import UNFINISHED
 from fifesim.output.run import folder as run_folder
 from fifesim.output.run.folder import FILES, simulate_to_folder
-from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.scenario import parse_scenario, read_scenario
 
 FLAT = {"dem": "flat"}
 SMALL = {"grid": {"width": 900, "height": 600}, "ground": {"arp": 0.24, "seed": 3}, "terrain": FLAT}
@@ -53,6 +55,14 @@ def test_report_gives_the_regressions_of_its_files(folder):
         assert f"{fit.r2:.4f}" in page
 
 
+BLUR = '<th>Blur</th><td class="number">modulation transfer at the Nyquist frequency {}'
+
+
+def test_report_says_how_much_the_instrument_blurs(folder):
+    """The paper's cosine passes 0.69 at the Nyquist frequency."""
+    assert BLUR.format("0.69") in (folder / "report.html").read_text(encoding="utf-8")
+
+
 def test_report_is_self_contained(folder):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
@@ -71,9 +81,15 @@ def test_all_bands_of_an_instrument_make_a_report(tmp_path):
     assert all(path.stat().st_size > 0 for path in files)
 
 
-def test_a_single_band_has_no_ndvi_and_still_a_report(tmp_path):
-    simulate_to_folder(parse_scenario(SMALL | {"sensor": {"bands": ["TM5"]}}), tmp_path / "one")
-    assert "What NDVI tells" not in (tmp_path / "one" / "report.html").read_text(encoding="utf-8")
+def test_a_single_band_through_its_detector_alone_has_no_ndvi_and_still_a_report(tmp_path):
+    """A detector as wide as the interval passes 2 / pi."""
+    scenario = parse_scenario(SMALL | {"sensor": {"bands": ["TM5"], "response": "detector"}})
+    simulate_to_folder(scenario, tmp_path / "one")
+    page = html.unescape((tmp_path / "one" / "report.html").read_text(encoding="utf-8"))
+    assert "What NDVI tells" not in page
+    said = "0.64; of TM5 the detector alone is known: the image is sharper than the instrument's"
+    assert BLUR.format(said) in page
+    assert read_scenario(tmp_path / "one" / "scenario.toml").sensor.response == "detector"
 
 
 def test_a_report_with_terrain_shows_it_and_says_how_far_it_is_known(tmp_path):
@@ -93,9 +109,11 @@ HILLS = {
 
 @pytest.fixture(scope="module")
 def hills(tmp_path_factory):
-    """A scene of several chunks on terrain, with its cells."""
+    """A scene of several chunks on terrain, with its cells; nobody looks at its pictures."""
     folder = tmp_path_factory.mktemp("hills") / "out"
-    simulate_to_folder(parse_scenario(HILLS), folder, scene=True, threads=2)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pages, "png", lambda figure, dpi: b"")
+        simulate_to_folder(parse_scenario(HILLS), folder, scene=True, threads=2)
     return folder
 
 
@@ -124,8 +142,9 @@ def test_nothing_unfinished_stays(hills):
     assert sorted(path.name for path in hills.iterdir()) == sorted([*FILES, "scene.zarr"])
 
 
-def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_path):
+def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_path, monkeypatch):
     """The image lies 30.315 m apart and the truth 30 m, so that no coordinate of one is in the other."""
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     scenario = parse_scenario(SMALL | {"sensor": {"interval": "native"}, "terrain": {"dem": "flat"}})
     simulate_to_folder(scenario, tmp_path / "own")
     assert "What NDVI tells" in (tmp_path / "own" / "report.html").read_text(encoding="utf-8")
@@ -157,6 +176,7 @@ def test_an_image_without_a_valid_pixel_is_an_error_that_says_why(tmp_path, valu
 
 
 def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     scenario = parse_scenario(lai_map(tmp_path / "lai.tif", 2.0))
     write_files = run_folder._write_files
 
@@ -171,6 +191,7 @@ def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
 
 
 def test_a_shard_that_changed_is_made_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "whole", scene=True)
 
     def full(*given):

@@ -41,6 +41,14 @@ def test_files_that_others_name_are_inputs(lai_file, tmp_path):
     assert names == {"lai.vrt", "source.tif", "mine.toml", "avhrr_response.csv", "samples.csv"}
 
 
+def test_a_table_of_bands_is_an_input(tmp_path):
+    """It says how wide the bands are and what noise they have, as the instrument's file does."""
+    (tmp_path / "bands.csv").write_text("name,center,width\nred,0.668,0.010\nnir,0.840,0.040\n")
+    (tmp_path / "mine.toml").write_text('name = "Mine"\naltitude = 7e5\ngsd = 30.0\nbits = 12\nbands = "bands.csv"\n')
+    found = inputs_of(parse_scenario(SMALL | {"sensor": {"instrument": str(tmp_path / "mine.toml")}}))
+    assert {os.path.basename(name) for name in found} == {"mine.toml", "bands.csv"}
+
+
 def scenario_of(lai_file):
     return parse_scenario(SMALL | {"ground": {"lai_file": str(lai_file)}}).complete()
 

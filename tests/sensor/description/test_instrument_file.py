@@ -57,6 +57,7 @@ def test_a_band_names_its_own_source_first():
 def test_bands_come_in_the_order_asked_for():
     tm = instrument("TM")
     assert [band.name for band in tm.select(["TM4", "tm3"])] == ["TM4", "TM3"]
+    assert [band.name for band in tm.select(["red", "nir", "B5"])] == ["TM3", "TM4", "TM5"]
     assert tm.select("TM3") == (tm.bands[2],)
     assert tm.select() == tm.bands
 

@@ -70,6 +70,15 @@ def test_bands_may_stand_in_a_table_beside_the_file(tmp_path):
     assert nir.wavelength == pytest.approx(0.840, abs=1e-9)
 
 
+def test_a_table_that_changed_is_read_again(tmp_path):
+    (tmp_path / "bands.csv").write_text(TABLE)
+    path = tmp_path / "camera.toml"
+    path.write_text('name = "Camera"\naltitude = 120.0\ngsd = 0.1\nbits = 12\nbands = "bands.csv"\n')
+    assert fifesim.instrument(path) is fifesim.instrument(path)
+    (tmp_path / "bands.csv").write_text(TABLE.replace("0.668", "0.6500"))
+    assert fifesim.instrument(path).bands[0].wavelength == pytest.approx(0.65, abs=1e-9)
+
+
 def test_share_of_shot_noise_stands_beside_the_ratio(tmp_path):
     red, _ = read(tmp_path, CAMERA.replace("snr_radiance = 100.0", "snr_radiance = 100.0, snr_shot = 0.75")).bands
     assert (red.noise.equivalent_radiance, red.noise.shot) == (0.5, 0.75)
@@ -107,6 +116,16 @@ def test_mistake_in_a_short_file_is_one_line(tmp_path, old, new, said):
     with pytest.raises(ValueError, match=said) as caught:
         read(tmp_path, CAMERA.replace(old, new))
     assert "\n" not in str(caught.value) and len(str(caught.value)) <= 500
+
+
+@pytest.mark.parametrize("name", ["../bands.csv", "/bands.csv", "bands.csv/"])
+def test_table_lies_beside_its_file(tmp_path, name):
+    (tmp_path / "bands.csv").write_text(TABLE)
+    folder = tmp_path / "own"
+    folder.mkdir()
+    name = str(tmp_path) + name if name.startswith("/") else name
+    with pytest.raises(ValueError, match="no such file beside it; type a CSV file of bands"):
+        read(folder, f'name = "Camera"\naltitude = 120.0\ngsd = 0.1\nbits = 12\nbands = "{name}"\n')
 
 
 @pytest.mark.parametrize(

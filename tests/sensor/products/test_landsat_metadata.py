@@ -51,6 +51,21 @@ def test_panchromatic_and_cirrus_have_their_flags():
     assert (flags["OLI8"], flags["OLI9"]) == (0, 256)
 
 
+def test_a_band_that_no_landsat_has_is_no_mistake_of_arithmetic():
+    """The instrument's list of bands refuses it by name."""
+    groups = products.landsat_groups(products.OLI)
+    scales = groups["LEVEL1_RADIOMETRIC_RESCALING"]
+    for number in ("0", "12", "99"):
+        groups["PRODUCT_CONTENTS"][f"FILE_NAME_BAND_{number}"] = f"B{number}.TIF"
+        groups["LEVEL1_MIN_MAX_PIXEL_VALUE"][f"QUANTIZE_CAL_MAX_BAND_{number}"] = "65535"
+        scales |= {f"REFLECTANCE_MULT_BAND_{number}": "2e-5", f"REFLECTANCE_ADD_BAND_{number}": "-0.1"}
+        for kind in ("RADIANCE", "REFLECTANCE"):
+            limits = {f"{kind}_MAXIMUM_BAND_{number}": "1", f"{kind}_MINIMUM_BAND_{number}": "0"}
+            groups[f"LEVEL1_MIN_MAX_{kind}"] |= limits
+    flags = {band.name: band.flag for band in landsat_scene(groups).bands}
+    assert (flags["OLI0"], flags["OLI12"], flags["OLI99"]) == (0, 0, 0)
+
+
 def test_solar_irradiance_is_that_behind_the_two_scales():
     """Of OLI, whose description has it from another scene; to the digits of the metadata."""
     bands = landsat_scene(products.landsat_groups(products.OLI)).bands

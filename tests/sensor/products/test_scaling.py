@@ -22,8 +22,9 @@ def test_no_data_and_saturated_are_nan(dn, flags, kept):
     assert bool(np.isfinite(found)) == kept
 
 
-def test_a_sun_that_is_not_known_leaves_nan():
-    assert np.isnan(scaling.product_reflectance(np.uint8(57), 1e-3, 0.0, 255, mu_s=np.nan))
+def test_a_sun_that_is_down_or_not_known_leaves_nan():
+    found = scaling.product_reflectance(np.uint8(57), 1e-3, 0.0, 255, mu_s=np.array([np.nan, 0.0, -0.1]))
+    assert np.isnan(found).all()
 
 
 def test_angles_are_hundredths_from_0_to_360():

@@ -1,5 +1,7 @@
 """Metadata of Sentinel-2 products."""
 
+import re
+
 import numpy as np
 import products
 import pytest
@@ -70,6 +72,8 @@ L1C = products.product_xml(1, "04.00")
         (L1C.replace(">10000<", ">many<"), "QUANTIFICATION_VALUE must be a number, got 'many'"),
         (L1C.replace(">10000<", ">0<"), "QUANTIFICATION_VALUE must be above 0"),
         (L1C.replace("<U>", "<V>").replace("</U>", "</V>"), "the metadata have no U: is"),
+        (re.sub("<U>.*</U>", "<U>0</U>", L1C), "U must be above 0, got 0"),
+        (re.sub("<U>.*</U>", "<U>-1.03</U>", L1C), "U must be above 0, got -1.03"),
         (L1C.replace("INDEX>0<", "INDEX>9<"), "no data is 9"),
         (L1C.replace("Level-1C_User", "Level-1B_User"), "is 'Level-1B_User_Product': Level-1C"),
         ('<!DOCTYPE a [<!ENTITY b "c">]><a/>', "declares a document type"),

@@ -6,14 +6,12 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import utc
 from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
-from fifesim.sensor.products.rasters.layers import TIME
 from fifesim.sensor.products.scaling import counts
 from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.pixels import matching_bands
@@ -64,7 +62,9 @@ def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=Non
     description = find_instrument(instrument)
     dn = north_up(dn if "band" in dn.dims else dn.expand_dims("band")).transpose("band", "y", "x")
     bands = matching_bands(dn, description)
-    geometry, time = _sun_and_time(geometry, time, dn)
+    # A geometry that is given wins over the sun of a time that is given, which is the image's all the same.
+    geometry = directions.given_geometry(geometry, dn, time if geometry is None else None)
+    time = directions.dated(dn, time).coords.get("time")
     if (gain is None) != (offset is None):
         raise ValueError("gain and offset make radiance of a digital number together: give both, or neither")
     compression = [0]
@@ -84,7 +84,7 @@ def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=Non
     out = directions.with_geometry(grids.place(out, grids.geobox(dn)), geometry).assign_coords(
         cf.band_coordinates(**along_band)
     )
-    out = out if time is None else out.assign_coords(time=((), time, TIME))
+    out = out if time is None or time.ndim else out.assign_coords(time=((), time.values, cf.TIME))
     history = f"calibrate: {description.name}"
     image = cf.label(out, "dn", source=dn, history=history, **attributes_of(description))
     image.attrs["_FillValue"] = image.dtype.type(0)
@@ -102,12 +102,3 @@ def _by_band(given, bands, name):
     if values.shape not in ((), (len(bands),)) or not np.isfinite(values).all():
         raise ValueError(f"{name} must be a number, or one for each of {len(bands)} bands, got {given!r}")
     return np.broadcast_to(values, (len(bands),))
-
-
-def _sun_and_time(geometry, time, dn):
-    """Sun and view as given, else of the time that is given, else as carried; and the time, or None."""
-    carried = dn.coords["time"].values if "time" in dn.coords and not dn.coords["time"].ndim else None
-    known = utc(time)[0].tz_localize(None).to_datetime64() if time is not None else carried
-    if geometry is not None:
-        return directions.checked_geometry(geometry), known
-    return directions.given_geometry(None, dn, time), known

@@ -14,8 +14,6 @@ from fifesim.sensor.products.scaling import product_reflectance
 # Edge of a chunk by default: whole blocks of the agencies' files. [pixel]
 CHUNK = 2048
 
-TIME = {"standard_name": "time", "long_name": "time of the image, UTC"}
-
 
 def chunk_sizes(given):
     """
@@ -189,7 +187,7 @@ def as_image(array, bands, description, *, level, time, geometry, quality, histo
         ],
     }
     array = directions.with_geometry(array.assign_coords(cf.band_coordinates(**along_band)), geometry)
-    array = array.assign_coords(time=((), time, TIME))
+    array = array.assign_coords(time=((), time, cf.TIME))
     if quality is not None:
         array = array.assign_coords(quality=(("y", "x"), quality.data, quality.attrs))
     name = "toa_reflectance" if level == 1 else "surface_reflectance"

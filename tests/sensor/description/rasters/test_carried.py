@@ -32,6 +32,7 @@ def test_an_instrument_of_ones_own_comes_back_whole(name):
 def test_one_of_fifesims_is_a_name():
     assert attributes_of(instrument("TM")) == {"instrument": "TM"}
     assert carried_instrument(raster(instrument="TM")) is instrument("TM")
+    assert carried_instrument(raster(instrument="landsat 5")) is instrument("TM"), "an alias"
     assert carried_instrument(raster()) is None
     other = dataclasses.replace(instrument("TM"), bits=10)
     assert carried_instrument(raster(**attributes_of(other))).bits == 10, "another instrument of the same name"

@@ -128,6 +128,26 @@ def test_what_is_missing_is_asked_for(dn, options, said):
         fifesim.calibrate(dn, "TM", **options)
 
 
+def test_each_date_has_its_own_sun(dn):
+    times = np.array(["1987-06-06T16:35", "1987-08-09T16:40"], "M8[ns]")
+    season = xr.concat([dn, 255 - dn], dim=xr.IndexVariable("time", times))
+    image = fifesim.calibrate(season, "TM")
+    assert image.dims == ("time", "band", "y", "x") and image["sza"].dims == ("time",)
+    for number in range(2):
+        xr.testing.assert_equal(image.isel(time=number), fifesim.calibrate(season.isel(time=number), "TM"))
+    assert abs(float(image["sza"][0] - image["sza"][1])) > 3
+
+
+def test_rows_from_south_to_north_stay_on_their_ground(dn):
+    image = fifesim.calibrate(dn.isel(y=slice(None, None, -1)), "TM", geometry=SUN)
+    xr.testing.assert_identical(image, fifesim.calibrate(dn, "TM", geometry=SUN))
+
+
+def test_a_geometry_stands_before_the_sun_of_the_time(dn):
+    image = fifesim.calibrate(dn, "TM", geometry=SUN, time="1987-06-06T16:35Z")
+    assert (float(image["sza"]), image["time"].values) == (35.0, np.datetime64("1987-06-06T16:35"))
+
+
 def test_an_image_is_not_calibrated_twice(dn):
     image = fifesim.calibrate(dn, "TM", geometry=SUN)
     with pytest.raises(ValueError, match=r"carries a calibration already: drop it with \.drop_vars"):
