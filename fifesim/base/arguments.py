@@ -27,6 +27,7 @@ from fifesim.base.kinds import (
     METRES,
     NAMES,
     NUMBER,
+    NUMBER_OR_RASTER,
     NUMBERS,
     OFFSET,
     PAIR,
@@ -58,16 +59,18 @@ KINDS = (
     | _of(NUMBER, "cell scale_height sza saa vza vaa earth_sun_distance thermal shot detectors gain_spread slope")
     | _of(NUMBER, "visibility aot h2o o3 residual_deviation realisations spacing offset_spread")
     | _of(NUMBER, "uncertainty min_coverage view_tolerance")
+    | _of(NUMBER, "crown_shape")
+    | _of(NUMBER_OR_RASTER, "brown dissociation crown_cover")
     | _of(NUMBERS, "radiance")
     | _of(LIST, "frequency")
     | _of(METRES, "pixel")
     | _of(INTERVAL, "interval")
     | _of(ANYTHING, "background")
     | _of(SURROUNDINGS, "surroundings")
-    | _of(LEAF, "leaf_optics")
+    | _of(LEAF, "leaf_optics brown_leaf")
     | _of(HORIZON, "horizon")
     | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality")
-    | _of(TEXT, "angles scaling pair quantity method datum vertical_units engine profile along band")
+    | _of(TEXT, "angles scaling pair quantity method datum vertical_units engine profile along band leaves")
     | _of(NAMES, "bands noise engines")
     | _of(PATH, "path")
     | _of(FILE_OR_RASTER, "path_or_raster")

@@ -9,11 +9,13 @@ from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.base.foreign import in_a_line
 from fifesim.base.geometry import Geometry
 from fifesim.chain import steps
+from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import Instrument
 
 # What surface_reflectance and sense take of a setup, by the same names.
 _GROUND = ("bands", "dem", "horizon", "upwelling", "atmosphere", "leaf_optics", "background", "leaf_angles", "hotspot")
+_GROUND += ("brown", "dissociation", "brown_leaf", "crown_cover", "crown_shape")
 _SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
 
 
@@ -33,6 +35,8 @@ class Setup:
         Of sun and sensor; by default that of the leaf area, else the paper's.
     leaf_optics, background, leaf_angles, hotspot : optional
         As in `fifesim.surface_reflectance`.
+    brown, dissociation, brown_leaf, crown_cover, crown_shape : optional
+        As in `fifesim.surface_reflectance`.
     dem, horizon, upwelling : optional
         As in `fifesim.surface_reflectance`; without a dem the ground is level.
     adjacency, surroundings : optional
@@ -51,6 +55,11 @@ class Setup:
     background: object = None
     leaf_angles: object = "spherical"
     hotspot: float = 0.0
+    brown: float | xr.DataArray = 0.0
+    dissociation: float | xr.DataArray = 0.0
+    brown_leaf: object = None
+    crown_cover: float | xr.DataArray = 1.0
+    crown_shape: float = SHAPE
     dem: xr.DataArray | None = None
     horizon: xr.DataArray | None = None
     upwelling: bool = True

@@ -5,6 +5,7 @@ from fifesim.atmosphere.schemes import engines
 from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
 from fifesim.ground.canopy import raster as ground
+from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.rasters import leaves, soils
 from fifesim.ground.terrain.rasters import light as terrain
 from fifesim.ground.terrain.rasters.dem import beside_altitude
@@ -31,6 +32,11 @@ def surface_reflectance(
     background=None,
     leaf_angles="spherical",
     hotspot=0.0,
+    brown=0.0,
+    dissociation=0.0,
+    brown_leaf=None,
+    crown_cover=1.0,
+    crown_shape=SHAPE,
     exact=False,
 ):
     """
@@ -72,6 +78,16 @@ def surface_reflectance(
         A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
     hotspot : float, optional
         Leaf size over canopy height; 0 is none, as in the paper. [1]
+    brown : float or xarray.DataArray, dims (y, x), optional
+        Dead share of the leaf area, 0 to 1. [1]
+    dissociation : float or xarray.DataArray, dims (y, x), optional
+        Where dead leaves are: 0 among the green ones, 1 below them. Of a raster, SAIL is evaluated at every cell. [1]
+    brown_leaf : optional
+        Optics of dead leaves, as ``leaf_optics`` takes them; by default dead tallgrass.
+    crown_cover : float or xarray.DataArray, dims (y, x), optional
+        Share of the ground below crowns, which hold all leaves; 0 is bare ground. [1]
+    crown_shape : float, optional
+        Crown diameter over height. [1]
     exact : bool, optional
         Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it, and all leaves.
 
@@ -88,11 +104,12 @@ def surface_reflectance(
 
     References
     ----------
-    [Verhoef1984]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5
+    [Verhoef1984]_; [VerhoefBach2007]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5
 
     See Also
     --------
-    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.raster.level_reflectance,
+    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.layers.two_layers,
+    fifesim.ground.canopy.crowns.clumped, fifesim.ground.canopy.raster.level_reflectance,
     fifesim.ground.terrain.rasters.light.terrain_reflectance
     """
     if dem is None and horizon is not None:
@@ -115,6 +132,11 @@ def surface_reflectance(
         geometry=geometry,
         leaf_angles=leaf_angles,
         hotspot=hotspot,
+        brown=brown,
+        dissociation=dissociation,
+        brown_optics=leaves.brown_optics(responses, brown, brown_leaf, lai, exact=exact),
+        crown_cover=crown_cover,
+        crown_shape=crown_shape,
         exact=exact,
         atmosphere=atmosphere.text,
         **attributes_of(description),

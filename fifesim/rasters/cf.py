@@ -18,6 +18,9 @@ class Quantity:
 
 QUANTITIES = {
     "lai": Quantity("1", "leaf_area_index", "leaf area index", "one-sided leaf area per ground area"),
+    "brown": Quantity("1", "", "dead share of the leaf area"),
+    "dissociation": Quantity("1", "", "how far dead leaves lie below green ones", "0 mixed, 1 below"),
+    "crown_cover": Quantity("1", "", "share of the ground below crowns"),
     "fpar": Quantity(
         "1",
         "fraction_of_surface_downwelling_photosynthetic_radiative_flux_absorbed_by_vegetation",

@@ -18,6 +18,11 @@ GROUND = {
     "background": {"TM3": 0.1, "TM4": 0.2},
     "leaf_angles": "planophile",
     "hotspot": 0.2,
+    "brown": 0.3,
+    "dissociation": 0.6,
+    "brown_leaf": {"TM3": (0.3, 0.1), "TM4": (0.4, 0.3)},
+    "crown_cover": 0.8,
+    "crown_shape": 0.5,
     "upwelling": False,
 }
 SENSOR = {

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fifesim.ground.canopy.layers import layers_of
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes, leaf_projection
 
 FPAR_INF = 0.94
@@ -78,3 +79,45 @@ def fpar(lai, extinction, fpar_inf=FPAR_INF):
     0.0
     """
     return -fpar_inf * np.expm1(-np.asarray(extinction, float) * np.asarray(lai, float))
+
+
+def green_fpar(lai, extinction, brown, dissociation=0.0, fpar_inf=FPAR_INF):
+    r"""
+    Fraction of photosynthetically active radiation that the green leaves of a canopy absorb.
+
+    .. math::
+
+        \mathrm{FPAR}_g = \mathrm{FPAR}_\infty \left[ (1 - b_1) \left( 1 - e^{-K L_1} \right)
+            + (1 - b_2) \, e^{-K L_1} \left( 1 - e^{-K L_2} \right) \right]
+
+    Parameters
+    ----------
+    lai : array
+        Leaf area index of both kinds. NaN gives NaN. [m2 m-2]
+    extinction, fpar_inf : array
+        As in `fpar`. [1]
+    brown, dissociation : array
+        Dead share :math:`f_B`, and :math:`D`, as in `layers_of`, which gives the layers and their shares. [1]
+
+    Returns
+    -------
+    fpar : array, shape of the broadcast inputs
+        [1]
+
+    Notes
+    -----
+    Where both kinds are mixed it is FPAR times the green share of the leaf area, as in Hall et al. (1992); green leaves
+    above dead ones get the light first.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 6; [Hall1992]_
+
+    Examples
+    --------
+    >>> bool(np.isclose(green_fpar(2.0, 0.57, 0.25), 0.75 * fpar(2.0, 0.57)))
+    True
+    """
+    layers, k = layers_of(lai, brown, dissociation), np.asarray(extinction, float)
+    above, below = fpar(layers.lai, k, fpar_inf), np.exp(-k * layers.lai) * fpar(layers.lai_below, k, fpar_inf)
+    return (1 - layers.brown) * above + (1 - layers.brown_below) * below

@@ -24,7 +24,7 @@ def with_background(canopy, background):
         r_{so}^* = r_{so} + (\tau_{ssoo} - \tau_{ss} \tau_{oo}) \, r
             + (\tau_{ss} + \tau_{sd}) \, \frac{r}{1 - r \, r_{dd}} \, (\tau_{oo} + \tau_{do})
 
-    and likewise, without the second term, for the other three.
+    and likewise, without the second term, for the other three; :math:`r_{dd}` is that of light from below.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def with_background(canopy, background):
     0.15
     """
     c, r = canopy, np.asarray(background, float)
-    returned = r / (1 - r * c.rdd)
+    returned = r / (1 - r * c.rdd_below)
     sun_down, to_observer = c.tss + c.tsd, c.too + c.tdo
     return Surface(
         rso=c.rso + (c.tsstoo - c.tss * c.too) * r + sun_down * returned * to_observer,

@@ -7,6 +7,7 @@ import numpy as np
 from fifesim.base import datasets
 from fifesim.base.bands import Band
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
+from fifesim.ground.canopy.ranges import check_fraction, within_one
 from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, did_you_mean, is_mixture
 
 LARGEST_LAI = 100.0
@@ -14,6 +15,9 @@ LARGEST_LAI = 100.0
 
 LARGEST_OF_MAPS = 20.0
 """Of measured canopies, and a little more: a map beyond is in another scale [m2 m-2]."""
+
+DEAD_LEAF = Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001)
+"""Dead tallgrass: the default leaf without green pigments and with little water; see ``data/README.md``."""
 
 # What the tables of the TM bands were modelled with; see data/README.md.
 _DEFAULT_BACKGROUND = {"soil_dry": 0.475, "shade": 0.525}
@@ -192,7 +196,7 @@ def check_leaf_optics(reflectance, transmittance):
     >>> check_leaf_optics(0.45, 0.42)
     """
     for name, values in (("reflectance", reflectance), ("transmittance", transmittance)):
-        _check_fraction(f"leaf {name}", values)
+        check_fraction(f"leaf {name}", values)
     total = np.max(np.add(reflectance, transmittance), initial=0.0)
     # Decimal fractions that add up to 1 may exceed it by rounding.
     if not total <= 1 + 1e-12:
@@ -221,9 +225,8 @@ def check_background(reflectance):
     >>> check_background(0.15)
     """
     values = np.asarray(reflectance, float)
-    if np.isnan(values).any():
-        values = values[~np.isnan(values)]
-    _check_fraction("background reflectance", values)
+    if not within_one(values):
+        check_fraction("background reflectance", values[~np.isnan(values)])
 
 
 def check_lai(lai):
@@ -303,12 +306,3 @@ def check_map(lai):
             "to NaN"
         )
     return lai
-
-
-def _check_fraction(name, values):
-    values = np.asarray(values, float)
-    wrong = ~((values >= 0) & (values <= 1))
-    if wrong.any():
-        raise ValueError(
-            f"{name} must be in [0, 1], got {values[wrong].flat[0]:g}: give a fraction, not percent or digital numbers"
-        )

@@ -1,36 +1,17 @@
 """Canopy reflectance of many cells: SAIL once per scene, then a table over leaf area index."""
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
-from fifesim.ground.canopy.absorption import extinction_coefficient
-from fifesim.ground.canopy.background import over_background, reflectance_factor, with_background
+from fifesim.ground.canopy.background import over_background, reflectance_factor
+from fifesim.ground.canopy.cell_reflectance import varied_reflectance
+from fifesim.ground.canopy.crowns import SHAPE, check_crowns
 from fifesim.ground.canopy.lai_table import interpolate, interpolate_over, tabulate
-from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_background, check_lai, check_leaf_optics
-from fifesim.ground.canopy.sail_model import sail
-
-_BLOCK = 2**15  # cells evaluated exactly at a time, to bound memory
-
-
-class _Scene(NamedTuple):
-    """What a canopy's reflectance depends on besides its leaf area and its background."""
-
-    leaf_reflectance: tuple | np.ndarray
-    leaf_transmittance: tuple | np.ndarray
-    sky: tuple | np.ndarray
-    sza: float | np.ndarray
-    vza: float | np.ndarray
-    raa: float | np.ndarray
-    leaf_angles: LeafAngles
-    hotspot: float
-
-    def part(self, cells):
-        """The same for some of the cells: of arrays that vary, whose last axis they are."""
-        by_cell = {name: v for name, v in self._asdict().items() if isinstance(v, np.ndarray) and v.shape[-1:] > (1,)}
-        return self._replace(**{name: values[..., cells] for name, values in by_cell.items()})
+from fifesim.ground.canopy.ranges import check_share
+from fifesim.ground.canopy.scene import Scene, canopy_of, cell_by_cell, decay, reflectance_of, sky_of
 
 
 def canopy_reflectance(
@@ -45,6 +26,12 @@ def canopy_reflectance(
     leaf_angles="spherical",
     hotspot=0.0,
     diffuse_fraction=0.0,
+    brown=0.0,
+    dissociation=0.0,
+    brown_reflectance=None,
+    brown_transmittance=None,
+    crown_cover=1.0,
+    crown_shape=SHAPE,
     exact=False,
 ):
     r"""
@@ -68,6 +55,14 @@ def canopy_reflectance(
         Ratio of leaf size to canopy height; 0 for none. [1]
     diffuse_fraction : float or array, shape (band,), optional
         Share of skylight in the irradiance. [1]
+    brown, dissociation : float, or array broadcastable to lai.shape, optional
+        Dead share of the leaf area, and how far it lies below the rest, as in `two_layers`; NaN gives NaN. [1]
+    brown_reflectance, brown_transmittance : array, shape (band,), optional
+        Of dead leaves; those of the others by default. [1]
+    crown_cover : float, or array broadcastable to lai.shape, optional
+        Share of the ground below crowns, which hold all leaves; NaN gives NaN. [1]
+    crown_shape : float, optional
+        Crown diameter over height. [1]
     exact : bool, optional
         Compute each cell instead of interpolating.
 
@@ -79,7 +74,7 @@ def canopy_reflectance(
     Raises
     ------
     ValueError
-        If leaf area index, leaf optics or background are outside their range.
+        If leaf area index, leaf optics, background or shares are outside their range.
 
     Notes
     -----
@@ -88,7 +83,7 @@ def canopy_reflectance(
 
     References
     ----------
-    [Verhoef2007]_
+    [Verhoef2007]_; [VerhoefBach2007]_
 
     Examples
     --------
@@ -106,18 +101,39 @@ def canopy_reflectance(
     if uniform:
         bands = np.broadcast_shapes(bands, background.shape)
     optics = tuple(_per_band(v, bands) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction))
-    scene = _Scene(*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
-    if exact:
-        ground = np.reshape(background, (-1,) + (1,) * lai.ndim) if uniform else background
-        ground = np.broadcast_to(ground, bands + lai.shape).reshape(*bands, -1)
-        return _cell_by_cell(lai.reshape(-1), ground, scene).reshape(bands + lai.shape)
+    scene = Scene(*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
+    dead = brown_reflectance, brown_transmittance
+    scene = scene._replace(**_kinds(lai, brown, dissociation, dead, bands), **_crowns(lai, crown_cover, crown_shape))
+    if exact or scene.varies():
+        if uniform:
+            ground = np.broadcast_to(background, bands)[:, None]
+        else:
+            ground = np.broadcast_to(background, bands + lai.shape).reshape(*bands, -1)
+        kernel = cell_by_cell if exact else varied_reflectance
+        return kernel(lai.reshape(-1), ground, scene).reshape(bands + lai.shape)
     if uniform:
         return interpolate(_surface_table(_per_band(background, bands), scene), lai)
     return interpolate_over(_layer_table(scene), lai, background)
 
 
 def directional_reflectance(
-    lai, leaf_reflectance, leaf_transmittance, background, *, sza, vza, raa, leaf_angles, hotspot, diffuse_fraction
+    lai,
+    leaf_reflectance,
+    leaf_transmittance,
+    background,
+    *,
+    sza,
+    vza,
+    raa,
+    leaf_angles,
+    hotspot,
+    diffuse_fraction,
+    brown=0.0,
+    dissociation=0.0,
+    brown_reflectance=None,
+    brown_transmittance=None,
+    crown_cover=1.0,
+    crown_shape=SHAPE,
 ):
     r"""
     Reflectance factor of a canopy where the directions of sun and view, or the leaves, differ from cell to cell.
@@ -132,8 +148,10 @@ def directional_reflectance(
         [1]
     sza, vza, raa : array, broadcastable to (...)
         NaN gives NaN. [degree]
-    leaf_angles, hotspot
+    leaf_angles, hotspot, brown, dissociation, crown_cover, crown_shape
         As in `canopy_reflectance`.
+    brown_reflectance, brown_transmittance : array, shape (band,) or (..., band), optional
+        Of dead leaves. [1]
 
     Returns
     -------
@@ -167,8 +185,10 @@ def directional_reflectance(
     missing = np.isnan(sza + vza + raa)
     sza, vza, raa = (np.where(missing, 0.0, angle) for angle in (sza, vza, raa))
     leaves = leaf_angle_classes(leaf_angles)
-    scene = _Scene(leaf_reflectance, leaf_transmittance, sky, sza, vza, raa, leaves, hotspot)
-    out = _cell_by_cell(lai, ground, scene)
+    scene = Scene(leaf_reflectance, leaf_transmittance, sky, sza, vza, raa, leaves, hotspot)
+    kinds = _kinds(lai.reshape(cells), brown, dissociation, (brown_reflectance, brown_transmittance))
+    scene = scene._replace(**kinds, **_crowns(lai.reshape(cells), crown_cover, crown_shape))
+    out = cell_by_cell(lai, ground, scene)
     out[:, np.broadcast_to(missing, lai.shape)] = np.nan
     return out.reshape(bands, *cells)
 
@@ -184,45 +204,48 @@ def _leaves_by_cell(reflectance, transmittance, cells):
     return tuple(np.ascontiguousarray(np.broadcast_to(each, shape).reshape(-1, shape[-1]).T) for each in (rho, tau))
 
 
+def _kinds(lai, brown, dissociation, dead, bands=None):
+    """What a scene has of dead leaves; optics of all of them by band, unless it is cells that have theirs."""
+    if not np.ndim(brown) and brown == 0:
+        return {}
+    if any(optics is None for optics in dead):
+        raise ValueError("brown leaves need optics of their own: give brown_reflectance and brown_transmittance")
+    check_share("brown", brown)
+    check_share("dissociation", dissociation)
+    if bands is None:
+        dead = _leaves_by_cell(*dead, lai.shape)
+    else:
+        check_leaf_optics(*dead)
+        dead = tuple(_per_band(optics, bands) for optics in dead)
+    optics = dict(zip(("brown_reflectance", "brown_transmittance"), dead, strict=True))
+    return {"brown": _of_cells(brown, lai), "dissociation": _of_cells(dissociation, lai)} | optics
+
+
+def _crowns(lai, crown_cover, crown_shape):
+    """What a scene has of crowns."""
+    if not np.ndim(crown_cover) and crown_cover == 1:
+        return {}
+    if not 0 <= crown_shape < np.inf:
+        raise ValueError(f"crown_shape must be at least 0, got {crown_shape:g}: it is crown diameter over height")
+    check_crowns(lai, crown_cover)
+    return {"crown_cover": _of_cells(crown_cover, lai), "crown_shape": float(crown_shape)}
+
+
+def _of_cells(value, lai):
+    """A number, or values of cells, shape (n,)."""
+    return np.broadcast_to(np.asarray(value, float), lai.shape).reshape(-1) if np.ndim(value) else float(value)
+
+
 def _per_band(values, bands):
     """Values of each band as a tuple, which a cache can look up."""
     return tuple(np.broadcast_to(np.asarray(values, float), bands).tolist())
-
-
-def _sail(lai, scene):
-    """SAIL of cells, shape (band, n) from (n,), and the sky's share, shape (band, 1) or (band, n)."""
-    rho, tau = (np.reshape(v, (len(v), -1)) for v in (scene.leaf_reflectance, scene.leaf_transmittance))
-    angles = {"sza": scene.sza, "vza": scene.vza, "raa": scene.raa, "leaf_angles": scene.leaf_angles}
-    return sail(lai, rho, tau, **angles, hotspot=scene.hotspot), np.reshape(scene.sky, (len(rho), -1))
-
-
-def _surface(lai, background, scene):
-    """Exact reflectance of cells, shape (band, n)."""
-    canopy, sky = _sail(lai, scene)
-    surface = with_background(canopy, background)
-    return reflectance_factor(surface.rso, surface.rdo, sky)
-
-
-def _cell_by_cell(lai, background, scene):
-    """The same, a block of cells at a time."""
-    out = np.empty(background.shape)
-    for start in range(0, lai.size, _BLOCK):
-        block = slice(start, start + _BLOCK)
-        out[:, block] = _surface(lai[block], background[:, block], scene.part(block))
-    return out
-
-
-def _rate(scene):
-    """Fastest decay with leaf area: sunbeam and view together, or diffuse light."""
-    down, up = (extinction_coefficient(angle, scene.leaf_angles) for angle in (scene.sza, scene.vza))
-    return max(1.0, down + up)
 
 
 @lru_cache(maxsize=32)
 def _surface_table(background, scene):
     """Table of the reflectance of each band."""
     ground = np.array(background)[:, None]
-    return tabulate(lambda lai: _surface(lai, ground, scene), _rate(scene))
+    return tabulate(lambda lai: reflectance_of(lai, ground, scene), decay(scene) / (scene.crown_cover or 1.0))
 
 
 @lru_cache(maxsize=32)
@@ -230,15 +253,15 @@ def _layer_table(scene):
     """Table of the terms of `interpolate_over`; the reflectance must hold for every background."""
 
     def terms(lai):
-        c, sky = _sail(lai, scene)
+        c, sky = canopy_of(lai, scene), sky_of(scene)
         alone = reflectance_factor(c.rso, c.rdo, sky)
         hot = (1 - sky) * (c.tsstoo - c.tss * c.too)
         through = reflectance_factor(c.tss + c.tsd, c.tdd, sky) * (c.too + c.tdo)
-        columns = np.broadcast_arrays(alone, hot, through, c.rdd)
+        columns = np.broadcast_arrays(alone, hot, through, c.rdd_below)
         return np.stack(columns, axis=1).reshape(-1, lai.size)
 
     def reflectances(values):
         alone, hot, through, rdd = values.reshape(-1, 4, values.shape[1]).swapaxes(0, 1)
         return np.stack([over_background(alone, hot, through, rdd, r) for r in (0.0, 0.5, 1.0)])
 
-    return tabulate(terms, _rate(scene), reflectances)
+    return tabulate(terms, decay(scene) / (scene.crown_cover or 1.0), reflectances)

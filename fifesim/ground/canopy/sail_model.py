@@ -6,6 +6,7 @@ import numpy as np
 
 from fifesim.base.geometry import relative_azimuth
 from fifesim.ground.canopy.divided_differences import exponential_chain
+from fifesim.ground.canopy.hot_spot import bidirectional_gap, hotspot_decay
 from fifesim.ground.canopy.leaf_angles import azimuth_limit, leaf_angle_classes, leaf_projection
 
 
@@ -27,10 +28,12 @@ class Canopy(NamedTuple):
     tdd: np.ndarray
     tsstoo: np.ndarray
     """Probability that sun and observer both see a point of the background."""
+    rdd_below: np.ndarray
+    """As rdd, of light from below; the same where all leaves are alike."""
 
 
-class _Scattering(NamedTuple):
-    """Coefficients of the four-stream equations per leaf area, Verhoef's notation."""
+class Scattering(NamedTuple):
+    """Coefficients of the four-stream equations per leaf area, Verhoef's notation. [1]"""
 
     ks: np.ndarray  # extinction of the sunbeam
     ko: np.ndarray  # and toward the observer
@@ -98,28 +101,72 @@ def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, le
     lai = np.asarray(lai, float)
     rho, tau = np.asarray(leaf_reflectance, float), np.asarray(leaf_transmittance, float)
     raa = relative_azimuth(raa, 0.0)
-    c = _scattering(rho, tau, sza, vza, raa, leaf_angle_classes(leaf_angles))
-    alpha = _hotspot_decay(sza, vza, raa, c.ks + c.ko, np.asarray(hotspot, float))
-    tsstoo, sunlit_and_seen = _bidirectional_gap(lai, c.ks, c.ko, alpha)
+    c = scattering(rho, tau, sza, vza, raa, leaf_angle_classes(leaf_angles))
+    alpha = hotspot_decay(sza, vza, raa, c.ks + c.ko, np.asarray(hotspot, float))
+    tsstoo, sunlit_and_seen = bidirectional_gap(lai, c.ks, c.ko, alpha)
+    layer = scattered_again(lai, c)
+    return layer._replace(rso=c.w * sunlit_and_seen + layer.rso, tsstoo=tsstoo)
+
+
+def scattered_again(lai, c):
+    """
+    Reflectances and transmittances of a layer, without the light that the observer gets by one scattering.
+
+    Parameters
+    ----------
+    lai : array
+        [m2 m-2]
+    c : Scattering
+
+    Returns
+    -------
+    canopy : Canopy
+        Its rso is of two scatterings or more, its tsstoo without a hot spot. [1]
+
+    References
+    ----------
+    [Verhoef1984]_; [Verhoef2007]_
+    """
     # sinh(m L) / m and A(L) of a slab, both times e^(-m L).
     sinh = exponential_chain(lai, 2 * c.m, 0.0)
     slab = np.exp(-2 * c.m * lai) + (c.a + c.m) * sinh
+    tss, too, rdd = np.exp(-c.ks * lai), np.exp(-c.ko * lai), c.sigma * sinh / slab
     return Canopy(
-        rso=c.w * sunlit_and_seen + _multiple_scattering(lai, c) / slab,
+        rso=_multiple_scattering(lai, c) / slab,
         rdo=_turned_back(lai, c, c.ko, c.vf, c.vb) / slab,
         rsd=_turned_back(lai, c, c.ks, c.sf, c.sb) / slab,
-        rdd=c.sigma * sinh / slab,
-        tss=np.exp(-c.ks * lai),
-        too=np.exp(-c.ko * lai),
+        rdd=rdd,
+        tss=tss,
+        too=too,
         tsd=_passed_on(lai, c, c.ks, c.sf, c.sb) / slab,
         tdo=_passed_on(lai, c, c.ko, c.vf, c.vb) / slab,
         tdd=np.exp(-c.m * lai) / slab,
-        tsstoo=tsstoo,
+        tsstoo=tss * too,
+        rdd_below=rdd,
     )
 
 
-def _scattering(rho, tau, sza, vza, raa, leaf_angles):
-    """Coefficients of the four-stream equations, summed over leaf angle classes (Verhoef 1984)."""
+def scattering(rho, tau, sza, vza, raa, leaf_angles):
+    """
+    Coefficients of the four-stream equations, summed over leaf angle classes.
+
+    Parameters
+    ----------
+    rho, tau : array
+        Reflectance and transmittance of the leaves. [1]
+    sza, vza, raa : array
+        [degree]
+    leaf_angles : LeafAngles
+
+    Returns
+    -------
+    coefficients : Scattering
+        Per leaf area. [1]
+
+    References
+    ----------
+    [Verhoef1984]_
+    """
     inclination, fraction = np.asarray(leaf_angles.inclination), np.asarray(leaf_angles.fraction)
     sza, vza, raa = (np.asarray(angle, float)[..., None] for angle in (sza, vza, raa))
     mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))
@@ -130,7 +177,7 @@ def _scattering(rho, tau, sza, vza, raa, leaf_angles):
     scattered = [_over_leaves(phase / (mu_s * mu_v), fraction) for phase in (reflected, transmitted)]
     sigma = ((1 + bf) * rho + (1 - bf) * tau) / 2
     absorbed = 1 - rho - tau
-    return _Scattering(
+    return Scattering(
         ks=ks,
         ko=ko,
         a=absorbed + sigma,
@@ -235,45 +282,3 @@ def _between(lai, c, k, upper, lower):
     return turned * (forward * direct + forward_again * from_above) + turned_again * (
         forward * from_below + forward_again * from_either
     )
-
-
-def _hotspot_decay(sza, vza, raa, extinction, hotspot):
-    """
-    Decay of the correlation between the gaps of sun and observer over the canopy's relative depth.
-
-    Infinite without a hot spot. The factor 2 / (ks + ko) is Breon's, as in Verhoef et al. (2007).
-    """
-    tan_s, tan_v = np.tan(np.radians(sza)), np.tan(np.radians(vza))
-    # The distance of the two directions on a horizontal plane, without cancellation near the hot spot.
-    chord = 4 * tan_s * tan_v * np.sin(np.radians(raa) / 2) ** 2
-    distance = np.sqrt((tan_s - tan_v) ** 2 + chord)
-    has = hotspot > 0
-    return np.where(has, 2 * distance / (extinction * np.where(has, hotspot, 1)), np.inf)
-
-
-def _bidirectional_gap(lai, ks, ko, alpha):
-    r"""
-    Chance that both beams reach the background, and leaf area that both reach (Kuusk 1991).
-
-    The gap fraction to relative depth x is P(x) = exp(-K L x + kappa L (1 - e^(-alpha x)) / alpha) with K = ks + ko
-    and kappa = sqrt(ks ko). Its integral to infinite depth is, by parts again and again,
-
-        sum_n (kappa L)^n / prod_j=0..n (K L + j alpha),
-
-    and what lies below x = 1 is P(1) times the same with kappa e^(-alpha). As kappa <= K / 2 each term is at
-    most half of the one before: 56 terms reach rounding, for any hot spot.
-    """
-    extinction, kappa = ks + ko, np.sqrt(ks * ko)
-    finite = np.where((alpha > 0) & (alpha < np.inf), alpha, 1)
-    overlap = np.where(alpha > 0, np.where(alpha < np.inf, -np.expm1(-finite) / finite, 0), 1)
-    tsstoo = np.exp(-(extinction - kappa * overlap) * lai)
-    shade = np.exp(-alpha)
-    term, below = np.broadcast_arrays(1.0, tsstoo)
-    total = term - below
-    for n in range(1, 57):
-        # At zero depth in the exact hot spot 0 / 0 stands for a term that does not count.
-        rate = extinction * lai + n * alpha
-        ratio = kappa * lai / np.where(rate > 0, rate, 1)
-        term, below = term * ratio, below * ratio * shade
-        total = total + (term - below)
-    return tsstoo, total / extinction

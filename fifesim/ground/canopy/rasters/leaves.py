@@ -57,6 +57,29 @@ def leaf_optics(bands, given, lai, *, exact=False):
     return optics.leaf_optics(bands, given)
 
 
+def brown_optics(bands, brown, given, lai, *, exact=False):
+    """
+    Optics of dead leaves, where there are any.
+
+    Parameters
+    ----------
+    bands, lai, exact
+        As in `leaf_optics`.
+    brown : float or xarray.DataArray
+        Dead share of the leaf area. [1]
+    given : optional
+        As in `leaf_optics`; dead tallgrass by default.
+
+    Returns
+    -------
+    optics : (array, array) or None
+        As of `leaf_optics`; None where no leaf is dead. [1]
+    """
+    if not isinstance(brown, xr.DataArray) and brown == 0:
+        return None
+    return leaf_optics(bands, optics.DEAD_LEAF if given is None else given, lai, exact=exact)
+
+
 def _has_raster(given):
     return any(isinstance(value, xr.DataArray) for value in (given if isinstance(given, tuple | list) else [given]))
 

@@ -1,0 +1,270 @@
+"""Leaves in crowns with gaps between: what sun and observer see of a clumped canopy."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+
+from fifesim.ground.canopy.background import over_background
+from fifesim.ground.canopy.hot_spot import apart
+from fifesim.ground.canopy.optics import LARGEST_LAI
+from fifesim.ground.canopy.ranges import check_share
+
+SHAPE = 1.0
+"""Crown diameter over height of round crowns [1]."""
+
+
+class CrownShares(NamedTuple):
+    """Shares of the ground, each 1 where crowns cover all of it. [1]"""
+
+    cover: np.ndarray
+    """Below crowns, by the vertical: Cv."""
+    sun: np.ndarray
+    """Whose sunbeam goes through a crown: Cs."""
+    view: np.ndarray
+    """Whose view does: Co."""
+    both: np.ndarray
+    """Of which both do: Cso."""
+    apart: np.ndarray
+    """What both share beyond chance: Cso - Cs Co."""
+    lit: np.ndarray
+    """Weight of the crowns in sunlight that an observer sees."""
+
+
+def crown_shares(crown_cover, crown_shape, sza, vza, raa):
+    r"""
+    Shares of the ground that crowns cover, as sun and observer see them.
+
+    .. math::
+
+        C_s &= 1 - (1 - C_v)^{1 / \mu_s}, \quad C_o = 1 - (1 - C_v)^{1 / \mu_v} \\
+        C_{so} &= C_s C_o + \min[C_s (1 - C_o), C_o (1 - C_s)] \, e^{-\Delta / \zeta}
+
+    Parameters
+    ----------
+    crown_cover : array
+        Share of the ground below crowns, :math:`C_v`, 0 to 1. [1]
+    crown_shape : array
+        Crown diameter over height, :math:`\zeta`: the flatter, the wider the hot spot of the crowns; 0 is none. [1]
+    sza, vza, raa : array
+        [degree]
+
+    Returns
+    -------
+    shares : CrownShares
+
+    Notes
+    -----
+    :math:`\Delta` is the distance of the two directions on a plane one unit below. The chance of a gap between crowns
+    is that of crowns placed at random (Nilson 1971): :math:`1 - C_v = e^{-n A}` for n crowns of area A, and a slant
+    beam meets the shadow of each, :math:`A / \mu` of a round crown. Crowns that are lit and seen weigh
+    :math:`1 - (1 - C_{so})^{(1 / \mu_s + 1 / \mu_v) / 2}`, which goes to 1 toward the horizon.
+
+    References
+    ----------
+    [VerhoefBach2007]_; [Nilson1971]_
+
+    Examples
+    --------
+    >>> crown_shares(1.0, 1.0, 60.0, 0.0, 0.0).both
+    np.float64(1.0)
+    """
+    gap = 1 - np.asarray(crown_cover, float)
+    sun_path, view_path = (1 / np.cos(np.radians(np.asarray(angle, float))) for angle in (sza, vza))
+    sun, view = 1 - gap**sun_path, 1 - gap**view_path
+    shape = np.asarray(crown_shape, float)
+    close = np.where(shape > 0, np.exp(-apart(sza, vza, raa) / np.where(shape > 0, shape, 1)), 0)
+    beyond = np.minimum(sun * (1 - view), view * (1 - sun)) * close
+    both = sun * view + beyond
+    lit = 1 - (1 - both) ** ((sun_path + view_path) / 2)
+    return CrownShares(1 - gap, sun, view, both, beyond, lit)
+
+
+def clumped(canopy, shares):
+    r"""
+    Reflectances and transmittances of crowns with gaps between them.
+
+    .. math::
+
+        \tau_{ss}' &= 1 - C_s + C_s \tau_{ss} \\
+        \tau_{ssoo}' &= C_{so} \tau_{ssoo} + (C_o - C_{so}) \tau_{oo} + (C_s - C_{so}) \tau_{ss}
+            + 1 - C_s - C_o + C_{so}
+
+    Parameters
+    ----------
+    canopy : Canopy
+        Of the crowns, whose leaf area index is that of the ground over the crown cover.
+    shares : CrownShares
+
+    Returns
+    -------
+    canopy : Canopy
+        Of crowns and gaps together. [1]
+
+    References
+    ----------
+    [VerhoefBach2007]_
+
+    Examples
+    --------
+    Crowns that cover the ground are the canopy itself:
+
+    >>> from fifesim.ground.canopy.sail_model import sail
+    >>> canopy = sail(2.0, 0.45, 0.42, sza=30)
+    >>> bool(clumped(canopy, crown_shares(1.0, 1.0, 30, 0, 0)).rso == canopy.rso)
+    True
+    """
+    c, s = canopy, shares
+    return c._replace(
+        rso=s.lit * c.rso,
+        rdo=s.view * c.rdo,
+        rsd=s.sun * c.rsd,
+        rdd=s.cover * c.rdd,
+        tss=1 - s.sun + s.sun * c.tss,
+        too=1 - s.view + s.view * c.too,
+        tsd=s.sun * c.tsd,
+        tdo=s.view * c.tdo,
+        tdd=1 - s.cover + s.cover * c.tdd,
+        tsstoo=s.both * c.tsstoo + (s.view - s.both) * c.too + (s.sun - s.both) * c.tss + (1 - s.sun - s.view + s.both),
+        rdd_below=s.cover * c.rdd_below,
+    )
+
+
+class CrownTerms(NamedTuple):
+    """Of leaves within crowns, what `crowns_over_background` needs of a band; 0 without leaves. [1]"""
+
+    seen: np.ndarray
+    """Sunlight's share times rso."""
+    seen_in_skylight: np.ndarray
+    """Skylight's share times rdo."""
+    kept: np.ndarray
+    """Sunlight's share times that which does not come through, 1 - tss - tsd."""
+    kept_of_skylight: np.ndarray
+    """Skylight's share times 1 - tdd."""
+    hidden: np.ndarray
+    """Of the ground's light, 1 - too - tdo."""
+    rdd_below: np.ndarray
+    hot: np.ndarray
+    """Sunlight's share times what sun and observer see together of the ground beyond chance, tsstoo - tss too."""
+    missed: np.ndarray
+    """Sunlight's share times (1 - tss) (1 - too)."""
+
+
+def crown_terms(canopy, sky):
+    """
+    Terms of `crowns_over_background`.
+
+    Parameters
+    ----------
+    canopy : Canopy
+        Of the crowns.
+    sky : array
+        Share of skylight. [1]
+
+    Returns
+    -------
+    terms : CrownTerms
+    """
+    c, sun = canopy, 1 - sky
+    return CrownTerms(
+        seen=sun * c.rso,
+        seen_in_skylight=sky * c.rdo,
+        kept=sun * (1 - c.tss - c.tsd),
+        kept_of_skylight=sky * (1 - c.tdd),
+        hidden=1 - c.too - c.tdo,
+        rdd_below=c.rdd_below,
+        hot=sun * (c.tsstoo - c.tss * c.too),
+        missed=sun * (1 - c.tss) * (1 - c.too),
+    )
+
+
+@register_jitable
+def crowns_over_background(terms, shares, background):
+    r"""
+    Reflectance factor of crowns and gaps over a background, from terms of the crowns.
+
+    Parameters
+    ----------
+    terms : sequence of 8 arrays
+        Those of `CrownTerms`. [1]
+    shares : sequence of 5 arrays
+        Fields ``cover``, ``sun``, ``view``, ``apart`` and ``lit`` of `CrownShares`. [1]
+    background : array
+        [1]
+
+    Returns
+    -------
+    reflectance : array
+        That of `clumped` `with_background` to rounding, mixed by `reflectance_factor`. [1]
+
+    References
+    ----------
+    [VerhoefBach2007]_
+
+    Examples
+    --------
+    >>> crowns_over_background((0.0,) * 8, (0.5, 0.5, 0.5, 0.0, 0.5), 0.15)
+    0.15
+    """
+    seen, seen_in_skylight, kept, kept_of_skylight, hidden, rdd, gaps, missed = terms
+    cover, sun, view, apart, lit = shares
+    hot = (sun * view + apart) * gaps + apart * missed
+    through = (1 - sun * kept - cover * kept_of_skylight) * (1 - view * hidden)
+    return over_background(lit * seen + view * seen_in_skylight, hot, through, cover * rdd, background)
+
+
+def lai_in_crowns(lai, crown_cover):
+    """
+    Leaf area index within crowns.
+
+    Parameters
+    ----------
+    lai : array
+        Of the ground. [m2 m-2]
+    crown_cover : array
+        [1]
+
+    Returns
+    -------
+    lai : array
+        0 where there are no crowns. [m2 m-2]
+
+    Examples
+    --------
+    >>> float(lai_in_crowns(1.5, 0.5))
+    3.0
+    """
+    lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
+    # NaN of the leaf area stays.
+    return np.where(cover > 0, lai / np.where(cover > 0, cover, 1), 0 * lai)
+
+
+def check_crowns(lai, crown_cover):
+    """
+    Refuse crowns that hold more leaves than any canopy; NaN passes, and so does a cover of 0, bare ground.
+
+    Parameters
+    ----------
+    lai : array
+        Of the ground. [m2 m-2]
+    crown_cover : array
+        Broadcasts against it. [1]
+
+    Raises
+    ------
+    ValueError
+        If the cover is outside 0 to 1, or the leaf area index within the crowns above 100.
+
+    Examples
+    --------
+    >>> check_crowns(1.5, 0.5)
+    """
+    check_share("crown_cover", crown_cover)
+    lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
+    # Seldom are there any; then ground without crowns, which holds no leaves, is told from crowns with too many.
+    if np.any(lai > LARGEST_LAI * cover) and np.any((lai > LARGEST_LAI * cover) & (cover > 0)):
+        inside = lai / np.where(cover > 0, cover, np.inf)
+        raise ValueError(
+            f"leaf area index within the crowns is lai / crown_cover, at most {LARGEST_LAI:g}, got up to "
+            f"{np.nanmax(inside):g}: where crowns cover that little lower the leaf area, or give crown_cover 0"
+        )
