@@ -19,10 +19,14 @@ from .ground.landscape.distribution import lai_distribution as lai_distribution
 from .ground.landscape.distribution import treatments as treatments
 from .ground.landscape.autoregression import correlation_length as correlation_length
 from .ground.landscape.autoregression import arp_for_length as arp_for_length
+from .ground.landscape.rasters.scenes import landscape as landscape
+from .ground.landscape.cover import Patches as Patches
+from .ground.landscape.classes import CoverClass as CoverClass
+from .ground.landscape.classes import fife_classes as fife_classes
 from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
-from .chain.steps import surface_reflectance as surface_reflectance  # method
-from .ground.canopy.raster import fpar as fpar  # method
+from .chain.steps import surface_reflectance as surface_reflectance  # method, of a Dataset too
+from .chain.landscapes import fpar as fpar  # method, of a Dataset too
 
 # Terrain
 from .ground.terrain.rasters.elevation import fine_dem as fine_dem
@@ -71,7 +75,7 @@ from .sensor.description.instrument_file import Instrument as Instrument
 from .base.bands import Band as Band
 
 # Analysis
-from .analysis.rasters.means import aggregate as aggregate  # method
+from .chain.landscapes import aggregate as aggregate  # method, of a Dataset too
 from .chain.images import ndvi as ndvi  # method, of a Dataset too
 from .analysis.rasters.composites import composite as composite  # method
 from .analysis.rasters.regression import regress as regress  # method

@@ -2,11 +2,10 @@
 
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.schemes import engines
+from fifesim.chain import landscapes
 from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
-from fifesim.ground.canopy import raster as ground
 from fifesim.ground.canopy.crowns import SHAPE
-from fifesim.ground.canopy.rasters import leaves, soils
 from fifesim.ground.terrain.rasters import light as terrain
 from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.rasters import directions
@@ -44,8 +43,9 @@ def surface_reflectance(
 
     Parameters
     ----------
-    lai : xarray.DataArray, dims (y, x)
-        Leaf area index. [m2 m-2]
+    lai : xarray.DataArray, dims (y, x), or xarray.Dataset
+        Leaf area index, or a landscape that has it as ``lai``, from `landscape`: its variables are those of its cells,
+        what classes say stands, and arguments below are of what neither says. [m2 m-2]
     instrument : str or Instrument, optional
         Whose bands are simulated; by default TM for a scene on the FIFE site.
     bands : sequence of str, optional
@@ -114,29 +114,22 @@ def surface_reflectance(
     """
     if dem is None and horizon is not None:
         raise ValueError("a horizon stands around a dem: give dem= too")
-    lai = north_up(lai)
+    land = landscapes.land_of(lai)
+    lai = north_up(land.lai)
     description = given_instrument(instrument, lai)
     geometry = directions.given_geometry(geometry, lai, time)
     atmosphere, lai = air_of(atmosphere, lai), directions.dated(lai, time)
     selected = description.select(bands)
     responses = tuple(band.response for band in selected)
-    leaf_reflectance, leaf_transmittance = leaves.leaf_optics(responses, leaf_optics, lai, exact=exact)
-    level = ground.level_reflectance(
-        lai,
-        bands=[band.name for band in selected],
-        wavelengths=[band.wavelength for band in selected],
-        leaf_reflectance=leaf_reflectance,
-        leaf_transmittance=leaf_transmittance,
-        background=soils.background(responses, background, lai),
+    canopy = {"leaf_optics": leaf_optics, "background": background, "leaf_angles": leaf_angles, "hotspot": hotspot}
+    canopy |= {"brown": brown, "dissociation": dissociation, "brown_leaf": brown_leaf}
+    canopy |= {"crown_cover": crown_cover, "crown_shape": crown_shape}
+    level = landscapes.level_reflectance(
+        land._replace(lai=lai),
+        selected,
+        canopy,
         diffuse_fraction=atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry),
         geometry=geometry,
-        leaf_angles=leaf_angles,
-        hotspot=hotspot,
-        brown=brown,
-        dissociation=dissociation,
-        brown_optics=leaves.brown_optics(responses, brown, brown_leaf, lai, exact=exact),
-        crown_cover=crown_cover,
-        crown_shape=crown_shape,
         exact=exact,
         atmosphere=atmosphere.text,
         **attributes_of(description),

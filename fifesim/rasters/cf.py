@@ -18,6 +18,8 @@ class Quantity:
 
 QUANTITIES = {
     "lai": Quantity("1", "leaf_area_index", "leaf area index", "one-sided leaf area per ground area"),
+    "cover": Quantity("1", "", "class of cover"),
+    "class_share": Quantity("1", "area_fraction", "share of the ground of a class"),
     "brown": Quantity("1", "", "dead share of the leaf area"),
     "dissociation": Quantity("1", "", "how far dead leaves lie below green ones", "0 mixed, 1 below"),
     "crown_cover": Quantity("1", "", "share of the ground below crowns"),

@@ -14,7 +14,7 @@ _CHUNK = 1008
 _TILES_PER_CHUNK = 2
 
 
-def tiles(kernel, grid, chunks=None, *, tile):
+def tiles(kernel, grid, chunks=None, *, tile, dtype=float):
     """
     Array of a kernel that makes its cells from their place alone.
 
@@ -28,6 +28,8 @@ def tiles(kernel, grid, chunks=None, *, tile):
         the whole array is made at once.
     tile : int
         Size of the fixed tiles that the kernel works by, counted from the origin of the CRS. [cell]
+    dtype : dtype, optional
+        Of what the kernel gives.
 
     Returns
     -------
@@ -36,7 +38,7 @@ def tiles(kernel, grid, chunks=None, *, tile):
     if chunks is None:
         return grids.place(xr.DataArray(kernel(0, 0, tuple(grid.shape)), dims=("y", "x")), grid)
     normal = chunk_sizes(grid, chunks, tile=tile)
-    lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal)), dims=("y", "x"))
+    lazy = xr.DataArray(array_by_place(kernel, normal, token=tokenize(kernel, normal), dtype=dtype), dims=("y", "x"))
     # xarray would take over dask's name.
     return grids.place(lazy.rename(None), grid)
 

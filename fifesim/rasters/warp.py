@@ -44,7 +44,12 @@ _MOST_CELLS = 2**26
 _SOURCE_MARGIN = 4
 
 
-def file_onto_grid(path, grid, chunks=None, allow_remote=False):
+# How cells larger than those of a file, and others, are made from its own.
+_OF_QUANTITIES = (Resampling.average, Resampling.bilinear)
+_OF_CLASSES = (Resampling.mode, Resampling.nearest)
+
+
+def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False):
     """
     One band of a raster file on a grid.
 
@@ -59,6 +64,8 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False):
         Makes the result lazy.
     allow_remote : bool, optional
         As of `fifesim.rasters.opening.raster_file`.
+    classes : bool, optional
+        Whether its numbers stand for classes: smaller cells then have the nearest, larger ones the most frequent.
 
     Returns
     -------
@@ -79,7 +86,7 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False):
         back, _ = projection.operation(grid.crs.to_wkt(), crs, area)
         _check_overlap(source, crs, grid, back, file.name)
     # A file that has changed is another file to the cache.
-    make_tile = partial(_warp_tile, file, file.state, grid, pipeline, back)
+    make_tile = partial(_warp_tile, file, file.state, grid, pipeline, back, classes)
     row, column = grids.lattice_position(grid)
 
     def kernel(first_row, first_column, shape):
@@ -88,7 +95,7 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False):
     return places.tiles(kernel, grid, chunks, tile=_TILE)
 
 
-def raster_onto_grid(raster, grid, chunks=None):
+def raster_onto_grid(raster, grid, chunks=None, *, classes=False):
     """
     A raster on a grid, as `file_onto_grid` brings a file there.
 
@@ -99,6 +106,8 @@ def raster_onto_grid(raster, grid, chunks=None):
     grid : odc.geo.geobox.GeoBox
     chunks : mapping or int, optional
         Makes the result lazy, as it is without where the raster is.
+    classes : bool, optional
+        As in `file_onto_grid`.
 
     Returns
     -------
@@ -122,7 +131,7 @@ def raster_onto_grid(raster, grid, chunks=None):
     def kernel(rows, columns, cells):
         down, across = reads.window(rows, columns)
         known = replace(reads.source, cells=cells, first=(down.start, across.start))
-        make_tile = partial(_tile, known, crs, source.name, grid, pipeline, back)
+        make_tile = partial(_tile, known, crs, source.name, grid, pipeline, back, classes)
         shape = rows.stop - rows.start, columns.stop - columns.start
         return assemble(make_tile, _TILE, row + rows.start, column + columns.start, shape)
 
@@ -246,13 +255,13 @@ def _cells_per_cell(source, crs, grid, back):
 
 
 @lru_cache(maxsize=16)
-def _warp_tile(file, state, grid, pipeline, back, tile_row, tile_column):
+def _warp_tile(file, state, grid, pipeline, back, classes, tile_row, tile_column):
     """One lattice tile of the file's first band, in its physical unit."""
     with sound_raster(file) as (source, crs):
-        return _tile(source, crs, file.name, grid, pipeline, back, tile_row, tile_column)
+        return _tile(source, crs, file.name, grid, pipeline, back, classes, tile_row, tile_column)
 
 
-def _tile(source, crs, name, grid, pipeline, back, tile_row, tile_column):
+def _tile(source, crs, name, grid, pipeline, back, classes, tile_row, tile_column):
     """One lattice tile of a file or array; blocks that do not meet the grid stay empty."""
     row, column = grids.lattice_position(grid)
     top, left = tile_row * _TILE - row, tile_column * _TILE - column
@@ -260,7 +269,8 @@ def _tile(source, crs, name, grid, pipeline, back, tile_row, tile_column):
     options = {"src_crs": crs, "src_nodata": np.nan}
     options |= {"dst_crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()), "dst_nodata": np.nan}
     finer = max(_cells_per_cell(source, crs, grid, back)) > 1.01
-    options |= {"resampling": Resampling.average if finer else Resampling.bilinear}
+    larger, other = _OF_CLASSES if classes else _OF_QUANTITIES
+    options |= {"resampling": larger if finer else other}
     options |= {"COORDINATE_OPERATION": pipeline} if pipeline else {}
     # Of the tile, not of the grid, so that it is the same in every window.
     size = _block_size(max(_cells_per_cell(source, crs, _part(grid, top, left, _TILE), back)))

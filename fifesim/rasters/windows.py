@@ -139,7 +139,7 @@ class _MadeByPlace(MaterializedLayer):
         self.kernel = kernel
 
 
-def array_by_place(kernel, chunks, *, token):
+def array_by_place(kernel, chunks, *, token, dtype=float):
     """
     Lazy array of a kernel that makes its cells from their place alone.
 
@@ -150,6 +150,8 @@ def array_by_place(kernel, chunks, *, token):
     chunks : (tuple of int, tuple of int)
     token : str
         As in `array_from_windows`.
+    dtype : dtype, optional
+        Of the result.
 
     Returns
     -------
@@ -162,7 +164,7 @@ def array_by_place(kernel, chunks, *, token):
         for j, columns in enumerate(slices(chunks[1])):
             graph[(name, i, j)] = _part_by_place(shared, rows, columns)
     layers = HighLevelGraph({name: _MadeByPlace(graph, shared)}, {name: set()})
-    return da.Array(layers, name, chunks, dtype=float, meta=np.empty((0, 0)))
+    return da.Array(layers, name, chunks, dtype=dtype, meta=np.empty((0, 0), dtype))
 
 
 def _part_by_place(kernel, rows, columns):

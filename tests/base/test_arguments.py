@@ -195,7 +195,7 @@ def test_what_a_user_typed(calls):
         (lambda: fifesim.Geometry([30, 40], 100.0), "sza of a Geometry is one number, got an array: .*xarray.Dataset"),
         (
             lambda: fifesim.surface_reflectance(np.ones((3, 3))),
-            "lai must be an xarray.DataArray over .*numpy",
+            "lai must be an xarray.DataArray or .*numpy",
         ),
         (lambda: fifesim.slope(masked), r"dem must be .* got a masked numpy array .*filled\(numpy.nan\)"),
         (

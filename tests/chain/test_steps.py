@@ -8,7 +8,7 @@ from lazy import ODD_CHUNKS, in_chunks, no_compute
 import fifesim
 from fifesim.atmosphere.schemes import engines
 from fifesim.base.geometry import Geometry
-from fifesim.chain import steps as chain
+from fifesim.chain import landscapes
 from fifesim.ground.canopy import optics
 from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
@@ -75,7 +75,7 @@ def test_skylight_of_the_atmosphere_reaches_the_ground(lai):
     sun = fifesim.fife_geometry()
     terms = engines.band_terms(haze, tuple(band.response for band in bands), sun.sza, sun.vza, sun.raa)
     reflectance, transmittance = optics.leaf_optics(TM34)
-    expected = chain.ground.level_reflectance(
+    expected = landscapes.ground.level_reflectance(
         lai, bands=TM34, wavelengths=[band.wavelength for band in bands], leaf_reflectance=reflectance,
         leaf_transmittance=transmittance, background=optics.background(TM34), diffuse_fraction=terms.diffuse_fraction,
         geometry=sun,

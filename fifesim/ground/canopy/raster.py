@@ -3,17 +3,15 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import ANGLES, relative_azimuth
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.canopy.rasters import canopy_shares
-from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
+from fifesim.ground.canopy.rasters.evaluation import canopy_kernel
 from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-from fifesim.rasters.dates import by_date
 from fifesim.rasters.packed import unpacked
 
 
@@ -87,38 +85,44 @@ def level_reflectance(
     fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.layers.two_layers,
     fifesim.ground.canopy.crowns.clumped
     """
-    if not 0 <= hotspot < np.inf:
-        raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
-    angles = leaf_angle_classes(leaf_angles)
-    parameters = {"leaf_angles": angles, "hotspot": float(hotspot)}
-    lai = _checked_scene(lai)
-    described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
-    if described == "raster":
-        cf.check_units(background, "surface_reflectance")
-        background = _background_bands(background, bands)
-    background = _per_band(background)
-    leaves = {"leaf_reflectance": leaf_reflectance, "leaf_transmittance": leaf_transmittance}
-    if isinstance(brown, xr.DataArray) or brown != 0:
-        leaves |= dict(zip(("brown_reflectance", "brown_transmittance"), brown_optics, strict=True))
+    lai = checked_scene(lai)
+    optics = {"leaf_reflectance": leaf_reflectance, "leaf_transmittance": leaf_transmittance, "background": background}
     shares = {"brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
-    shares = {name: canopy_shares.share(name, value, lai) for name, value in shares.items()}
-    parameters["crown_shape"] = float(crown_shape)
-    if directions.varying(geometry) or any(isinstance(each, xr.DataArray) for each in leaves.values()):
-        out = _by_cell(lai, background, diffuse_fraction, leaves, geometry, shares, parameters)
-    else:
-        parameters |= {name: tuple(map(float, values)) for name, values in leaves.items()}
-        parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
-        parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
-        kernel, rasters = canopy_shares.with_shares(_reflectance, shares)
-        out = chunking.pointwise(kernel, lai, background, *rasters, bands=len(bands), **parameters)
-    out = out.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
+    how = {"leaf_angles": leaf_angles, "hotspot": hotspot, "brown_optics": brown_optics, "crown_shape": crown_shape}
+    light = {"diffuse_fraction": diffuse_fraction, "geometry": geometry, "exact": exact}
+    kernel, rasters = canopy_kernel(lai, bands, **optics, **shares, **how, **light)
+    varies = directions.varying(geometry)
+    out = chunking.pointwise(kernel, lai.drop_vars(varies, errors="ignore"), *rasters, bands=len(bands))
+    described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
+    said = {"leaf_angles": str(leaf_angle_classes(leaf_angles)), "background": described}
+    return labelled(out, lai, bands, wavelengths, geometry, told=canopy_shares.in_words(shares), **said, **provenance)
+
+
+def labelled(reflectance, lai, bands, wavelengths, geometry, *, leaf_angles, told="", **provenance):
+    """
+    Reflectance of a scene with its bands, place, directions and attributes.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+    lai : xarray.DataArray, dims (y, x)
+    bands, wavelengths, geometry
+        As in `level_reflectance`.
+    leaf_angles, told : str
+        Leaf angles, and what else there is to tell, for a line of the history.
+    **provenance : str or number
+        Further attributes.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+    """
+    out = reflectance.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
     out = directions.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
-    said = f"surface_reflectance: SAIL, {angles} leaves, {canopy_shares.in_words(shares)}{_directions(geometry)}"
-    provenance = {"leaf_angles": str(angles), "background": described, **provenance}
-    return cf.label(out, "surface_reflectance", source=lai, history=said, **provenance)
+    said = f"surface_reflectance: SAIL, {leaf_angles} leaves, {told}{_directions(geometry)}"
+    return cf.label(out, "surface_reflectance", source=lai, history=said, leaf_angles=leaf_angles, **provenance)
 
 
-@by_date
 def fpar(
     lai,
     *,
@@ -138,18 +142,8 @@ def fpar(
     ----------
     lai : xarray.DataArray, dims (y, x)
         [m2 m-2]
-    geometry : fifesim.base.geometry.Geometry, optional
-        The sun's; by default that which the array carries, else at its time and place.
-    time : str or datetime, optional
-        In the place of ``geometry``.
-    leaf_angles : optional
-        As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
-    fpar_inf : float, optional
-        Of an infinitely thick canopy. [1]
-    leaves : {"all", "green"}, optional
-        Which leaves absorb it: all of them, dead ones too, or those alone that can use it.
-    brown, dissociation, crown_cover : float or xarray.DataArray, dims (y, x), optional
-        As in `surface_reflectance`. [1]
+    geometry, time, leaf_angles, fpar_inf, leaves, brown, dissociation, crown_cover : optional
+        As in `fifesim.fpar`.
 
     Returns
     -------
@@ -160,11 +154,6 @@ def fpar(
     ------
     ValueError
         If LAI is negative, or a share outside 0 to 1.
-
-    Notes
-    -----
-    Both kinds of leaf absorb alike here, as in Eq. 6. SAIL's own shares, of each wavelength, are in
-    `ground.canopy.light_budget`.
 
     References
     ----------
@@ -182,7 +171,7 @@ def fpar(
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "fpar")
     extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))
-    lai = _checked_scene(lai)
+    lai = checked_scene(lai)
     shares = {"crown_cover": canopy_shares.share("crown_cover", crown_cover, lai)}
     if leaves == "green":
         shares |= {"brown": canopy_shares.share("brown", brown, lai)}
@@ -196,8 +185,24 @@ def fpar(
     return cf.label(out, "fpar", source=lai, history=said)
 
 
-def _checked_scene(lai):
-    """Leaf area of a scene, in its unit; of what is in memory, with data."""
+def checked_scene(lai):
+    """
+    Leaf area of a scene in its unit.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+
+    Raises
+    ------
+    ValueError
+        If it is another quantity, has other dimensions or no grid; of what is in memory, if it has no data.
+    """
     cf.check_quantity(lai, "lai")
     if set(lai.dims) != {"y", "x"}:
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
@@ -206,36 +211,6 @@ def _checked_scene(lai):
     if lai.chunks is None and lai.size and not np.isfinite(lai.values).any():
         raise ValueError("all cells of the leaf area index are NaN: look at the nodata value and the place of its map")
     return lai
-
-
-def _per_band(values):
-    """A raster, or values of each band, without the names of the bands."""
-    if isinstance(values, xr.DataArray):
-        return values.drop_vars("band", errors="ignore")
-    return xr.DataArray(np.asarray(values, float), dims="band")
-
-
-def _reflectance(lai, background, **parameters):
-    # apply_ufunc hands the bands over as the last axis.
-    return canopy_reflectance(check_map(lai), background=np.moveaxis(background, -1, 0), **parameters)
-
-
-def _by_cell(lai, background, diffuse_fraction, leaves, geometry, shares, parameters):
-    """Reflectance where the directions of sun or sensor, or the leaves, vary over the scene."""
-
-    def kernel(cells, ground, sky, sza, saa, vza, vaa, *rasters, **given):
-        optics, given = rasters[: len(leaves)], given | dict(zip(names, rasters[len(leaves) :], strict=True))
-        directions = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
-        light = {"background": ground, "diffuse_fraction": sky, **directions}
-        return directional_reflectance(check_map(cells), **dict(zip(leaves, optics, strict=True)), **light, **given)
-
-    names = [name for name, value in shares.items() if isinstance(value, xr.DataArray)]
-    numbers = {name: value for name, value in shares.items() if name not in names}
-    plain = lai.drop_vars(ANGLES, errors="ignore")
-    background, sky, *optics = (_per_band(each) for each in (background, diffuse_fraction, *leaves.values()))
-    rasters = *directions.angles(geometry), *optics, *(shares[name] for name in names)
-    bands = len(optics[0]["band"])
-    return chunking.pointwise(kernel, plain, background, sky, *rasters, bands=bands, **numbers, **parameters)
 
 
 def _directions(geometry):
@@ -253,15 +228,3 @@ def _fpar(lai, *, extinction, fpar_inf, sza, crown_cover, **kinds):
     check_crowns(lai, crown_cover)
     inside, lit = lai_in_crowns(lai, crown_cover), crown_shares(crown_cover, SHAPE, sza, 0.0, 0.0).sun
     return lit * (absorption.green_fpar(inside, **light, **kinds) if kinds else absorption.fpar(inside, **light))
-
-
-def _background_bands(background, bands):
-    """A background raster with one band for each of the canopy's."""
-    if "band" not in background.dims:
-        return background.expand_dims(band=list(bands))
-    missing = [name for name in bands if name not in background["band"].to_numpy().tolist()]
-    if missing:
-        raise ValueError(
-            f"the background lacks band {', '.join(missing)}, it has {', '.join(map(str, background['band'].values))}"
-        )
-    return background.sel(band=list(bands))

@@ -1,0 +1,290 @@
+"""Landscapes in the chain: what a Dataset says of the ground, each class with its own canopy, and its true means."""
+
+from collections.abc import Mapping
+from functools import partial
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis.rasters import means
+from fifesim.ground.canopy import absorption
+from fifesim.ground.canopy import raster as ground
+from fifesim.ground.canopy.crowns import SHAPE
+from fifesim.ground.canopy.optics import DEAD_LEAF
+from fifesim.ground.canopy.rasters import leaves, soils
+from fifesim.ground.canopy.rasters.classes import reflectance_of_classes
+from fifesim.ground.landscape.classes import CoverClass
+from fifesim.ground.landscape.compression import NO_CLASS
+from fifesim.ground.landscape.rasters.cover import classes_of
+from fifesim.ground.landscape.rasters.evaluation import by_class
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
+from fifesim.rasters.axes import north_up
+from fifesim.rasters.dates import by_date
+
+_DEFAULTS = {"leaf_optics": None, "background": None, "leaf_angles": "spherical", "hotspot": 0.0}
+_DEFAULTS |= {"brown": 0.0, "dissociation": 0.0, "brown_leaf": None, "crown_cover": 1.0, "crown_shape": SHAPE}
+"""Of what a canopy is told, where nothing is said."""
+
+_OF_CLASS = {"leaf_optics": "leaf"}
+"""What `surface_reflectance` and `CoverClass` call by different names."""
+
+_BY_BAND = ("leaf_optics", "background", "brown_leaf")
+"""What is resolved into numbers of each band."""
+
+_OF_CELLS = ("brown", "dissociation", "crown_cover")
+"""Variables of a landscape that say what its canopy is in each cell."""
+
+
+class Land(NamedTuple):
+    """A scene: leaf area; codes of its classes and what they are; and what else its cells say."""
+
+    lai: xr.DataArray
+    cover: xr.DataArray | None = None
+    classes: tuple[CoverClass, ...] = ()
+    cells: Mapping = MappingProxyType({})
+
+
+def land_of(scene):
+    """
+    Parts of a scene.
+
+    Parameters
+    ----------
+    scene : xarray.DataArray, dims (y, x), or xarray.Dataset
+        Leaf area, or a landscape that has it as ``lai``.
+
+    Returns
+    -------
+    land : Land
+
+    Raises
+    ------
+    ValueError
+        If the Dataset has no ``lai``, or its ``cover`` does not say its classes.
+    """
+    if not isinstance(scene, xr.Dataset):
+        return Land(scene)
+    if "lai" not in scene.data_vars:
+        raise ValueError(
+            f"a landscape has a variable lai, this Dataset has {', '.join(map(str, scene.data_vars)) or 'none'}: "
+            "make it with fifesim.landscape(grid, ...), or rename one with .rename(LAI='lai')"
+        )
+    cells = {name: scene[name] for name in _OF_CELLS if name in scene.data_vars}
+    cells = {name: each if each.ndim else float(each) for name, each in cells.items()}
+    if "cover" not in scene.data_vars:
+        return Land(scene["lai"], cells=cells)
+    return Land(scene["lai"], north_up(scene["cover"]), classes_of(scene["cover"]), cells)
+
+
+def level_reflectance(land, bands, canopy, *, exact, **scene):
+    """
+    Reflectance factor of the canopies of a scene, for flat ground.
+
+    Parameters
+    ----------
+    land : Land
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
+    canopy : dict of str
+        What `fifesim.surface_reflectance` was told of the canopy, by the names of its arguments.
+    exact : bool
+    **scene
+        What `ground.canopy.raster.level_reflectance` takes besides.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        As in `fifesim.surface_reflectance`; if an argument is given that all classes say themselves.
+    """
+    responses = tuple(band.response for band in bands)
+    named = {"bands": [band.name for band in bands], "wavelengths": [band.wavelength for band in bands]}
+    optics = _Optics(responses, land.lai, exact)
+    _check_used(land, canopy)
+    if land.cover is None:
+        return ground.level_reflectance(land.lai, **optics.of({**canopy, **land.cells}), **named, exact=exact, **scene)
+    canopies = {each.code: optics.of(_told(each, canopy, land.cells)) for each in land.classes}
+    return reflectance_of_classes(land.lai, land.cover, canopies, **named, exact=exact, **scene)
+
+
+def _told(kind, canopy, cells):
+    """What is said of the canopy of a class: by the cells, else by itself, else by the call."""
+    own = {name: getattr(kind, _OF_CLASS.get(name, name)) for name in canopy}
+    return {name: canopy[name] if own[name] is None else own[name] for name in canopy} | dict(cells)
+
+
+class _Optics:
+    """Canopies by their numbers in each band; what several have is looked up once."""
+
+    def __init__(self, responses, lai, exact):
+        self._responses, self._lai, self._exact = responses, lai, exact
+        self._known = {}
+
+    def of(self, canopy):
+        """What `ground.canopy.raster.canopy_kernel` takes of a canopy."""
+        leaf = self._once("leaf_optics", leaves.leaf_optics, canopy["leaf_optics"], exact=self._exact)
+        below = self._once("background", soils.background, canopy["background"])
+        dead = None
+        if isinstance(canopy["brown"], xr.DataArray) or canopy["brown"] != 0:
+            given = DEAD_LEAF if canopy["brown_leaf"] is None else canopy["brown_leaf"]
+            dead = self._once("leaf_optics", leaves.leaf_optics, given, exact=self._exact)
+        others = {name: value for name, value in canopy.items() if name not in _BY_BAND}
+        by_band = {"leaf_reflectance": leaf[0], "leaf_transmittance": leaf[1], "background": below}
+        return {**by_band, "brown_optics": dead, **others}
+
+    def _once(self, name, function, given, **options):
+        # What is given is kept beside, so that its identity stays its own.
+        key = name, id(given)
+        if key not in self._known:
+            self._known[key] = given, function(self._responses, given, self._lai, **options)
+        return self._known[key][1]
+
+
+def _check_used(land, canopy):
+    """Refuse an argument that would change nothing."""
+    for name, value in canopy.items():
+        default = _DEFAULTS[name]
+        if value is default or (isinstance(value, str | int | float) and value == default):
+            continue
+        if name in land.cells:
+            raise ValueError(f"{name} is given, and the landscape has a variable {name}: leave out one of the two")
+        if land.classes and all(getattr(each, _OF_CLASS.get(name, name)) is not None for each in land.classes):
+            raise ValueError(
+                f"{name} is given, and all classes of the landscape say theirs: leave it out, or out of the classes"
+            )
+
+
+@by_date
+def fpar(
+    lai,
+    *,
+    geometry=None,
+    time=None,
+    leaf_angles="spherical",
+    fpar_inf=absorption.FPAR_INF,
+    leaves="all",
+    brown=0.0,
+    dissociation=0.0,
+    crown_cover=1.0,
+):
+    """
+    Fraction of photosynthetically active radiation that a canopy absorbs, or its green leaves.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x), or xarray.Dataset
+        Leaf area index, or a landscape that has it as ``lai``. [m2 m-2]
+    geometry : fifesim.base.geometry.Geometry, optional
+        The sun's; by default that which the array carries, else at its time and place.
+    time : str or datetime, optional
+        In the place of ``geometry``.
+    leaf_angles : optional
+        As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
+    fpar_inf : float, optional
+        Of an infinitely thick canopy. [1]
+    leaves : {"all", "green"}, optional
+        Which leaves absorb it: all of them, dead ones too, or those alone that can use it.
+    brown, dissociation, crown_cover : float or xarray.DataArray, dims (y, x), optional
+        As in `surface_reflectance`. [1]
+
+    Returns
+    -------
+    fpar : xarray.DataArray, dims (y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If LAI is negative, or a share outside 0 to 1.
+
+    Notes
+    -----
+    Both kinds of leaf absorb alike here, as in Eq. 6. SAIL's own shares, of each wavelength, are in
+    `ground.canopy.light_budget`.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 6
+
+    See Also
+    --------
+    fifesim.ground.canopy.absorption.fpar, fifesim.ground.canopy.absorption.green_fpar
+    """
+    land = land_of(lai)
+    said = {"geometry": geometry, "time": time, "fpar_inf": fpar_inf, "leaves": leaves}
+    canopy = {"leaf_angles": leaf_angles, "brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
+    _check_used(land, canopy)
+    if land.cover is None:
+        return ground.fpar(land.lai, **said, **{**canopy, **land.cells})
+    told = {each.code: _told(each, canopy, land.cells) for each in land.classes}
+    # Of classes with the same canopy once.
+    made = {repr(each): ground.fpar(land.lai, **said, **each) for each in {repr(v): v for v in told.values()}.values()}
+    kernels = {code: (np.positive, [made[repr(each)]]) for code, each in told.items()}
+    out = grids.place(by_class(kernels, land.cover), grids.geobox(land.lai))
+    history = next(iter(made.values())).attrs["history"].splitlines()[-1] if len(made) == 1 else "fpar: by class"
+    return cf.label(out, "fpar", source=land.lai, history=history)
+
+
+@by_date
+def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
+    """
+    Means over square blocks of ground: the truth that a pixel is compared with.
+
+    Parameters
+    ----------
+    array : xarray.DataArray, dims (..., y, x), or xarray.Dataset
+        Of a landscape, ``brown`` is that of the leaf area of a block, and the codes of ``cover`` are counted.
+    pixel : float, optional
+        Size of the blocks, any multiple of the cell or not. [m]
+    min_valid : float, optional
+        Share of its area that a block needs on valid cells; below it is NaN. [1]
+    lsf : line spread function, optional
+        As `fifesim.base.footprints` has it, to weight the cells about each block's middle; all within the block count
+        the same by default.
+
+    Returns
+    -------
+    means : xarray.DataArray, dims (..., y, x), or xarray.Dataset
+        On the grid of whole blocks from the upper left corner. Of a landscape, ``class_share`` over (class, y, x) is in
+        the place of ``cover``.
+
+    Raises
+    ------
+    ValueError
+        If the array has no grid, or no block fits.
+    TypeError
+        If the size is no number.
+
+    See Also
+    --------
+    fifesim.base.footprints.regularize
+    """
+    mean = partial(means.aggregate, pixel=pixel, min_valid=min_valid, lsf=lsf)
+    if not isinstance(array, xr.Dataset):
+        return mean(array)
+    by_cell = {name: each for name, each in array.data_vars.items() if {"y", "x"} <= set(each.dims)}
+    kept = {name: each for name, each in array.data_vars.items() if name != "cover"}
+    out = {name: mean(each) if name in by_cell else each for name, each in kept.items()}
+    if "brown" in by_cell and "lai" in by_cell:
+        dead = mean(array["lai"] * array["brown"]) / out["lai"]
+        out["brown"] = out["brown"].copy(data=dead.where(out["lai"] != 0, 0.0).data)
+    if "cover" in by_cell:
+        out["class_share"] = _class_shares(array["cover"], mean)
+    return xr.Dataset(out, attrs=array.attrs)
+
+
+def _class_shares(cover, mean):
+    """Share of the ground of each class."""
+    table = classes_of(cover)
+    known = cover.where(cover != NO_CLASS)
+    shares = [mean((known == each.code).where(known.notnull())) for each in table]
+    names = xr.Variable("class", [each.name for each in table])
+    out = xr.concat(shares, dim=names, coords="minimal", compat="override", combine_attrs="override")
+    out = grids.place(out, grids.geobox(shares[0]))
+    return cf.label(out, "class_share", source=cover, history="aggregate: shares of classes")

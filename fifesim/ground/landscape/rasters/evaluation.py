@@ -1,0 +1,86 @@
+"""What differs by class of cover, on labelled rasters: each class is evaluated on its own cells alone."""
+
+from functools import partial
+
+import numpy as np
+
+from fifesim.base.geometry import ANGLES
+from fifesim.ground.landscape.compression import NO_CLASS, cells_by_class, check_codes
+from fifesim.rasters import chunks as chunking
+
+
+def by_class(kernels, cover, *scene, bands=None):
+    """
+    A raster of which each class of cover has its own kernel.
+
+    Parameters
+    ----------
+    kernels : dict of int to (callable, sequence of xarray.DataArray)
+        Of each code: ``kernel(*cells)`` gives values of shape ([band], n) from n cells of the scene and of the rasters
+        beside it. What has bands has them as last axis; what is no raster is given as it is.
+    cover : xarray.DataArray, dims (y, x)
+        Codes; -1 and NaN give NaN.
+    *scene : xarray.DataArray, dims (y, x)
+        Rasters that all kernels take first.
+    bands : int, optional
+        Of the result.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims ([band], y, x)
+        Lazy where an input is; one task for a chunk, and the same bits as of each class alone.
+
+    Raises
+    ------
+    ValueError
+        If the rasters lie on different grids; when computed, if a cell has another code.
+    """
+    found, parts = {}, []
+    for kernel, taken in kernels.values():
+        keys = [_identity(each) for each in taken]
+        found |= {key: each for key, each in zip(keys, taken, strict=True) if key not in found}
+        parts.append((kernel, tuple(list(found).index(key) for key in keys)))
+    rasters = list(found.values())
+    banded = tuple("band" in each.dims for each in (*scene, *rasters))
+    plain = [each.drop_vars(ANGLES, errors="ignore") for each in (cover, *scene, *rasters)]
+    kernel = partial(_of_classes, tuple(kernels), tuple(parts), banded, bands, len(scene))
+    return chunking.pointwise(kernel, *plain, bands=bands)
+
+
+def _identity(raster):
+    """What tells rasters apart without a look at their cells: those that classes share are handed over once."""
+    if raster.chunks is not None:
+        return raster.dims, raster.data.name
+    if raster.ndim < 2:
+        return raster.dims, raster.shape, raster.values.tobytes()
+    return raster.dims, raster.shape, raster.data.strides, raster.data.__array_interface__["data"]
+
+
+def _of_classes(codes, parts, banded, bands, first, cover, *blocks):
+    """A block of cells: those of each class are put together, evaluated and put back."""
+    shape = np.broadcast_shapes(cover.shape, *(block.shape[:2] for block in blocks[:first]))
+    cover = np.broadcast_to(cover, shape).ravel()
+    blocks = [_flat(block, has_bands, shape) for block, has_bands in zip(blocks, banded, strict=True)]
+    scene, rasters = blocks[:first], blocks[first:]
+    codes_of_cells = check_codes(cover, codes)
+    if codes_of_cells.size and (alone := codes_of_cells[0]) != NO_CLASS and (codes_of_cells == alone).all():
+        kernel, taken = parts[codes.index(alone)]
+        found = kernel(*(block for block, _ in (*scene, *(rasters[index] for index in taken))))
+        return np.reshape(found, ((bands,) if bands else ()) + shape)
+    out = np.full((bands or 1, cover.size), np.nan)
+    for cells, (kernel, taken) in zip(cells_by_class(codes_of_cells, codes), parts, strict=True):
+        if cells.size:
+            read = (*scene, *(rasters[index] for index in taken))
+            found = kernel(*(block[cells] if varies else block for block, varies in read))
+            # Band by band: numpy puts cells of several rows at once back at half the speed.
+            for band, values in zip(out, found if bands else [found], strict=True):
+                band[cells] = values
+    return out.reshape(((bands,) if bands else ()) + shape)
+
+
+def _flat(block, has_bands, shape):
+    """A block by cells, shape (n, [band]), and whether it is by cells at all."""
+    if block.ndim == int(has_bands):
+        return block, False
+    end = block.shape[-1:] if has_bands else ()
+    return np.broadcast_to(block, shape + end).reshape(-1, *end), True

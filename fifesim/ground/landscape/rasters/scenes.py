@@ -1,0 +1,215 @@
+"""Landscapes: Datasets of what a ground scene is made of, on one grid."""
+
+from functools import partial
+from numbers import Number
+
+import numpy as np
+import xarray as xr
+
+from fifesim.base.kinds import described, is_path
+from fifesim.base.seeds import check_seed
+from fifesim.ground.landscape.autoregression import check_arp
+from fifesim.ground.landscape.classes import class_table, fife_classes
+from fifesim.ground.landscape.compression import cells_by_class
+from fifesim.ground.landscape.cover import Patches
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.field import streaming_field
+from fifesim.ground.landscape.raster import lai_window
+from fifesim.ground.landscape.rasters.cover import classes_of, cover_map, drawn_cover
+from fifesim.rasters import cf, places
+from fifesim.rasters import chunks as chunking
+from fifesim.rasters import grid as grids
+from fifesim.rasters.packed import unpacked
+from fifesim.rasters.sites import is_fife, made_on_site
+from fifesim.rasters.warp import file_onto_grid, raster_onto_grid
+
+FIFE_PASTURES = Patches("pastures", 1200.0)
+"""Of the default landscape: rectangles of 144 ha on average, as large as ranches of the Flint Hills fence them."""
+
+_REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
+
+
+def landscape(
+    grid,
+    *,
+    cover=None,
+    classes=None,
+    lai=None,
+    arp=0.15,
+    brown=None,
+    crown_cover=None,
+    seed=0,
+    chunks=None,
+    allow_remote=False,
+):
+    """
+    A landscape: leaf area and classes of cover, and what else a ground scene is made of, on one grid.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells, in a projected CRS.
+    cover : Patches, str, path or xarray.DataArray, optional
+        How the classes lie: patches that are drawn, or a map of whole numbers, a raster file or what rioxarray has
+        opened, in any CRS; cells no larger than the map's have its nearest class, larger ones the most frequent. By
+        default one class is everywhere, and FIFE's three treatments lie in pastures.
+    classes : CoverClass, sequence of CoverClass, or mapping of str to CoverClass, optional
+        What the classes are; by default those that a raster of cover carries, or `fife_classes` of what is drawn.
+    lai : xarray.DataArray, str or path, optional
+        Your own leaf area, as `open_lai` takes it, in the place of the classes' distributions. [m2 m-2]
+    arp : float, optional
+        Autoregressive parameter of the classes that say none, in [0, 0.2498]. [1]
+    brown : float, xarray.DataArray, str or path, optional
+        Share of dead leaf area, in the place of the classes'. [1]
+    crown_cover : float, xarray.DataArray, str or path, optional
+        Share of the ground below crowns, in the place of the classes'. [1]
+    seed : int, optional
+        In [0, 2**63).
+    chunks : mapping or int or "auto", optional
+        Makes the landscape lazy.
+    allow_remote : bool, optional
+        Take addresses, and formats that lead to other files: only for what you trust.
+
+    Returns
+    -------
+    land : xarray.Dataset
+        ``lai`` [m2 m-2] and ``cover``, codes of classes by ``flag_values`` and ``flag_meanings`` with -1 for no data,
+        over (y, x), and the others where they are given. ``land.fifesim.surface_reflectance(instrument)`` takes it.
+
+    Raises
+    ------
+    ValueError
+        If the grid, arp, seed, a class or its share is not one allowed, a map is not usable, or a class has no leaf
+        area; of a lazy map when it computes, if it has a code without a class.
+    TypeError
+        If an argument is of another kind.
+
+    Notes
+    -----
+    Every variable is a function of the seed and of place: a window is a slice of the whole, and chunks change nothing.
+    Leaf area of all classes comes from one white noise, filtered with each class's arp and mapped to its distribution.
+    A fence is so a change of density and of texture on ground that goes on: dense spots of one treatment are dense
+    spots of the other, as deep soil is on both sides of a fence, and landscapes of one seed differ by their classes
+    and not by chance.
+
+    References
+    ----------
+    [Friedl1995]_, Fig. 2
+
+    See Also
+    --------
+    fifesim.ground.landscape.cover.patch_classes, fifesim.ground.landscape.field.streaming_field
+    """
+    grids.check_grid(grid)
+    check_arp(arp)
+    seed = check_seed(seed)
+    variables = {}
+    if classes is not None or cover is not None or lai is None:
+        table = class_table(_default_classes(cover) if classes is None else classes)
+        variables["cover"] = _cover(grid, cover, table, seed, chunks, allow_remote)
+    if lai is None:
+        variables["lai"] = _lai(grid, variables["cover"], table, arp, seed)
+    else:
+        variables["lai"] = _own_lai(lai, grid, chunks, allow_remote)
+    for name, given in {"brown": brown, "crown_cover": crown_cover}.items():
+        if given is not None:
+            variables[name] = _share(name, given, grid, chunks, allow_remote)
+    # Fields that are drawn, and that go with the ground, have their place here.
+    order = ["lai", *(name for name in variables if name != "lai")]
+    site = {key: variables["lai"].attrs[key] for key in ("site",) if key in variables["lai"].attrs}
+    return xr.Dataset({name: variables[name] for name in order}, attrs=site)
+
+
+def _own_lai(lai, grid, chunks, allow_remote):
+    """Leaf area of a user; a scene that was made on the FIFE site stays one."""
+    found = lai_window(lai, grid, chunks, allow_remote=allow_remote)
+    made = made_on_site(grid) if isinstance(lai, xr.DataArray) and is_fife(lai) else {}
+    return found.assign_attrs(made)
+
+
+def _default_classes(cover):
+    """Classes of a cover where none are given: its own, or FIFE's where it is drawn."""
+    if cover is None or isinstance(cover, Patches):
+        return fife_classes()
+    if isinstance(cover, xr.DataArray) and "classes" in cover.attrs:
+        return classes_of(cover)
+    raise ValueError("a map of cover needs classes=, such as [fifesim.CoverClass('grass', lai=1.2, code=1), ...]")
+
+
+def _cover(grid, cover, table, seed, chunks, allow_remote):
+    """Codes of the classes."""
+    if cover is None:
+        if len(table) > 1 and [each.name for each in table] != list(fife_classes()):
+            raise ValueError(
+                f"nothing says how the {len(table)} classes lie: give cover= a map of their codes, or for instance "
+                'fifesim.Patches("voronoi", size=300)'
+            )
+        cover = FIFE_PASTURES
+    if isinstance(cover, Patches):
+        return drawn_cover(grid, cover, table, seed, chunks)
+    if not (isinstance(cover, xr.DataArray) or is_path(cover)):
+        raise TypeError(f"cover must be a fifesim.Patches, the path of a map or a raster, got {described(cover)}")
+    return cover_map(cover, grid, table, chunks, allow_remote=allow_remote)
+
+
+def _lai(grid, cover, table, arp, seed):
+    """Leaf area of each class, from its own distribution and arp."""
+    lacking = [each.name for each in table if each.lai is None]
+    if lacking:
+        raise ValueError(
+            f"class {', '.join(lacking[:8])} has no leaf area: type CoverClass(..., lai='burned-grazed'), or a number "
+            "where it is uniform, or give landscape(lai=) a raster"
+        )
+    codes = tuple(each.code for each in table)
+    kinds = tuple((_quantiles(each.lai), arp if each.arp is None else each.arp) for each in table)
+    # What streaming_field refuses is known before anything lazy is built.
+    for _, of_class in kinds:
+        streaming_field(seed, of_class, 0, 0, (0, 0))
+    kernel = partial(_leaf_area, codes, kinds, seed, grids.lattice_position(grid))
+    lai = grids.place(places.located(kernel, cover.drop_attrs()), grid)
+    history = "\n".join([cover.attrs["history"], f"landscape: leaf area of {len(table)} classes, seed {seed}"])
+    made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": "by class"} | made_on_site(grid)
+    return cf.label(lai, "lai", history=history, **made, method="streaming", references=_REFERENCE)
+
+
+def _quantiles(lai):
+    """Quantiles of a distribution, or the number that all cells have."""
+    return float(lai) if isinstance(lai, Number) else quantile_table(lai_distribution(lai))
+
+
+def _leaf_area(codes, kinds, seed, lattice, cover, starts):
+    """Leaf area of a block of codes that begins at some row and column of the grid."""
+    out = np.full(cover.size, np.nan)
+    row, column = (first + start for first, start in zip(lattice, starts, strict=True))
+    fields = {}
+    for cells, (quantiles, arp) in zip(cells_by_class(cover.ravel(), codes), kinds, strict=True):
+        if isinstance(quantiles, float) or not cells.size:
+            out[cells] = quantiles if cells.size else np.nan
+            continue
+        if arp not in fields:
+            fields[arp] = streaming_field(seed, arp, row, column, cover.shape).ravel()
+        out[cells] = quantile_map(fields[arp][None, cells], quantiles)[0]
+    return out.reshape(cover.shape)
+
+
+def _share(name, given, grid, chunks, allow_remote):
+    """A number, or a raster on the grid, of a share."""
+    check = partial(_check_share, name)
+    if isinstance(given, Number):
+        return cf.label(xr.DataArray(check(float(given))), name, history=f"landscape: {name} {given:g}")
+    if isinstance(given, xr.DataArray):
+        found = raster_onto_grid(unpacked(given), grid, chunks)
+    elif is_path(given):
+        found = file_onto_grid(given, grid, chunks, allow_remote)
+    else:
+        raise TypeError(f"{name} must be a number, the path of a raster or an xarray.DataArray, got {described(given)}")
+    shares = grids.place(chunking.pointwise(check, found), grid)
+    return cf.label(shares, name, history=f"landscape: {name} of a raster")
+
+
+def _check_share(name, values):
+    """Refuse what is no share; NaN passes."""
+    wrong = (np.asarray(values) < 0) | (np.asarray(values) > 1)
+    if wrong.any():
+        raise ValueError(f"{name} must be in [0, 1], got {np.asarray(values)[wrong].flat[0]:g}: it is a share")
+    return values

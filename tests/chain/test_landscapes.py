@@ -1,0 +1,244 @@
+"""Landscapes through the chain: classes with canopies of their own, and the closed form of a pixel of two."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from elevations import labelled
+from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
+from oracles_canopy import four_streams
+
+import fifesim
+from fifesim.atmosphere.schemes import engines
+from fifesim.rasters import grid as grids
+
+TM34 = ["TM3", "TM4"]
+GRASS = {"lai": "burned-grazed", "leaf_angles": "erectophile", "background": {"dead_grass": 1.0}, "hotspot": 0.1}
+WOOD = {"lai": "unburned-ungrazed", "leaf": fifesim.Leaf(chlorophyll=50), "background": {"TM3": 0.05, "TM4": 0.1}}
+BARE = {"lai": 0.0, "background": 0.2}
+CLASSES = {"grass": fifesim.CoverClass(**GRASS), "wood": fifesim.CoverClass(**WOOD), "bare": fifesim.CoverClass(**BARE)}
+CANOPY = {"leaf": "leaf_optics"}
+
+
+@pytest.fixture(scope="module")
+def land(site):
+    return fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=CLASSES, seed=7)
+
+
+@pytest.fixture(scope="module")
+def rho(land):
+    return land.fifesim.surface_reflectance("TM", bands=TM34)
+
+
+def test_each_class_has_the_bits_of_a_scene_of_it_alone(land, rho):
+    for code, said in enumerate((GRASS, WOOD, BARE), 1):
+        canopy = {CANOPY.get(name, name): value for name, value in said.items() if name != "lai"}
+        alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, **canopy)
+        of_class = (land.cover == code).values
+        assert 400 < of_class.sum() < 1600
+        np.testing.assert_array_equal(rho.values[:, of_class], alone.values[:, of_class])
+
+
+@pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS], ids=["chunked", "odd-chunks"])
+@pytest.mark.parametrize("exact", [False, True])
+def test_reflectance_is_lazy_and_has_the_same_bits_in_chunks(land, rho, chunks, exact):
+    lazy = xr.Dataset({name: in_chunks(each, chunks) for name, each in land.data_vars.items()})
+    with no_compute():
+        made = lazy.fifesim.surface_reflectance("TM", bands=TM34, exact=exact)
+    assert made.chunks is not None
+    expected = land.fifesim.surface_reflectance("TM", bands=TM34, exact=True) if exact else rho
+    xr.testing.assert_identical(made.compute(), expected)
+
+
+def test_reflectance_of_a_landscape_goes_on_as_of_a_lone_leaf_area(land, rho):
+    assert rho.name == "surface_reflectance" and rho.attrs["instrument"] == "TM" and rho.attrs["site"] == "FIFE"
+    assert "spherical" in rho.attrs["leaf_angles"] and rho.attrs["background"] == "by class"
+    image = rho.fifesim.to_toa().fifesim.sense("TM")
+    assert image.dtype == np.uint8 and (image > 0).all()
+
+
+def test_landscape_without_cover_is_one_class(land):
+    alone = land[["lai"]].fifesim.surface_reflectance("TM", bands=TM34, hotspot=0.1)
+    xr.testing.assert_identical(alone, land.lai.fifesim.surface_reflectance("TM", bands=TM34, hotspot=0.1))
+
+
+def test_arguments_are_those_of_classes_that_leave_them_open(land, rho, lai):
+    """Rasters as well: here of the background of the one class that says none."""
+    open_one = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed")}
+    scene = fifesim.landscape(grids.geobox(land.lai), cover=fifesim.Patches("voronoi", 30), classes=open_one, seed=7)
+    litter = (0.1 + lai / 20).rename("litter").drop_attrs(deep=False)
+    made = scene.fifesim.surface_reflectance("TM", bands=TM34, background=litter)
+    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, background=litter)
+    grass = (land.cover == 1).values
+    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
+    np.testing.assert_array_equal(made.values[:, ~grass], rho.values[:, ~grass])
+
+
+def test_argument_that_would_change_nothing_is_refused(land):
+    with pytest.raises(ValueError, match="background is given, and all classes of the landscape say theirs"):
+        land.fifesim.surface_reflectance("TM", background=0.1)
+
+
+def test_view_and_leaves_that_vary_are_taken_by_class(land):
+    """Where directions differ SAIL is evaluated at every cell, of each class with its own canopy."""
+    sza = (xr.zeros_like(land.lai) + 30 + 0.01 * np.arange(land.sizes["x"])).rename("sza").drop_attrs(deep=False)
+    sun = xr.Dataset({"sza": sza, "saa": 120.0, "vza": 10.0, "vaa": 90.0, "earth_sun_distance": 1.0})
+    made = land.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun)
+    canopy = {CANOPY.get(name, name): value for name, value in WOOD.items() if name != "lai"}
+    alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun, **canopy)
+    wood = (land.cover == 2).values
+    np.testing.assert_array_equal(made.values[:, wood], alone.values[:, wood])
+
+
+def test_cells_without_class_or_leaf_area_have_no_reflectance(land, rho):
+    holes = land.copy(deep=True)
+    holes.cover[3:5, 4] = -1
+    holes.lai[10, 10:12] = np.nan
+    made = holes.fifesim.surface_reflectance("TM", bands=TM34)
+    missing = np.zeros(land.lai.shape, bool)
+    missing[3:5, 4] = missing[10, 10:12] = True
+    assert np.isnan(made.values[:, missing]).all()
+    np.testing.assert_array_equal(made.values[:, ~missing], rho.values[:, ~missing])
+
+
+def test_landscape_comes_back_from_a_file(tmp_path, land, rho):
+    land.to_netcdf(tmp_path / "land.nc")
+    again = xr.open_dataset(tmp_path / "land.nc", decode_coords="all")
+    xr.testing.assert_equal(again.fifesim.surface_reflectance("TM", bands=TM34), rho)
+
+
+def test_code_without_a_class_is_named(land):
+    other = land.copy(deep=True)
+    other.cover[0, 0] = 77
+    with pytest.raises(ValueError, match="codes without a class: 77, in 1 of"):
+        other.fifesim.surface_reflectance("TM", bands=TM34)
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (lambda land: land[["cover"]], "a landscape has a variable lai, this Dataset has cover"),
+        (lambda land: land.assign(cover=land.cover.drop_attrs(deep=False)), "does not say what its classes are"),
+    ],
+)
+def test_other_datasets_are_refused(land, change, message):
+    with pytest.raises(ValueError, match=message):
+        change(land).fifesim.surface_reflectance("TM", bands=TM34)
+
+
+# A canopy of one leaf inclination over a dark ground, beside bare soil.
+LEAF, DARK, SOIL, DENSE = {"TM3": (0.07, 0.04), "TM4": (0.46, 0.41)}, 0.08, 0.19, 2.3
+
+
+def two_uniform_classes():
+    """Classes that part each pixel of 9 x 9 cells after so many rows: 0, 1, ... 9."""
+    grid = fifesim.fife_site(30 / 9, window=((0, 9), (0, 90)))
+    codes = np.where(np.arange(9)[:, None] < np.repeat(np.arange(10), 9), 1, 2)
+    table = {
+        "canopy": fifesim.CoverClass(lai=DENSE, leaf=LEAF, background=DARK, leaf_angles="45: 1"),
+        "soil": fifesim.CoverClass(lai=0, leaf=LEAF, background=SOIL),
+    }
+    return fifesim.landscape(grid, cover=labelled(grid, codes).drop_attrs(deep=False), classes=table)
+
+
+def test_pixel_of_two_uniform_classes_is_the_closed_form():
+    r"""
+    Mean reflectance, NDVI and its bias of shares f and 1 - f, to 1e-9.
+
+    With S the sum and N the NDVI of a class, :math:`f (1 - f) (N_a - N_b) (S_b - S_a) / (f S_a + (1 - f) S_b)` is the
+    bias. The canopy's reflectance is that of leaf equations solved by a matrix exponential.
+    """
+    sun = fifesim.Geometry(30.0, 120.0, 20.0, 80.0)
+    land = two_uniform_classes()
+    air = {"geometry": sun, "atmosphere": fifesim.Atmosphere()}
+    cells = land.fifesim.surface_reflectance("TM", bands=TM34, exact=True, **air)
+    responses = tuple(band.response for band in fifesim.instrument("TM").select(TM34))
+    sky = engines.band_terms(fifesim.Atmosphere(), responses, sun.sza, sun.vza, sun.raa).diffuse_fraction
+    dense = []
+    for (rho, tau), share in zip(LEAF.values(), sky, strict=True):
+        c = four_streams(DENSE, rho, tau, sun.sza, sun.vza, sun.raa, 45.0)
+        below = DARK / (1 - DARK * c["rdd"])
+        up = c["too"] + c["tdo"]
+        direct = c["rso"] + (c["tss"] + c["tsd"]) * below * up
+        dense.append((1 - share) * direct + share * (c["rdo"] + c["tdd"] * below * up))
+    f = np.arange(10) / 9
+    red, nir = (f * each + (1 - f) * SOIL for each in dense)
+    mean = cells.fifesim.aggregate(30)
+    np.testing.assert_allclose(mean[:, 0], [red, nir], rtol=0, atol=1e-9)
+    ndvi = mean.fifesim.ndvi()
+    np.testing.assert_allclose(ndvi[0], (nir - red) / (nir + red), rtol=0, atol=1e-9)
+    sums, ratio = (sum(dense), 2 * SOIL), ((dense[1] - dense[0]) / sum(dense), 0.0)
+    bias = f * (1 - f) * (ratio[0] - ratio[1]) * (sums[1] - sums[0]) / (f * sums[0] + (1 - f) * sums[1])
+    np.testing.assert_allclose(fifesim.scale_bias(fifesim.ndvi, cells)["bias"][0], bias, rtol=0, atol=1e-9)
+    assert np.abs(bias).max() > 0.01
+
+
+def test_means_of_a_landscape_are_those_of_its_variables(land):
+    brown = (land.lai / 4).clip(max=1).rename("brown")
+    of_all = land.assign(brown=brown, crown_cover=0.7).fifesim.aggregate(30)
+    assert set(of_all.data_vars) == {"lai", "brown", "crown_cover", "class_share"}
+    xr.testing.assert_identical(of_all.lai, land.lai.fifesim.aggregate(30))
+    assert of_all.crown_cover == 0.7
+    dead = (land.lai * brown).fifesim.aggregate(30) / land.lai.fifesim.aggregate(30)
+    np.testing.assert_allclose(of_all.brown, dead.where(of_all.lai > 0, 0), rtol=1e-14)
+    assert np.abs(of_all.brown - brown.fifesim.aggregate(30)).max() > 0.01
+
+
+def test_codes_are_counted_not_averaged(land):
+    shares = land.fifesim.aggregate(30).class_share
+    assert shares.dims == ("class", "y", "x") and shares["class"].values.tolist() == ["grass", "wood", "bare"]
+    blocks = land.cover.values.reshape(5, 9, 6, 9).swapaxes(1, 2).reshape(5, 6, 81)
+    counted = np.stack([np.mean(blocks == code, axis=-1) for code in (1, 2, 3)])
+    np.testing.assert_allclose(shares, counted, rtol=0, atol=1e-12)
+    holes = land.copy(deep=True)
+    holes.cover[:9, :5] = -1
+    assert np.isnan(holes.fifesim.aggregate(30).class_share[:, 0, 0]).all()
+    lazy = xr.Dataset({name: in_chunks(each, ODD_CHUNKS) for name, each in land.data_vars.items()})
+    with no_compute():
+        made = lazy.fifesim.aggregate(30)
+    xr.testing.assert_allclose(made.compute(), land.fifesim.aggregate(30), rtol=1e-14)
+
+
+def test_light_absorbed_goes_by_the_leaf_angles_of_a_class(land):
+    fpar = land.fifesim.fpar()
+    for code, angles in ((1, "erectophile"), (2, "spherical"), (3, "spherical")):
+        alone = land.lai.fifesim.fpar(leaf_angles=angles)
+        np.testing.assert_array_equal(fpar.values[land.cover == code], alone.values[land.cover == code])
+    planophile = land.fifesim.fpar(leaf_angles="planophile")
+    grass = (land.cover == 1).values
+    assert (planophile.values[grass] == fpar.values[grass]).all() and (planophile != fpar).any()
+    assert fpar.name == "fpar"
+    xr.testing.assert_identical(land[["lai"]].fifesim.fpar(), land.lai.fifesim.fpar())
+
+
+DEAD = {"brown": 0.4, "dissociation": 0.5, "crown_cover": 0.7, "crown_shape": 0.5}
+
+
+def test_dead_leaves_and_crowns_are_those_of_a_class(site, land):
+    """What a class says of them has the bits of a scene of it alone, and other classes go on without."""
+    dead = fifesim.CoverClass(lai="burned-grazed", brown_leaf={"TM3": (0.3, 0.1), "TM4": (0.4, 0.3)}, **DEAD)
+    table = CLASSES | {"grass": dead}
+    scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7)
+    made = scene.fifesim.surface_reflectance("TM", bands=TM34)
+    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, brown_leaf=dead.brown_leaf, **DEAD)
+    grass = (land.cover == 1).values
+    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
+    others = land.fifesim.surface_reflectance("TM", bands=TM34)
+    np.testing.assert_array_equal(made.values[:, ~grass], others.values[:, ~grass])
+    green = scene.fifesim.fpar(leaves="green")
+    shares = {name: DEAD[name] for name in ("brown", "dissociation", "crown_cover")}
+    expected = scene.lai.fifesim.fpar(leaves="green", **shares)
+    np.testing.assert_array_equal(green.values[grass], expected.values[grass])
+
+
+def test_variables_of_a_landscape_win_over_its_classes(site, land):
+    brown = (land.lai / 5).drop_attrs(deep=False).rename("brown")
+    table = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed", brown=0.9)}
+    scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7, brown=brown)
+    made = scene.fifesim.surface_reflectance("TM", bands=TM34)
+    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, brown=scene.brown)
+    grass = (land.cover == 1).values
+    np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
+    with pytest.raises(ValueError, match="brown is given, and the landscape has a variable brown"):
+        scene.fifesim.surface_reflectance("TM", bands=TM34, brown=0.1)
+    number = fifesim.landscape(site, lai=land.lai, brown=0.3).fifesim.surface_reflectance("TM", bands=TM34)
+    xr.testing.assert_equal(number, land.lai.fifesim.surface_reflectance("TM", bands=TM34, brown=0.3))

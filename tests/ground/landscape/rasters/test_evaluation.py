@@ -1,0 +1,60 @@
+"""Kernels of classes on labelled rasters: each on its own cells, in any chunks."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
+
+from fifesim.ground.landscape.rasters.evaluation import _identity, by_class
+
+
+@pytest.fixture
+def cover(lai):
+    codes = np.random.default_rng(2).choice([-1, 1, 5, 9], lai.shape).astype(np.int16)
+    return lai.copy(data=codes).rename("cover")
+
+
+@pytest.fixture
+def kernels(lai):
+    by_band = xr.DataArray([1.0, 2.0], dims="band")
+    shifted = (lai + 1).rename("shifted")
+    rows = xr.DataArray(np.arange(lai.sizes["y"]) * 1.0, dims="y", coords={"y": lai.y})
+    return {
+        1: (lambda cells, bands: bands[:, None] * cells, [by_band]),
+        5: (lambda cells, other: np.stack([cells - other, other]), [shifted]),
+        9: (lambda cells, other, row, bands: np.stack([bands[0] * row, other]), [shifted, rows, by_band]),
+    }
+
+
+@pytest.mark.parametrize("chunks", [None, CHUNKS, ODD_CHUNKS], ids=str)
+def test_each_class_has_what_its_kernel_gives(lai, cover, kernels, chunks):
+    expected = np.full((2, *lai.shape), np.nan)
+    values, rows = lai.values, np.broadcast_to(np.arange(lai.sizes["y"])[:, None], lai.shape)
+    expected[:, cover == 1] = [values[cover == 1], 2 * values[cover == 1]]
+    expected[:, cover == 5] = [(values - (values + 1))[cover == 5], (values + 1)[cover == 5]]
+    expected[:, cover == 9] = [rows[cover == 9], (values + 1)[cover == 9]]
+    if chunks:
+        lai, cover = in_chunks(lai, chunks), in_chunks(cover, chunks)
+    with no_compute():
+        made = by_class(kernels, cover, lai, bands=2)
+    assert (made.chunks is not None) == bool(chunks)
+    np.testing.assert_array_equal(made, expected)
+
+
+def test_block_of_one_class_is_handed_over_as_it_is(lai, cover):
+    one = by_class({5: (np.sqrt, [])}, xr.full_like(cover, 5), lai)
+    np.testing.assert_array_equal(one, np.sqrt(lai))
+
+
+def test_raster_that_classes_share_is_taken_once(lai):
+    for raster in (lai, in_chunks(lai, CHUNKS), xr.DataArray([1.0, 2.0], dims="band")):
+        again = raster.copy() if raster.ndim < 2 else raster.drop_vars("spatial_ref")
+        others = raster + 1, raster.isel({raster.dims[0]: [0]})
+        keys = [_identity(each) for each in (raster, again, *others)]
+        assert [keys.index(key) for key in keys] == [0, 0, 2, 3]
+
+
+def test_code_without_a_kernel_is_an_error_when_it_computes(lai, cover):
+    lazy = by_class({1: (np.sqrt, []), 5: (np.sqrt, [])}, in_chunks(cover, CHUNKS), lai)
+    with pytest.raises(ValueError, match="codes without a class: 9"):
+        lazy.compute()
