@@ -27,6 +27,7 @@ from fifesim.base.kinds import (
     METRES,
     NAMES,
     NUMBER,
+    NUMBER_OR_RASTER,
     NUMBERS,
     OFFSET,
     PAIR,
@@ -58,6 +59,7 @@ KINDS = (
     | _of(NUMBER, "cell scale_height sza saa vza vaa earth_sun_distance thermal shot detectors gain_spread slope")
     | _of(NUMBER, "visibility aot h2o o3 residual_deviation realisations spacing offset_spread")
     | _of(NUMBER, "uncertainty min_coverage view_tolerance")
+    | _of(NUMBER_OR_RASTER, "soil moisture")
     | _of(NUMBERS, "radiance")
     | _of(LIST, "frequency")
     | _of(METRES, "pixel")

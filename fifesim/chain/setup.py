@@ -13,7 +13,10 @@ from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import Instrument
 
 # What surface_reflectance and sense take of a setup, by the same names.
-_GROUND = ("bands", "dem", "horizon", "upwelling", "atmosphere", "leaf_optics", "background", "leaf_angles", "hotspot")
+_GROUND = (
+    *("bands", "dem", "horizon", "upwelling", "atmosphere", "leaf_optics", "background", "leaf_angles", "hotspot"),
+    *("soil", "moisture"),
+)
 _SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
 
 
@@ -31,7 +34,7 @@ class Setup:
         By default midlatitude summer, continental aerosol, 45 km visibility.
     geometry : Geometry or xarray.Dataset, optional
         Of sun and sensor; by default that of the leaf area, else the paper's.
-    leaf_optics, background, leaf_angles, hotspot : optional
+    leaf_optics, background, soil, moisture, leaf_angles, hotspot : optional
         As in `fifesim.surface_reflectance`.
     dem, horizon, upwelling : optional
         As in `fifesim.surface_reflectance`; without a dem the ground is level.
@@ -49,6 +52,8 @@ class Setup:
     geometry: Geometry | xr.Dataset | None = None
     leaf_optics: object = None
     background: object = None
+    soil: float | xr.DataArray | None = None
+    moisture: float | xr.DataArray | None = None
     leaf_angles: object = "spherical"
     hotspot: float = 0.0
     dem: xr.DataArray | None = None

@@ -29,6 +29,8 @@ def surface_reflectance(
     time=None,
     leaf_optics=None,
     background=None,
+    soil=None,
+    moisture=None,
     leaf_angles="spherical",
     hotspot=0.0,
     exact=False,
@@ -68,6 +70,12 @@ def surface_reflectance(
         ``{spectrum: fraction}`` that mixes spectra; the path of a CSV file, or a Dataset, with ``wavelength`` [um] and
         ``reflectance``. Each number by band or spectrum may be a raster over (y, x). By default soil and litter of
         tallgrass. [1]
+    soil : float or xarray.DataArray, dims (y, x), optional
+        How much brighter the background is along the soil line: the change of its mean reflectance from 0.4 to 0.7 um,
+        by which all bands change; below 0 it is darker. No reflectance leaves 0 to 1. [1]
+    moisture : float or xarray.DataArray, dims (y, x), optional
+        Of the background, 0 dry and 1 saturated (5 and 55 percent of the volume): films of water darken it, most of all
+        in the shortwave infrared. [1]
     leaf_angles : optional
         A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
     hotspot : float, optional
@@ -88,11 +96,11 @@ def surface_reflectance(
 
     References
     ----------
-    [Verhoef1984]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5
+    [Verhoef1984]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5; [Yang2020]_ for moist soil
 
     See Also
     --------
-    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.raster.level_reflectance,
+    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.soil.moistened, fifesim.ground.canopy.raster.level_reflectance,
     fifesim.ground.terrain.rasters.light.terrain_reflectance
     """
     if dem is None and horizon is not None:
@@ -110,7 +118,7 @@ def surface_reflectance(
         wavelengths=[band.wavelength for band in selected],
         leaf_reflectance=leaf_reflectance,
         leaf_transmittance=leaf_transmittance,
-        background=soils.background(responses, background, lai),
+        background=soils.as_it_lies(responses, soils.background(responses, background, lai), lai, soil, moisture),
         diffuse_fraction=atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry),
         geometry=geometry,
         leaf_angles=leaf_angles,

@@ -6,10 +6,12 @@ import numpy as np
 import xarray as xr
 
 from fifesim.ground.canopy import optics
+from fifesim.ground.canopy.soil import brightened, moistened, soil_line, water_films
 from fifesim.ground.canopy.spectra import Spectrum, check_shares, is_mixture
+from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters.crs import with_crs_of
-from fifesim.rasters.layers import by_band
+from fifesim.rasters.layers import by_band, layers_of
 
 
 def background(bands, given, lai):
@@ -53,6 +55,74 @@ def background(bands, given, lai):
             return _mixed(bands, given, lai)
         return by_band({name: optics.of_band(given, name, "background") for name in names}, lai)
     return optics.background(bands, given)
+
+
+def as_it_lies(bands, below, lai, soil=None, moisture=None):
+    """
+    Background where the soil is brighter or darker, and moist.
+
+    Parameters
+    ----------
+    bands : sequence of fifesim.base.bands.Band
+    below : array, shape (band,), or xarray.DataArray, dims ([band], y, x)
+        Dry, from `background`. [1]
+    lai : xarray.DataArray, dims (y, x)
+        Whose CRS the rasters have where they lost theirs.
+    soil : float or xarray.DataArray, dims (y, x), optional
+        Brightness, a change along the soil line. [1]
+    moisture : float or xarray.DataArray, dims (y, x), optional
+        0 is dry, 1 saturated. [1]
+
+    Returns
+    -------
+    background : array, shape (band,), or xarray.DataArray, dims (band, y, x)
+        What was given where neither is. [1]
+
+    Raises
+    ------
+    ValueError
+        If one is out of its range, on lazy data when it computes; if rasters lie on different grids.
+
+    See Also
+    --------
+    fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil.moistened
+    """
+    given = {name: value for name, value in (("soil", soil), ("moisture", moisture)) if value is not None}
+    if not given:
+        return below
+    line = None if soil is None else soil_line(bands)
+    films = None if moisture is None else water_films(tuple(bands))
+
+    def kernel(reflectance, *changes):
+        change = dict(zip(given, changes, strict=True))
+        if line is not None:
+            reflectance = brightened(reflectance, change["soil"], line)
+        if films is not None:
+            reflectance = moistened(reflectance, change["moisture"], films)
+        return np.moveaxis(reflectance, -1, 0)
+
+    if not any(isinstance(each, xr.DataArray) for each in (below, *given.values())):
+        return kernel(below, *map(np.float64, given.values()))
+    names = [band.name for band in bands]
+    if isinstance(below, xr.DataArray):
+        cf.check_units(below, "surface_reflectance")
+        below = by_band(dict(zip(names, layers_of(below, names, "background"), strict=True)), lai)
+    else:
+        below = xr.DataArray(below, dims="band")
+    changes = [_by_cell(name, value, lai) for name, value in given.items()]
+    out = chunking.pointwise(kernel, below.drop_vars("band", errors="ignore"), *changes, bands=len(names))
+    return out.drop_attrs(deep=False).rename("background").assign_coords(band=names)
+
+
+def _by_cell(name, value, lai):
+    """A raster over (y, x), or a number, as one that broadcasts."""
+    if not isinstance(value, xr.DataArray):
+        return xr.DataArray(np.float64(value))
+    if set(value.dims) != {"y", "x"}:
+        raise ValueError(f"{name} is a number, or a raster over (y, x), got dimensions {value.dims}: select one layer")
+    cf.check_units(value, "soil" if name == "soil" else "moisture")
+    plain = with_crs_of(value, lai)
+    return plain.drop_vars(set(plain.coords) - {"y", "x", "spatial_ref"}).rename(name)
 
 
 def _mixed(bands, given, lai):
