@@ -30,6 +30,7 @@ from .ground.terrain.rasters.elevation import source_dem as source_dem
 from .ground.terrain.rasters.hills import flint_hills as flint_hills
 from .ground.terrain.rasters.slopes import slope as slope  # method
 from .ground.terrain.rasters.slopes import aspect as aspect  # method
+from .ground.terrain.rasters.drainage import wetness as wetness  # method
 from .ground.terrain.rasters.sky import horizon as horizon  # method
 from .ground.terrain.rasters.light import sky_view as sky_view  # method
 from .ground.terrain.rasters.light import terrain_view as terrain_view  # method
