@@ -71,8 +71,8 @@ def surface_reflectance(
         ``reflectance``. Each number by band or spectrum may be a raster over (y, x). By default soil and litter of
         tallgrass. [1]
     soil : float or xarray.DataArray, dims (y, x), optional
-        How much brighter the background is along the soil line: the change of its mean reflectance from 0.4 to 0.7 um,
-        by which all bands change; below 0 it is darker. No reflectance leaves 0 to 1. [1]
+        How much brighter the background is along the soil line: the change of its reflectance at 0.55 um, by which all
+        bands change; below 0 it is darker. No reflectance leaves 0 to 1. [1]
     moisture : float or xarray.DataArray, dims (y, x), optional
         Of the background, 0 dry and 1 saturated (5 and 55 percent of the volume): films of water darken it, most of all
         in the shortwave infrared. [1]
@@ -100,8 +100,8 @@ def surface_reflectance(
 
     See Also
     --------
-    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.soil.moistened, fifesim.ground.canopy.raster.level_reflectance,
-    fifesim.ground.terrain.rasters.light.terrain_reflectance
+    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil.moistened,
+    fifesim.ground.canopy.raster.level_reflectance, fifesim.ground.terrain.rasters.light.terrain_reflectance
     """
     if dem is None and horizon is not None:
         raise ValueError("a horizon stands around a dem: give dem= too")
@@ -125,6 +125,7 @@ def surface_reflectance(
         hotspot=hotspot,
         exact=exact,
         atmosphere=atmosphere.text,
+        **soils.in_words(soil, moisture),
         **attributes_of(description),
     )
     if dem is None:

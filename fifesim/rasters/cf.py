@@ -23,7 +23,7 @@ QUANTITIES = {
         "fraction_of_surface_downwelling_photosynthetic_radiative_flux_absorbed_by_vegetation",
         "fraction of absorbed photosynthetically active radiation",
     ),
-    "soil": Quantity("1", "", "brightness of the soil", "change of its mean reflectance, 0.4 to 0.7 um"),
+    "soil": Quantity("1", "", "brightness of the soil", "change of its reflectance at 0.55 um"),
     "moisture": Quantity("1", "", "moisture of the soil", "0 where it is dry, 1 where it is saturated"),
     "normal_score": Quantity("1", "", "standard normal deviate"),
     "surface_reflectance": Quantity(
@@ -102,6 +102,8 @@ PROVENANCE = (
     "method",
     "leaf_angles",
     "background",
+    "soil",
+    "moisture",
     "atmosphere",
     "instrument",
     "instrument_description",

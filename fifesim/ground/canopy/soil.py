@@ -11,8 +11,8 @@ from fifesim.base import datasets
 from fifesim.ground.canopy.prospect import interface_transmissivity
 from fifesim.ground.canopy.spectra import band_means
 
-# Whose mean reflectance is the brightness of a soil. [um]
-VISIBLE = (0.4, 0.7)
+# Where the reflectance of a soil is its brightness: in the midst of visible light, as for aerosol and visibility. [um]
+GREEN = 0.55
 
 # Of the brightness-shape-moisture model, Yang et al. (2020): the water of the driest and of the wettest soil that it is
 # for, and what a soil holds in its first film, in percent of the volume; the thickness of a film [cm]; and the index of
@@ -46,9 +46,7 @@ def soil_line(bands):
     r"""
     Change of the reflectance of bands along the soil line, for a change of brightness.
 
-    .. math:: s_b = \frac{d_b}{\bar d}, \quad d = r_{dry} - r_{wet}
-
-    with the mean over 0.4 to 0.7 um below.
+    .. math:: s_b = \frac{d_b}{d(0.55 \, \mu m)}, \quad d = r_{dry} - r_{wet}
 
     Parameters
     ----------
@@ -75,15 +73,13 @@ def soil_line(bands):
     Examples
     --------
     >>> from fifesim.base.bands import Band
-    >>> flat = Band("visible", (0.4, 0.401, 0.699, 0.7), (0, 1, 1, 0))
-    >>> bool(abs(soil_line([flat])[0] - 1) < 0.05)
-    True
+    >>> soil_line([Band("green", (0.549, 0.55, 0.551), (0, 1, 0))]).round(3).tolist()
+    [1.0]
     """
     table = datasets.table("ground_spectra.csv")
     wavelength, change = (each.to_numpy() for each in (table["wavelength"], table["soil_dry"] - table["soil_wet"]))
     _check_range(bands, wavelength)
-    visible = (wavelength >= VISIBLE[0]) & (wavelength <= VISIBLE[1])
-    return band_means(bands, wavelength, change) / np.trapezoid(change[visible], wavelength[visible]) * np.ptp(VISIBLE)
+    return band_means(bands, wavelength, change) / np.interp(GREEN, wavelength, change)
 
 
 def brightened(reflectance, brightness, line):
@@ -95,7 +91,7 @@ def brightened(reflectance, brightness, line):
     reflectance : array, shape (..., band)
         NaN gives NaN. [1]
     brightness : array, shape (...)
-        Change of the mean reflectance from 0.4 to 0.7 um; NaN gives NaN. [1]
+        Change of the reflectance at 0.55 um; NaN gives NaN. [1]
     line : array, shape (band,)
         From `soil_line`.
 

@@ -114,6 +114,32 @@ def as_it_lies(bands, below, lai, soil=None, moisture=None):
     return out.drop_attrs(deep=False).rename("background").assign_coords(band=names)
 
 
+def in_words(soil, moisture):
+    """
+    Attributes of a surface that say what its soil is like.
+
+    Parameters
+    ----------
+    soil, moisture : float or xarray.DataArray, or None
+
+    Returns
+    -------
+    attributes : dict of str
+        Numbers, or "raster"; nothing of what is None.
+
+    Examples
+    --------
+    >>> in_words(0.02, None)
+    {'soil': 0.02}
+    """
+    given = {"soil": soil, "moisture": moisture}
+    return {
+        name: "raster" if isinstance(value, xr.DataArray) else float(value)
+        for name, value in given.items()
+        if value is not None
+    }
+
+
 def _by_cell(name, value, lai):
     """A raster over (y, x), or a number, as one that broadcasts."""
     if not isinstance(value, xr.DataArray):

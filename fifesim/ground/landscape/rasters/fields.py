@@ -9,6 +9,8 @@ import numpy as np
 import xarray as xr
 from dask.graph_manipulation import clone
 
+from fifesim.base.arguments import check
+from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
 from fifesim.ground.landscape.correlations import flat, pairs_of
 from fifesim.ground.landscape.covariance import copula, correlated, field_seed
@@ -25,6 +27,11 @@ from fifesim.rasters.sites import made_on_site
 
 # The ground is known by at most so many rows and columns of it, evenly spaced.
 SAMPLED = 512
+
+_ARPS = Kind(
+    "a number for each field, such as {'lai': 0.15, 'soil': 0.24}",
+    lambda arps: all(isinstance(name, str) and NUMBER.fits(arp) for name, arp in arps.items()),
+)
 
 OF_ELEVATION = ("elevation", "wetness", "illumination", "slope")
 """What correlations may name of a landscape's elevation."""
@@ -77,6 +84,8 @@ def correlated_fields(grid, arps, correlations=None, *, seed=0, covariates=None,
     """
     grids.check_grid(grid)
     seed = check_seed(seed)
+    for name, arp in arps.items():
+        check("arps", {name: arp}, _ARPS)
     pairs = pairs_of(correlations, list(arps), list(covariates or {}))
     covariates = {name: each for name, each in (covariates or {}).items() if any(name in pair for pair in pairs)}
     covariates = {name: _on_grid(name, each, grid) for name, each in covariates.items()}
