@@ -13,7 +13,7 @@ from fifesim.base.arguments import check
 from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
 from fifesim.ground.landscape.correlations import flat, pairs_of
-from fifesim.ground.landscape.covariance import copula, correlated, field_seed
+from fifesim.ground.landscape.covariance import Copula, copula, correlated, field_seed
 from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 from fifesim.ground.landscape.field import TILE, streaming_field
 from fifesim.ground.terrain.rasters.drainage import wetness
@@ -295,15 +295,18 @@ def _noises_of(names, pairs):
 
 
 def _copula(arps, pairs, covariates, reference):
-    """How the fields are put together, as an array without dimensions; lazy where the ground is."""
+    """How the fields are put together; where the ground is lazy, as a lazy array without dimensions."""
     known = covariates if reference is None else {name: _referred(reference, name) for name in covariates}
     sizes = {each.shape for each in known.values()}
     if len(sizes) > 1:
         raise ValueError(f"the rasters of reference have different sizes, {sizes}: take all on one grid")
 
     def found(*samples):
+        return copula(arps, pairs, {name: each.ravel() for name, each in zip(known, samples, strict=True)})
+
+    def boxed(*samples):
         out = np.empty((), object)
-        out[()] = copula(arps, pairs, {name: each.ravel() for name, each in zip(known, samples, strict=True)})
+        out[()] = found(*samples)
         return out
 
     arrays = [each.data for each in known.values()]
@@ -311,8 +314,8 @@ def _copula(arps, pairs, covariates, reference):
     copies = iter(clone(*lazy) if (lazy := [each for each in arrays if isinstance(each, da.Array)]) else ())
     samples = [_evenly(next(copies) if isinstance(each, da.Array) else each) for each in arrays]
     if not lazy:
-        return xr.DataArray(found(*samples))
-    return xr.DataArray(da.from_delayed(dask.delayed(found)(*samples), (), dtype=object))
+        return found(*samples)
+    return xr.DataArray(da.from_delayed(dask.delayed(boxed)(*samples), (), dtype=object))
 
 
 def _referred(reference, name):
@@ -330,9 +333,14 @@ def _evenly(array):
 def _mixed(parts, name, noises, ground):
     """A field of its noises and of the ground."""
 
-    def kernel(made, *layers):
-        made = made.item() if isinstance(made, np.ndarray) else made
+    def kernel(*layers, made=None):
+        if made is None:
+            *layers, last = layers
+            made = last.item()
         own = dict(zip(noises, layers, strict=False))
         return correlated(made, name, own, dict(zip(ground, layers[len(own) :], strict=True)))
 
-    return chunking.pointwise(kernel, parts, *noises.values(), *ground.values())
+    layers = *noises.values(), *ground.values()
+    if isinstance(parts, Copula):
+        return chunking.pointwise(kernel, *layers, made=parts)
+    return chunking.pointwise(kernel, *layers, parts)
