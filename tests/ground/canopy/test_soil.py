@@ -34,7 +34,7 @@ def test_line_leads_from_the_wet_soil_to_the_dry():
     steps = (table["soil_dry"] - table["soil_wet"]).loc[places].to_numpy() / line
     np.testing.assert_allclose(steps, steps[0], rtol=2e-3)
     assert line[1] == pytest.approx(1, rel=2e-3)
-    # A brighter soil is more so in the near infrared than in the red: published soil lines have slopes of 1.1 to 1.3.
+    # A brighter soil is more so in the near infrared than in the red.
     red, near_infrared = soil_line(TM[2:4])
     assert near_infrared / red == pytest.approx(1.2, abs=0.02)
 
@@ -105,11 +105,11 @@ def test_surfaces_reflect_as_fresnel_says():
 
 
 def test_moisture_darkens_and_most_in_the_shortwave_infrared():
-    """A wet soil has about two thirds of a dry one's light in the visible, less where water absorbs."""
+    """Nearly alike where water is clear, which a third of the light is lost to, and more where it absorbs."""
     moisture = np.linspace(0, 1, 11)
     found = moistened(np.full(6, 0.3), moisture, water_films(TM)) / 0.3
     assert np.all(np.diff(found, axis=0) < 0)
-    tm1, tm2, tm3, tm4, tm5, tm7 = found[-1]
+    tm1, _, tm3, tm4, tm5, tm7 = found[-1]
     assert 0.6 < tm3 < 0.75 and abs(tm1 - tm4) < 0.01
     assert tm7 < tm5 < tm4
 

@@ -99,6 +99,18 @@ def test_what_follows_the_ground_correlates_exactly(places):
         assert np.mean(ground * scores) == pytest.approx(ASKED["lai", name], abs=1e-3)
 
 
+def test_ground_that_is_not_normal_together_is_followed_as_asked():
+    """Each is normal, and their sum is far from it: where one is beyond 1, the other is its mirror image."""
+    one = np.random.default_rng(8).standard_normal(20_000)
+    ground = {"elevation": one, "wetness": np.where(np.abs(one) < 1.0, one, -one)}
+    asked = {("lai", "elevation"): 0.5, ("lai", "wetness"): -0.3}
+    parts = copula({"lai": 0.1}, asked, ground)
+    follows = correlated(parts, "lai", {"lai": np.zeros(20_000)}, ground)
+    for (_, name), r in asked.items():
+        assert np.mean(follows * normal_scores(ground[name], parts.covariates[name])) == pytest.approx(r, abs=1e-3)
+    assert follows.std() == pytest.approx(parts.ground["lai"].share, rel=1e-3)
+
+
 def test_noises_of_other_arps_correlate_more():
     parts = copula(ARPS, {("lai", "soil"): -0.4})
     own, shared = parts.noise["soil"]["soil"], parts.noise["soil"]["lai"]

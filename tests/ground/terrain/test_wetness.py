@@ -104,3 +104,13 @@ def test_water_leaves_where_nothing_is_known(rough):
     np.testing.assert_array_equal(np.isnan(found), np.isnan(gap))
     area = drained_area(fill_pits(gap), 10.0, 10.0)
     assert np.isfinite(area).all()
+
+
+def test_water_parts_by_slope_to_a_power():
+    """From a top one metre above eight neighbours on cells of 10 m by 20 m, each as steep as it is near."""
+    top = np.zeros((3, 3))
+    top[1, 1] = 1.0
+    distance = np.hypot(10.0 * np.array([-1, 0, 1])[:, None], 20.0 * np.array([-1, 0, 1]))
+    share = np.where(distance > 0, (1 / np.where(distance > 0, distance, 1)) ** 1.1, 0.0)
+    expected = 200.0 * (1 + share / share.sum())
+    np.testing.assert_allclose(drained_area(top, 10.0, 20.0), expected, rtol=1e-12)

@@ -148,7 +148,7 @@ def test_window_with_the_reference_of_the_whole_is_a_slice(grid, ground, followi
 def test_elevation_is_asked_what_it_tells(grid, hills, following):
     from_hills = landscape_fields(grid, {"lai": 0.15, "soil": 0.24}, COVARY, seed=7, dem=hills)
     xr.testing.assert_identical(from_hills["lai"], following["lai"])
-    with pytest.raises(ValueError, match="covary names elevation, .* give dem="):
+    with pytest.raises(ValueError, match=r"covary names elevation, .* give dem="):
         landscape_fields(grid, {"lai": 0.15}, {"elevation": 0.3})
     with pytest.raises(ValueError, match="an elevation model says nothing of rain"):
         of_elevation(hills, ["rain"])
