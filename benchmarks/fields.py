@@ -27,9 +27,7 @@ def cases(cells):
     soil, moisture = 0.04 * score, 0.3 + 0.04 * score
 
     def fields(arps, correlations=None, covariates=None):
-        return lambda: fifesim.correlated_fields(
-            grid, arps, correlations, seed=next(seeds), covariates=covariates
-        )
+        return lambda: fifesim.correlated_fields(grid, arps, correlations, seed=next(seeds), covariates=covariates)
 
     def reflectance(**options):
         return lambda: lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE, **options)

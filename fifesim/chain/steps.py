@@ -100,8 +100,9 @@ def surface_reflectance(
 
     See Also
     --------
-    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil.moistened,
-    fifesim.ground.canopy.raster.level_reflectance, fifesim.ground.terrain.rasters.light.terrain_reflectance
+    fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.raster.level_reflectance,
+    fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil_water.moistened,
+    fifesim.ground.terrain.rasters.light.terrain_reflectance
     """
     if dem is None and horizon is not None:
         raise ValueError("a horizon stands around a dem: give dem= too")

@@ -9,28 +9,23 @@ import zlib
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from fifesim.base.seeds import check_seed, generator
 from fifesim.ground.landscape.autoregression import check_arp, field_variance
 from fifesim.ground.landscape.correlations import Impossible, largest_share, refused
+from fifesim.ground.landscape.scores import Scores, add_scores, normal_scores, score_table
 
 # First of the streams of random numbers that are named after fields.
 _STREAM = 2**50
 
-# Of a table of ranks; ground between two nodes is interpolated.
-_NODES = 2049
-
-# The ranks of what several properties of the ground make together bend it a little; the weights are mended so often.
+# The ranks of what several properties of the ground make together bend it a little; the weights are mended
+# at most so often, until correlations are so close.
 _ROUNDS = 30
-_CLOSE = 1e-9
+_CLOSE = 1e-4
 
-
-class Scores(NamedTuple):
-    """Standard normal scores of values: what ranks among all of a sample make of them."""
-
-    values: np.ndarray
-    scores: np.ndarray
+# What is left of a correlation may be so far from what is asked.
+_APART = 0.01
 
 
 class Ground(NamedTuple):
@@ -110,63 +105,6 @@ def cross_correlation(arp, other):
         return 1.0
     one, two = (a * 2 / np.pi * special.ellipk((4 * a) ** 2) for a in (arp, other))
     return float((one - two) / (arp - other) / np.sqrt(field_variance(arp) * field_variance(other)))
-
-
-def score_table(sample):
-    """
-    Standard normal scores of the values of a sample.
-
-    Parameters
-    ----------
-    sample : array, shape (n,)
-        Without NaN.
-
-    Returns
-    -------
-    scores : Scores
-        Of mean 0 and standard deviation 1 over the sample; equal values share the mean of their ranks.
-
-    Raises
-    ------
-    ValueError
-        If all values are the same.
-
-    Examples
-    --------
-    >>> score_table(np.arange(9.0)).scores.round(2).tolist()
-    [-1.71, -1.04, -0.63, -0.3, 0.0, 0.3, 0.63, 1.04, 1.71]
-    """
-    values, counts = np.unique(sample, return_counts=True)
-    if values.size < 2:
-        raise ValueError("is the same everywhere: nothing can follow it")
-    scores = stats.norm.ppf((np.cumsum(counts) - counts / 2) / counts.sum())
-    mean = np.average(scores, weights=counts)
-    scores = (scores - mean) / np.sqrt(np.average((scores - mean) ** 2, weights=counts))
-    kept = np.unique(np.linspace(0, values.size - 1, _NODES).round().astype(int))
-    return Scores(values[kept], scores[kept])
-
-
-def normal_scores(values, scores):
-    """
-    Scores of values by a table; beyond it those of its ends.
-
-    Parameters
-    ----------
-    values : array
-        NaN gives NaN.
-    scores : Scores
-
-    Returns
-    -------
-    scores : array, shape of values
-        [1]
-
-    Examples
-    --------
-    >>> normal_scores(np.array([-5.0, 4.0]), score_table(np.arange(9.0))).round(2).tolist()
-    [-1.71, 0.0]
-    """
-    return np.interp(values, *scores)
 
 
 def copula(arps, correlations, samples=None):
@@ -252,23 +190,28 @@ def _follow(name, asked, scores):
     known = np.stack([scores[each] for each in asked])
     between = np.atleast_2d(np.corrcoef(known))
     wanted = np.array(list(asked.values()))
-    target = wanted.copy()
+    if not wanted.any():
+        return Ground(tuple(asked), wanted, score_table(np.array([-1.0, 1.0])), 0.0), np.zeros(known.shape[1])
+    best, target, step = None, wanted, 1.0
     for _ in range(_ROUNDS):
         weights = np.linalg.lstsq(between, target, rcond=1e-9)[0]
         share = np.sqrt(max(float(target @ weights), 0.0))
-        if share == 0.0:
-            return Ground(tuple(asked), weights, Scores(np.array([0.0, 1.0]), np.zeros(2)), 0.0), np.zeros(
-                known.shape[1]
-            )
         if share > 1 + 1e-9 or np.abs(between @ weights - target).max() > 1e-6:
             raise Impossible(f"{name} cannot follow all of {', '.join(asked)} so closely, which correlate themselves")
         table = score_table(weights @ known)
-        signal = normal_scores(weights @ known, table)
-        missed = wanted - share * np.mean(signal * known, axis=1)
-        if np.abs(missed).max() < _CLOSE or len(asked) == 1:
+        signal = share * normal_scores(weights @ known, table)
+        missed = wanted - np.mean(signal * known, axis=1)
+        if best is None or np.abs(missed).max() < np.abs(best[0]).max():
+            best = missed, target, Ground(tuple(asked), weights, table, min(share, 1.0)), signal
+        else:
+            step /= 2
+        if np.abs(best[0]).max() < _CLOSE or len(asked) == 1:
             break
-        target = target + missed
-    return Ground(tuple(asked), weights, table, min(share, 1.0)), share * signal
+        target = best[1] + step * best[0]
+    missed, _, ground, signal = best
+    if np.abs(missed).max() > _APART and len(asked) > 1:
+        raise Impossible(f"no sum of {', '.join(asked)} has such ranks that {name} follows each of them")
+    return ground, signal
 
 
 def _noise_correlation(one, other, r, arps, ground, signals):
@@ -324,6 +267,9 @@ def correlated(parts, name, noises, covariates):
     if name not in parts.ground:
         return noise
     ground = parts.ground[name]
-    known = (normal_scores(covariates[each], parts.covariates[each]) for each in ground.covariates)
-    signal = sum(weight * each for weight, each in zip(ground.weights, known, strict=True))
-    return ground.share * normal_scores(signal, ground.scores) + np.sqrt(1 - ground.share**2) * noise
+    signal = np.zeros(noise.size)
+    for weight, each in zip(ground.weights, ground.covariates, strict=True):
+        add_scores(covariates[each], parts.covariates[each], weight, signal)
+    field = np.sqrt(1 - ground.share**2) * np.ravel(noise)
+    add_scores(signal, ground.scores, ground.share, field)
+    return field.reshape(noise.shape)

@@ -10,9 +10,8 @@ from fifesim.ground.landscape.covariance import (
     correlated,
     cross_correlation,
     field_seed,
-    normal_scores,
-    score_table,
 )
+from fifesim.ground.landscape.scores import normal_scores, score_table
 
 ARPS = {"lai": 0.15, "soil": 0.24, "moisture": 0.05}
 
@@ -44,20 +43,6 @@ def test_cross_correlation_is_that_of_the_spectra(one, other):
 
 def test_cross_correlation_of_nearly_equal_arps_is_nearly_one():
     assert cross_correlation(0.2, 0.2 + 2e-7) == pytest.approx(1, abs=1e-6)
-
-
-def test_scores_are_normal_whatever_the_values(places):
-    for values in (places["elevation"], places["wetness"]):
-        scores = normal_scores(values, score_table(values))
-        assert stats.kstest(scores, "norm").statistic < 1e-3
-        assert stats.spearmanr(scores, values).statistic == pytest.approx(1, abs=1e-9)
-
-
-def test_values_that_are_shared_have_one_score():
-    table = score_table(np.array([0.0, 0.0, 0.0, 1.0, 2.0]))
-    assert table.values.tolist() == [0, 1, 2]
-    scores = normal_scores(np.array([0.0, 0.0, 0.0, 1.0, 2.0]), table)
-    assert scores.mean() == pytest.approx(0, abs=1e-12) and scores.std() == pytest.approx(1, abs=1e-12)
 
 
 def test_ground_that_is_level_is_followed_by_nothing():
@@ -103,12 +88,14 @@ def test_ground_that_is_not_normal_together_is_followed_as_asked():
     """Each is normal, and their sum is far from it: where one is beyond 1, the other is its mirror image."""
     one = np.random.default_rng(8).standard_normal(20_000)
     ground = {"elevation": one, "wetness": np.where(np.abs(one) < 1.0, one, -one)}
-    asked = {("lai", "elevation"): 0.5, ("lai", "wetness"): -0.3}
+    asked = {("lai", "elevation"): 0.3, ("lai", "wetness"): 0.1}
     parts = copula({"lai": 0.1}, asked, ground)
     follows = correlated(parts, "lai", {"lai": np.zeros(20_000)}, ground)
     for (_, name), r in asked.items():
         assert np.mean(follows * normal_scores(ground[name], parts.covariates[name])) == pytest.approx(r, abs=1e-3)
     assert follows.std() == pytest.approx(parts.ground["lai"].share, rel=1e-3)
+    with pytest.raises(ValueError, match="no sum of elevation, wetness has such ranks that lai follows each"):
+        copula({"lai": 0.1}, {("lai", "elevation"): 0.4, ("lai", "wetness"): 0.3}, ground)
 
 
 def test_noises_of_other_arps_correlate_more():

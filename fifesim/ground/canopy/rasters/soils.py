@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 
 from fifesim.ground.canopy import optics
-from fifesim.ground.canopy.soil import brightened, moistened, soil_line, water_films
+from fifesim.ground.canopy.soil import brightened, soil_line
+from fifesim.ground.canopy.soil_water import moistened, water_films
 from fifesim.ground.canopy.spectra import Spectrum, check_shares, is_mixture
 from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
@@ -85,7 +86,7 @@ def as_it_lies(bands, below, lai, soil=None, moisture=None):
 
     See Also
     --------
-    fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil.moistened
+    fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil_water.moistened
     """
     given = {name: value for name, value in (("soil", soil), ("moisture", moisture)) if value is not None}
     if not given:

@@ -1,7 +1,6 @@
 """Fields that correlate, on labelled rasters."""
 
 from collections.abc import Mapping
-from functools import partial
 
 import dask
 import dask.array as da
@@ -14,7 +13,6 @@ from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
 from fifesim.ground.landscape.correlations import flat, pairs_of
 from fifesim.ground.landscape.covariance import Copula, copula, correlated, field_seed
-from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 from fifesim.ground.landscape.field import TILE, streaming_field
 from fifesim.ground.terrain.rasters.drainage import wetness
 from fifesim.ground.terrain.rasters.light import illumination
@@ -26,7 +24,7 @@ from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.sites import made_on_site
 
 # The ground is known by at most so many rows and columns of it, evenly spaced.
-SAMPLED = 512
+SAMPLED = 256
 
 _ARPS = Kind(
     "a number for each field, such as {'lai': 0.15, 'soil': 0.24}",
@@ -76,7 +74,7 @@ def correlated_fields(grid, arps, correlations=None, *, seed=0, covariates=None,
     Notes
     -----
     Correlations are those of standard normal scores at the same cell. The scores of the ground are by rank among at
-    most 512 x 512 evenly spaced cells; where it is lazy, these are computed apart, so that none waits in memory.
+    most 256 x 256 evenly spaced cells; where it is lazy, these are computed apart, so that none waits in memory.
 
     See Also
     --------
@@ -187,70 +185,6 @@ def of_elevation(dem, names, *, geometry=None, time=None):
     if unknown:
         raise ValueError(f"an elevation model says nothing of {', '.join(unknown)}: it has {', '.join(make)}")
     return {name: make[name]() for name in names}
-
-
-def with_distribution(field, quantity, distribution):
-    """
-    A standard normal field as one of another distribution, by its quantiles.
-
-    Parameters
-    ----------
-    field : xarray.DataArray, dims (y, x)
-        From `correlated_fields`.
-    quantity : str
-        What it becomes: "lai", "moisture", or another key of `fifesim.rasters.cf.QUANTITIES`.
-    distribution : frozen scipy distribution
-        Without negative values.
-
-    Returns
-    -------
-    values : xarray.DataArray, dims (y, x)
-        Lazy where the field is.
-
-    See Also
-    --------
-    fifesim.ground.landscape.distribution.quantile_map
-    """
-    if distribution.support()[0] < -1e-12:
-        raise ValueError(
-            f"{quantity} cannot be negative, got a distribution from {distribution.support()[0]:g} up: truncate it, "
-            "for instance scipy.stats.truncnorm"
-        )
-    values = chunking.pointwise(partial(quantile_map, table=quantile_table(distribution)), field)
-    return _labelled(values, field, quantity, f"{quantity}: by quantiles")
-
-
-def with_deviation(field, quantity, deviation):
-    """
-    A standard normal field times a standard deviation.
-
-    Parameters
-    ----------
-    field : xarray.DataArray, dims (y, x)
-        From `correlated_fields`.
-    quantity : str
-        Such as "soil".
-    deviation : float
-        Not negative.
-
-    Returns
-    -------
-    values : xarray.DataArray, dims (y, x)
-        Lazy where the field is.
-
-    Raises
-    ------
-    ValueError
-        If the deviation is negative.
-    """
-    if not 0 <= deviation < np.inf:
-        raise ValueError(f"the standard deviation of {quantity} must not be negative, got {deviation:g}")
-    return _labelled(field * float(deviation), field, quantity, f"{quantity}: standard deviation {deviation:g}")
-
-
-def _labelled(values, field, quantity, said):
-    placed = grids.place(values, grids.geobox(field))
-    return cf.label(placed, quantity, source=field, history=said)
 
 
 def _on_grid(name, raster, grid):

@@ -8,14 +8,12 @@ from scipy import stats
 
 import fifesim
 from fifesim.ground.landscape.autoregression import response
-from fifesim.ground.landscape.covariance import normal_scores, score_table
 from fifesim.ground.landscape.rasters.fields import (
     correlated_fields,
     landscape_fields,
     of_elevation,
-    with_deviation,
-    with_distribution,
 )
+from fifesim.ground.landscape.scores import normal_scores, score_table
 from fifesim.rasters import cf
 
 ARPS = {"lai": 0.15, "soil": 0.24, "moisture": 0.05}
@@ -76,14 +74,6 @@ def test_each_keeps_its_own_scale(fields):
         power = response(arp, u[:, None], u) ** 2
         expected = np.mean(power * np.cos(u)) / power.mean()
         assert found == pytest.approx(expected, abs=4 * standard_error(arp, arp, z.size))
-
-
-def test_leaf_area_alone_is_that_of_the_scene(grid, fields):
-    """Whatever else there is, the field of the name lai has the seed's own noise."""
-    scene = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
-    lai = with_distribution(fields["lai"], "lai", fifesim.lai_distribution("burned-grazed"))
-    np.testing.assert_array_equal(lai, scene)
-    assert lai.attrs["standard_name"] == "leaf_area_index" and lai.attrs["site"] == "FIFE"
 
 
 def test_a_name_has_the_same_field_beside_any_others(grid, fields):
@@ -160,16 +150,6 @@ def test_missing_ground_is_missing_by_cell(grid, ground):
     found = landscape_fields(grid, {"lai": 0.1, "soil": 0.1}, {"elevation": 0.5}, covariates={"elevation": hole})
     assert int(np.isnan(found["lai"]).sum()) == 1 and np.isnan(found["lai"][3, 4])
     assert not np.isnan(found["soil"]).any()
-
-
-def test_deviation_scales(fields):
-    soil = with_deviation(fields["soil"], "soil", 0.04)
-    np.testing.assert_array_equal(soil, fields["soil"] * 0.04)
-    assert soil.name == "soil" and soil.attrs["units"] == "1" and soil.attrs["arp"] == 0.24
-    with pytest.raises(ValueError, match="deviation of soil must not be negative"):
-        with_deviation(fields["soil"], "soil", -0.1)
-    with pytest.raises(ValueError, match="moisture cannot be negative"):
-        with_distribution(fields["moisture"], "moisture", stats.norm(0.3, 0.1))
 
 
 @pytest.mark.parametrize(
