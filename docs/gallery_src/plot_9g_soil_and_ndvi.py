@@ -2,8 +2,8 @@
 Soil and NDVI
 =============
 
-Soils that are brighter or darker below the same leaves, and moist ones: what they do to red and near infrared light, and
-to a line of leaf area on NDVI.
+Soils that are brighter or darker below the same leaves, and moist ones: what they do to red and near infrared light,
+and to a line of leaf area on NDVI.
 """
 
 import matplotlib.pyplot as plt
@@ -16,8 +16,8 @@ bands = ["TM3", "TM4"]
 colors = plt.get_cmap("YlGn")(np.linspace(0.3, 1, 6))
 
 # %%
-# A small raster: leaf area from row to row, and soil from column to column. On bare ground, below, the points lie on the
-# soil line; leaves lift them off it. Lines of one leaf area do not run through the origin as those of one NDVI do.
+# A small raster: leaf area from row to row, and soil from column to column. Bare ground, the lowest line, is the soil
+# line; leaves lift the others off it. Lines of one leaf area do not run through the origin as those of one NDVI do.
 
 grid = fifesim.fife_site(cell=30, window=((0, 6), (0, 41)))
 lai = fifesim.lai_scene(grid, seed=7).drop_attrs(deep=False)

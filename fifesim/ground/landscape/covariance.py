@@ -262,14 +262,17 @@ def correlated(parts, name, noises, covariates):
     field : array, shape (y, x)
         Standard normal over the places that the ground was sampled at; NaN where the ground is. [1]
     """
-    weights = parts.noise[name]
-    noise = sum(weight * noises[other] for other, weight in weights.items())
+    (first, weight), *others = parts.noise[name].items()
+    noise = weight * noises[first]
+    for other, weight in others:
+        noise += weight * noises[other]
     if name not in parts.ground:
         return noise
     ground = parts.ground[name]
     signal = np.zeros(noise.size)
     for weight, each in zip(ground.weights, ground.covariates, strict=True):
         add_scores(covariates[each], parts.covariates[each], weight, signal)
-    field = np.sqrt(1 - ground.share**2) * np.ravel(noise)
+    field = np.ravel(noise)
+    field *= np.sqrt(1 - ground.share**2)
     add_scores(signal, ground.scores, ground.share, field)
     return field.reshape(noise.shape)

@@ -112,7 +112,8 @@ def as_it_lies(bands, below, lai, soil=None, moisture=None):
         below = xr.DataArray(below, dims="band")
     changes = [_by_cell(name, value, lai) for name, value in given.items()]
     out = chunking.pointwise(kernel, below.drop_vars("band", errors="ignore"), *changes, bands=len(names))
-    return out.drop_attrs(deep=False).rename("background").assign_coords(band=names)
+    out.attrs = {}
+    return out.rename("background").assign_coords(band=names)
 
 
 def in_words(soil, moisture):

@@ -196,8 +196,7 @@ def _on_grid(name, raster, grid):
             f"{name} lies on another grid, {grids.in_words(grids.geobox(raster))}, than the fields, "
             f"{grids.in_words(grid)}: bring it onto theirs first"
         )
-    plain = raster.drop_vars(set(raster.coords) - {"y", "x", "spatial_ref"})
-    return grids.place(plain.drop_attrs(deep=False).rename(name), grid)
+    return grids.place(xr.DataArray(raster.data, dims=("y", "x"), name=name), grid)
 
 
 def _noise(grid, arp, seed, name, chunks):
