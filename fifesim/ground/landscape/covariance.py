@@ -241,19 +241,20 @@ def _lower(matrix):
     return out
 
 
-def correlated(parts, name, noises, covariates):
+def correlated(ground, noise, scores, covariates):
     r"""
     A field: what follows the ground, and noise.
 
-    .. math:: z = R \, s + \sqrt{1 - R^2} \, \sum_j l_j z_j
+    .. math:: z = R \, s + \sqrt{1 - R^2} \, n
 
     Parameters
     ----------
-    parts : Copula
-    name : str
+    ground : Ground
         Of the field.
-    noises : dict of str to array, shape (y, x)
-        Standard normal fields of the field's own arp, of the seeds of the fields in ``parts.noise[name]``.
+    noise : array, shape (y, x)
+        Standard normal field :math:`n` of the field's own arp.
+    scores : dict of str to fifesim.ground.landscape.scores.Scores
+        Of the ground.
     covariates : dict of str to array, shape (y, x)
         The ground.
 
@@ -262,17 +263,9 @@ def correlated(parts, name, noises, covariates):
     field : array, shape (y, x)
         Standard normal over the places that the ground was sampled at; NaN where the ground is. [1]
     """
-    (first, weight), *others = parts.noise[name].items()
-    noise = weight * noises[first]
-    for other, weight in others:
-        noise += weight * noises[other]
-    if name not in parts.ground:
-        return noise
-    ground = parts.ground[name]
     signal = np.zeros(noise.size)
     for weight, each in zip(ground.weights, ground.covariates, strict=True):
-        add_scores(covariates[each], parts.covariates[each], weight, signal)
-    field = np.ravel(noise)
-    field *= np.sqrt(1 - ground.share**2)
+        add_scores(covariates[each], scores[each], weight, signal)
+    field = np.sqrt(1 - ground.share**2) * np.ravel(noise)
     add_scores(signal, ground.scores, ground.share, field)
     return field.reshape(noise.shape)

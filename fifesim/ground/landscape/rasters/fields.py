@@ -1,6 +1,7 @@
 """Fields that correlate, on labelled rasters."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import dask
 import dask.array as da
@@ -13,7 +14,7 @@ from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
 from fifesim.ground.landscape.correlations import flat, pairs_of
 from fifesim.ground.landscape.covariance import Copula, copula, correlated, field_seed
-from fifesim.ground.landscape.field import TILE, streaming_field
+from fifesim.ground.landscape.field import TILE, mixed_field
 from fifesim.ground.terrain.rasters.drainage import wetness
 from fifesim.ground.terrain.rasters.light import illumination
 from fifesim.ground.terrain.rasters.slopes import slope
@@ -90,14 +91,10 @@ def correlated_fields(grid, arps, correlations=None, *, seed=0, covariates=None,
     like = next((each.data for each in covariates.values() if each.chunks is not None), None)
     chunks = dict(zip("yx", like.chunks, strict=True)) if chunks is None and like is not None else chunks
     parts = _copula(arps, pairs, covariates, reference)
-    mixture = _noises_of(list(arps), pairs)
-    needed = {(other, arps[name]) for name, others in mixture.items() for other in others}
-    noises = {(other, arp): _noise(grid, arp, seed, other, chunks) for other, arp in needed}
     fields = {}
-    for name, others in mixture.items():
-        own = {other: noises[other, arps[name]] for other in others}
+    for name in arps:
         ground = {other: covariates[other] for other in covariates if (name, other) in pairs}
-        field = own[name] if len(own) == 1 and not ground else _mixed(parts, name, own, ground)
+        field = _field(grid, arps[name], name, {each: field_seed(seed, each) for each in arps}, parts, ground, chunks)
         said = f"correlated_fields: {name}, arp {arps[name]:g}, seed {seed}"
         said += "".join(f", {one}-{other} {r:g}" for (one, other), r in pairs.items() if name in (one, other))
         made = {"arp": float(arps[name]), "rng_seed": str(seed), **made_on_site(grid)}
@@ -199,32 +196,35 @@ def _on_grid(name, raster, grid):
     return grids.place(xr.DataArray(raster.data, dims=("y", "x"), name=name), grid)
 
 
-def _noise(grid, arp, seed, name, chunks):
-    """Field of one arp, and of the noise of a name."""
+def _field(grid, arp, name, seeds, parts, ground, chunks):
+    """One field, of the noises that are in it and of the ground that it follows."""
     row, column = grids.lattice_position(grid)
-    seed = field_seed(seed, name)
 
-    def cells(first_row, first_column, shape):
-        return streaming_field(seed, arp, row + first_row, column + first_column, shape)
+    def noise(made, first_row, first_column, shape):
+        weights = {seeds[other]: weight for other, weight in made.noise[name].items()}
+        return mixed_field(weights, arp, row + first_row, column + first_column, shape)
 
-    # A first window raises what streaming_field refuses before anything lazy is built.
-    cells(0, 0, (0, 0))
-    return places.tiles(cells, grid, chunks, tile=TILE)
+    if isinstance(parts, Copula) and not ground:
+        # A first window raises what is refused before anything lazy is built.
+        noise(parts, 0, 0, (0, 0))
+        return places.tiles(partial(noise, parts), grid, chunks, tile=TILE)
 
+    def kernel(rows, columns, *layers, made=None):
+        if made is None:
+            *layers, last = layers
+            made = last.item()
+        cells = noise(made, int(rows.flat[0]), int(columns.flat[0]), (rows.size, columns.size))
+        if not ground:
+            return cells
+        return correlated(made.ground[name], cells, made.covariates, dict(zip(ground, layers, strict=True)))
 
-def _noises_of(names, pairs):
-    """For each field the fields whose noise may be in it: those that a triangular root of the matrix fills."""
-    filled = {name: {name} for name in names}
-    for one, other in pairs:
-        if one in filled and other in filled:
-            first, second = sorted((one, other), key=names.index)
-            filled[second].add(first)
-    for i, name in enumerate(names):
-        later = [other for other in names[i + 1 :] if name in filled[other]]
-        for k, other in enumerate(later):
-            for last in later[k + 1 :]:
-                filled[last].add(other)
-    return filled
+    at = [xr.DataArray(np.arange(size), dims=axis) for axis, size in zip("yx", grid.shape, strict=True)]
+    if chunks is not None:
+        sizes = places.chunk_sizes(grid, chunks, tile=TILE)
+        at = [each.chunk({axis: part}) for each, axis, part in zip(at, "yx", sizes, strict=True)]
+    if isinstance(parts, Copula):
+        return chunking.pointwise(kernel, *at, *ground.values(), made=parts)
+    return chunking.pointwise(kernel, *at, *ground.values(), parts)
 
 
 def _copula(arps, pairs, covariates, reference):
@@ -261,19 +261,3 @@ def _evenly(array):
     steps = (max(1, -(-size // SAMPLED)) for size in array.shape)
     rows, columns = (slice(None, None, step) for step in steps)
     return array[rows, columns]
-
-
-def _mixed(parts, name, noises, ground):
-    """A field of its noises and of the ground."""
-
-    def kernel(*layers, made=None):
-        if made is None:
-            *layers, last = layers
-            made = last.item()
-        own = dict(zip(noises, layers, strict=False))
-        return correlated(made, name, own, dict(zip(ground, layers[len(own) :], strict=True)))
-
-    layers = *noises.values(), *ground.values()
-    if isinstance(parts, Copula):
-        return chunking.pointwise(kernel, *layers, made=parts)
-    return chunking.pointwise(kernel, *layers, parts)
