@@ -166,7 +166,7 @@ def moistened(dry, moisture, films):
     Notes
     -----
     Absorption is the mean of what films let pass over a band, and the dry soil is taken as flat in it. The surface of
-    the water reflects 2 %: a soil darker than 3 % becomes brighter. More than six films count as six.
+    the water reflects 2 %: a soil darker than 4 % becomes brighter. More than six films count as six.
 
     References
     ----------

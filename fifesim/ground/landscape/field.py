@@ -63,7 +63,7 @@ def streaming_field(seed, arp, row, column, shape):
     >>> bool((streaming_field(7, 0.15, 10, 20, (5, 6)) == whole[10:15, 20:26]).all())
     True
     """
-    return mixed_field({seed: 1.0}, arp, row, column, shape)
+    return mixed_field({check_seed(seed): 1.0}, arp, row, column, shape)
 
 
 def mixed_field(weights, arp, row, column, shape):

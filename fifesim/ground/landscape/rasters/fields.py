@@ -243,8 +243,10 @@ def _copula(arps, pairs, covariates, reference):
         return out
 
     arrays = [each.data for each in known.values()]
-    # A copy of the graph: else all that is sampled would wait in memory for the last sample.
-    copies = iter(clone(*lazy) if (lazy := [each for each in arrays if isinstance(each, da.Array)]) else ())
+    lazy = [each for each in arrays if isinstance(each, da.Array)]
+    # A copy of the graph: else all that is sampled would wait in memory for the last sample. Of one array dask gives
+    # one, of more a tuple.
+    copies = iter((clone(*lazy),) if len(lazy) == 1 else clone(*lazy) if lazy else ())
     samples = [_evenly(next(copies) if isinstance(each, da.Array) else each) for each in arrays]
     if not lazy:
         return found(*samples)

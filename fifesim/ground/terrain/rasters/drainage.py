@@ -3,6 +3,7 @@
 import dask.array as da
 import numpy as np
 import xarray as xr
+from dask.graph_manipulation import clone
 from scipy import ndimage
 
 from fifesim.ground.terrain.rasters.dem import elevation_grid, source_resolution
@@ -40,7 +41,8 @@ def wetness(dem, *, resolution=None):
 
     Notes
     -----
-    All places are in memory together when it computes: 1.2 percent of the cells of 3.33 m where the source has 30 m.
+    All places are in memory together when it computes: 1.2 percent of the cells of 3.33 m where the source has 30 m. A
+    lazy elevation is computed twice, for the places and for the cells, so that none of it waits in memory.
 
     See Also
     --------
@@ -76,5 +78,6 @@ def _at_places(data, places):
 
     if not isinstance(data, da.Array):
         return index(np.asarray(data[np.ix_(rows, columns)], float))
-    samples = data[rows][:, columns].rechunk(-1)
+    # A copy of the graph: else all elevation would wait in memory for the last place.
+    samples = clone(data)[rows][:, columns].rechunk(-1)
     return samples.map_blocks(index, dtype=float, meta=np.empty((0, 0)))

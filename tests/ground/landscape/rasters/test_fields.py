@@ -125,6 +125,15 @@ def test_lazy_ground_makes_lazy_fields_of_the_same_bits(grid, ground, following)
         xr.testing.assert_identical(field.compute(), following[name])
 
 
+def test_one_lazy_property_beside_others_in_memory(grid, ground):
+    asked = {"elevation": 0.3, "wetness": 0.4}
+    expected = landscape_fields(grid, {"lai": 0.15}, asked, seed=7, covariates=ground)["lai"]
+    mixed = ground | {"elevation": in_chunks(ground["elevation"], {"y": 250, "x": 333})}
+    found = landscape_fields(grid, {"lai": 0.15}, asked, seed=7, covariates=mixed)["lai"]
+    assert found.chunks is not None
+    xr.testing.assert_identical(found.compute(), expected)
+
+
 def test_window_with_the_reference_of_the_whole_is_a_slice(grid, ground, following):
     window = (slice(200, 300), slice(50, 222))
     part = landscape_fields(
