@@ -15,6 +15,7 @@ from .rasters.sun import sun_position as sun_position
 # Ground
 from .ground.landscape.raster import lai_scene as lai_scene
 from .ground.landscape.raster import open_lai as open_lai
+from .ground.landscape.rasters.fields import correlated_fields as correlated_fields
 from .ground.landscape.distribution import lai_distribution as lai_distribution
 from .ground.landscape.distribution import treatments as treatments
 from .ground.landscape.autoregression import correlation_length as correlation_length
@@ -34,6 +35,7 @@ from .ground.terrain.rasters.elevation import source_dem as source_dem
 from .ground.terrain.rasters.hills import flint_hills as flint_hills
 from .ground.terrain.rasters.slopes import slope as slope  # method
 from .ground.terrain.rasters.slopes import aspect as aspect  # method
+from .ground.terrain.rasters.drainage import wetness as wetness  # method
 from .ground.terrain.rasters.sky import horizon as horizon  # method
 from .ground.terrain.rasters.light import sky_view as sky_view  # method
 from .ground.terrain.rasters.light import terrain_view as terrain_view  # method

@@ -26,15 +26,16 @@ from fifesim.rasters.dates import by_date
 
 _DEFAULTS = {"leaf_optics": None, "background": None, "leaf_angles": "spherical", "hotspot": 0.0}
 _DEFAULTS |= {"brown": 0.0, "dissociation": 0.0, "brown_leaf": None, "crown_cover": 1.0, "crown_shape": SHAPE}
+_DEFAULTS |= {"soil": None, "moisture": None}
 """Of what a canopy is told, where nothing is said."""
 
 _OF_CLASS = {"leaf_optics": "leaf"}
 """What `surface_reflectance` and `CoverClass` call by different names."""
 
-_BY_BAND = ("leaf_optics", "background", "brown_leaf")
-"""What is resolved into numbers of each band."""
+_RESOLVED = ("leaf_optics", "background", "brown_leaf", "soil", "moisture")
+"""What is resolved into numbers of each band, or what makes them."""
 
-_OF_CELLS = ("brown", "dissociation", "crown_cover")
+_OF_CELLS = ("brown", "dissociation", "crown_cover", "soil", "moisture")
 """Variables of a landscape that say what its canopy is in each cell."""
 
 
@@ -108,15 +109,24 @@ def level_reflectance(land, bands, canopy, *, exact, **scene):
     optics = _Optics(responses, land.lai, exact)
     _check_used(land, canopy)
     if land.cover is None:
-        return ground.level_reflectance(land.lai, **optics.of({**canopy, **land.cells}), **named, exact=exact, **scene)
+        told = {**canopy, **land.cells}
+        scene |= soils.in_words(told["soil"], told["moisture"])
+        return ground.level_reflectance(land.lai, **optics.of(told), **named, exact=exact, **scene)
     canopies = {each.code: optics.of(_told(each, canopy, land.cells)) for each in land.classes}
+    scene |= soils.in_words(*({**canopy, **land.cells}[name] for name in ("soil", "moisture")))
     return reflectance_of_classes(land.lai, land.cover, canopies, **named, exact=exact, **scene)
 
 
 def _told(kind, canopy, cells):
     """What is said of the canopy of a class: by the cells, else by itself, else by the call."""
     own = {name: getattr(kind, _OF_CLASS.get(name, name)) for name in canopy}
-    return {name: canopy[name] if own[name] is None else own[name] for name in canopy} | dict(cells)
+    said = {name: canopy[name] if own[name] is None else own[name] for name in canopy}
+    return said | _of_cells(canopy, cells)
+
+
+def _of_cells(canopy, cells):
+    """What cells say of that which is asked of a canopy."""
+    return {name: each for name, each in cells.items() if name in canopy}
 
 
 class _Optics:
@@ -134,9 +144,18 @@ class _Optics:
         if isinstance(canopy["brown"], xr.DataArray) or canopy["brown"] != 0:
             given = DEAD_LEAF if canopy["brown_leaf"] is None else canopy["brown_leaf"]
             dead = self._once("leaf_optics", leaves.leaf_optics, given, exact=self._exact)
-        others = {name: value for name, value in canopy.items() if name not in _BY_BAND}
-        by_band = {"leaf_reflectance": leaf[0], "leaf_transmittance": leaf[1], "background": below}
-        return {**by_band, "brown_optics": dead, **others}
+        others = {name: value for name, value in canopy.items() if name not in _RESOLVED}
+        by_band = {"leaf_reflectance": leaf[0], "leaf_transmittance": leaf[1], "brown_optics": dead}
+        return {**by_band, **self._below(below, canopy["soil"], canopy["moisture"]), **others}
+
+    def _below(self, dry, soil, moisture):
+        """Background, and what makes that of each cell of it."""
+        if any(isinstance(each, xr.DataArray) for each in (soil, moisture)):
+            key = "soil", id(soil), id(moisture)
+            if key not in self._known:
+                self._known[key] = soils.soil_kernel(self._responses, self._lai, soil, moisture)
+            return {"background": dry, "soil_changes": self._known[key]}
+        return {"background": soils.as_it_lies(self._responses, dry, self._lai, soil, moisture)}
 
     def _once(self, name, function, given, **options):
         # What is given is kept beside, so that its identity stays its own.
@@ -221,7 +240,7 @@ def fpar(
     canopy = {"leaf_angles": leaf_angles, "brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
     _check_used(land, canopy)
     if land.cover is None:
-        return ground.fpar(land.lai, **said, **{**canopy, **land.cells})
+        return ground.fpar(land.lai, **said, **(canopy | _of_cells(canopy, land.cells)))
     told = {each.code: _told(each, canopy, land.cells) for each in land.classes}
     # Of classes with the same canopy once.
     made = {repr(each): ground.fpar(land.lai, **said, **each) for each in {repr(v): v for v in told.values()}.values()}

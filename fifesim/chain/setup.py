@@ -16,6 +16,7 @@ from fifesim.sensor.description.instruments import Instrument
 # What surface_reflectance and sense take of a setup, by the same names.
 _GROUND = ("bands", "dem", "horizon", "upwelling", "atmosphere", "leaf_optics", "background", "leaf_angles", "hotspot")
 _GROUND += ("brown", "dissociation", "brown_leaf", "crown_cover", "crown_shape")
+_GROUND += ("soil", "moisture")
 _SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
 
 
@@ -33,7 +34,7 @@ class Setup:
         By default midlatitude summer, continental aerosol, 45 km visibility.
     geometry : Geometry or xarray.Dataset, optional
         Of sun and sensor; by default that of the leaf area, else the paper's.
-    leaf_optics, background, leaf_angles, hotspot : optional
+    leaf_optics, background, soil, moisture, leaf_angles, hotspot : optional
         As in `fifesim.surface_reflectance`.
     brown, dissociation, brown_leaf, crown_cover, crown_shape : optional
         As in `fifesim.surface_reflectance`.
@@ -53,6 +54,8 @@ class Setup:
     geometry: Geometry | xr.Dataset | None = None
     leaf_optics: object = None
     background: object = None
+    soil: float | xr.DataArray | None = None
+    moisture: float | xr.DataArray | None = None
     leaf_angles: object = "spherical"
     hotspot: float = 0.0
     brown: float | xr.DataArray = 0.0

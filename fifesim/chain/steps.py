@@ -29,6 +29,8 @@ def surface_reflectance(
     time=None,
     leaf_optics=None,
     background=None,
+    soil=None,
+    moisture=None,
     leaf_angles="spherical",
     hotspot=0.0,
     brown=0.0,
@@ -74,6 +76,12 @@ def surface_reflectance(
         ``{spectrum: fraction}`` that mixes spectra; the path of a CSV file, or a Dataset, with ``wavelength`` [um] and
         ``reflectance``. Each number by band or spectrum may be a raster over (y, x). By default soil and litter of
         tallgrass. [1]
+    soil : float or xarray.DataArray, dims (y, x), optional
+        How much brighter the background is along the soil line: the change of its reflectance at 0.55 um, by which all
+        bands change; below 0 it is darker. No reflectance leaves 0 to 1. [1]
+    moisture : float or xarray.DataArray, dims (y, x), optional
+        Of the background, 0 dry and 1 saturated (5 and 55 percent of the volume): films of water darken it, most of all
+        in the shortwave infrared. [1]
     leaf_angles : optional
         A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
     hotspot : float, optional
@@ -104,12 +112,13 @@ def surface_reflectance(
 
     References
     ----------
-    [Verhoef1984]_; [Verhoef2007b]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5
+    [Verhoef1984]_; [VerhoefBach2007]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5; [Yang2020]_ for moist soil
 
     See Also
     --------
     fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.layers.two_layers,
     fifesim.ground.canopy.crowns.clumped, fifesim.ground.canopy.raster.level_reflectance,
+    fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil_water.moistened,
     fifesim.ground.terrain.rasters.light.terrain_reflectance
     """
     if dem is None and horizon is not None:
@@ -123,7 +132,7 @@ def surface_reflectance(
     responses = tuple(band.response for band in selected)
     canopy = {"leaf_optics": leaf_optics, "background": background, "leaf_angles": leaf_angles, "hotspot": hotspot}
     canopy |= {"brown": brown, "dissociation": dissociation, "brown_leaf": brown_leaf}
-    canopy |= {"crown_cover": crown_cover, "crown_shape": crown_shape}
+    canopy |= {"crown_cover": crown_cover, "crown_shape": crown_shape, "soil": soil, "moisture": moisture}
     level = landscapes.level_reflectance(
         land._replace(lai=lai),
         selected,

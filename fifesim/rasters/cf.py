@@ -29,6 +29,9 @@ QUANTITIES = {
         "fraction of absorbed photosynthetically active radiation",
     ),
     "green_fpar": Quantity("1", "", "fraction of photosynthetically active radiation that green leaves absorb"),
+    "soil": Quantity("1", "", "brightness of the soil", "change of its reflectance at 0.55 um"),
+    "moisture": Quantity("1", "", "moisture of the soil", "0 where it is dry, 1 where it is saturated"),
+    "normal_score": Quantity("1", "", "standard normal deviate"),
     "surface_reflectance": Quantity(
         "1", "surface_bidirectional_reflectance", "surface reflectance factor", "direct and diffuse light mixed"
     ),
@@ -45,6 +48,9 @@ QUANTITIES = {
     ),
     "sky_view": Quantity("1", "", "sky view factor", "diffuse light over that on an open plain"),
     "terrain_view": Quantity("1", "", "terrain configuration factor"),
+    "wetness": Quantity(
+        "1", "", "topographic wetness index", "logarithm of the area that drains through a metre of contour, over slope"
+    ),
     "illumination": Quantity("1", "", "cosine of the solar zenith angle on the slope", "0 in shadow"),
     "shadow": Quantity("1", "", "shadow", "1 where the sun does not reach the slope"),
     "kt": Quantity("1", "", "topographic correction factor", "irradiance on the slope over that on level ground"),
@@ -105,6 +111,8 @@ PROVENANCE = (
     "method",
     "leaf_angles",
     "background",
+    "soil",
+    "moisture",
     "atmosphere",
     "instrument",
     "instrument_description",

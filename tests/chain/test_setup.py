@@ -16,6 +16,8 @@ GROUND = {
     "geometry": fifesim.Geometry(40.0, 100.0, 5.0, 10.0),
     "leaf_optics": {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)},
     "background": {"TM3": 0.1, "TM4": 0.2},
+    "soil": 0.03,
+    "moisture": 0.4,
     "leaf_angles": "planophile",
     "hotspot": 0.2,
     "brown": 0.3,

@@ -32,6 +32,7 @@ def level_reflectance(
     brown_optics=None,
     crown_cover=1.0,
     crown_shape=SHAPE,
+    soil_changes=None,
     exact=False,
     **provenance,
 ):
@@ -65,6 +66,8 @@ def level_reflectance(
         Of dead leaves, each as those of the leaves are given; where some are dead they are needed. [1]
     crown_shape : float, optional
         Crown diameter over height. [1]
+    soil_changes : (callable, sequence of xarray.DataArray), optional
+        What makes the background of each cell of a dry one, from `ground.canopy.rasters.soils.soil_kernel`.
     exact : bool, optional
         Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it.
     **provenance : str or number
@@ -89,6 +92,7 @@ def level_reflectance(
     optics = {"leaf_reflectance": leaf_reflectance, "leaf_transmittance": leaf_transmittance, "background": background}
     shares = {"brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
     how = {"leaf_angles": leaf_angles, "hotspot": hotspot, "brown_optics": brown_optics, "crown_shape": crown_shape}
+    how["soil_changes"] = soil_changes
     light = {"diffuse_fraction": diffuse_fraction, "geometry": geometry, "exact": exact}
     kernel, rasters = canopy_kernel(lai, bands, **optics, **shares, **how, **light)
     varies = directions.varying(geometry)

@@ -10,16 +10,17 @@ from fifesim.base.kinds import LEAF, described
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.canopy.prospect import Leaf
+from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 
 LARGEST_CODE = 2**15 - 1
 """Of a class in a map: codes are numbers of 16 bits, of which -1 is no data."""
 
-_SHARES = ("brown", "dissociation", "crown_cover")
+_SHARES = ("brown", "dissociation", "crown_cover", "moisture")
 _RATIOS = ("hotspot", "crown_shape")
 
-OPTICS = ("leaf", "brown_leaf", "background", "leaf_angles", *_RATIOS, *_SHARES)
+OPTICS = ("leaf", "brown_leaf", "background", "leaf_angles", *_RATIOS, *_SHARES, "soil")
 """What a class may say of its reflectance, beside its leaf area."""
 
 
@@ -52,6 +53,10 @@ class CoverClass:
         Share of the ground below crowns, in [0, 1]. [1]
     crown_shape : float, optional
         Diameter of a crown over the height of its middle. [1]
+    soil : float, optional
+        Brightness of the soil, a change of its reflectance along the soil line. [1]
+    moisture : float, optional
+        Of the soil, 0 dry to 1 saturated. [1]
     code : int, optional
         Of the class in a map, 0 to 32767; by default classes count from 1.
 
@@ -80,6 +85,8 @@ class CoverClass:
     dissociation: float | None = None
     crown_cover: float | None = None
     crown_shape: float | None = None
+    soil: float | None = None
+    moisture: float | None = None
     code: int | None = None
 
     def __post_init__(self):
@@ -89,7 +96,7 @@ class CoverClass:
             self._check()
 
     def _check(self):
-        for name in ("arp", *_RATIOS, *_SHARES):
+        for name in ("arp", "soil", *_RATIOS, *_SHARES):
             value = getattr(self, name)
             if value is not None and not _is_number(value):
                 raise TypeError(f"{name} must be a number, got {described(value)}: rasters go to landscape()")
@@ -103,6 +110,8 @@ class CoverClass:
         for name in _RATIOS:
             if getattr(self, name) is not None and not 0 <= getattr(self, name) < np.inf:
                 raise ValueError(f"{name} must be at least 0, got {getattr(self, name):g}: it is a ratio")
+        if self.soil is not None:
+            check_brightness(self.soil)
         if self.code is not None:
             _check_code(self.code)
         if _is_number(self.lai):

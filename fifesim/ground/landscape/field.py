@@ -63,13 +63,48 @@ def streaming_field(seed, arp, row, column, shape):
     >>> bool((streaming_field(7, 0.15, 10, 20, (5, 6)) == whole[10:15, 20:26]).all())
     True
     """
+    return mixed_field({check_seed(seed): 1.0}, arp, row, column, shape)
+
+
+def mixed_field(weights, arp, row, column, shape):
+    """
+    Field of a mixture of noises, as a function of place.
+
+    Parameters
+    ----------
+    weights : dict of int to float
+        Of the noise of each seed; their squares add up to 1. [1]
+    arp, row, column, shape
+        As in `streaming_field`.
+
+    Returns
+    -------
+    field : array, shape (rows, columns)
+        Zero mean and unit variance over the ensemble. [1]
+
+    Raises
+    ------
+    ValueError
+        If arp or a seed is out of range.
+    TypeError
+        If a seed is no whole number.
+
+    Examples
+    --------
+    Turned noise is turned land:
+
+    >>> turned = mixed_field({7: -1.0}, 0.15, 0, 0, (4, 5))
+    >>> bool((turned == -streaming_field(7, 0.15, 0, 0, (4, 5))).all())
+    True
+    """
     check_arp(arp)
-    check_seed(seed)
+    for seed in weights:
+        check_seed(seed)
     if arp > LARGEST_STREAMING_ARP:
         raise ValueError(
             f'arp must be at most {LARGEST_STREAMING_ARP} for the streaming field, got {arp:g}: use method="periodic"'
         )
-    return assemble(partial(_tile, seed, arp), TILE, row, column, shape)
+    return assemble(partial(_tile, tuple(weights.items()), arp), TILE, row, column, shape)
 
 
 def periodic_field(seed, arp, shape):
@@ -111,15 +146,28 @@ def periodic_field(seed, arp, shape):
 # to 0.2498.
 # Chunks smaller than tiles, or cut elsewhere, ask for a tile more than once. Twelve tiles are 49 MB.
 @lru_cache(maxsize=12)
-def _tile(seed, arp, tile_row, tile_column):
-    """One tile of the streaming field, in single precision."""
+def _tile(weights, arp, tile_row, tile_column):
+    """One tile of a field, in single precision."""
     around = margin(arp)
     size = fft.next_fast_len(TILE + 2 * around, real=True)
-    noise = white_noise(seed, tile_row * TILE - around, tile_column * TILE - around, (size, size))
+    noise = _mixed_noise(weights, tile_row * TILE - around, tile_column * TILE - around, (size, size))
     inside = slice(around, around + TILE)
     tile = _filter(noise, _half_response(arp, (size, size), np.float32))[inside, inside].copy()
     tile.flags.writeable = False
     return tile
+
+
+def _mixed_noise(weights, row, column, shape):
+    mixture = None
+    for seed, weight in weights:
+        noise = white_noise(seed, row, column, shape)
+        if weight != 1.0:
+            noise *= np.float32(weight)
+        if mixture is None:
+            mixture = noise
+        else:
+            mixture += noise
+    return mixture
 
 
 def _filter(noise, half_response):

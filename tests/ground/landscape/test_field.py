@@ -16,7 +16,7 @@ from fifesim.ground.landscape.autoregression import (
     response,
 )
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
-from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
+from fifesim.ground.landscape.field import TILE, mixed_field, periodic_field, streaming_field
 from fifesim.ground.landscape.noise import white_noise
 
 ARPS = [0.05, 0.1, 0.15, 0.2, 0.24]
@@ -182,3 +182,12 @@ def test_streaming_stops_before_its_margin_grows_without_bound():
     with pytest.raises(ValueError, match=r"at most 0\.2498.*method=\"periodic\""):
         streaming_field(1, 0.2499, 0, 0, (2, 2))
     assert np.isfinite(periodic_field(1, 0.2499, (50, 50))).all()
+
+
+def test_field_of_mixed_noise_is_the_mixture_of_fields():
+    """The filter is linear; single precision rounds each by 3e-7 rms."""
+    window = 0.15, TILE - 20, -30, (50, 60)
+    one, other = (streaming_field(seed, *window) for seed in (7, 8))
+    found = mixed_field({7: 0.6, 8: -0.8}, *window)
+    np.testing.assert_allclose(found, 0.6 * one - 0.8 * other, rtol=0, atol=5e-6)
+    np.testing.assert_array_equal(mixed_field({7: 1.0}, *window), one)

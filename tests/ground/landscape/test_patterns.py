@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.stats import norm
 
-from fifesim.ground.landscape.patterns import _drawn, _fenced, pastures, smooth_field, voronoi
+from fifesim.ground.landscape.patterns import _blocks, _drawn, _fenced, _nearest, pastures, smooth_field, voronoi
 
 
 @pytest.mark.parametrize("make", [voronoi, pastures])
@@ -22,13 +22,27 @@ def test_patches_have_the_mean_area_asked_for(make):
 
 
 def test_voronoi_cells_are_those_of_a_search_tree():
-    down, across = np.linspace(-7.3, -1.2, 61), np.linspace(3.1, 9.4, 57)
-    points = _drawn(11, 8, -11, 0, (14, 13), 3)
-    points[0] += np.arange(-11, 3)[:, None]
-    points[1] += np.arange(13)
+    down, across = np.arange(200) * 0.37 - 40, np.arange(200) * 0.37 + 30
+    (top, rows), (left, columns) = (_blocks(each, 2) for each in (down, across))
+    points = _drawn(11, 8, top, left, (rows, columns), 3)
+    points[0] += np.arange(top, top + rows)[:, None]
+    points[1] += np.arange(left, left + columns)
     tree = cKDTree(points[:2].reshape(2, -1).T)
-    _, nearest = tree.query(np.stack(np.meshgrid(down, across, indexing="ij"), -1).reshape(-1, 2))
+    places = np.stack(np.meshgrid(down, across, indexing="ij"), -1).reshape(-1, 2)
+    _, nearest = tree.query(places)
     np.testing.assert_array_equal(voronoi(11, down, across).ravel(), points[2].ravel()[nearest])
+
+
+def test_nearest_point_may_lie_two_squares_away():
+    """As it seldom does: here those of the squares between turn their backs."""
+    points = np.empty((3, 5, 5))
+    points[2] = np.arange(25).reshape(5, 5)
+    points[:2] = np.indices((5, 5)) + np.where(np.indices((5, 5)) < 2, 0.0, 0.99)
+    points[:2, 2, 0] = 2.5, 0.99
+    number = np.empty((1, 1))
+    _nearest(np.array([2.5]), np.array([2.02]), 0, 0, points, number)
+    away = np.hypot(points[0] - 2.5, points[1] - 2.02)
+    assert away.argmin() == 10 and number[0, 0] == 10
 
 
 def test_points_of_patches_are_even_over_their_squares():
@@ -38,20 +52,18 @@ def test_points_of_patches_are_even_over_their_squares():
 
 
 def test_smooth_field_is_standard_normal_and_has_its_length():
-    """Sixty fields of 12 x 12 lengths; correlation of a Gaussian of 1/e at distance 1, the same down and across."""
-    place = np.arange(48) / 4
-    fields = np.stack([smooth_field(seed, place - 30, place + 800) for seed in range(60)])
+    """300 x 300 lengths; the correlation of a Gaussian is 1/e at distance 1, the same down and across."""
+    place = np.arange(1200) / 4
+    field = smooth_field(3, place - 30, place + 800)
     # A field of area A has some A / pi independent values.
-    independent = 60 * 144 / np.pi
-    assert abs(fields.mean()) < 4 / np.sqrt(independent)
-    assert abs(fields.var() - 1) < 4 * np.sqrt(2 / independent)
+    independent = 300**2 / np.pi
+    assert abs(field.mean()) < 4 / np.sqrt(independent)
+    assert abs(field.var() - 1) < 4 * np.sqrt(2 / independent)
     for lag in (2, 4, 6):
         expected = np.exp(-((lag / 4) ** 2))
-        across = np.mean(fields[:, :, lag:] * fields[:, :, :-lag])
-        down = np.mean(fields[:, lag:] * fields[:, :-lag])
-        np.testing.assert_allclose([across, down], expected, rtol=0, atol=4 / np.sqrt(independent))
-    below = np.mean(fields < norm.ppf(0.2))
-    assert abs(below - 0.2) < 4 * np.sqrt(0.16 / independent)
+        found = np.mean(field[:, lag:] * field[:, :-lag]), np.mean(field[lag:] * field[:-lag])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=4 / np.sqrt(independent))
+    assert abs(np.mean(field < norm.ppf(0.2)) - 0.2) < 4 * np.sqrt(0.16 / independent)
 
 
 def test_pastures_are_rectangles_that_fill_their_block():

@@ -30,6 +30,7 @@ def canopy_kernel(
     brown_optics=None,
     crown_cover=1.0,
     crown_shape=SHAPE,
+    soil_changes=None,
     exact=False,
 ):
     """
@@ -42,6 +43,8 @@ def canopy_kernel(
     bands : sequence of str
     leaf_reflectance, leaf_transmittance, background, diffuse_fraction, geometry
         As in `ground.canopy.raster.level_reflectance`, and the others too.
+    soil_changes : (callable, sequence of xarray.DataArray), optional
+        What makes the background of each cell of a dry one, from `ground.canopy.rasters.soils.soil_kernel`.
 
     Returns
     -------
@@ -68,12 +71,25 @@ def canopy_kernel(
     if directions.varying(geometry) or any(isinstance(each, xr.DataArray) for each in leaves.values()):
         kernel, rasters = canopy_shares.with_shares(partial(_by_cell, parameters, tuple(leaves)), shares)
         by_band = [_per_band(each) for each in (background, diffuse_fraction, *leaves.values())]
-        return kernel, [*by_band[:2], *directions.angles(geometry), *by_band[2:], *rasters]
+        return _over_soil(kernel, [*by_band[:2], *directions.angles(geometry), *by_band[2:], *rasters], soil_changes)
     parameters |= {name: tuple(map(float, values)) for name, values in leaves.items()}
     parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
     parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
     kernel, rasters = canopy_shares.with_shares(partial(_uniform, parameters), shares)
-    return kernel, [background, *rasters]
+    return _over_soil(kernel, [background, *rasters], soil_changes)
+
+
+def _over_soil(kernel, rasters, soil_changes):
+    """Kernel whose background, its first raster, is made of the dry one."""
+    if soil_changes is None:
+        return kernel, rasters
+    changed, changes = soil_changes
+    return partial(_on_soil, kernel, changed, len(changes)), [*changes, *rasters]
+
+
+def _on_soil(kernel, changed, count, lai, *blocks):
+    changes, (background, *others) = blocks[:count], blocks[count:]
+    return kernel(lai, changed(background, *changes), *others)
 
 
 def _uniform(parameters, lai, background, **shares):

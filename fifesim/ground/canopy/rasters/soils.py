@@ -6,10 +6,13 @@ import numpy as np
 import xarray as xr
 
 from fifesim.ground.canopy import optics
+from fifesim.ground.canopy.soil import brightened, soil_line
+from fifesim.ground.canopy.soil_water import moistened, water_films
 from fifesim.ground.canopy.spectra import Spectrum, check_shares, is_mixture
+from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters.crs import with_crs_of
-from fifesim.rasters.layers import by_band
+from fifesim.rasters.layers import by_band, layers_of
 
 
 def background(bands, given, lai):
@@ -53,6 +56,126 @@ def background(bands, given, lai):
             return _mixed(bands, given, lai)
         return by_band({name: optics.of_band(given, name, "background") for name in names}, lai)
     return optics.background(bands, given)
+
+
+def as_it_lies(bands, below, lai, soil=None, moisture=None):
+    """
+    Background where the soil is brighter or darker, and moist.
+
+    Parameters
+    ----------
+    bands : sequence of fifesim.base.bands.Band
+    below : array, shape (band,), or xarray.DataArray, dims ([band], y, x)
+        Dry, from `background`. [1]
+    lai : xarray.DataArray, dims (y, x)
+        Whose CRS the rasters have where they lost theirs.
+    soil : float or xarray.DataArray, dims (y, x), optional
+        Brightness, a change along the soil line. [1]
+    moisture : float or xarray.DataArray, dims (y, x), optional
+        0 is dry, 1 saturated. [1]
+
+    Returns
+    -------
+    background : array, shape (band,), or xarray.DataArray, dims (band, y, x)
+        What was given where neither is. [1]
+
+    Raises
+    ------
+    ValueError
+        If one is out of its range, on lazy data when it computes; if rasters lie on different grids.
+
+    See Also
+    --------
+    fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil_water.moistened
+    """
+    kernel, changes = soil_kernel(bands, lai, soil, moisture)
+    if kernel is None:
+        return below
+    if not any(isinstance(each, xr.DataArray) for each in (below, soil, moisture)):
+        return kernel(below, *(each.values for each in changes))
+    names = [band.name for band in bands]
+    if isinstance(below, xr.DataArray):
+        cf.check_units(below, "surface_reflectance")
+        below = by_band(dict(zip(names, layers_of(below, names, "background"), strict=True)), lai)
+    else:
+        below = xr.DataArray(below, dims="band")
+
+    def bands_first(*blocks):
+        return np.moveaxis(kernel(*blocks), -1, 0)
+
+    out = chunking.pointwise(bands_first, below.drop_vars("band", errors="ignore"), *changes, bands=len(names))
+    out.attrs = {}
+    return out.rename("background").assign_coords(band=names)
+
+
+def soil_kernel(bands, lai, soil=None, moisture=None):
+    """
+    What brightness and moisture make of a background, and the rasters that it takes.
+
+    Parameters
+    ----------
+    bands, lai, soil, moisture
+        As in `as_it_lies`.
+
+    Returns
+    -------
+    kernel : callable, or None
+        ``kernel(dry, *blocks)`` gives reflectance, shape (..., band), from that of dry ground, shape (band,) or (...,
+        band), and blocks of the rasters, shape (...). None where neither is given. [1]
+    rasters : list of xarray.DataArray
+    """
+    given = {name: value for name, value in (("soil", soil), ("moisture", moisture)) if value is not None}
+    if not given:
+        return None, []
+    line = None if soil is None else soil_line(bands)
+    films = None if moisture is None else water_films(tuple(bands))
+
+    def kernel(reflectance, *changes):
+        change = dict(zip(given, changes, strict=True))
+        if line is not None:
+            reflectance = brightened(reflectance, change["soil"], line)
+        if films is not None:
+            reflectance = moistened(reflectance, change["moisture"], films)
+        return reflectance
+
+    return kernel, [_by_cell(name, value, lai) for name, value in given.items()]
+
+
+def in_words(soil, moisture):
+    """
+    Attributes of a surface that say what its soil is like.
+
+    Parameters
+    ----------
+    soil, moisture : float or xarray.DataArray, or None
+
+    Returns
+    -------
+    attributes : dict of str
+        Numbers, or "raster"; nothing of what is None.
+
+    Examples
+    --------
+    >>> in_words(0.02, None)
+    {'soil': 0.02}
+    """
+    given = {"soil": soil, "moisture": moisture}
+    return {
+        name: "raster" if isinstance(value, xr.DataArray) else float(value)
+        for name, value in given.items()
+        if value is not None
+    }
+
+
+def _by_cell(name, value, lai):
+    """A raster over (y, x), or a number, as one that broadcasts."""
+    if not isinstance(value, xr.DataArray):
+        return xr.DataArray(np.float64(value))
+    if set(value.dims) != {"y", "x"}:
+        raise ValueError(f"{name} is a number, or a raster over (y, x), got dimensions {value.dims}: select one layer")
+    cf.check_units(value, "soil" if name == "soil" else "moisture")
+    plain = with_crs_of(value, lai)
+    return plain.drop_vars(set(plain.coords) - {"y", "x", "spatial_ref"}).rename(name)
 
 
 def _mixed(bands, given, lai):

@@ -20,7 +20,7 @@ from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.packed import unpacked
-from fifesim.rasters.sites import made_on_site
+from fifesim.rasters.sites import is_fife, made_on_site
 from fifesim.rasters.warp import file_onto_grid, raster_onto_grid
 
 FIFE_PASTURES = Patches("pastures", 1200.0)
@@ -110,13 +110,21 @@ def landscape(
     if lai is None:
         variables["lai"] = _lai(grid, variables["cover"], table, arp, seed)
     else:
-        variables["lai"] = lai_window(lai, grid, chunks, allow_remote=allow_remote)
+        variables["lai"] = _own_lai(lai, grid, chunks, allow_remote)
     for name, given in {"brown": brown, "crown_cover": crown_cover}.items():
         if given is not None:
             variables[name] = _share(name, given, grid, chunks, allow_remote)
     # Fields that are drawn, and that go with the ground, have their place here.
     order = ["lai", *(name for name in variables if name != "lai")]
-    return xr.Dataset({name: variables[name] for name in order}, attrs=made_on_site(grid))
+    site = {key: variables["lai"].attrs[key] for key in ("site",) if key in variables["lai"].attrs}
+    return xr.Dataset({name: variables[name] for name in order}, attrs=site)
+
+
+def _own_lai(lai, grid, chunks, allow_remote):
+    """Leaf area of a user; a scene that was made on the FIFE site stays one."""
+    found = lai_window(lai, grid, chunks, allow_remote=allow_remote)
+    made = made_on_site(grid) if isinstance(lai, xr.DataArray) and is_fife(lai) else {}
+    return found.assign_attrs(made)
 
 
 def _default_classes(cover):

@@ -83,6 +83,29 @@ class Between(NamedTuple):
         spans = ((before, np.minimum(before + 2, size)) for (before, _), size in zip(self, sizes, strict=True))
         return chunking.Reads(layers, *spans)
 
+    def values(self, layer, rows, columns):
+        """
+        Values of a block of cells, bilinear between the places.
+
+        Parameters
+        ----------
+        layer : array, shape (y, x)
+            What the block reads.
+        rows, columns : slice
+            Of cells.
+
+        Returns
+        -------
+        values : array, shape (rows, columns)
+        """
+        (row, down), (column, across) = self
+        row, column = row[rows] - row[rows.start], column[columns] - column[columns.start]
+        down, across = down[rows, None], across[columns]
+        after = np.minimum(row + 1, layer.shape[0] - 1)
+        lines = layer[row] * (1 - down) + layer[after] * down
+        after = np.minimum(column + 1, layer.shape[1] - 1)
+        return lines[:, column] * (1 - across) + lines[:, after] * across
+
     def sky(self, layers, rows, columns):
         """
         The sky of a block of cells.

@@ -1,0 +1,96 @@
+"""
+Soil and NDVI
+=============
+
+Soils that are brighter or darker below the same leaves, and moist ones: what they do to red and near infrared light,
+and to a line of leaf area on NDVI.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import xarray as xr
+
+import fifesim
+
+bands = ["TM3", "TM4"]
+colors = plt.get_cmap("YlGn")(np.linspace(0.3, 1, 6))
+
+# %%
+# A small raster: leaf area from row to row, and soil from column to column. Bare ground, the lowest line, is the soil
+# line; leaves lift the others off it. Lines of one leaf area do not run through the origin as those of one NDVI do.
+
+grid = fifesim.fife_site(cell=30, window=((0, 6), (0, 41)))
+lai = fifesim.lai_scene(grid, seed=7).drop_attrs(deep=False)
+lai = xr.zeros_like(lai) + xr.DataArray([0.0, 0.5, 1.0, 2.0, 3.0, 5.0], dims="y", coords={"y": lai.y})
+across = xr.zeros_like(lai) + xr.DataArray(np.linspace(0, 1, 41), dims="x", coords={"x": lai.x})
+case = {"bands": bands, "geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere()}
+changes = {
+    "Brightness −0.1 to 0.15": {"soil": 0.25 * across - 0.1},
+    "Moisture 0 to 1, of a brighter soil": {"soil": 0.15, "moisture": across},
+}
+
+figure, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained", sharex=True, sharey=True)
+for axis, (title, soil) in zip(axes, changes.items(), strict=True):
+    rho = fifesim.surface_reflectance(lai, "TM", **case, **soil)
+    for ndvi in (0.2, 0.4, 0.6, 0.8):
+        slope = (1 + ndvi) / (1 - ndvi)
+        axis.plot([0, 0.5], [0, 0.5 * slope], color="0.8", linewidth=0.8, zorder=0)
+        x = min(0.33, 0.5 / slope)
+        axis.annotate(f"NDVI {ndvi:g}", (x, x * slope), color="0.5", fontsize=8, ha="right")
+    for row, color in zip(range(lai.sizes["y"]), colors, strict=True):
+        red, near_infrared = rho.isel(y=row)
+        axis.plot(red, near_infrared, color=color, linewidth=2, label=f"{float(lai[row, 0]):g}")
+        axis.plot(red[-1], near_infrared[-1], "o", color=color, markersize=5)
+    axis.set(title=title, xlabel="red reflectance (TM3)", xlim=(0, 0.35), ylim=(0, 0.55))
+axes[0].set_ylabel("near infrared reflectance (TM4)")
+axes[0].legend(title="leaf area index", frameon=False, loc="lower right", ncols=2)
+axes[1].annotate("dots: the end, bright or wet", (0.2, 0.04), fontsize=9)
+
+# %%
+# The FIFE site's sparsest grass over soils whose brightness varies with a standard deviation of 0.04, as TM sees it.
+# Where the field of the soil is alike over as far as the leaf area's, pixels do not average it away.
+
+grid = fifesim.fife_site(cell=30 / 9, window=((0, 900), (0, 900)))
+lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.24, seed=7)
+score = fifesim.correlated_fields(grid, {"soil": 0.24}, seed=7)["soil"]
+truth = lai.fifesim.aggregate(30)
+
+
+def ndvi_over(deviation):
+    soil = deviation * score if deviation else None
+    return (
+        lai.fifesim.surface_reflectance("TM", bands=bands, soil=soil)
+        .fifesim.to_toa()
+        .fifesim.sense("TM")
+        .fifesim.ndvi()
+    )
+
+
+images = {deviation: ndvi_over(deviation) for deviation in (0.0, 0.02, 0.04, 0.06)}
+figure, axes = plt.subplots(1, 3, figsize=(12, 4), layout="constrained")
+corner = {"y": slice(0, 40), "x": slice(0, 40)}
+soil = (0.04 * score).fifesim.aggregate(30)
+for axis, raster, title, style in (
+    (axes[0], truth, "Leaf area index", {"cmap": "YlGn"}),
+    (axes[1], soil, "Brightness of the soil", {"cmap": "cividis"}),
+    (axes[2], images[0.04] - images[0.0], "Change of NDVI by the soil", {"cmap": "RdBu", "vmin": -0.06, "vmax": 0.06}),
+):
+    drawn = axis.imshow(raster.isel(corner), extent=(0, 1.2, 0, 1.2), **style)
+    figure.colorbar(drawn, ax=axis, shrink=0.8)
+    axis.set(title=title, xlabel="easting [km]")
+axes[0].set_ylabel("northing [km]")
+
+# %%
+# More variance of the soil, more scatter. A bright soil looks like fewer leaves, where there are few leaves to hide it.
+
+figure, axes = plt.subplots(1, 4, figsize=(13, 3.6), layout="constrained", sharex=True, sharey=True)
+for axis, (deviation, ndvi) in zip(axes, images.items(), strict=True):
+    fit = fifesim.regress(truth, ndvi)
+    points = axis.scatter(ndvi, truth, c=soil * deviation / 0.04, s=2, cmap="cividis", vmin=-0.08, vmax=0.08)
+    line = np.array([float(ndvi.min()), float(ndvi.max())])
+    axis.plot(line, fit.intercept + fit.slope * line, color="black", linewidth=1)
+    axis.set(title=f"sd {deviation:g}: R² {fit.r2:.3f}", xlabel="NDVI")
+axes[0].set_ylabel("leaf area index of 30 m")
+figure.colorbar(points, ax=axes, label="brightness of the soil")
+
+plt.show()

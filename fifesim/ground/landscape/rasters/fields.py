@@ -1,0 +1,265 @@
+"""Fields that correlate, on labelled rasters."""
+
+from collections.abc import Mapping
+from functools import partial
+
+import dask
+import dask.array as da
+import numpy as np
+import xarray as xr
+from dask.graph_manipulation import clone
+
+from fifesim.base.arguments import check
+from fifesim.base.kinds import NUMBER, Kind
+from fifesim.base.seeds import check_seed
+from fifesim.ground.landscape.correlations import flat, pairs_of
+from fifesim.ground.landscape.covariance import Copula, copula, correlated, field_seed
+from fifesim.ground.landscape.field import TILE, mixed_field
+from fifesim.ground.terrain.rasters.drainage import wetness
+from fifesim.ground.terrain.rasters.light import illumination
+from fifesim.ground.terrain.rasters.slopes import slope
+from fifesim.rasters import cf, places
+from fifesim.rasters import chunks as chunking
+from fifesim.rasters import grid as grids
+from fifesim.rasters.crs import with_crs_of
+from fifesim.rasters.sites import made_on_site
+
+# The ground is known by at most so many rows and columns of it, evenly spaced.
+SAMPLED = 256
+
+_ARPS = Kind(
+    "a number for each field, such as {'lai': 0.15, 'soil': 0.24}",
+    lambda arps: all(isinstance(name, str) and NUMBER.fits(arp) for name, arp in arps.items()),
+)
+
+OF_ELEVATION = ("elevation", "wetness", "illumination", "slope")
+"""What correlations may name of a landscape's elevation."""
+
+
+def correlated_fields(grid, arps, correlations=None, *, seed=0, covariates=None, reference=None, chunks=None):
+    """
+    Standard normal fields that correlate with each other and with the ground.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells, in a projected CRS.
+    arps : dict of str to float
+        Autoregressive parameter of each field, by its name, in [0, 0.2498]. [1]
+    correlations : mapping, optional
+        ``{("lai", "soil"): -0.4, ("lai", "elevation"): 0.3}``, or by name, ``{"lai": {"soil": -0.4}}``. [1]
+    seed : int, optional
+        In [0, 2**63). The field "lai" is that of `fifesim.lai_scene`; each other name has noise of its own.
+    covariates : dict of str to xarray.DataArray, dims (y, x), optional
+        Properties of the ground on the cells of the grid.
+    reference : dict of str to xarray.DataArray, dims (y, x), optional
+        The same properties over all of a landscape, of which the grid is a window, in cells of any size. By default
+        ranks are those on the grid.
+    chunks : mapping or int or "auto", optional
+        Makes the fields lazy, as they are without where a covariate is.
+
+    Returns
+    -------
+    fields : dict of str to xarray.DataArray, dims (y, x)
+        Each the same to the bit in any chunks, and in any window of the ground that has its ``reference``; without
+        covariates functions of seed and place. [1]
+
+    Raises
+    ------
+    ValueError
+        If correlations cannot be, with the nearest that can; where the ground is lazy, when it computes. If names are
+        unknown, an arp or the seed is out of range, or rasters lie on other grids.
+    TypeError
+        If correlations are no mapping of pairs to numbers, or the seed is no whole number.
+
+    Notes
+    -----
+    Correlations are those of standard normal scores at the same cell. The scores of the ground are by rank among at
+    most 256 x 256 evenly spaced cells; where it is lazy, these are computed apart, so that none waits in memory.
+
+    See Also
+    --------
+    fifesim.ground.landscape.covariance.copula, fifesim.ground.landscape.covariance.correlated
+    """
+    grids.check_grid(grid)
+    seed = check_seed(seed)
+    for name, arp in arps.items():
+        check("arps", {name: arp}, _ARPS)
+    pairs = pairs_of(correlations, list(arps), list(covariates or {}))
+    covariates = {name: each for name, each in (covariates or {}).items() if any(name in pair for pair in pairs)}
+    covariates = {name: _on_grid(name, each, grid) for name, each in covariates.items()}
+    like = next((each.data for each in covariates.values() if each.chunks is not None), None)
+    chunks = dict(zip("yx", like.chunks, strict=True)) if chunks is None and like is not None else chunks
+    parts = _copula(arps, pairs, covariates, reference)
+    fields = {}
+    for name in arps:
+        ground = {other: covariates[other] for other in covariates if (name, other) in pairs}
+        field = _field(grid, arps[name], name, {each: field_seed(seed, each) for each in arps}, parts, ground, chunks)
+        said = f"correlated_fields: {name}, arp {arps[name]:g}, seed {seed}"
+        said += "".join(f", {one}-{other} {r:g}" for (one, other), r in pairs.items() if name in (one, other))
+        made = {"arp": float(arps[name]), "rng_seed": str(seed), **made_on_site(grid)}
+        fields[name] = cf.label(grids.place(field, grid), "normal_score", history=said, **made).rename(name)
+    return fields
+
+
+def landscape_fields(
+    grid, arps, covary=None, *, seed=0, dem=None, covariates=None, reference=None, geometry=None, time=None, chunks=None
+):
+    """
+    Fields of a landscape, some of which follow its elevation.
+
+    Parameters
+    ----------
+    grid, arps, seed, reference, chunks
+        As in `correlated_fields`.
+    covary : mapping, optional
+        Of the field "lai", ``{"elevation": 0.3, "soil": -0.4}``, or correlations as in `correlated_fields`. [1]
+    dem : xarray.DataArray, dims (y, x), optional
+        Of which the names in `OF_ELEVATION` come. [m]
+    covariates : dict of str to xarray.DataArray, dims (y, x), optional
+        Other properties of the ground, or one's own of these names.
+    geometry, time : optional
+        Of the sun, as in `fifesim.illumination`.
+
+    Returns
+    -------
+    fields : dict of str to xarray.DataArray, dims (y, x)
+        Standard normal. [1]
+
+    Raises
+    ------
+    ValueError
+        As in `correlated_fields`, or if a name of the elevation's is given without one.
+    TypeError
+        As in `correlated_fields`.
+    """
+    covariates = dict(covariates or {})
+    plain = isinstance(covary, Mapping) and {name: r for name, r in covary.items() if isinstance(name, str)}
+    of_lai = {name: r for name, r in (plain or {}).items() if not isinstance(r, Mapping)}
+    correlations = {name: r for name, r in covary.items() if name not in of_lai} if of_lai else covary
+    if of_lai:
+        correlations = correlations | {("lai", name): r for name, r in of_lai.items()}
+    asked = {name for one, other, _ in flat(correlations or {}) for name in (one, other)} - set(arps) - set(covariates)
+    of_dem = [name for name in OF_ELEVATION if name in asked]
+    if of_dem and dem is None:
+        raise ValueError(f"covary names {', '.join(of_dem)}, which the elevation tells: give dem=")
+    if of_dem:
+        covariates |= of_elevation(dem, of_dem, geometry=geometry, time=time)
+    options = {"seed": seed, "covariates": covariates, "reference": reference, "chunks": chunks}
+    return correlated_fields(grid, arps, correlations, **options)
+
+
+def of_elevation(dem, names, *, geometry=None, time=None):
+    """
+    Properties of the ground that fields may follow.
+
+    Parameters
+    ----------
+    dem : xarray.DataArray, dims (y, x)
+        [m]
+    names : sequence of str
+        Of `OF_ELEVATION`.
+    geometry, time : optional
+        Of the sun, as in `fifesim.illumination`.
+
+    Returns
+    -------
+    covariates : dict of str to xarray.DataArray, dims (y, x)
+        Lazy where the elevation is.
+
+    Raises
+    ------
+    ValueError
+        If a name is none of them.
+    """
+    make = {
+        "elevation": lambda: dem,
+        "wetness": lambda: wetness(dem),
+        "illumination": lambda: illumination(dem, geometry, time=time),
+        "slope": lambda: slope(dem),
+    }
+    unknown = [name for name in names if name not in make]
+    if unknown:
+        raise ValueError(f"an elevation model says nothing of {', '.join(unknown)}: it has {', '.join(make)}")
+    return {name: make[name]() for name in names}
+
+
+def _on_grid(name, raster, grid):
+    """A covariate on the cells of the grid."""
+    cells = grids.place(xr.DataArray(np.broadcast_to(0.0, grid.shape), dims=("y", "x")), grid)
+    raster = with_crs_of(raster.transpose("y", "x"), cells)
+    if not grids.same_grid(grids.geobox(raster), grid):
+        raise ValueError(
+            f"{name} lies on another grid, {grids.in_words(grids.geobox(raster))}, than the fields, "
+            f"{grids.in_words(grid)}: bring it onto theirs first"
+        )
+    return grids.place(xr.DataArray(raster.data, dims=("y", "x"), name=name), grid)
+
+
+def _field(grid, arp, name, seeds, parts, ground, chunks):
+    """One field, of the noises that are in it and of the ground that it follows."""
+    row, column = grids.lattice_position(grid)
+
+    def noise(made, first_row, first_column, shape):
+        weights = {seeds[other]: weight for other, weight in made.noise[name].items()}
+        return mixed_field(weights, arp, row + first_row, column + first_column, shape)
+
+    if isinstance(parts, Copula) and not ground:
+        # A first window raises what is refused before anything lazy is built.
+        noise(parts, 0, 0, (0, 0))
+        return places.tiles(partial(noise, parts), grid, chunks, tile=TILE)
+
+    def kernel(rows, columns, *layers, made=None):
+        if made is None:
+            *layers, last = layers
+            made = last.item()
+        cells = noise(made, int(rows.flat[0]), int(columns.flat[0]), (rows.size, columns.size))
+        if not ground:
+            return cells
+        return correlated(made.ground[name], cells, made.covariates, dict(zip(ground, layers, strict=True)))
+
+    at = [xr.DataArray(np.arange(size), dims=axis) for axis, size in zip("yx", grid.shape, strict=True)]
+    if chunks is not None:
+        sizes = places.chunk_sizes(grid, chunks, tile=TILE)
+        at = [each.chunk({axis: part}) for each, axis, part in zip(at, "yx", sizes, strict=True)]
+    if isinstance(parts, Copula):
+        return chunking.pointwise(kernel, *at, *ground.values(), made=parts)
+    return chunking.pointwise(kernel, *at, *ground.values(), parts)
+
+
+def _copula(arps, pairs, covariates, reference):
+    """How the fields are put together; where the ground is lazy, as a lazy array without dimensions."""
+    known = covariates if reference is None else {name: _referred(reference, name) for name in covariates}
+    sizes = {each.shape for each in known.values()}
+    if len(sizes) > 1:
+        raise ValueError(f"the rasters of reference have different sizes, {sizes}: take all on one grid")
+
+    def found(*samples):
+        return copula(arps, pairs, {name: each.ravel() for name, each in zip(known, samples, strict=True)})
+
+    def boxed(*samples):
+        out = np.empty((), object)
+        out[()] = found(*samples)
+        return out
+
+    arrays = [each.data for each in known.values()]
+    lazy = [each for each in arrays if isinstance(each, da.Array)]
+    # A copy of the graph: else all that is sampled would wait in memory for the last sample. Of one array dask gives
+    # one, of more a tuple.
+    copies = iter((clone(*lazy),) if len(lazy) == 1 else clone(*lazy) if lazy else ())
+    samples = [_evenly(next(copies) if isinstance(each, da.Array) else each) for each in arrays]
+    if not lazy:
+        return found(*samples)
+    return xr.DataArray(da.from_delayed(dask.delayed(boxed)(*samples), (), dtype=object))
+
+
+def _referred(reference, name):
+    if name not in reference:
+        raise ValueError(f"reference has no {name!r}, it has {', '.join(map(str, reference))}: give all that is named")
+    return reference[name].transpose("y", "x")
+
+
+def _evenly(array):
+    steps = (max(1, -(-size // SAMPLED)) for size in array.shape)
+    rows, columns = (slice(None, None, step) for step in steps)
+    return array[rows, columns]

@@ -1,0 +1,178 @@
+"""Fields that correlate, beside integrals of their spectra and matrices solved by others."""
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+from fifesim.ground.landscape.autoregression import field_variance, response
+from fifesim.ground.landscape.covariance import (
+    copula,
+    correlated,
+    cross_correlation,
+    field_seed,
+)
+from fifesim.ground.landscape.scores import normal_scores, score_table
+
+ARPS = {"lai": 0.15, "soil": 0.24, "moisture": 0.05}
+
+
+@pytest.fixture(scope="module")
+def places():
+    """A ground of three properties that correlate, none of them normal."""
+    drawn = np.random.default_rng(4).standard_normal((3, 20_000))
+    height = drawn[0]
+    wet = np.exp(-0.5 * height + drawn[1])
+    lit = np.maximum(0.4 * height + drawn[2], -1.0)
+    return {"elevation": 400 + 30 * height**3, "wetness": wet, "illumination": lit}
+
+
+def field_of(parts, name, noises, places):
+    """A field of the parts' own name, of noises that stand for cells."""
+    noise = sum(weight * noises[other] for other, weight in parts.noise[name].items())
+    if name not in parts.ground:
+        return noise
+    return correlated(parts.ground[name], noise, parts.covariates, places)
+
+
+def noise_of(places, seed=9):
+    count = next(iter(places.values())).size
+    return dict(zip(ARPS, np.random.default_rng(seed).standard_normal((3, count)), strict=True))
+
+
+@pytest.mark.parametrize(("one", "other"), [(0.05, 0.24), (0.15, 0.2), (0.0, 0.2498), (0.1, 0.1001)])
+def test_cross_correlation_is_that_of_the_spectra(one, other):
+    product, _ = integrate.dblquad(
+        lambda u, v: response(one, u, v) * response(other, u, v), 0, np.pi, 0, np.pi, epsabs=1e-9, epsrel=1e-9
+    )
+    expected = product / np.pi**2 / np.sqrt(field_variance(one) * field_variance(other))
+    assert cross_correlation(one, other) == pytest.approx(expected, abs=1e-7)
+    assert cross_correlation(other, one) == cross_correlation(one, other)
+
+
+def test_cross_correlation_of_nearly_equal_arps_is_nearly_one():
+    assert cross_correlation(0.2, 0.2 + 2e-7) == pytest.approx(1, abs=1e-6)
+
+
+def test_ground_that_is_level_is_followed_by_nothing():
+    with pytest.raises(ValueError, match="elevation is the same everywhere"):
+        copula({"lai": 0.1}, {("lai", "elevation"): 0.3}, {"elevation": np.ones(50)})
+
+
+ASKED = {
+    ("lai", "elevation"): 0.3,
+    ("lai", "wetness"): 0.5,
+    ("lai", "illumination"): -0.2,
+    ("soil", "elevation"): -0.6,
+    ("lai", "soil"): -0.4,
+    ("lai", "moisture"): 0.35,
+}
+
+
+def test_correlations_are_those_asked_for(places):
+    """With noise that stands for fields of one cell each, so that arps count as equal: 20,000 places, 5 errors."""
+    arps = dict.fromkeys(ARPS, 0.1)
+    parts, noises = copula(arps, ASKED, places), noise_of(places)
+    found = {name: field_of(parts, name, noises, places) for name in arps}
+    found |= {name: normal_scores(values, score_table(values)) for name, values in places.items()}
+    for (one, other), asked in ASKED.items():
+        r = np.corrcoef(found[one], found[other])[0, 1]
+        assert r == pytest.approx(asked, abs=5 * (1 - asked**2) / np.sqrt(20_000)), (one, other)
+    for name in arps:
+        assert stats.kstest(found[name], "norm").pvalue > 0.001
+
+
+def test_what_follows_the_ground_correlates_exactly(places):
+    """Without noise nothing is left to chance."""
+    parts = copula(
+        {"lai": 0.1}, {pair: r for pair, r in ASKED.items() if pair[0] == "lai" and pair[1] in places}, places
+    )
+    ground = field_of(parts, "lai", {"lai": np.zeros(20_000)}, places)
+    for name in places:
+        scores = normal_scores(places[name], score_table(places[name]))
+        assert np.mean(ground * scores) == pytest.approx(ASKED["lai", name], abs=1e-3)
+
+
+def test_ground_that_is_not_normal_together_is_followed_as_asked():
+    """Each is normal, and their sum is far from it: where one is beyond 1, the other is its mirror image."""
+    one = np.random.default_rng(8).standard_normal(20_000)
+    ground = {"elevation": one, "wetness": np.where(np.abs(one) < 1.0, one, -one)}
+    asked = {("lai", "elevation"): 0.3, ("lai", "wetness"): 0.1}
+    parts = copula({"lai": 0.1}, asked, ground)
+    follows = field_of(parts, "lai", {"lai": np.zeros(20_000)}, ground)
+    for (_, name), r in asked.items():
+        assert np.mean(follows * normal_scores(ground[name], parts.covariates[name])) == pytest.approx(r, abs=1e-3)
+    assert follows.std() == pytest.approx(parts.ground["lai"].share, rel=1e-3)
+    with pytest.raises(ValueError, match="no sum of elevation, wetness has such ranks that lai follows each"):
+        copula({"lai": 0.1}, {("lai", "elevation"): 0.4, ("lai", "wetness"): 0.3}, ground)
+
+
+def test_noises_of_other_arps_correlate_more():
+    parts = copula(ARPS, {("lai", "soil"): -0.4})
+    own, shared = parts.noise["soil"]["soil"], parts.noise["soil"]["lai"]
+    assert shared == pytest.approx(-0.4 / cross_correlation(0.15, 0.24), rel=1e-12)
+    assert own**2 + shared**2 == pytest.approx(1, rel=1e-12)
+    assert parts.noise["moisture"] == {"moisture": 1.0}
+
+
+def test_noise_has_the_matrix_that_is_asked_for():
+    asked = {("lai", "soil"): -0.5, ("soil", "moisture"): 0.6, ("lai", "moisture"): 0.2}
+    parts = copula(dict.fromkeys(ARPS, 0.2), asked)
+    lower = np.array([[parts.noise[name].get(other, 0.0) for other in ARPS] for name in ARPS])
+    np.testing.assert_allclose(lower @ lower.T, [[1, -0.5, 0.2], [-0.5, 1, 0.6], [0.2, 0.6, 1]], rtol=0, atol=1e-12)
+
+
+def test_fields_that_are_one_are_allowed():
+    parts = copula({"lai": 0.1, "soil": 0.1}, {("lai", "soil"): -1.0})
+    assert parts.noise["soil"] == {"lai": -1.0}
+
+
+@pytest.mark.parametrize(
+    ("arps", "asked", "message", "nearest"),
+    [
+        (
+            dict.fromkeys(ARPS, 0.1),
+            {("lai", "soil"): 0.9, ("lai", "moisture"): 0.9, ("soil", "moisture"): -0.9},
+            "no correlation matrix",
+            0.5,
+        ),
+        ({"lai": 0.05, "soil": 0.24}, {("lai", "soil"): 0.8}, "can have -0.63 to 0.63, by their arps", 0.63),
+    ],
+)
+def test_what_no_matrix_allows_is_told_with_what_one_does(arps, asked, message, nearest):
+    """The smallest eigenvalue of 1, 1, 1 with r, r, -r is 1 - 2 r: 0.5 is the most."""
+    with pytest.raises(ValueError, match=message) as caught:
+        copula(arps, asked)
+    said = str(caught.value)
+    assert len(said) <= 500 and all(f"{one}-{other} {r:g}" in said for (one, other), r in asked.items())
+    allowed = float(said.split()[-1])
+    assert abs(allowed) == pytest.approx(nearest, abs=0.011)
+    copula(arps, {pair: np.sign(r) * abs(allowed) for pair, r in asked.items()})
+    with pytest.raises(ValueError):
+        copula(arps, {pair: np.sign(r) * (abs(allowed) + 0.02) for pair, r in asked.items()})
+
+
+def test_ground_that_cannot_be_followed_so_closely(places):
+    """Wetness falls where elevation rises: nothing rises with both so steeply."""
+    asked = {("lai", "elevation"): 0.9, ("lai", "wetness"): 0.9}
+    with pytest.raises(ValueError, match="lai cannot follow all of elevation, wetness so closely") as caught:
+        copula({"lai": 0.1}, asked, places)
+    allowed = float(str(caught.value).split()[-1])
+    parts = copula({"lai": 0.1}, dict.fromkeys(asked, allowed), places)
+    assert 0.95 < parts.ground["lai"].share <= 1
+
+
+def test_places_where_something_is_missing_are_left_out(places):
+    holes = {name: values.copy() for name, values in places.items()}
+    holes["wetness"][::3] = np.nan
+    parts = copula({"lai": 0.1}, {("lai", "elevation"): 0.5, ("lai", "wetness"): -0.2}, holes)
+    kept = {name: np.delete(values, np.s_[::3]) for name, values in places.items()}
+    other = copula({"lai": 0.1}, {("lai", "elevation"): 0.5, ("lai", "wetness"): -0.2}, kept)
+    np.testing.assert_array_equal(parts.ground["lai"].weights, other.ground["lai"].weights)
+    with pytest.raises(ValueError, match="nowhere are all known"):
+        copula({"lai": 0.1}, {("lai", "elevation"): 0.5}, {"elevation": np.full(9, np.nan)})
+
+
+def test_each_name_has_noise_of_its_own():
+    seeds = {field_seed(seed, name) for seed in (0, 1) for name in ("lai", "soil", "moisture", "brown")}
+    assert len(seeds) == 8
+    assert field_seed(2**63 - 1, "lai") == 2**63 - 1

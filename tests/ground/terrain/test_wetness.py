@@ -1,0 +1,116 @@
+"""Where water gathers, beside closed forms, another filling of pits, and what flows out."""
+
+import heapq
+
+import numpy as np
+import pytest
+from oracles_terrain import hills
+
+from fifesim.ground.terrain.wetness import LEAST_SLOPE, drained_area, fill_pits, wetness_index
+
+FALL = 1e-4
+
+
+def flooded(elevation):
+    """Ground filled from its border inward, the lowest cell first (priority flood)."""
+    filled = np.full(elevation.shape, np.inf)
+    edge = [
+        (elevation[place], place)
+        for place in np.ndindex(elevation.shape)
+        if 0 in place or place[0] == elevation.shape[0] - 1 or place[1] == elevation.shape[1] - 1
+    ]
+    for height, place in edge:
+        filled[place] = height
+    heapq.heapify(edge)
+    while edge:
+        height, (y, x) = heapq.heappop(edge)
+        for place in [(y + a, x + b) for a in (-1, 0, 1) for b in (-1, 0, 1)]:
+            inside = 0 <= place[0] < filled.shape[0] and 0 <= place[1] < filled.shape[1]
+            if inside and np.isinf(filled[place]):
+                filled[place] = max(elevation[place], height + FALL)
+                heapq.heappush(edge, (filled[place], place))
+    return filled
+
+
+@pytest.fixture(scope="module")
+def rough():
+    """Hills with many pits."""
+    return hills((37, 52), seed=3) + np.random.default_rng(1).normal(0, 4, (37, 52))
+
+
+def test_pits_are_filled_as_a_flood_from_the_border_does(rough):
+    filled = fill_pits(rough)
+    np.testing.assert_allclose(filled, flooded(rough), rtol=0, atol=1e-9)
+    assert (filled > rough).any() and (filled >= rough).all()
+
+
+def test_all_water_reaches_the_border(rough):
+    """Cells without a lower neighbour lie on the border, and what comes to them is the area of all."""
+    filled = fill_pits(rough)
+    area = drained_area(filled, 10.0, 20.0)
+    around = np.pad(filled, 1, constant_values=np.inf)
+    windows = np.lib.stride_tricks.sliding_window_view(around, (3, 3))
+    ends = windows.min(axis=(2, 3)) == filled
+    assert not ends[1:-1, 1:-1].any()
+    assert area[ends].sum() == pytest.approx(rough.size * 200.0, rel=1e-12)
+    assert area.min() >= 200.0
+
+
+def test_plane_drains_a_line_of_cells_for_each():
+    """Away from its sides, where water that parts leaves: the distance from the top, over the slope."""
+    rows = np.arange(40.0)[:, None]
+    plane = np.repeat(200.0 - 0.08 * 10.0 * rows, 81, axis=1)
+    found = wetness_index(plane, 10.0, 10.0)[:, 40]
+    np.testing.assert_allclose(found[:30], np.log((rows[:30, 0] + 1) * 10.0 / 0.08), rtol=0, atol=2e-3)
+
+
+def test_cone_drains_alike_all_round():
+    """Water from the top of a cone crosses circles: area over contour is a half of the radius, in all directions."""
+    y, x = np.mgrid[-50:51, -50:51]
+    radius = np.hypot(x, y)
+    found = drained_area(100.0 - radius, 1.0, 1.0)
+    ring = (radius > 25) & (radius < 35)
+    # A contour is a little longer than cells are wide where water crosses them obliquely.
+    ratio = found[ring] / (radius[ring] / 2)
+    assert ratio.mean() == pytest.approx(1.1, abs=0.1) and ratio.std() < 0.15
+    np.testing.assert_allclose(found, found.T, rtol=1e-9)
+
+
+def test_valleys_are_wet_and_ridges_dry():
+    across, along = np.meshgrid(np.arange(-20.0, 21.0), np.arange(60.0))
+    valley = 0.3 * np.abs(across) - 0.05 * along + 50
+    found = wetness_index(valley, 1.0, 1.0)
+    assert found[50, 20] > found[50, 5:15].max() + 2
+    # The area of all of both sides above, but for what leaves by the sides.
+    assert np.exp(found[50, 20]) * np.hypot(0.0, 0.05) == pytest.approx(51 * 41, rel=0.25)
+
+
+def test_mirrored_ground_has_a_mirrored_index(rough):
+    found = wetness_index(rough, 10.0, 20.0)
+    np.testing.assert_allclose(wetness_index(rough[::-1], 10.0, 20.0)[::-1], found, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(wetness_index(rough.T, 20.0, 10.0).T, found, rtol=0, atol=1e-9)
+
+
+def test_level_ground_is_finite_and_small_rasters_are_too():
+    assert np.isfinite(wetness_index(np.full((6, 7), 3.0), 5.0, 5.0)).all()
+    assert wetness_index(np.full((1, 1), 3.0), 5.0, 5.0)[0, 0] == pytest.approx(np.log(5.0 / LEAST_SLOPE))
+    assert wetness_index(np.array([[3.0, 2.0]]), 5.0, 5.0).shape == (1, 2)
+
+
+def test_water_leaves_where_nothing_is_known(rough):
+    gap = rough.copy()
+    gap[15:18, 20:30] = np.nan
+    found = wetness_index(gap, 10.0, 10.0)
+    np.testing.assert_array_equal(np.isnan(found), np.isnan(gap))
+    area = drained_area(fill_pits(gap), 10.0, 10.0)
+    assert np.isfinite(area).all()
+
+
+def test_water_parts_by_slope_to_a_power():
+    """From a top one metre above eight neighbours on cells of 10 m by 20 m, each as steep as it is near."""
+    top = np.zeros((3, 3))
+    top[1, 1] = 1.0
+    distance = np.hypot(10.0 * np.array([-1, 0, 1])[:, None], 20.0 * np.array([-1, 0, 1]))
+    share = np.where(distance > 0, (1 / np.where(distance > 0, distance, 1)) ** 1.1, 0.0)
+    expected = 200.0 * (1 + share / share.sum())
+    np.testing.assert_allclose(drained_area(top, 10.0, 20.0), expected, rtol=1e-12)
