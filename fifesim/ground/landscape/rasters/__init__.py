@@ -1,0 +1,1 @@
+"""Landscapes of several classes and properties, on labelled rasters."""
