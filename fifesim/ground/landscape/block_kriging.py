@@ -97,7 +97,7 @@ def kriging_filter(arp, deviation, ratio, shape):
 
     References
     ----------
-    [Kyriakidis2004]_, Eqs. 9 to 11, for point estimates from areas; [KyriakidisYoo2005]_ for the simulation
+    [Kyriakidis2004]_ for estimates of points from areas; [KyriakidisYoo2005]_ for the simulation
     """
     u, v = (2.0 * np.pi * fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
     number = ratio[0] * ratio[1]

@@ -9,7 +9,7 @@ from fifesim.ground.landscape.field import periodic_field
 # Of the logarithm of cells.
 LARGEST_DEVIATION = 2.0
 
-_NODES = 81
+_NODES = 41
 
 # Cells along a side of the sample, and pixels at least.
 _SAMPLE, _FEWEST = 504, 8
@@ -106,7 +106,7 @@ def deviation_table(arp, ratio):
 
     Returns
     -------
-    variations, deviations : array, shape (81,)
+    variations, deviations : array, shape (41,)
         c and s, increasing from 0. Those of `pixel_sample`, good to 0.5 %. [1]
     """
     sample = pixel_sample(arp, ratio)

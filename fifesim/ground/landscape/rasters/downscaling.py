@@ -10,7 +10,7 @@ import xarray as xr
 from fifesim.base.lattice import assemble
 from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.optics import check_map
-from fifesim.ground.landscape.autoregression import check_arp
+from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
 from fifesim.ground.landscape.block_kriging import by_pixel, kriging_filter
 from fifesim.ground.landscape.dispersion import deviation_table, kept_variance, marginal_deviation
 from fifesim.ground.landscape.distribution import lai_distribution
@@ -70,11 +70,12 @@ def downscale(lai, grid, *, arp=0.15, distribution=None, cv=None, seed=0, chunks
     Notes
     -----
     Exact: the mean of the cells of each pixel, within rounding (1e-12), and that none is negative. Approximate: where
-    the map is a mean of a scene of the model, the semivariogram over one and two cells is the model's within 1 % (3 % at
-    arp 0.24), inside of pixels and across their borders. A smoother map leaves cells less room: of a uniform map
-    neighbours across a border differ by 0.89, 0.81 and 0.55 times the model's variance at arp 0, 0.15 and 0.24 and
-    pixels of 3 x 3 cells, those in a pixel by 1, 0.98 and 0.75 times. With `cv` the logarithm of the cells is normal,
-    with `distribution` they are quantiles of a normal field; cells may exceed the end of a distribution by 1 %.
+    the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 1 %
+    (1.5 % at a cv of 0.2, 3 % at arp 0.24), inside of pixels and across their borders alike. The model is a field whose
+    logarithm is normal for `cv`, quantiles of a normal field for `distribution`; cells may pass the end of a
+    distribution by 1 %. A map that is smoother than that leaves cells less room: of a uniform map, in pixels of 3 x 3
+    cells, neighbours across a border have 0.89, 0.81 and 0.55 times the model's semivariance at arp 0, 0.15 and 0.24,
+    those in a pixel 1, 0.98 and 0.75 times.
 
     The field of cells is that of `fifesim.lai_scene`, whose seed gives the same ups and downs.
 
@@ -88,12 +89,14 @@ def downscale(lai, grid, *, arp=0.15, distribution=None, cv=None, seed=0, chunks
     """
     grid, seed = grids.check_grid(grid), check_seed(seed)
     check_arp(arp)
+    if arp > LARGEST_STREAMING_ARP:
+        raise ValueError(
+            f"arp must be at most {LARGEST_STREAMING_ARP}, got {arp:g}: use larger cells for a longer range"
+        )
     pixels = one_layer(unpacked(north_up(lai)))
     cf.check_quantity(pixels, "lai")
     lattice = pixel_lattice(pixels, grid)
     model = _model(float(arp), distribution, cv, lattice.ratio)
-    # A first window raises what the field refuses before anything lazy is built.
-    streaming_field(seed, arp, 0, 0, (0, 0))
     reads = PixelReads(chunking.pointwise(check_map, pixels).transpose("y", "x").data, lattice)
 
     def kernel(rows, columns, known):
@@ -136,7 +139,7 @@ def _model(arp, distribution, cv, ratio):
         transform = Marginal.of(lai_distribution(distribution), kept_variance(arp, ratio))
         deviation = marginal_deviation(transform, arp, ratio)
         return _Model(arp, transform, None, None, deviation, distribution_name(distribution))
-    table = deviation_table(arp, ratio)
+    table = _deviations(arp, ratio)
     variation = fife_variation if cv is None else cv
     if callable(variation):
         typical = _checked_variation(np.asarray(variation(np.ones((1, 1))), float), table)
@@ -145,6 +148,9 @@ def _model(arp, distribution, cv, ratio):
         return _Model(arp, LogNormal(), variation, table, deviation, words)
     _checked_variation(np.asarray(cv, float), table)
     return _Model(arp, LogNormal(), None, None, float(np.interp(cv, *table)), f"log-normal, cv {cv:g}")
+
+
+_deviations = lru_cache(maxsize=4)(deviation_table)
 
 
 def _checked_variation(values, table):

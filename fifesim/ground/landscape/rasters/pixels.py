@@ -154,8 +154,8 @@ def _corner(source, grid):
     """Row and column of the grid at which the map begins."""
     a, b = source.affine, grid.affine
     corner = (a.f - b.f) / b.e, (a.c - b.c) / b.a
-    off = [each - round(each) for each in corner]
-    if max(map(abs, off)) > _OFF:
+    off = [abs(each - round(each)) for each in corner]
+    if max(off) > _OFF:
         raise ValueError(
             f"the corners of the map's pixels lie {off[0]:.2f} rows and {off[1]:.2f} columns of cells beside those of "
             f"the grid's cells: {_CURE}"
