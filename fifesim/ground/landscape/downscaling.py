@@ -228,13 +228,12 @@ def downscaled(pixels, field, response, transform, deviation):
     filled = _nearest(vegetated)
     means = pixels[filled]
     wanted = transform.level(means)
-    residual = field - kriged(block_means(field, ratio), response, ratio)
-    residual *= deviation if np.ndim(deviation) == 0 else _between(deviation[filled], ratio).astype(np.float32)
-    levels = wanted.copy()
+    own = field * (deviation if np.ndim(deviation) == 0 else _between(deviation[filled], ratio).astype(np.float32))
+    levels = wanted - block_means(own, ratio)
     for _ in range(STEPS):
-        got = block_means(transform.cells(kriged(levels, response, ratio) + residual), ratio)
+        got = block_means(transform.cells(kriged(levels, response, ratio) + own), ratio)
         levels += (wanted - transform.level(got))[filled]
-    lai = transform.cells(kriged(levels, response, ratio) + residual).astype(float)
+    lai = transform.cells(kriged(levels, response, ratio) + own).astype(float)
     got = block_means(lai, ratio)
     lai *= by_pixel(np.where(vegetated, means / got, np.where(pixels == 0, 0.0, np.nan)), ratio)
     return lai
