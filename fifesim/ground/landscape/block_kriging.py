@@ -40,7 +40,9 @@ def block_means(cells, ratio):
     [[2.0, 5.0]]
     """
     down, across = ratio
-    return cells.reshape(cells.shape[0] // down, down, -1, across).mean(axis=(1, 3))
+    # Strides are several times faster than a mean over two axes of a few cells each.
+    rows = sum(cells[i::down] for i in range(1, down)) + cells[::down]
+    return (sum(rows[:, j::across] for j in range(1, across)) + rows[:, ::across]) / (down * across)
 
 
 def by_pixel(pixels, ratio):
@@ -143,8 +145,8 @@ def kriged(pixels, response, ratio):
     True
     """
     spectrum = fft.fft2(pixels.astype(np.float32))
-    columns = np.arange(response.shape[1]) % pixels.shape[1]
-    repeated = np.tile(spectrum, (ratio[0], 1))[:, columns]
-    repeated *= response
+    spectrum = spectrum[:, np.arange(response.shape[1]) % pixels.shape[1]]
+    # Frequencies of cells that are one of pixels have its value.
+    repeated = (response.reshape(ratio[0], *spectrum.shape) * spectrum).reshape(response.shape)
     size = pixels.shape[0] * ratio[0], pixels.shape[1] * ratio[1]
     return fft.irfft2(repeated, s=size, overwrite_x=True)

@@ -16,7 +16,7 @@ from fifesim.ground.landscape.autoregression import (
     response,
 )
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
-from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
+from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field, window_field
 from fifesim.ground.landscape.noise import white_noise
 
 ARPS = [0.05, 0.1, 0.15, 0.2, 0.24]
@@ -183,3 +183,10 @@ def test_streaming_stops_before_its_margin_grows_without_bound():
     with pytest.raises(ValueError, match=r"at most 0\.2498.*method=\"periodic\""):
         streaming_field(1, 0.2499, 0, 0, (2, 2))
     assert np.isfinite(periodic_field(1, 0.2499, (50, 50))).all()
+
+
+@pytest.mark.parametrize("arp", [0.0, 0.15, 0.24])
+def test_window_filtered_by_itself_has_the_cells_of_the_tiles(arp):
+    """Across the corner of four tiles."""
+    found = window_field(20, arp, -50, TILE - 40, (90, 70))
+    np.testing.assert_allclose(found, streaming_field(20, arp, -50, TILE - 40, (90, 70)), rtol=0, atol=1e-5)

@@ -15,7 +15,7 @@ from fifesim.ground.landscape.block_kriging import by_pixel, kriging_filter
 from fifesim.ground.landscape.dispersion import deviation_table, kept_variance, marginal_deviation
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.downscaling import LogNormal, Marginal, downscaled, fife_variation
-from fifesim.ground.landscape.field import streaming_field
+from fifesim.ground.landscape.field import window_field
 from fifesim.ground.landscape.raster import distribution_name, one_layer
 from fifesim.ground.landscape.rasters.pixels import MARGIN, PixelReads, pixel_lattice
 from fifesim.rasters import cf, places
@@ -192,7 +192,7 @@ def _tile(model, seed, lattice, row, column, pixels):
         for place, number, shift in zip((row, column), lattice.ratio, lattice.shift, strict=True)
     ]
     size = tuple(count * number for count, number in zip(shape, lattice.ratio, strict=True))
-    field = streaming_field(seed, model.arp, *first, size)
+    field = window_field(seed, model.arp, *first, size)
     response = _filter(model.arp, model.deviation, lattice.ratio, shape)
     cells = downscaled(pixels, field, response, model.transform, model.deviations(pixels))
     cut = tuple(slice(MARGIN * number, -MARGIN * number) for number in lattice.ratio)
