@@ -46,7 +46,7 @@ def field(side):
 
 def downscaling(side):
     grid = grid_of(side // 3 * 3)
-    pixels = lai_of(side // 3 * 3).fifesim.aggregate(10).persist()
+    pixels = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7, chunks="auto").fifesim.aggregate(10).persist()
     return lambda: _run(pixels.fifesim.downscale(grid, arp=0.15, cv=0.4, seed=next(SEEDS), chunks="auto").data)
 
 

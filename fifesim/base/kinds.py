@@ -170,7 +170,7 @@ SPREAD = Kind(
 )
 FUNCTION = Kind("a function", callable)
 VARIATION = Kind(
-    "a number, or a function of the means of pixels, such as lambda mean: 0.4 / mean",
+    "a number, or a function of the means of pixels, such as lambda mean: 0.5 / (1 + mean)",
     lambda value: callable(value) or _is_number(value),
 )
 HORIZON = Kind(

@@ -145,6 +145,22 @@ def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
 
 
 def one_layer(raster):
+    """
+    A map without the dimensions of which it has one step.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray
+
+    Returns
+    -------
+    raster : xarray.DataArray, dims (y, x)
+
+    Raises
+    ------
+    ValueError
+        If it has several layers.
+    """
     raster = raster.squeeze([name for name in raster.dims if raster.sizes[name] == 1 and name == "band"], drop=True)
     if raster.ndim != 2:
         raise ValueError(f"a map of leaf area has rows and columns, got dimensions {raster.dims}: select one layer")
@@ -177,6 +193,17 @@ def _periodic_scene(grid, density, arp, seed, chunks):
 
 
 def distribution_name(source):
+    """
+    What a distribution of leaf area is called in attributes.
+
+    Parameters
+    ----------
+    source : str, path or frozen scipy distribution
+
+    Returns
+    -------
+    name : str
+    """
     if hasattr(source, "dist"):
         return f"{source.dist.name}({', '.join(f'{value:g}' for value in [*source.args, *source.kwds.values()])})"
     return Path(source).name
