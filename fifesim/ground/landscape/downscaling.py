@@ -2,7 +2,8 @@
 Cells below the pixels of a map of leaf area: they vary as the autoregressive process, and their means are the map's.
 
 The field of cells is conditioned on the levels of the pixels by block kriging, and mapped to leaf area. The levels are
-found so that means over pixels are those of the map; what the last step leaves is a factor of each pixel.
+found so that means over pixels are those of the map; what is left of some pixels shifts these by themselves, and a last
+factor, 0.999 to 1.001 as a rule, makes means exact.
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 
 # Each step makes what is left of the misfit five times smaller or more.
 STEPS = 4
+
+SHIFTS = 8  # of single pixels
 
 _FURTHEST = 8.5  # level of a distribution's ends, in standard deviations
 
@@ -233,9 +236,22 @@ def downscaled(pixels, field, response, transform, deviation):
     for _ in range(STEPS):
         got = block_means(transform.cells(kriged(levels, response, ratio) + own), ratio)
         levels += (wanted - transform.level(got))[filled]
-    lai = transform.cells(kriged(levels, response, ratio) + own).astype(float)
-    got = block_means(lai, ratio)
-    lai *= by_pixel(np.where(vegetated, means / got, np.where(pixels == 0, 0.0, np.nan)), ratio)
+    lai = _met(kriged(levels, response, ratio) + own, wanted, means, vegetated, transform)
+    lai *= by_pixel(np.where(vegetated, means / block_means(lai, ratio), np.where(pixels == 0, 0.0, np.nan)), ratio)
+    return lai
+
+
+def _met(field, wanted, means, vegetated, transform):
+    """Leaf area of a field; pixels whose mean is off by more than a thousandth are shifted, each by itself."""
+    lai = transform.cells(field).astype(float)
+    (rows, columns), ratio = means.shape, tuple(np.floor_divide(field.shape, means.shape))
+    off = np.nonzero(vegetated & (np.abs(block_means(lai, ratio) - means) > 1e-3 * means))
+    if off[0].size:
+        apart = rows, ratio[0], columns, ratio[1]
+        part = field.reshape(apart)[off[0], :, off[1]].reshape(off[0].size, -1)
+        for _ in range(SHIFTS):
+            part += (wanted[off] - transform.level(transform.cells(part).mean(axis=1)))[:, None].astype(np.float32)
+        lai.reshape(apart)[off[0], :, off[1]] = transform.cells(part).reshape(-1, *ratio)
     return lai
 
 

@@ -73,7 +73,7 @@ def downscale(lai, grid, *, arp=0.15, distribution=None, cv=None, seed=0, chunks
     the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 1 %
     (1.5 % at a cv of 0.2, 3 % at arp 0.24), inside of pixels and across their borders alike. The model is a field whose
     logarithm is normal for `cv`, quantiles of a normal field for `distribution`; cells may pass the end of a
-    distribution by 1 %. A map that is smoother than that leaves cells less room: of a uniform map, in pixels of 3 x 3
+    distribution by 0.1 %. A map that is smoother than that leaves cells less room: of a uniform map, in pixels of 3 x 3
     cells, neighbours across a border have 0.89, 0.81 and 0.55 times the model's semivariance at arp 0, 0.15 and 0.24,
     those in a pixel 1, 0.98 and 0.75 times.
 
