@@ -16,6 +16,7 @@ from .rasters.sun import sun_position as sun_position
 from .ground.landscape.raster import lai_scene as lai_scene
 from .ground.landscape.raster import open_lai as open_lai
 from .ground.landscape.rasters.fields import correlated_fields as correlated_fields
+from .ground.landscape.rasters.downscaling import downscale as downscale  # method
 from .ground.landscape.distribution import lai_distribution as lai_distribution
 from .ground.landscape.distribution import treatments as treatments
 from .ground.landscape.autoregression import correlation_length as correlation_length

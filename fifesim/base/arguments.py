@@ -43,6 +43,7 @@ from fifesim.base.kinds import (
     TEXT,
     TRACK,
     TWO,
+    VARIATION,
     Kind,
     described,
     is_a,
@@ -92,6 +93,7 @@ KINDS = (
     | _of(PLAIN, "noise_models aerosol axes")
     | _of(DISTRIBUTION, "distribution")
     | _of(LEAF_ANGLES, "leaf_angles")
+    | _of(VARIATION, "cv")
 )
 """What an argument may be, by its name, which means the same everywhere."""
 

@@ -172,6 +172,10 @@ SPREAD = Kind(
     "a line spread function, such as fifesim.instrument('TM').line_spread", lambda value: hasattr(value, "half_width")
 )
 FUNCTION = Kind("a function", callable)
+VARIATION = Kind(
+    "a number, or a function of the means of pixels, such as lambda mean: 0.5 / (1 + mean)",
+    lambda value: callable(value) or _is_number(value),
+)
 HORIZON = Kind(
     "an xarray.DataArray over (direction, y, x), as fifesim.horizon gives it",
     lambda value: _is_raster(value) and "direction" in value.dims,
