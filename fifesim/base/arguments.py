@@ -66,7 +66,7 @@ KINDS = (
     | _of(SURROUNDINGS, "surroundings")
     | _of(LEAF, "leaf_optics")
     | _of(HORIZON, "horizon")
-    | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality")
+    | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality reflect")
     | _of(TEXT, "angles scaling pair quantity method datum vertical_units engine profile along band")
     | _of(NAMES, "bands noise engines")
     | _of(PATH, "path")
