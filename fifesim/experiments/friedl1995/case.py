@@ -1,187 +1,247 @@
-"""The experiment of Friedl et al. (1995): nine scenes, what the sensor makes of them, and Table 2."""
+"""The experiment of Friedl et al. (1995): nine scenarios that differ in the ground, and what is made of each."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property
+from math import ceil
 
 import numpy as np
-from odc.geo.geobox import GeoBox
+import xarray as xr
 
 from fifesim.analysis.rasters.means import aggregate
-from fifesim.base import datasets
+from fifesim.base import datasets, fife
+from fifesim.base.foreign import shown
+from fifesim.base.kinds import is_path
 from fifesim.chain import steps as chain
 from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
-from fifesim.ground.canopy import raster as ground
-from fifesim.ground.landscape.distribution import treatments, truncated_normal
+from fifesim.experiments.friedl1995 import inputs
+from fifesim.experiments.friedl1995.readings import CELL, NATIVE, TABLE_1, Reading, reading_of
+from fifesim.ground.canopy import raster as canopy
+from fifesim.ground.landscape.distribution import treatments
 from fifesim.ground.landscape.raster import lai_scene
-from fifesim.ground.terrain.rasters.hills import flint_hills
-from fifesim.rasters import sites
-from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.description.spatial_response import CosineResponse
+from fifesim.scenario.land import elevation
+from fifesim.scenario.scenario import Scenario
+from fifesim.scenario.simulation import setup_of
 
 ARPS = (0.05, 0.15, 0.24)
 VARIABLES = ("lai", "fpar")
-BANDS = ("TM3", "TM4")
-
-# Nine cells across a pixel of 30 m.
-CELL = 30 / 9
-PIXEL = 30.0
 
 # Along the edge of a scene. The paper states no size; the report shows what others give.
 CELLS = 333
-# With fewer than a hundred pixels increments hold too few for a deviation.
-FEWEST_CELLS = 90
+# With fewer pixels along an edge increments hold too few for a deviation.
+_FEWEST_PIXELS = 10
+_COARSE_PIXELS = 12
 
 # Where in the FIFE site the scene lies, in cells from its corner: only the relief depends on it.
 _CORNER = 1000
-_HILLS_SEED = 7
 
 
-@dataclass(frozen=True)
-class Reading:
-    """
-    How the pixels of Table 1 lie on the blocks of ground that they are compared with.
-
-    Parameters
-    ----------
-    name : str
-    text : str
-        What it takes Table 1 to say.
-    own_interval : bool
-        Pixels at the instrument's own sampling interval, paired with the blocks by row and column.
-    count : int, optional
-        Number of angles of the line spread function; the instrument's by default.
-    offset : float
-        Constant displacement of the image, southward and eastward. [cell]
-    topography : bool
-        Slopes change the light on the ground (Eqs. 4 and 5).
-    """
-
-    name: str
-    text: str
-    own_interval: bool = False
-    count: int | None = None
-    offset: float = 0.0
-    topography: bool = False
+def _own_densities():
+    return inputs.densities_of(None)
 
 
-USED = Reading(
-    "native interval",
-    "pixels every 43 µrad × 705 km = 30.315 m, paired by row and column with the 30 m blocks of the truth",
-    own_interval=True,
-)
-READINGS = (
-    USED,
-    Reading("aligned", "pixels of 30 m on the blocks of the truth"),
-    Reading("narrow response", "aligned, with a line spread of 7 of the 9 angles (23.6 m)", count=7),
-    Reading("constant offset", "aligned, then displaced by 2 cells (6.7 m) along both axes", offset=2.0),
-    Reading("aligned with relief", "aligned, on the synthetic Flint Hills", topography=True),
-    Reading("native interval with relief", "native interval, on the synthetic Flint Hills", True, topography=True),
-)
-
-
-def _setup():
-    """That of the experiment, with its leaf optics."""
-    optics = {band: tuple(pair) for band, *pair in datasets.table("friedl1995_optics.csv").itertuples(index=False)}
-    return Setup(instrument=find_instrument("TM"), bands=BANDS, leaf_optics=optics)
-
-
-def densities(shift=0.0, factor=1.0, bound=0.0):
-    """
-    Distributions of LAI of the experiment, or changed ones.
-
-    Parameters
-    ----------
-    shift : float, optional
-        Added to mean and bounds. [m2 m-2]
-    factor : float, optional
-        Of the standard deviation. [1]
-    bound : float, optional
-        By how many standard deviations the bounds move outward; a lower one of 0 stays. [1]
-
-    Returns
-    -------
-    densities : dict of str to frozen scipy distribution
-        By treatment.
-    """
-    found = {}
-    for name, mean, deviation, low, high in datasets.table("friedl1995_densities.csv").itertuples(index=False):
-        moved = low + shift - bound * deviation if low else low, high + shift + bound * deviation
-        found[name] = truncated_normal(mean + shift, factor * deviation, *moved)
-    return found
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
     """
     What the nine scenes have in common.
 
     Parameters
     ----------
-    cells : int
-        Along the edge of a scene.
     reading : Reading
-    densities : mapping of str to frozen scipy distribution
-        Of LAI, by treatment.
-    setup : fifesim.chain.setup.Setup
-        On level ground, as Table 1 has it before it is read.
+        Of Table 1.
+    dem : str
+        "flat", "flint-hills" or a raster file of elevation.
+    densities : mapping of str
+        By treatment, what `fifesim.lai_distribution` takes.
+    optics : mapping of str to (float, float), optional
+        Leaf reflectance and transmittance by band; by default fifesim's own. [1]
+    background : mapping of str to float, optional
+        By band, or shares of spectra; by default fifesim's own. [1]
+    sensor : str
+        Name of an instrument, or its file.
+    cells : int, optional
+        Along the edge of a scene; 333, or 12 pixels of a coarse sensor, by default.
+
+    Raises
+    ------
+    ValueError
+        If a scene would have fewer than 10 pixels along its edge, or the sensor lacks a red or near infrared band.
     """
 
-    cells: int = CELLS
-    reading: Reading = USED
-    densities: Mapping = field(default_factory=densities)
-    setup: Setup = field(default_factory=_setup)
+    reading: Reading = NATIVE
+    dem: str = "flat"
+    densities: Mapping = field(default_factory=_own_densities)
+    optics: Mapping | None = None
+    background: Mapping | None = None
+    sensor: str = TABLE_1
+    cells: int | None = None
 
     def __post_init__(self):
-        if self.cells < FEWEST_CELLS:
+        if self.cells is None:
+            object.__setattr__(self, "cells", max(CELLS, ceil(_COARSE_PIXELS * self.pixel / CELL)))
+        fewest = ceil(_FEWEST_PIXELS * self.pixel / CELL)
+        if self.cells < fewest:
             raise ValueError(
-                f"cells must be at least {FEWEST_CELLS}, 10 pixels along the edge of a scene, got {self.cells}: "
-                "samples of 200 pixels need 135"
+                f"cells must be at least {fewest}, {_FEWEST_PIXELS} pixels along the edge of a scene, got "
+                f"{self.cells}: samples of 200 pixels need {ceil(15 * self.pixel / CELL)}"
             )
 
-    @property
-    def grid(self):
-        """Grid of the cells, an `odc.geo.geobox.GeoBox`."""
-        site = sites.fife_site(CELL)
-        first = min(_CORNER, max(site.shape.y - self.cells, 0))
-        return GeoBox((self.cells, self.cells), site[first:, first:].affine, site.crs)
+    @cached_property
+    def bands(self):
+        """Names of the red and the near infrared band, a tuple of str."""
+        return inputs.sensor_of(self.sensor)[1]
+
+    @cached_property
+    def instrument(self):
+        """As the reading has it, a `fifesim.sensor.description.instrument_file.Instrument`."""
+        return self.reading.instrument(inputs.sensor_of(self.sensor)[0])
 
     @property
-    def read(self):
-        """The setup as the reading of Table 1 has it, a `fifesim.chain.setup.Setup`."""
-        instrument, reading = self.setup.instrument, self.reading
-        if reading.count is not None:
-            lsf = instrument.lsf
-            instrument = replace(instrument, lsf=CosineResponse(kind=lsf.kind, step=lsf.step, count=reading.count))
-        return replace(
-            self.setup,
-            instrument=instrument,
-            dem=_relief(self.grid) if reading.topography else None,
-            interval="native" if reading.own_interval else None,
-            offset=(reading.offset * CELL / PIXEL,) * 2,
-        )
+    def pixel(self):
+        """Size of a pixel, and of a block of the truth. [m]"""
+        description, (red, _) = inputs.sensor_of(self.sensor)
+        return description.pixel(description.select([red])[0])
+
+    @property
+    def interval(self):
+        """Distance between the instrument's own samples. [m]"""
+        return max(self.instrument.ground_intervals(self.instrument.select(self.bands)[0]))
+
+    @property
+    def drift(self):
+        """How far along an axis the last pixel lies from its block. [m]"""
+        if not self.reading.own_interval:
+            return 0.0
+        return (int(self.cells * CELL / self.interval) - 1) * abs(self.interval - self.pixel)
+
+    def scenario(self, treatment, arp, seed):
+        """
+        One of the nine, which `fifesim simulate` runs.
+
+        Parameters
+        ----------
+        treatment : str
+        arp : float
+            [1]
+        seed : int
+
+        Returns
+        -------
+        scenario : fifesim.scenario.scenario.Scenario
+            All that matters to the ground is said, whatever the defaults are. A reading with another response, and a
+            density that has no name, are not in it.
+        """
+        crs, west, north = fife.CORNERS["NAD83"]
+        edge = self.cells * CELL
+        first = min(_CORNER * CELL, max(fife.SIZE - edge, 0.0))
+        grid = {"crs": crs, "west": west + first, "north": north - first, "width": edge, "height": edge, "cell": CELL}
+        source = self.densities[treatment]
+        ground = {"distribution": str(source) if is_path(source) else treatment, "arp": arp, "seed": seed}
+        ground |= {"method": "periodic"} | self._leaves()
+        sensor = {"instrument": self.sensor, "bands": list(self.bands)}
+        sensor |= {"interval": "native" if self.reading.own_interval else "product"}
+        sensor |= {"offset": [self.reading.offset * CELL / self.pixel] * 2}
+        return Scenario(grid=grid, ground=ground, terrain={"dem": self.dem}, sensor=sensor)
+
+    def setup(self, scenario):
+        """
+        Ground, air and instrument of one of its scenarios, without elevation.
+
+        Parameters
+        ----------
+        scenario : fifesim.scenario.scenario.Scenario
+
+        Returns
+        -------
+        setup : fifesim.chain.setup.Setup
+        """
+        return replace(setup_of(scenario), instrument=self.instrument)
+
+    def land(self):
+        """
+        Elevation of the scenes, which is one for all, and the horizon around.
+
+        Returns
+        -------
+        dem, horizon : xarray.DataArray or None
+            As `fifesim.scenario.land.elevation` gives them, in memory.
+        """
+        scenario = self.scenario(treatments()[0], ARPS[0], 0)
+        dem, horizon, _ = elevation(scenario, scenario.geobox())
+        return dem, None if horizon is None else horizon.compute()
+
+    def _leaves(self):
+        keys = {}
+        if self.optics is not None:
+            for number, name in enumerate(inputs.OPTICS):
+                keys[name] = {band: float(pair[number]) for band, pair in self.optics.items()}
+        if self.background is not None:
+            by_band = set(self.background) & set(self.bands)
+            keys["background" if by_band else "background_spectra"] = dict(self.background)
+        return keys
 
 
-def scenes():
+def case_of(reading="native", dem="flat", densities=None, optics=None, background=None, sensor=TABLE_1, cells=None):
     """
-    Treatment and autoregressive parameter of the nine scenes, in the order of Table 2.
+    A case of what a reader gives.
+
+    Parameters
+    ----------
+    reading, dem, densities, optics, background, sensor, cells : optional
+        As in `fifesim.reproduce`.
 
     Returns
     -------
-    scenes : list of (str, float)
+    case : Case
 
-    Examples
-    --------
-    >>> len(scenes()), scenes()[0]
-    (9, ('burned-grazed', 0.05))
+    Raises
+    ------
+    ValueError
+        If one of them is not right.
     """
-    return [(treatment, arp) for treatment in treatments() for arp in ARPS]
+    sensor = os.fspath(sensor)
+    description, bands = inputs.sensor_of(sensor)
+    case = Case(
+        reading=reading_of(reading, description.name),
+        dem=os.fspath(dem),
+        densities=inputs.densities_of(densities),
+        optics=inputs.by_band(optics, bands, inputs.OPTICS, "optics"),
+        background=inputs.background_of(background, bands),
+        sensor=sensor,
+        cells=cells,
+    )
+    if case.dem not in ("flat", "flint-hills") and not os.path.isfile(case.dem):
+        raise ValueError(f'dem = {shown(case.dem)}: type "flat", "flint-hills", or a raster file of elevation')
+    case.scenario(treatments()[0], ARPS[0], 0)
+    return case
 
 
-def landscape(case, treatment, arp, seed):
+@dataclass(frozen=True, eq=False)
+class Ground:
     """
-    Leaf area of a scene and the light that it absorbs.
+    Ground of a scene, and the light above it.
+
+    Parameters
+    ----------
+    setup : fifesim.chain.setup.Setup
+        With the elevation.
+    lai, fpar : xarray.DataArray, dims (y, x)
+    reflectance, toa : xarray.DataArray, dims (band, y, x)
+        At the ground and at the top of the atmosphere. [1]
+    """
+
+    setup: Setup
+    lai: xr.DataArray
+    fpar: xr.DataArray
+    reflectance: xr.DataArray
+    toa: xr.DataArray
+
+
+def ground_of(case, treatment, arp, seed, land=(None, None)):
+    """
+    Ground of a scene, by the paper's own route: one Fourier transform of the scene, and exact ranks.
 
     Parameters
     ----------
@@ -190,14 +250,57 @@ def landscape(case, treatment, arp, seed):
     arp : float
         [1]
     seed : int
+    land : (xarray.DataArray, xarray.DataArray), optional
+        From `Case.land`; level by default.
 
     Returns
     -------
-    lai, fpar : xarray.DataArray, dims (y, x)
-        By the paper's own route: one Fourier transform of the scene, and exact ranks.
+    ground : Ground
     """
-    lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method="periodic")
-    return lai, ground.fpar(lai)
+    scenario = case.scenario(treatment, arp, seed)
+    keys, (dem, horizon) = scenario.ground, land
+    setup = replace(case.setup(scenario), dem=dem, horizon=horizon)
+    lai = lai_scene(scenario.geobox(), case.densities[treatment], arp=arp, seed=seed, method=keys.method)
+    fpar = canopy.fpar(lai, geometry=setup.geometry, leaf_angles=keys.leaf_angles, fpar_inf=keys.fpar_inf)
+    reflectance = reflectance_of(setup, lai).compute()
+    return Ground(setup, lai, fpar, reflectance, chain.to_toa(reflectance, instrument=setup.instrument))
+
+
+def image(case, ground, treatment, arp, seed):
+    """
+    What the instrument of a case records of the ground of a scene.
+
+    Parameters
+    ----------
+    case : Case
+        Of the same ground, sun and bands.
+    ground : Ground
+    treatment, arp, seed
+        Of the scene.
+
+    Returns
+    -------
+    image : xarray.DataArray of unsigned integers, dims (band, y, x)
+    """
+    return image_of(case.setup(case.scenario(treatment, arp, seed)), ground.reflectance)
+
+
+def block_means(case, ground, array):
+    """
+    Means over the blocks of the truth.
+
+    Parameters
+    ----------
+    case : Case
+    ground : Ground
+    array : xarray.DataArray, dims (..., y, x)
+        By cells.
+
+    Returns
+    -------
+    means : xarray.DataArray, dims (..., y, x)
+    """
+    return aggregate(array, case.pixel, min_valid=ground.setup.min_valid)
 
 
 def pixel_values(truth, *images):
@@ -218,32 +321,36 @@ def pixel_values(truth, *images):
     return values[:, np.isfinite(values).all(axis=0)]
 
 
-def run(case, treatment, arp, seed):
+def cell_limits(ground):
     """
-    Pixels of one scene, as Table 2 regresses them.
+    Least and largest of the cells of a scene.
 
     Parameters
     ----------
-    case : Case
-    treatment : str
-    arp : float
-        [1]
-    seed : int
+    ground : Ground
 
     Returns
     -------
-    pixels : array, shape (3, n)
-        True LAI, true FPAR, and NDVI at the top of the atmosphere.
-    cells : array, shape (3, 2)
-        Least and largest of the same in the cells; NDVI at the top of the atmosphere, too.
+    limits : array, shape (3, 2)
+        Of LAI, FPAR, and NDVI at the top of the atmosphere.
     """
-    lai, fpar = landscape(case, treatment, arp, seed)
-    reflectance = reflectance_of(case.read, lai)
-    image = image_of(case.read, reflectance)
-    truth = [aggregate(array, PIXEL) for array in (lai, fpar)]
-    of_cells = ndvi(chain.to_toa(reflectance))
-    limits = [(float(array.min()), float(array.max())) for array in (lai, fpar, of_cells)]
-    return pixel_values(*truth, ndvi(image)), np.array(limits)
+    return np.array([(float(each.min()), float(each.max())) for each in (ground.lai, ground.fpar, ndvi(ground.toa))])
+
+
+def scenes():
+    """
+    Treatment and autoregressive parameter of the nine scenes, in the order of Table 2.
+
+    Returns
+    -------
+    scenes : list of (str, float)
+
+    Examples
+    --------
+    >>> len(scenes()), scenes()[0]
+    (9, ('burned-grazed', 0.05))
+    """
+    return [(treatment, arp) for treatment in treatments() for arp in ARPS]
 
 
 def paper_table():
@@ -268,9 +375,3 @@ def paper_text():
         Columns quantity, variable, arp and value.
     """
     return datasets.table("friedl1995_text.csv")
-
-
-@lru_cache(maxsize=1)
-def _relief(grid):
-    """Elevation of the synthetic hills, with a cell more on each side for the slopes at the border."""
-    return flint_hills(grid.pad(1), _HILLS_SEED)
