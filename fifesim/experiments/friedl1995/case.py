@@ -63,6 +63,8 @@ class Case:
         Name of an instrument, or its file.
     cells : int, optional
         Along the edge of a scene; 333, or 12 pixels of a coarse sensor, by default.
+    bits : int, optional
+        Of digital numbers; the instrument's by default.
 
     Raises
     ------
@@ -77,6 +79,7 @@ class Case:
     background: Mapping | None = None
     sensor: str = TABLE_1
     cells: int | None = None
+    bits: int | None = None
 
     def __post_init__(self):
         if self.cells is None:
@@ -96,7 +99,8 @@ class Case:
     @cached_property
     def instrument(self):
         """As the reading has it, a `fifesim.sensor.description.instrument_file.Instrument`."""
-        return self.reading.instrument(inputs.sensor_of(self.sensor)[0])
+        found = self.reading.instrument(inputs.sensor_of(self.sensor)[0])
+        return found if self.bits is None else replace(found, bits=self.bits)
 
     @property
     def pixel(self):
@@ -130,8 +134,8 @@ class Case:
         Returns
         -------
         scenario : fifesim.scenario.scenario.Scenario
-            All that matters to the ground is said, whatever the defaults are. A reading with another response, and a
-            density that has no name, are not in it.
+            All that matters to the ground is said, whatever the defaults are. A response of the reading, other bits and
+            a density without a name are not in it.
         """
         crs, west, north = fife.CORNERS["NAD83"]
         edge = self.cells * CELL

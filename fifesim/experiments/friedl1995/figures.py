@@ -145,6 +145,7 @@ def _figure5(found, reading):
 def _figure6(found, reading):
     """Densities of LAI, FPAR and NDVI of the cells and of the pixels."""
     figure = Figure(figsize=(_FIGURE_WIDTH, 3.1), layout="constrained")
+    first = found["arp"].values[0]
     for axis, variable in zip(figure.subplots(1, 3), (*VARIABLES, "ndvi"), strict=True):
         cells = found[f"cell_{variable}"].isel(arp=-1).values.ravel()
         # Neither leaf area nor FPAR is below zero, where both are dense.
@@ -160,11 +161,11 @@ def _figure6(found, reading):
             axis.plot(at, of_pixels, dash, color=color, label=f"pixels, arp {arp:g}")
             if variable == "ndvi":
                 smooth = density.sample_density(values["analogue_ndvi"], at)
-                axis.plot(at, smooth, color=color, linewidth=0.6, alpha=0.8)
+                axis.plot(at, smooth, color=_GREY, linewidth=0.9, label="before digitising" if arp == first else None)
         unit = "[m² m⁻²]⁻¹" if variable == "lai" else "[1]"
         axis.set(xlabel=_LABELS[variable], ylabel=f"density {unit}", ylim=(0, None))
         _finish(axis)
-    _legend_below(figure, figure.axes[0])
+    _legend_below(figure, figure.axes[-1])
     return figure
 
 
