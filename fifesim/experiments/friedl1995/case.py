@@ -38,10 +38,6 @@ _COARSE_PIXELS = 12
 _CORNER = 1000
 
 
-def _own_densities():
-    return inputs.densities_of(None)
-
-
 @dataclass(frozen=True, eq=False)
 class Case:
     """
@@ -74,7 +70,7 @@ class Case:
 
     reading: Reading = NATIVE
     dem: str = "flat"
-    densities: Mapping = field(default_factory=_own_densities)
+    densities: Mapping = field(default_factory=lambda: inputs.densities_of(None))
     optics: Mapping | None = None
     background: Mapping | None = None
     sensor: str = TABLE_1
@@ -149,19 +145,20 @@ class Case:
         sensor |= {"offset": [self.reading.offset * CELL / self.pixel] * 2}
         return Scenario(grid=grid, ground=ground, terrain={"dem": self.dem}, sensor=sensor)
 
-    def setup(self, scenario):
-        """
-        Ground, air and instrument of one of its scenarios, without elevation.
+    @cached_property
+    def common(self):
+        """What the nine scenarios share, one of them, a `fifesim.scenario.scenario.Scenario`."""
+        return self.scenario(treatments()[0], ARPS[0], 0)
 
-        Parameters
-        ----------
-        scenario : fifesim.scenario.scenario.Scenario
+    @cached_property
+    def grid(self):
+        """Grid of the cells, an `odc.geo.geobox.GeoBox`."""
+        return self.common.geobox()
 
-        Returns
-        -------
-        setup : fifesim.chain.setup.Setup
-        """
-        return replace(setup_of(scenario), instrument=self.instrument)
+    @cached_property
+    def setup(self):
+        """Ground, air and instrument, without elevation, a `fifesim.chain.setup.Setup`."""
+        return replace(setup_of(self.common), instrument=self.instrument)
 
     def land(self):
         """
@@ -172,8 +169,7 @@ class Case:
         dem, horizon : xarray.DataArray or None
             As `fifesim.scenario.land.elevation` gives them, in memory.
         """
-        scenario = self.scenario(treatments()[0], ARPS[0], 0)
-        dem, horizon, _ = elevation(scenario, scenario.geobox())
+        dem, horizon, _ = elevation(self.common, self.grid)
         return dem, None if horizon is None else horizon.compute()
 
     def _leaves(self):
@@ -218,7 +214,8 @@ def case_of(reading="native", dem="flat", densities=None, optics=None, backgroun
     )
     if case.dem not in ("flat", "flint-hills") and not os.path.isfile(case.dem):
         raise ValueError(f'dem = {shown(case.dem)}: type "flat", "flint-hills", or a raster file of elevation')
-    case.scenario(treatments()[0], ARPS[0], 0)
+    # Physics refuses what cannot be before anything is computed.
+    case.common.complete()
     return case
 
 
@@ -261,16 +258,15 @@ def ground_of(case, treatment, arp, seed, land=(None, None)):
     -------
     ground : Ground
     """
-    scenario = case.scenario(treatment, arp, seed)
-    keys, (dem, horizon) = scenario.ground, land
-    setup = replace(case.setup(scenario), dem=dem, horizon=horizon)
-    lai = lai_scene(scenario.geobox(), case.densities[treatment], arp=arp, seed=seed, method=keys.method)
+    keys, (dem, horizon) = case.common.ground, land
+    setup = replace(case.setup, dem=dem, horizon=horizon)
+    lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method=keys.method)
     fpar = canopy.fpar(lai, geometry=setup.geometry, leaf_angles=keys.leaf_angles, fpar_inf=keys.fpar_inf)
     reflectance = reflectance_of(setup, lai).compute()
     return Ground(setup, lai, fpar, reflectance, chain.to_toa(reflectance, instrument=setup.instrument))
 
 
-def image(case, ground, treatment, arp, seed):
+def image(case, ground):
     """
     What the instrument of a case records of the ground of a scene.
 
@@ -279,14 +275,12 @@ def image(case, ground, treatment, arp, seed):
     case : Case
         Of the same ground, sun and bands.
     ground : Ground
-    treatment, arp, seed
-        Of the scene.
 
     Returns
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
     """
-    return image_of(case.setup(case.scenario(treatment, arp, seed)), ground.reflectance)
+    return image_of(case.setup, ground.reflectance)
 
 
 def block_means(case, ground, array):

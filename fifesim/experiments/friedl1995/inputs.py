@@ -126,7 +126,7 @@ def background_of(given, bands):
         As `by_band`, or if the shares are not right.
     """
     if isinstance(given, str) and ":" in given and not os.path.exists(given):
-        given = _shares(given)
+        return dict(Background(_shares(given)).fractions)
     if isinstance(given, Mapping) and given and set(map(str, given)) <= set(spectrum_names()):
         return dict(Background(given).fractions)
     found = by_band(given, bands, BACKGROUND, "background")

@@ -82,6 +82,6 @@ def _write_rasters(case, own, land, treatment, arp, seed):
     cells = {"lai": ground.lai, "fpar": ground.fpar}
     for band in ground.reflectance["band"].values:
         cells[str(band)] = ground.reflectance.sel(band=band).drop_vars(["band", "wavelength"], errors="ignore")
-    to_geotiff(friedl1995.image(case, ground, treatment, arp, seed), own / "image.tif")
+    to_geotiff(friedl1995.image(case, ground), own / "image.tif")
     to_geotiff(xr.Dataset(truth).astype(np.float32), own / "truth.tif")
     to_geotiff(xr.Dataset(cells).astype(np.float32), own / "scene.tif")

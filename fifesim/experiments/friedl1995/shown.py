@@ -89,9 +89,8 @@ def _scene(cases, land, arp, seed):
     key = [seed, friedl1995.scenes().index((treatment, arp))]
     pixels = []
     for case in cases:
-        image = friedl1995.image(case, ground, treatment, arp, seed)
-        setup = case.setup(case.scenario(treatment, arp, seed))
-        analogue = ndvi(image_of(replace(setup, quantise=False), ground.reflectance))
+        image = friedl1995.image(case, ground)
+        analogue = ndvi(image_of(replace(case.setup, quantise=False), ground.reflectance))
         red, nir = planetary_reflectance(image)
         rasters = truth | {"ndvi": ndvi(image), "analogue_ndvi": analogue, "toa_red": red, "toa_nir": nir}
         values = dict(zip(rasters, friedl1995.pixel_values(*rasters.values()), strict=True))

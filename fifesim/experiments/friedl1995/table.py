@@ -247,7 +247,7 @@ def _scene(cases, land, seed, treatment, arp):
     key = [seed, friedl1995.scenes().index((treatment, arp))]
     found = []
     for case in cases:
-        image = friedl1995.image(case, ground, treatment, arp, seed)
+        image = friedl1995.image(case, ground)
         found.append(_statistics(friedl1995.pixel_values(*truth, ndvi(image)), limits, key))
     return found
 
