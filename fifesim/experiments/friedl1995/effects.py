@@ -44,15 +44,30 @@ def readings(case, seeds, each=iter):
         ``r2 burned-grazed 0.05``; ``growth``, the slope at arp 0.24 over that at 0.05 in the mean of the three
         treatments; and how far all rows are from the paper's, as `agreement` has it.
     """
-    known = [one for one in READINGS.values() if case.instrument.name == TABLE_1 or not one.other_response]
     other = replace(case, dem="flint-hills" if case.dem == "flat" else "flat")
     rows = []
-    for one, several in ((case, known), (other, (NATIVE, ALIGNED))):
+    for one, several in ((case, readings_for(case)), (other, (NATIVE, ALIGNED))):
         found = friedl1995_table.realise(one, seeds, readings=several, each=each)
         rows += [
             {"name": reading.name, "dem": one.dem} | row_of(found.sel(reading=reading.name)) for reading in several
         ]
     return pd.DataFrame(rows)
+
+
+def readings_for(case):
+    """
+    Readings that the instrument of a case can have.
+
+    Parameters
+    ----------
+    case : fifesim.experiments.friedl1995.case.Case
+
+    Returns
+    -------
+    readings : list of Reading
+        All for TM; another has no line spread of Table 1.
+    """
+    return [each for each in READINGS.values() if case.instrument.name == TABLE_1 or not each.other_response]
 
 
 def sizes(case, seeds, each=iter):

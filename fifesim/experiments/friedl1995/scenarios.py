@@ -36,9 +36,40 @@ def write_scenarios(case, folder, seed, scenes=False, each=iter):
     for treatment, arp in each(friedl1995.scenes()):
         own = folder / f"{treatment}-{arp:g}"
         own.mkdir(parents=True)
-        (own / "scenario.toml").write_text(_scenario_text(case, own, treatment, arp, seed), encoding="utf-8")
+        (own / "scenario.toml").write_text(scenario_text(case, own, treatment, arp, seed), encoding="utf-8")
         if scenes:
             _write_rasters(case, own, land, treatment, arp, seed)
+
+
+def scenario_text(case, own, treatment, arp, seed):
+    """
+    Text of one of the nine scenarios, complete.
+
+    Parameters
+    ----------
+    case : fifesim.experiments.friedl1995.case.Case
+    own : pathlib.Path
+        Folder that it is to lie in, beside the instrument of a reading with another response, which is written.
+    treatment : str
+    arp : float
+        [1]
+    seed : int
+
+    Returns
+    -------
+    text : str
+        TOML.
+    """
+    scenario = case.scenario(treatment, arp, seed)
+    if not case.reading.other_response:
+        return write_scenario(scenario.complete())
+    name = f"{case.reading.name}.toml"
+    (own / name).write_text(case.reading.instrument_file(case.instrument.altitude), encoding="utf-8")
+    sensor = scenario.sensor.model_copy(update={"instrument": str(own / name)})
+    complete = scenario.model_copy(update={"sensor": sensor}).complete()
+    # Beside the scenario, wherever both are moved.
+    beside = complete.sensor.model_copy(update={"instrument": name})
+    return write_scenario(complete.model_copy(update={"sensor": beside}))
 
 
 def check_named(case):
@@ -60,20 +91,6 @@ def check_named(case):
                 f"densities: that of {treatment} is no file, and a scenario names one: write samples of it as a CSV "
                 "file, or call fifesim.reproduce"
             )
-
-
-def _scenario_text(case, own, treatment, arp, seed):
-    """A complete scenario; an instrument of the reading's own lies beside it."""
-    scenario = case.scenario(treatment, arp, seed)
-    if not case.reading.other_response:
-        return write_scenario(scenario.complete())
-    name = f"{case.reading.name}.toml"
-    (own / name).write_text(case.reading.instrument_file(case.instrument.altitude), encoding="utf-8")
-    sensor = scenario.sensor.model_copy(update={"instrument": str(own / name)})
-    complete = scenario.model_copy(update={"sensor": sensor}).complete()
-    # Beside the scenario, wherever both are moved.
-    beside = complete.sensor.model_copy(update={"instrument": name})
-    return write_scenario(complete.model_copy(update={"sensor": beside}))
 
 
 def _write_rasters(case, own, land, treatment, arp, seed):
