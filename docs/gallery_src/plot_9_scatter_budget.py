@@ -38,7 +38,7 @@ axis.legend(frameon=False, loc="lower right")
 
 # %%
 # The paper's discussion names three mechanisms: the non-linearity of NDVI against LAI, the scaling of NDVI itself, and
-# regularization by the sensor. It does not name the place of the pixels, which drift from their blocks here. With figures:
+# regularization by the sensor. It does not name the place of the pixels, which drift from their blocks here.
 
 print("arp    non-linearity and curvature    NDVI scaling    point spread    registration    total [% of variance]")
 for arp, found in budgets.items():

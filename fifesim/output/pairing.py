@@ -36,9 +36,10 @@ def pairing_rows(scenario, fits):
     interval = own.description.ground_intervals(own.description.select(own.bands)[0])[0]
     why = (
         f"{paper:.2f}, and {fits['lai'].r2:.2f} here, where pixels lie on the blocks of ground that they are compared "
-        f"with. There, as fifesim reads Table 1, they lie {interval:.3f} m apart, and drift from blocks of {own.size:g} m"
+        f"with. There, as fifesim reads Table 1, they lie {interval:.3f} m apart, and drift from blocks of "
+        f"{own.size:g} m"
     )
-    typed = f"type interval = \"native\" in [sensor] and width = height = {_EDGE:g} in [grid], or fifesim reproduce"
+    typed = f'type interval = "native" in [sensor] and width = height = {_EDGE:g} in [grid], or fifesim reproduce'
     found = _papers_pairing(scenario)
     if found is not None:
         cells, r2 = found

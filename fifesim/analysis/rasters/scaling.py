@@ -19,7 +19,7 @@ from fifesim.rasters.reductions import extremes, sums_by_block
 # Bins of the histogram that stands for the values of a raster: 1/2000 of their range is far less than a bandwidth.
 _BINS = 2000
 
-# Quantities whose density is reflected at zero, by name and by standard name: they cannot be less, and may be dense there.
+# Quantities whose density is reflected at zero, by name and standard name: they cannot be less, and are often near.
 _AT_LEAST_ZERO = {"lai", "fpar"} | {cf.QUANTITIES[name].standard_name for name in ("lai", "fpar")}
 
 # Blocks of values that are counted together. [cell]

@@ -10,7 +10,7 @@ from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE
 _PEAK = 0.05
 
 
-def captions(found, reading, own_densities):
+def figure_captions(found, reading, own_densities):
     """
     Captions of Figures 3 to 9.
 
@@ -40,12 +40,12 @@ def captions(found, reading, own_densities):
         "truth. Sensor: the simulated image, whose digital numbers show as columns.",
         6: f"Densities of 200 pixels, and of all cells, {seen}; reflected at zero but for NDVI, which is that at the "
         f"top of the atmosphere. {_peaks(found, reading)}",
-        7: f"Relative equivalent noise (Eq. 7) of 200 pixels by increments of 0.1 of LAI and 0.05 of FPAR with at least "
+        7: "Relative equivalent noise (Eq. 7) of 200 pixels by increments of 0.1 of LAI and 0.05 of FPAR with at least "
         f"three pixels, {seen}.",
         8: "NDVI of the mean reflectance against the mean NDVI of the cells (above), and their difference beside what "
         "the curvature of NDVI predicts from the variances within the pixel (below). No sensor is in it.",
-        9: f"Reflectance of the image against the mean reflectance of the ground in the same block, {seen}. The line is "
-        f"what the atmosphere alone does. {_scatter(found, reading)}",
+        9: f"Reflectance of the image against the mean reflectance of the ground in the same block, {seen}. The line "
+        f"is what the atmosphere alone does. {_scatter(found, reading)}",
     }
 
 

@@ -1,4 +1,4 @@
-"""The experiment of Friedl et al. (1995): nine scenarios that differ in the ground, and what is made of each."""
+"""The experiment of Friedl et al. (1995): nine scenarios that differ in the ground, and all that they share."""
 
 import os
 from collections.abc import Mapping
@@ -6,21 +6,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil
 
-import numpy as np
-import xarray as xr
-
-from fifesim.analysis.rasters.means import aggregate
 from fifesim.base import datasets, fife
 from fifesim.base.foreign import shown
 from fifesim.base.kinds import is_path
-from fifesim.chain import steps as chain
-from fifesim.chain.images import ndvi
-from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.experiments.friedl1995 import inputs
 from fifesim.experiments.friedl1995.readings import CELL, NATIVE, TABLE_1, Reading, reading_of
-from fifesim.ground.canopy import raster as canopy
 from fifesim.ground.landscape.distribution import treatments
-from fifesim.ground.landscape.raster import lai_scene
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
@@ -61,6 +52,8 @@ class Case:
         Along the edge of a scene; 333, or 12 pixels of a coarse sensor, by default.
     bits : int, optional
         Of digital numbers; the instrument's by default.
+    upwelling : bool, optional
+        With the view's cosine on slopes (Eq. 5).
 
     Raises
     ------
@@ -76,6 +69,7 @@ class Case:
     sensor: str = TABLE_1
     cells: int | None = None
     bits: int | None = None
+    upwelling: bool = True
 
     def __post_init__(self):
         if self.cells is None:
@@ -143,7 +137,7 @@ class Case:
         sensor = {"instrument": self.sensor, "bands": list(self.bands)}
         sensor |= {"interval": "native" if self.reading.own_interval else "product"}
         sensor |= {"offset": [self.reading.offset * CELL / self.pixel] * 2}
-        return Scenario(grid=grid, ground=ground, terrain={"dem": self.dem}, sensor=sensor)
+        return Scenario(grid=grid, ground=ground, terrain={"dem": self.dem, "upwelling": self.upwelling}, sensor=sensor)
 
     @cached_property
     def common(self):
@@ -217,122 +211,6 @@ def case_of(reading="native", dem="flat", densities=None, optics=None, backgroun
     # Physics refuses what cannot be before anything is computed.
     case.common.complete()
     return case
-
-
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """
-    Ground of a scene, and the light above it.
-
-    Parameters
-    ----------
-    setup : fifesim.chain.setup.Setup
-        With the elevation.
-    lai, fpar : xarray.DataArray, dims (y, x)
-    reflectance, toa : xarray.DataArray, dims (band, y, x)
-        At the ground and at the top of the atmosphere. [1]
-    """
-
-    setup: Setup
-    lai: xr.DataArray
-    fpar: xr.DataArray
-    reflectance: xr.DataArray
-    toa: xr.DataArray
-
-
-def ground_of(case, treatment, arp, seed, land=(None, None)):
-    """
-    Ground of a scene, by the paper's own route: one Fourier transform of the scene, and exact ranks.
-
-    Parameters
-    ----------
-    case : Case
-    treatment : str
-    arp : float
-        [1]
-    seed : int
-    land : (xarray.DataArray, xarray.DataArray), optional
-        From `Case.land`; level by default.
-
-    Returns
-    -------
-    ground : Ground
-    """
-    keys, (dem, horizon) = case.common.ground, land
-    setup = replace(case.setup, dem=dem, horizon=horizon)
-    lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method=keys.method)
-    fpar = canopy.fpar(lai, geometry=setup.geometry, leaf_angles=keys.leaf_angles, fpar_inf=keys.fpar_inf)
-    reflectance = reflectance_of(setup, lai).compute()
-    return Ground(setup, lai, fpar, reflectance, chain.to_toa(reflectance, instrument=setup.instrument))
-
-
-def image(case, ground):
-    """
-    What the instrument of a case records of the ground of a scene.
-
-    Parameters
-    ----------
-    case : Case
-        Of the same ground, sun and bands.
-    ground : Ground
-
-    Returns
-    -------
-    image : xarray.DataArray of unsigned integers, dims (band, y, x)
-    """
-    return image_of(case.setup, ground.reflectance)
-
-
-def block_means(case, ground, array):
-    """
-    Means over the blocks of the truth.
-
-    Parameters
-    ----------
-    case : Case
-    ground : Ground
-    array : xarray.DataArray, dims (..., y, x)
-        By cells.
-
-    Returns
-    -------
-    means : xarray.DataArray, dims (..., y, x)
-    """
-    return aggregate(array, case.pixel, min_valid=ground.setup.min_valid)
-
-
-def pixel_values(truth, *images):
-    """
-    Pixels of several rasters paired by row and column, without those where one has no data.
-
-    Parameters
-    ----------
-    truth, *images : xarray.DataArray, dims (y, x)
-
-    Returns
-    -------
-    values : array, shape (rasters, pixels)
-    """
-    rasters = (truth, *images)
-    rows, columns = min(raster.sizes["y"] for raster in rasters), min(raster.sizes["x"] for raster in rasters)
-    values = np.stack([raster.values[:rows, :columns].ravel() for raster in rasters])
-    return values[:, np.isfinite(values).all(axis=0)]
-
-
-def cell_limits(ground):
-    """
-    Least and largest of the cells of a scene.
-
-    Parameters
-    ----------
-    ground : Ground
-
-    Returns
-    -------
-    limits : array, shape (3, 2)
-        Of LAI, FPAR, and NDVI at the top of the atmosphere.
-    """
-    return np.array([(float(each.min()), float(each.max())) for each in (ground.lai, ground.fpar, ndvi(ground.toa))])
 
 
 def scenes():

@@ -68,7 +68,7 @@ def origins(case):
         _size(case),
         Origin(
             "reading of Table 1", 1, FITTED if case.reading.own_interval else CHOSEN,
-            f"{case.reading.name}, one of {len(READINGS)}; the native one is preferred because R² of Table 2 agrees with it",
+            f"{case.reading.name}, one of {len(READINGS)}; R² of Table 2 agrees with the native one",
         ),
         _land(case),
         Origin(

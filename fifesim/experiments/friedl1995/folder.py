@@ -10,7 +10,7 @@ from fifesim.experiments.friedl1995 import effects, figures, scenarios
 from fifesim.experiments.friedl1995 import report as friedl1995_report
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.readings import TABLE_1, beside
-from fifesim.experiments.friedl1995.reproduction import REALISATIONS, SEED, reproduction
+from fifesim.experiments.friedl1995.reproduction import REALISATIONS, SEED, reproduce_case
 from fifesim.output import pages
 from fifesim.output.folders import check_folder, results
 from fifesim.output.progress import steps
@@ -67,15 +67,13 @@ def reproduce_to_folder(
     pictures = pictures_of(case)
     names = ["table2.csv", *(f"{name}.csv" for name in _TABLES), *pictures.values(), "scenarios", "report.html"]
     with results(folder, names, overwrite=overwrite) as partial:
-        found = reproduction(case, realisations, seed, each=_shown)
+        found = reproduce_case(case, realisations, seed, each=_shown)
         shown = str(found["reading"].values[0])
-        friedl1995_table.table2(found.sel(reading=shown)).to_csv(partial / "table2.csv", index=False, float_format="%.6g")
         tables = _effects(case, range(seed, seed + _EFFECT_REALISATIONS))
+        tables["table2"] = friedl1995_table.table2(found.sel(reading=shown))
         for name, table in tables.items():
             table.to_csv(partial / f"{name}.csv", index=False, float_format="%.6g")
-        drawn = {
-            key: pages.png(figures.plot_reproduction(key[0], found, reading=key[1]), _DPI) for key in pictures
-        }
+        drawn = {key: pages.png(figures.plot_reproduction(key[0], found, reading=key[1]), _DPI) for key in pictures}
         for key, picture in drawn.items():
             (partial / pictures[key]).write_bytes(picture)
         scenarios.write_scenarios(case, partial / "scenarios", seed, scenes, each=_shown("scenarios"))

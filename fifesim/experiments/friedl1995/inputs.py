@@ -52,7 +52,8 @@ def densities_of(given):
     missing = [name for name in names if name not in given]
     other = [str(name) for name in given if name not in names]
     if missing or other:
-        said = f"lacks {wanted} of {' and '.join(missing)}" if missing else f"has an unknown treatment {shown(other[0])}"
+        lacks = f"lacks {wanted} of {' and '.join(missing)}"
+        said = lacks if missing else f"has an unknown treatment {shown(other[0])}"
         raise ValueError(f"{where} {said}: Table 2 needs {_files(names) if wanted == 'a file' else ', '.join(names)}")
     for source in given.values():
         lai_distribution(source)
@@ -87,9 +88,11 @@ def by_band(given, bands, columns, what):
     """
     if given is None:
         return None
-    found, where = (_table(given, columns, what), f"{what} file {in_a_line(Path(given).name, 100)}") if is_path(
-        given
-    ) else ({str(band): tuple(np.atleast_1d(values).tolist()) for band, values in given.items()}, what)
+    found, where = (
+        (_table(given, columns, what), f"{what} file {in_a_line(Path(given).name, 100)}")
+        if is_path(given)
+        else ({str(band): tuple(np.atleast_1d(values).tolist()) for band, values in given.items()}, what)
+    )
     missing = [band for band in bands if band not in found]
     if missing:
         raise ValueError(

@@ -84,6 +84,11 @@ class Reading:
         -------
         text : str
             TOML.
+
+        Raises
+        ------
+        RuntimeError
+            If the installation's file has no response that can be changed.
         """
         text = datasets.path(_FILE).read_text(encoding="utf-8")
         if self.count is not None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from fifesim.experiments.friedl1995 import fitted
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.captions import captions
+from fifesim.experiments.friedl1995.captions import figure_captions
 from fifesim.experiments.friedl1995.case import ARPS
 from fifesim.experiments.friedl1995.readings import ALIGNED, CELL, NATIVE, READINGS
 from fifesim.ground.landscape.distribution import treatments
@@ -29,7 +29,7 @@ def reproduction_page(case, found, effects, figures, run):
     ----------
     case : fifesim.experiments.friedl1995.case.Case
     found : xarray.Dataset
-        From `fifesim.experiments.friedl1995.reproduction.reproduction`.
+        From `fifesim.experiments.friedl1995.reproduction.reproduce_case`.
     effects : mapping of str to pandas.DataFrame
         ``readings``, ``sizes`` and ``sensitivity`` of `fifesim.experiments.friedl1995.effects`.
     figures : mapping of (int, str) to bytes
@@ -55,7 +55,7 @@ def reproduction_page(case, found, effects, figures, run):
         effects={name: each.to_dict("records") for name, each in effects.items()},
         blur=on_blur(effects["readings"], effects["sensitivity"]), relief=on_relief(effects["readings"]),
         displacement=on_displacement(effects["readings"]), moved=effects["sensitivity"]["r2_largest"].max(),
-        figures=figures, captions={name: captions(found, name, own) for name in (shown, beside)},
+        figures=figures, captions={name: figure_captions(found, name, own) for name in (shown, beside)},
         drift=case.drift, interval=case.interval, land=_GROUND.get(case.dem, Path(case.dem).name), fewest=_FEWEST,
     )  # fmt: skip
 
@@ -80,22 +80,23 @@ def on_blur(readings, sensitivity):
         return ""
     drift, blur = rows[NATIVE.name], min(blurred, key=lambda row: row["lai_r2_rms"])
     said = (
-        f"R² of {blur['name']} is off by {blur['lai_r2_rms']:.2f} in the root mean square of nine rows, that of the drift "
-        f"by {drift['lai_r2_rms']:.2f}. Slopes of {blur['name']} are off by {100 * blur['lai_slope_rms']:.0f} %, those of "
-        f"the drift by {100 * drift['lai_slope_rms']:.0f} %"
+        f"R² of {blur['name']} is off by {blur['lai_r2_rms']:.2f} in the root mean square of nine rows, that of the "
+        f"drift by {drift['lai_r2_rms']:.2f}. Slopes of {blur['name']} are off by {100 * blur['lai_slope_rms']:.0f} %, "
+        f"those of the drift by {100 * drift['lai_slope_rms']:.0f} %"
     )
     if blur["lai_slope_rms"] < 2 * drift["lai_slope_rms"]:
         return said + ": these figures do not tell blur from drift."
     step = 100 * sensitivity["lai_slope"].abs().max() if len(sensitivity) else 0.0
     said += (
-        f": blur narrows NDVI, drift does not, and slopes rise {blur['lai_slope_factor']:.2f} times. Other optics could "
-        f"lower all of them together, though no change in the last table moves them by more than {step:.0f} %; "
+        f": blur narrows NDVI, drift does not, and slopes rise {blur['lai_slope_factor']:.2f} times. Other optics "
+        f"could lower all of them together, though no change in the last table moves them by more than {step:.0f} %; "
         f"{100 * blur['lai_slope_rest']:.0f} % would be left, of the drift {100 * drift['lai_slope_rest']:.0f} %. "
     )
-    growths = f"{drift['paper_growth']:.2f} times in the paper, {drift['growth']:.2f} with drift, {blur['growth']:.2f} with blur"
-    decided = abs(blur["growth"] - drift["paper_growth"]) > 2 * abs(drift["growth"] - drift["paper_growth"])
+    paper, drifting, blurring = drift["paper_growth"], drift["growth"], blur["growth"]
+    growths = f"{paper:.2f} times in the paper, {drifting:.2f} with drift, {blurring:.2f} with blur"
+    decided = abs(blurring - paper) > 2 * abs(drifting - paper)
     end = "So slopes decide, not R²." if decided else "So it is their height that speaks against blur, and no more."
-    return said + f"Nor does it change how slopes grow with arp: {growths}. {end}"
+    return said + f"What a common factor leaves is how slopes grow with arp: {growths}. {end}"
 
 
 def on_relief(readings):
@@ -142,8 +143,8 @@ def on_displacement(readings):
     offset, native = rows["offset"], rows[NATIVE.name]
     said = (
         f"A constant offset has R² of LAI off by {offset['lai_r2_rms']:.3f} and slopes by "
-        f"{100 * offset['lai_slope_rms']:.0f} % in the root mean square, the interval by {native['lai_r2_rms']:.3f} and "
-        f"{100 * native['lai_slope_rms']:.0f} %"
+        f"{100 * offset['lai_slope_rms']:.0f} % in the root mean square, the interval by {native['lai_r2_rms']:.3f} "
+        f"and {100 * native['lai_slope_rms']:.0f} %"
     )
     alike = abs(offset["lai_r2_rms"] - native["lai_r2_rms"]) < _ALIKE
     return said + (": Table 2 does not tell them apart." if alike else ".")

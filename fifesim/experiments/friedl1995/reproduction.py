@@ -81,10 +81,10 @@ def reproduce(
     """
     given = {"dem": dem, "densities": densities, "optics": optics, "background": background}
     case = friedl1995.case_of(reading, sensor=sensor, cells=cells, **given)
-    return reproduction(case, realisations, seed)
+    return reproduce_case(case, realisations, seed)
 
 
-def reproduction(case, realisations, seed, each=lambda label: iter):
+def reproduce_case(case, realisations, seed, each=lambda label: iter):
     """
     The same of a case.
 

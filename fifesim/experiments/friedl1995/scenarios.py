@@ -5,6 +5,7 @@ import xarray as xr
 
 from fifesim.base.kinds import is_path
 from fifesim.experiments.friedl1995 import case as friedl1995
+from fifesim.experiments.friedl1995.pixels import block_means, ground_of, scene_image
 from fifesim.rasters.files import to_geotiff
 from fifesim.scenario.toml import write_scenario
 
@@ -94,11 +95,11 @@ def check_named(case):
 
 
 def _write_rasters(case, own, land, treatment, arp, seed):
-    ground = friedl1995.ground_of(case, treatment, arp, seed, land)
-    truth = {name: friedl1995.block_means(case, ground, getattr(ground, name)) for name in ("lai", "fpar")}
+    ground = ground_of(case, treatment, arp, seed, land)
+    truth = {name: block_means(case, ground, getattr(ground, name)) for name in ("lai", "fpar")}
     cells = {"lai": ground.lai, "fpar": ground.fpar}
     for band in ground.reflectance["band"].values:
         cells[str(band)] = ground.reflectance.sel(band=band).drop_vars(["band", "wavelength"], errors="ignore")
-    to_geotiff(friedl1995.image(case, ground), own / "image.tif")
+    to_geotiff(scene_image(case, ground), own / "image.tif")
     to_geotiff(xr.Dataset(truth).astype(np.float32), own / "truth.tif")
     to_geotiff(xr.Dataset(cells).astype(np.float32), own / "scene.tif")

@@ -12,6 +12,7 @@ from fifesim.chain.setup import image_of
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import ARPS
+from fifesim.experiments.friedl1995.pixels import block_means, ground_of, pixel_values, scene_image
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 
 # Values of leaf area at which densities are given.
@@ -84,16 +85,16 @@ def densities(case):
 def _scene(cases, land, arp, seed):
     """Cells of a scene, and its pixels in each reading."""
     treatment = treatments()[0]
-    ground = friedl1995.ground_of(cases[0], treatment, arp, seed, land)
+    ground = ground_of(cases[0], treatment, arp, seed, land)
     truth = _truth(cases[0], ground)
     key = [seed, friedl1995.scenes().index((treatment, arp))]
     pixels = []
     for case in cases:
-        image = friedl1995.image(case, ground)
+        image = scene_image(case, ground)
         analogue = ndvi(image_of(replace(case.setup, quantise=False), ground.reflectance))
         red, nir = planetary_reflectance(image)
         rasters = truth | {"ndvi": ndvi(image), "analogue_ndvi": analogue, "toa_red": red, "toa_nir": nir}
-        values = dict(zip(rasters, friedl1995.pixel_values(*rasters.values()), strict=True))
+        values = dict(zip(rasters, pixel_values(*rasters.values()), strict=True))
         numbers = np.arange(values["ndvi"].size)
         chosen = friedl1995_table.draw(numbers[None], friedl1995_table.SAMPLE, key, 1)[0, 0]
         one = {f"pixel_{name}": value for name, value in values.items()}
@@ -105,11 +106,11 @@ def _scene(cases, land, arp, seed):
 def _truth(case, ground):
     """What the blocks of the truth hold, whatever the sensor."""
     red, nir = (ground.reflectance.isel(band=number, drop=True) for number in (0, 1))
-    means = friedl1995.block_means(case, ground, ground.reflectance)
+    means = block_means(case, ground, ground.reflectance)
     clear = chain.to_toa(means, instrument=ground.setup.instrument)
     cells = {"lai": ground.lai, "fpar": ground.fpar, "boa_ndvi": indices.ndvi(ground.reflectance)}
     cells |= {"red_red": red**2, "red_nir": red * nir, "nir_nir": nir**2}
-    found = {name: friedl1995.block_means(case, ground, array) for name, array in cells.items()}
+    found = {name: block_means(case, ground, array) for name, array in cells.items()}
     return found | {
         "ndvi_of_mean": indices.ndvi(means),
         "boa_red": means[0], "boa_nir": means[1],

@@ -10,6 +10,7 @@ from fifesim.analysis import uncertainty
 from fifesim.chain.images import ndvi
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
+from fifesim.experiments.friedl1995.pixels import block_means, cell_limits, ground_of, pixel_values, scene_image
 from fifesim.ground.landscape.distribution import treatments
 
 SAMPLE = 200
@@ -241,14 +242,14 @@ def draw(pixels, count, seed, draws):
 
 def _scene(cases, land, seed, treatment, arp):
     """What each reading gives of a scene, a list of dicts."""
-    ground = friedl1995.ground_of(cases[0], treatment, arp, seed, land)
-    truth = [friedl1995.block_means(cases[0], ground, array) for array in (ground.lai, ground.fpar)]
-    limits = friedl1995.cell_limits(ground)
+    ground = ground_of(cases[0], treatment, arp, seed, land)
+    truth = [block_means(cases[0], ground, array) for array in (ground.lai, ground.fpar)]
+    limits = cell_limits(ground)
     key = [seed, friedl1995.scenes().index((treatment, arp))]
     found = []
     for case in cases:
-        image = friedl1995.image(case, ground)
-        found.append(_statistics(friedl1995.pixel_values(*truth, ndvi(image)), limits, key))
+        image = scene_image(case, ground)
+        found.append(_statistics(pixel_values(*truth, ndvi(image)), limits, key))
     return found
 
 

@@ -3,19 +3,19 @@
 import pytest
 
 from fifesim.experiments.friedl1995.case import case_of
-from fifesim.experiments.friedl1995.reproduction import reproduction
+from fifesim.experiments.friedl1995.reproduction import reproduce_case
 
 
 @pytest.fixture(scope="session")
 def found():
     """Three realisations of the nine scenes, native and aligned."""
-    return reproduction(case_of(), 3, 1995)
+    return reproduce_case(case_of(), 3, 1995)
 
 
 @pytest.fixture(scope="session")
 def small():
     """One realisation of scenes of 10 x 10 pixels."""
-    return reproduction(case_of(cells=90), 1, 1995)
+    return reproduce_case(case_of(cells=90), 1, 1995)
 
 
 @pytest.fixture(scope="session")

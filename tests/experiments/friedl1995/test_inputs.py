@@ -23,18 +23,21 @@ def test_own_densities_are_the_default():
 def test_missing_density_is_named(folders, tmp_path):
     (tmp_path / "burned-grazed.csv").write_text((folders["densities"] / "burned-grazed.csv").read_text())
     (tmp_path / "unburned-ungrazed.csv").write_text((folders["densities"] / "burned-grazed.csv").read_text())
-    with pytest.raises(ValueError, match="lacks a file of burned-ungrazed: Table 2 needs burned-grazed.csv, burned-un"):
+    with pytest.raises(
+        ValueError, match=r"lacks a file of burned-ungrazed: Table 2 needs burned-grazed\.csv, burned-un"
+    ):
         inputs.densities_of(tmp_path)
     with pytest.raises(ValueError, match="lacks an entry of burned-ungrazed and unburned-ungrazed"):
         inputs.densities_of({"burned-grazed": "burned-grazed"})
     with pytest.raises(ValueError, match="unknown treatment 'grazed'"):
         inputs.densities_of(inputs.densities_of(None) | {"grazed": "burned-grazed"})
-    with pytest.raises(ValueError, match="is no folder: it holds burned-grazed.csv"):
+    with pytest.raises(ValueError, match=r"is no folder: it holds burned-grazed\.csv"):
         inputs.densities_of(tmp_path / "nowhere")
 
 
 def test_optics_and_background_of_a_file(folders):
-    assert inputs.by_band(folders["optics"], BANDS, inputs.OPTICS, "optics") == {"TM3": (0.09, 0.05), "TM4": (0.42, 0.4)}
+    optics = inputs.by_band(folders["optics"], BANDS, inputs.OPTICS, "optics")
+    assert optics == {"TM3": (0.09, 0.05), "TM4": (0.42, 0.4)}
     assert inputs.background_of(folders["background"], BANDS) == {"TM3": 0.10, "TM4": 0.16}
     assert inputs.background_of("soil_dry:0.4 + shade:0.6", BANDS) == {"soil_dry": 0.4, "shade": 0.6}
     assert inputs.by_band(None, BANDS, inputs.OPTICS, "optics") is None

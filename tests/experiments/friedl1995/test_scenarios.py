@@ -8,6 +8,7 @@ from scipy import stats
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import scenarios
 from fifesim.experiments.friedl1995.case import case_of
+from fifesim.experiments.friedl1995.pixels import ground_of, scene_image
 from fifesim.output.run.folder import simulate_to_folder
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
@@ -50,7 +51,7 @@ def test_inputs_and_readings_are_in_the_scenario(tmp_path, folders, options):
     place.mkdir()
     scene = ("burned-ungrazed", 0.24, 11)
     (place / "scenario.toml").write_text(scenarios.scenario_text(case, place, *scene), encoding="utf-8")
-    image = friedl1995.image(case, friedl1995.ground_of(case, *scene, case.land()))
+    image = scene_image(case, ground_of(case, *scene, case.land()))
     moved = place.rename(tmp_path / "elsewhere")
     run = simulate(read_scenario(moved / "scenario.toml"))
     np.testing.assert_array_equal(run["image"]["dn"].values, image.values)
