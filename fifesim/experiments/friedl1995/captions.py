@@ -5,6 +5,7 @@ import numpy as np
 from fifesim.analysis import density
 from fifesim.experiments.friedl1995.figures import sample
 from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE
+from fifesim.experiments.friedl1995.table import INCREMENTS
 
 # A rise of a density is a peak where it reaches this share of the highest.
 _PEAK = 0.05
@@ -40,8 +41,8 @@ def figure_captions(found, reading, own_densities):
         "truth. Sensor: the simulated image, whose digital numbers show as columns.",
         6: f"Densities of 200 pixels, and of all cells, {seen}; reflected at zero but for NDVI, which is that at the "
         f"top of the atmosphere. {_peaks(found, reading)}",
-        7: "Relative equivalent noise (Eq. 7) of 200 pixels by increments of 0.1 of LAI and 0.05 of FPAR with at least "
-        f"three pixels, {seen}.",
+        7: f"Relative equivalent noise (Eq. 7) of 200 pixels by increments of {INCREMENTS['lai']:g} of LAI and "
+        f"{INCREMENTS['fpar']:g} of FPAR with at least three pixels, {seen}.",
         8: "NDVI of the mean reflectance against the mean NDVI of the cells (above), and their difference beside what "
         "the curvature of NDVI predicts from the variances within the pixel (below). No sensor is in it.",
         9: f"Reflectance of the image against the mean reflectance of the ground in the same block, {seen}. The line "
@@ -133,7 +134,7 @@ def _scatter(found, reading):
         most = "Most of the scatter" if share.min() > 0.5 else "A part of the scatter"
         return (
             f"{most} about it, {range_} of 1 − R² by band and arp, is the assumed drift of the pixels, up to "
-            f"{drift:.1f} m: it goes when they are put onto their blocks. The rest is response and digitising."
+            f"{drift:.1f} m along each axis: it goes when they are put onto their blocks. The rest is response and digitising."
         )
     return (
         f"The scatter about it is response and digitising; native pixels, which drift, have more, of which {range_} is "

@@ -63,7 +63,13 @@ def test_relief_is_told_by_the_row_that_it_lowers_most(readings):
     found = report.on_relief(readings)
     assert (found["treatment"], found["arp"], found["dem"]) == ("burned-ungrazed", "0.05", "flint-hills")
     assert found["level"]["native"][found["most"]] == 0.45 and found["hills"]["native"][found["most"]] == 0.25
+    assert "was not in Table 2" in found["follows"]
     # Of a case on hills, level ground is the other.
     turned = pd.concat([readings.iloc[5:], readings.iloc[:5]], ignore_index=True)
     again = report.on_relief(turned)
     assert again["hills"]["native"]["lai_r2_rms"] == 0.08 and again["level"]["native"]["lai_r2_rms"] == 0.05
+
+
+def test_relief_that_changes_little_is_not_ruled_out(readings):
+    readings.loc[5, "lai_r2_rms"] = 0.055
+    assert "too little to be told" in report.on_relief(readings)["follows"]
