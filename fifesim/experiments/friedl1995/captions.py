@@ -134,7 +134,8 @@ def _scatter(found, reading):
         most = "Most of the scatter" if share.min() > 0.5 else "A part of the scatter"
         return (
             f"{most} about it, {range_} of 1 − R² by band and arp, is the assumed drift of the pixels, up to "
-            f"{drift:.1f} m along each axis: it goes when they are put onto their blocks. The rest is response and digitising."
+            f"{drift:.1f} m along each axis: it goes when they are put onto their blocks. The rest is response and "
+            "digitising."
         )
     return (
         f"The scatter about it is response and digitising; native pixels, which drift, have more, of which {range_} is "

@@ -67,7 +67,7 @@ def origins(case):
         _background(case, bands),
         _size(case),
         Origin(
-            "reading of Table 1", 1, FITTED if case.reading.own_interval else CHOSEN,
+            "reading of Table 1", 1, FITTED if case.reading.own_interval and case.sensor == TABLE_1 else CHOSEN,
             f"{case.reading.name}, one of {len(READINGS)}; R² of Table 2 agrees with the native one",
         ),
         _land(case),

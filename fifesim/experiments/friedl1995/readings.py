@@ -13,6 +13,8 @@ CELL = 30 / 9
 TABLE_1 = "TM"
 _FILE = "instruments/tm.toml"
 
+_OWN_INTERVAL = "43 µrad × 705 km = 30.315 m"
+
 _BLUR = (
     "a Gaussian of {eifov:g} m effective field of view, measured in flight over the San Mateo Bridge "
     "(Schowengerdt et al. 1985, Landsat-4 TM)"
@@ -50,6 +52,30 @@ class Reading:
     def other_response(self):
         """Whether the pixels see otherwise than the instrument's file says."""
         return self.count is not None or self.eifov is not None
+
+    def in_words(self, interval, pixel):
+        """
+        What it takes an instrument to do.
+
+        Parameters
+        ----------
+        interval, pixel : float
+            Of the instrument. [m]
+
+        Returns
+        -------
+        text : str
+            That of Table 1 where the two are its own.
+
+        Examples
+        --------
+        >>> ALIGNED.in_words(30.0, 10.0)
+        'pixels of 10 m on the blocks of the truth'
+        """
+        said = self.text
+        if f"{interval:.3f}" not in _OWN_INTERVAL:
+            said = said.replace(_OWN_INTERVAL, f"{interval:.3f} m")
+        return said.replace("30 m", f"{pixel:g} m")
 
     def instrument(self, description):
         """
@@ -105,7 +131,7 @@ class Reading:
 
 NATIVE = Reading(
     "native",
-    "pixels every 43 µrad × 705 km = 30.315 m, paired by row and column with the 30 m blocks of the truth",
+    f"pixels every {_OWN_INTERVAL}, paired by row and column with the 30 m blocks of the truth",
     own_interval=True,
 )
 ALIGNED = Reading("aligned", "pixels of 30 m on the blocks of the truth")

@@ -6,7 +6,7 @@ from fifesim.experiments.friedl1995 import fitted
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.captions import figure_captions
 from fifesim.experiments.friedl1995.case import ARPS
-from fifesim.experiments.friedl1995.readings import ALIGNED, CELL, NATIVE, READINGS, TABLE_1
+from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE, READINGS, TABLE_1
 from fifesim.ground.landscape.distribution import treatments
 from fifesim.output import pages
 
@@ -22,6 +22,10 @@ _RELIEF_COUNTS = (
     "If the pixels drifted as they do here, relief of this kind was not in Table 2; if relief of this kind was, its "
     "scatter is not to be had from this drift with these densities and optics. The paper does not say which, nor do "
     "these simulations."
+)
+_RELIEF_HELPS = (
+    "Relief of this kind brings R² nearer to the paper's; how near is in the table. So a part of the paper's scatter "
+    "may be relief."
 )
 _RELIEF_PASSES = "Relief of this kind changes too little to be told from level ground by Table 2."
 
@@ -50,21 +54,39 @@ def reproduction_page(case, found, effects, figures, run):
     """
     shown, beside = (str(name) for name in found["reading"].values)
     tables = {name: friedl1995_table.table2(found.sel(reading=name)) for name in (shown, beside)}
-    texts = {name: friedl1995_table.text_table(found.sel(reading=name)).to_dict("records") for name in (shown, beside)}
+    texts = [friedl1995_table.text_table(found.sel(reading=name)).to_dict("records") for name in (shown, beside)]
     own = dict(case.densities) == {name: name for name in treatments()}
     return pages.html(
-        _TEMPLATE, case=case, run=run, shown=shown, beside=beside, pixel=case.pixel, cell=CELL,
+        _TEMPLATE, case=case, run=run, shown=shown, beside=beside, **_constants(case),
         rows=list(zip(*(table.to_dict("records") for table in tables.values()), strict=True)),
-        texts=list(zip(*texts.values(), strict=True)),
+        texts=list(zip(*texts, strict=True)),
         limits=fitted.limits(*tables.values()), origins=fitted.origins(case), fitted=fitted.fitted_count(case),
         agreements={name: friedl1995_table.agreement(table) for name, table in tables.items()},
-        readings=READINGS, arps=ARPS, treatments=treatments(), sample=friedl1995_table.SAMPLE,
-        effects={name: each.to_dict("records") for name, each in effects.items()},
-        blur=on_blur(effects["readings"], effects["sensitivity"]), relief=on_relief(effects["readings"]),
-        displacement=on_displacement(effects["readings"]), moved=effects["sensitivity"]["r2_largest"].max(),
         figures=figures, captions={name: figure_captions(found, name, own) for name in (shown, beside)},
-        increments=friedl1995_table.INCREMENTS, tm=case.sensor == TABLE_1, drift=case.drift, interval=case.interval, land=_GROUND.get(case.dem, Path(case.dem).name), fewest=_FEWEST,
+        **_conclusions(effects),
     )  # fmt: skip
+
+
+def _constants(case):
+    """What a page says of its case, whatever was found."""
+    return {
+        "arps": ARPS, "treatments": treatments(), "sample": friedl1995_table.SAMPLE, "fewest": _FEWEST,
+        "increments": friedl1995_table.INCREMENTS, "tm": case.sensor == TABLE_1, "drift": case.drift,
+        "interval": case.interval, "pixel": case.pixel,
+        "readings": {name: each.in_words(case.interval, case.pixel) for name, each in READINGS.items()},
+    }  # fmt: skip
+
+
+def _conclusions(effects):
+    """The tables of effects, and what follows from them."""
+    readings, sensitivity = effects["readings"], effects["sensitivity"]
+    return {
+        "effects": {name: each.to_dict("records") for name, each in effects.items()},
+        "known": list(dict.fromkeys(readings["name"])),
+        "lands": {name: _GROUND.get(name, Path(name).name) for name in readings["dem"].unique()},
+        "blur": on_blur(readings, sensitivity), "relief": on_relief(readings),
+        "displacement": on_displacement(readings), "moved": sensitivity["r2_largest"].max(),
+    }  # fmt: skip
 
 
 def on_blur(readings, sensitivity):
@@ -117,8 +139,8 @@ def on_relief(readings):
     Returns
     -------
     relief : dict
-        Rows of the readings table by reading, ``level`` and ``hills``; the ``treatment`` and ``arp`` whose R2 falls most,
-        and its column; and what ``follows``.
+        Rows of the readings table by reading, ``level`` and ``hills``; the ``treatment`` and ``arp`` whose R2 falls
+        most, and its column; and what ``follows``.
     """
     rows = readings.to_dict("records")
     first = rows[0]["dem"]
@@ -132,7 +154,7 @@ def on_relief(readings):
     worse = sets[hills][NATIVE.name]["lai_r2_rms"] - sets[level][NATIVE.name]["lai_r2_rms"]
     return {
         "level": sets[level], "hills": sets[hills], "dem": hills, "most": most, "treatment": treatment, "arp": arp,
-        "follows": _RELIEF_COUNTS if worse > _ALIKE else _RELIEF_PASSES,
+        "follows": _RELIEF_COUNTS if worse > _ALIKE else _RELIEF_HELPS if worse < -_ALIKE else _RELIEF_PASSES,
         "native": NATIVE.name, "aligned": ALIGNED.name,
     }  # fmt: skip
 

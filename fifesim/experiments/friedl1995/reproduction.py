@@ -7,7 +7,7 @@ from fifesim.base.seeds import check_seed
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import shown
 from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
-from fifesim.experiments.friedl1995.readings import READINGS, TABLE_1, beside
+from fifesim.experiments.friedl1995.readings import TABLE_1, beside
 from fifesim.experiments.friedl1995.table import COEFFICIENTS, realise
 from fifesim.ground.landscape.distribution import treatments
 
@@ -112,7 +112,7 @@ def reproduce_case(case, realisations, seed, each=lambda label: iter):
     found = realise(case, range(seed, seed + realisations), readings=pair, each=each("nine scenes"))
     scenes = shown.shown_scenes(case, pair, seed, each=each("scenes of the figures"))
     out = found.merge(scenes).merge(_paper()).assign(density=shown.densities(case))
-    out = out.assign_coords(text=("reading", [READINGS[name].text for name in out["reading"].values]))
+    out = out.assign_coords(text=("reading", [reading.in_words(case.interval, case.pixel) for reading in pair]))
     return out.assign_attrs(
         title="Friedl et al. (1995), repeated", sensor=case.instrument.name, dem=case.dem, cells=case.cells,
         seed=str(seed), drift=case.drift, pixel=case.pixel, cell=friedl1995.CELL,

@@ -47,3 +47,8 @@ def test_aligned_reading_stands_beside_every_other():
 def test_reading_that_there_is_not_is_refused(name, sensor, said):
     with pytest.raises(ValueError, match=said):
         reading_of(name, sensor)
+
+
+def test_words_of_a_reading_are_those_of_the_instrument():
+    assert all(each.in_words(43e-6 * 705000, 30.0) == each.text for each in READINGS.values())
+    assert "every 21.900 m" in NATIVE.in_words(21.9, 20.0) and "the 20 m blocks" in NATIVE.in_words(21.9, 20.0)

@@ -73,3 +73,5 @@ def test_relief_is_told_by_the_row_that_it_lowers_most(readings):
 def test_relief_that_changes_little_is_not_ruled_out(readings):
     readings.loc[5, "lai_r2_rms"] = 0.055
     assert "too little to be told" in report.on_relief(readings)["follows"]
+    readings.loc[5, "lai_r2_rms"] = 0.01
+    assert "nearer to the paper's" in report.on_relief(readings)["follows"]
