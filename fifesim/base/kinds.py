@@ -143,6 +143,9 @@ NUMBER_OR_RASTER = Kind(
 )
 PATH = Kind("the path of a file", is_path)
 RASTER = Kind("an xarray.DataArray over (y, x)", _is_raster)
+LAND = Kind("'flat', 'flint-hills' or the path of a raster file", is_path)
+FILES_BY_NAME = Kind("a folder, or a mapping by treatment", lambda value: is_path(value) or _is_mapping(value))
+FILE_BY_BAND = Kind("the path of a CSV file, or a mapping by band", lambda value: is_path(value) or _is_mapping(value))
 FILE_OR_RASTER = Kind("the path of a file, or an xarray.DataArray", lambda value: is_path(value) or _is_raster(value))
 GRID = Kind("an odc.geo.geobox.GeoBox, such as fifesim.grid_at or raster.odc.geobox give", lambda v: is_a(v, "GeoBox"))
 INSTRUMENT = Kind(
