@@ -71,7 +71,7 @@ def surface_reflectance(
     leaf_angles : optional
         A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
     hotspot : float, optional
-        Leaf size over canopy height; 0 is none, as in the paper. [1]
+        Leaf size over canopy height; 0 is none, as in the paper's SAIL. [1]
     exact : bool, optional
         Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it, and all leaves.
 
