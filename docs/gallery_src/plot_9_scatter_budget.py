@@ -37,13 +37,13 @@ axis.set_xlabel("share of the variance of LAI that a line on NDVI does not expla
 axis.legend(frameon=False, loc="lower right")
 
 # %%
-# The paper (Discussion and Conclusions) names three mechanisms: the non-linearity of NDVI against LAI, the scaling of
-# NDVI itself, and regularization by the sensor. It does not name registration, which stands apart here:
+# The paper's discussion names three mechanisms: the non-linearity of NDVI against LAI, the scaling of NDVI itself, and
+# regularization by the sensor. It does not name the place of the pixels, which drift from their blocks here. With figures:
 
 print("arp    non-linearity and curvature    NDVI scaling    point spread    registration    total [% of variance]")
 for arp, found in budgets.items():
     mean = 100 * found.sel(variable="lai").mean("realisation")
     share = mean["share"].to_series()
     first = share["non-linearity"] + float(mean["curvature"])
-    others = share["NDVI scaling"], share["point spread"], share["registration"], float(mean["total"])
-    print(f"{arp:.2f} {first:20.1f} {others[0]:22.1f} {others[1]:16.1f} {others[2]:15.1f} {others[3]:16.1f}")
+    scaling, spread, place = share["NDVI scaling"], share["point spread"], share["registration"]
+    print(f"{arp:.2f} {first:20.1f} {scaling:22.1f} {spread:15.1f} {place:15.1f} {float(mean['total']):17.1f}")
