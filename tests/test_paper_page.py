@@ -40,7 +40,7 @@ def test_page_is_made_of_its_numbers(make_paper):
 
 def test_no_number_of_the_page_is_typed_by_hand():
     text = re.sub(r"\{\{.*?\}\}|\{%.*?%\}", "", (DOCS / "paper.md.j2").read_text(encoding="utf-8"), flags=re.DOTALL)
-    assert set(re.findall(r"\d+\.\d+", text)) <= STATED
+    assert set(re.findall(r"(?<![\w.])\d+\.\d+", text)) <= STATED
 
 
 @pytest.mark.parametrize("name", ["native", "aligned"])
