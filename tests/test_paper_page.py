@@ -100,7 +100,8 @@ def test_numbers_are_those_of_this_program(make_paper):
     sizes = make_paper.paper_deviations
     for name, found in (("lengths", sizes.lengths()), ("sun", sizes.sun())):
         for one, kept in zip(found, NUMBERS["deviations"][name], strict=True):
-            assert one == pytest.approx(kept, rel=1e-4)
+            for key in one.keys() - {"time"}:
+                assert one[key] == pytest.approx(kept[key], rel=1e-4)
     lines = sizes.fits(friedl1995.Case(), range(make_paper.SEED, make_paper.SEED + 2)).mean(axis=0)
     kept = [row for row in NUMBERS["table2"]["native"] if row["variable"] == "lai"]
     np.testing.assert_allclose(lines[:, 2], [row["r2"] for row in kept], atol=0.06)
