@@ -52,9 +52,8 @@ def fits(case, seeds, change=None, method="periodic", reflectance=reflectance_of
     found = []
     for seed in seeds:
         for treatment, arp in friedl1995.scenes():
-            scenario = case.scenario(treatment, arp, seed)
-            setup = replace(case.setup(scenario), dem=land[0], horizon=land[1], **(change or {}))
-            lai = lai_scene(scenario.geobox(), case.densities[treatment], arp=arp, seed=seed, method=method)
+            setup = replace(case.setup, dem=land[0], horizon=land[1], **(change or {}))
+            lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method=method)
             image = image_of(setup, reflectance(setup, lai).compute())
             truth = aggregate(lai, case.pixel, min_valid=setup.min_valid)
             values = friedl1995.pixel_values(truth, ndvi(image))
@@ -133,9 +132,8 @@ def blur(case, seeds):
 
 def sky(case):
     """Share of skylight, and what it does to NDVI of the ground at the mean of the burned, grazed."""
-    scenario = case.scenario("burned-grazed", 0.15, 0)
-    setup = case.setup(scenario)
-    lai = lai_scene(scenario.geobox(), case.densities["burned-grazed"], arp=0.15, seed=0)
+    setup, density = case.setup, case.densities["burned-grazed"]
+    lai = lai_scene(case.grid, density, arp=0.15, seed=0)
     mixed, alone = (float(ndvi(make(setup, lai)).mean()) for make in (reflectance_of, _by_sunlight))
     shares = dict(zip(("red", "nir"), map(float, _shares(setup)), strict=True))
     return shares | {"ndvi": mixed - alone}
