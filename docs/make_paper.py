@@ -17,8 +17,9 @@ from fifesim.analysis.scaling import ndvi_linearity
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import effects, fitted, table
 from fifesim.experiments.friedl1995.case import ARPS, Case
+from fifesim.experiments.friedl1995.pixels import ground_of
 from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE, READINGS
-from fifesim.experiments.friedl1995.reproduction import SEED, reproduction
+from fifesim.experiments.friedl1995.reproduction import SEED, reproduce_case
 from fifesim.output.pages import fixed
 
 DOCS = Path(__file__).parent
@@ -46,7 +47,7 @@ def numbers(realisations=REALISATIONS, few=FEW):
         Of plain numbers, text, lists and dicts.
     """
     case, seeds = Case(), range(SEED, SEED + few)
-    found = reproduction(case, realisations, SEED)
+    found = reproduce_case(case, realisations, SEED)
     tables = {reading.name: table.table2(found.sel(reading=reading.name)) for reading in (NATIVE, ALIGNED)}
     return {
         "run": {"realisations": realisations, "few": few, "seed": SEED, "cells": case.cells, "drift": case.drift,
@@ -92,7 +93,7 @@ def scaling(case, found):
     """
     rows = []
     for arp in ARPS:
-        ground = friedl1995.ground_of(case, "burned-grazed", arp, SEED)
+        ground = ground_of(case, "burned-grazed", arp, SEED)
         one = found.sel(reading=NATIVE.name, arp=arp)
         bias = (one["pixel_ndvi_of_mean"] - one["pixel_boa_ndvi"]).values
         rows.append(

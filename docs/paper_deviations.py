@@ -14,6 +14,7 @@ from fifesim.chain.images import ndvi
 from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995.case import Case
+from fifesim.experiments.friedl1995.pixels import pixel_values
 from fifesim.experiments.friedl1995.readings import CELL, READINGS
 from fifesim.experiments.friedl1995.table import line
 from fifesim.ground.canopy import raster as canopy
@@ -56,7 +57,7 @@ def fits(case, seeds, change=None, method="periodic", reflectance=reflectance_of
             lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method=method)
             image = image_of(setup, reflectance(setup, lai).compute())
             truth = aggregate(lai, case.pixel, min_valid=setup.min_valid)
-            values = friedl1995.pixel_values(truth, ndvi(image))
+            values = pixel_values(truth, ndvi(image))
             found.append(line(values[1], values[0]))
     return np.array(found).reshape(len(seeds), len(friedl1995.scenes()), 3)
 
