@@ -55,17 +55,24 @@ def numbers(realisations=REALISATIONS, few=FEW):
         "table2": {name: each.to_dict("records") for name, each in tables.items()},
         "agreement": {name: table.agreement(each) for name, each in tables.items()},
         "limits": fitted.limits(*tables.values()),
-        "origins": [vars(each) for each in fitted.origins(case)],
-        "fitted": fitted.fitted_count(case),
         "text": table.text_table(found.sel(reading=NATIVE.name)).to_dict("records"),
         "readings": effects.readings(case, seeds).to_dict("records"),
-        "reading_texts": {name: each.text for name, each in READINGS.items()},
         "sizes": effects.sizes(case, seeds).to_dict("records"),
         "sensitivity": effects.sensitivity(case, seeds).to_dict("records"),
         "growth_deviation": growth_deviation(found),
         "scaling": scaling(case, found),
         "deviations": paper_deviations.deviations(seeds),
+        **words(case),
     }  # fmt: skip
+
+
+def words(case):
+    """What needs no simulation: where each number of a case comes from, how many were fitted, and what readings say."""
+    return {
+        "origins": [vars(each) for each in fitted.origins(case)],
+        "fitted": fitted.fitted_count(case),
+        "reading_texts": {name: each.text for name, each in READINGS.items()},
+    }
 
 
 def growth_deviation(found):
@@ -141,9 +148,9 @@ def between(reading, other):
 
 
 def main():
-    if "--text" not in sys.argv:
-        NUMBERS.write_text(json.dumps(_plain(numbers()), indent=1) + "\n", encoding="utf-8")
-    PAGE.write_text(text(json.loads(NUMBERS.read_text(encoding="utf-8"))), encoding="utf-8")
+    known = json.loads(NUMBERS.read_text(encoding="utf-8")) | words(Case()) if "--text" in sys.argv else numbers()
+    NUMBERS.write_text(json.dumps(_plain(known), indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(text(_plain(known)), encoding="utf-8")
 
 
 def _plain(value):

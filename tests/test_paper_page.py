@@ -97,6 +97,8 @@ def test_limits_are_met():
 @pytest.mark.slow
 def test_numbers_are_those_of_this_program(make_paper):
     """Sizes that need no realisation, and Table 2 within the scatter of two. Else run ``python docs/make_paper.py``."""
+    for name, found in make_paper.words(friedl1995.Case()).items():
+        assert found == NUMBERS[name]
     sizes = make_paper.paper_deviations
     for name, found in (("lengths", sizes.lengths()), ("sun", sizes.sun())):
         for one, kept in zip(found, NUMBERS["deviations"][name], strict=True):
