@@ -109,7 +109,7 @@ def mixed_field(weights, arp, row, column, shape):
 
 def periodic_field(seed, arp, shape):
     """
-    Field of the paper's own route: one Fourier transform over the whole scene, periodic at its borders.
+    Field by the paper's own route (Fig. 2): one Fourier transform over the whole scene, periodic at its borders.
 
     Parameters
     ----------
