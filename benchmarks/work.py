@@ -44,6 +44,12 @@ def field(side):
     return lambda: _run(fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=next(SEEDS), chunks="auto").data)
 
 
+def downscaling(side):
+    grid = grid_of(side // 3 * 3)
+    pixels = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7, chunks="auto").fifesim.aggregate(10).persist()
+    return lambda: _run(pixels.fifesim.downscale(grid, arp=0.15, cv=0.4, seed=next(SEEDS), chunks="auto").data)
+
+
 def canopy(side):
     lai = lai_of(side)
     return lambda: _run(lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE).data)
@@ -105,6 +111,7 @@ def _run(array):
 
 STAGES = {
     "field and LAI": field,
+    "map of 10 m downscaled": downscaling,
     "canopy, 2 bands": canopy,
     "atmosphere, 2 bands": atmosphere,
     "sensor, 2 bands": sensor,

@@ -70,7 +70,8 @@ def main():
     structure, chlorophyll, dry_matter = fit.x
     header = [
         "Leaf reflectance and transmittance of green tallgrass in the Landsat TM bands. Dimensionless, 0 to 1.",
-        "Calibrated: TM3 and TM4, so that the simulation meets Table 2 of Friedl et al. (1995). Not measured at FIFE.",
+        "Calibrated: TM3 and TM4, so that the simulation meets Table 2 of Friedl et al. (1995).",
+        "  FIFE's own were not found (README.md).",
         "  They lie within the values reported for bluestem leaves (red reflectance .07-.09, near infrared .42-.46;",
         "  recalled, not checked against a table).",
         "Modelled: TM1, TM2, TM5, TM7, from PROSPECT-D (Feret et al. 2017) fitted to TM3 and TM4:",
@@ -90,8 +91,8 @@ def main():
     background[CALIBRATED] = BACKGROUND
     header = [
         "Reflectance of the background (soil and litter) below tallgrass in the Landsat TM bands.",
-        "Calibrated: TM3 and TM4, so that the simulation meets Table 2 of Friedl et al. (1995). FIFE measured no soil",
-        "  reflectance.",
+        "Calibrated: TM3 and TM4, so that the simulation meets Table 2 of Friedl et al. (1995). FIFE's own",
+        "  soil and litter were not found (README.md).",
         "Modelled: TM1, TM2, TM5, TM7, from the generic dry soil spectrum distributed with prosail,",
         f"  times {scale:.3f}, which is within {misfit:.4f} of the calibrated values.",
         "  Band means over the Landsat-5 TM responses of pyrsr, weighted by the extraterrestrial sun of ASTM G173-03.",

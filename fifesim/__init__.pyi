@@ -16,6 +16,7 @@ from .rasters.sun import sun_position as sun_position
 from .ground.landscape.raster import lai_scene as lai_scene
 from .ground.landscape.raster import open_lai as open_lai
 from .ground.landscape.rasters.fields import correlated_fields as correlated_fields
+from .ground.landscape.rasters.downscaling import downscale as downscale  # method
 from .ground.landscape.distribution import lai_distribution as lai_distribution
 from .ground.landscape.distribution import treatments as treatments
 from .ground.landscape.autoregression import correlation_length as correlation_length
@@ -115,5 +116,7 @@ from .scenario.sweeps import sweep as sweep
 from .experiments.scatter.shares import budget as budget
 from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import read_scenario as read_scenario
+from .experiments.friedl1995.reproduction import reproduce as reproduce
+from .experiments.friedl1995.figures import plot_reproduction as plot_reproduction
 from .experiments.verification.areas import verify as verify
 from .chain.setup import Setup as Setup

@@ -141,16 +141,33 @@ def simulate(
 @app.command()
 def reproduce(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("friedl1995"),
+    reading: Annotated[
+        str, typer.Option(help="Of Table 1: native, aligned, narrow, offset, blur-40.8 or blur-48.6.")
+    ] = "native",
+    dem: Annotated[str, typer.Option(help="Elevation: flat, flint-hills (synthetic), or a raster file.")] = "flat",
+    densities: Annotated[
+        Path | None, typer.Option(help="Folder of LAI samples: burned-grazed.csv and so on; inferred by default.")
+    ] = None,
+    optics: Annotated[
+        Path | None, typer.Option(help="CSV file: band,leaf_reflectance,leaf_transmittance; fitted by default.")
+    ] = None,
+    background: Annotated[
+        str | None, typer.Option(help="CSV file: band,background; or shares, soil_dry:0.5+shade:0.5; else fitted.")
+    ] = None,
+    sensor: Annotated[str, typer.Option(help="An instrument with red and near infrared, or its file.")] = "TM",
     realisations: Annotated[int, typer.Option(help="How many of each of the nine scenes.")] = 20,
-    cells: Annotated[int, typer.Option(help="Along the edge of a scene, of 3.33 m each.")] = 333,
+    cells: Annotated[int | None, typer.Option(help="Along the edge of a scene, of 3.33 m each; 333 for TM.")] = None,
     seed: Annotated[int, typer.Option(help="Of the first realisation; the others follow.")] = 1995,
+    scenes: Annotated[bool, typer.Option("--scenes", help="Write image, truth and scene of each scenario.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
 ):
-    """Repeat the paper: table2.csv, figure3.png to figure9.png, report.html."""
+    """Repeat the paper: table2.csv, figures 3 to 9, the nine scenarios, report.html."""
     with _importing():
         from fifesim.experiments.friedl1995.folder import reproduce_to_folder
 
-    _say(*reproduce_to_folder(output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite))
+    inputs = {"reading": reading, "dem": dem, "densities": densities, "optics": optics, "background": background}
+    inputs |= {"sensor": sensor, "realisations": realisations, "cells": cells, "seed": seed}
+    _say(*reproduce_to_folder(output, **inputs, scenes=scenes, overwrite=overwrite))
 
 
 @app.command()

@@ -3,7 +3,7 @@ Leaf area densities (Fig. 3)
 ============================
 
 The three grassland treatments of FIFE in early June 1987. Their means and deviations are inferred from the paper's
-Table 2, because the measurements are not public: see :doc:`/physics`.
+Table 2, because the measurements behind Fig. 3 were not found: see :doc:`/physics`.
 """
 
 import tempfile

@@ -34,8 +34,8 @@ for axis in axes:
     axis.legend(frameon=False, ncols=2, fontsize=8, loc="upper right" if axis is axes[0] else "lower right")
 
 # %%
-# Across the principal plane, toward the sun (left) and away from it. The paper's SAIL has no hot spot; ``hotspot``,
-# leaf size over canopy height, gives it one.
+# Across the principal plane, toward the sun (left) and away from it. The paper's SAIL has no hot spot (section Surface
+# Reflectance); ``hotspot``, leaf size over canopy height, gives it one.
 
 views = np.union1d(np.arange(-70, 71), -sun.sza)
 two = lai.isel(x=[40])  # LAI 2

@@ -16,7 +16,7 @@ import fifesim
 grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=30, height=30, cell=30)
 wavelength = np.linspace(0.4025, 2.4975, 839)
 cell = wrap_xr(np.ones((1, 1)), grid)
-sun = fifesim.fife_geometry()  # the paper's
+sun = fifesim.fife_geometry()  # of the paper's day
 spectrum = cell * xr.DataArray(np.ones(839), dims="band", coords={"wavelength": ("band", wavelength)})
 
 figure, axis = plt.subplots(figsize=(11, 4.4), layout="constrained")

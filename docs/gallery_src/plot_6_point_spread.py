@@ -58,11 +58,13 @@ axes[-1].set(xlabel="easting [m]", xlim=(0, 900))
 figure.suptitle("Stripes 90 m apart")
 
 # %%
-# **What it does to R².** The paper compares TM pixels with 30 m means of the ground. If pixel i is compared with block
-# i while pixels lie 30.315 m apart, the two drift by a third of a metre per pixel: 11 m across 333 cells (1.1 km).
+# **What it does to R².** The paper compares TM pixels with 30 m means of the ground (section Analyses). If pixel i is
+# compared with block i while pixels lie 30.315 m apart, the two drift by a third of a metre per pixel: 11 m across 333
+# cells (1.1 km).
 # ``pair="index"`` compares by row and column, as an analysis that takes 30.315 m for 30 m would.
 #
-# The scene size is our choice; the paper does not state its own, nor how its grids were registered.
+# The scene size is our choice; the paper states neither its own nor how its grids were registered. More readings:
+# :doc:`/paper`.
 
 paper = {0.05: 0.49, 0.15: 0.61, 0.24: 0.81}
 print("R² of LAI on NDVI   aligned   30.315 m, by index   paper, Table 2")

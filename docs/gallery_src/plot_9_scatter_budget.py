@@ -38,12 +38,12 @@ axis.legend(frameon=False, loc="lower right")
 
 # %%
 # The paper's discussion names three mechanisms: the non-linearity of NDVI against LAI, the scaling of NDVI itself, and
-# regularization by the sensor. With figures:
+# regularization by the sensor. It does not name the place of the pixels, which drift from their blocks here.
 
-print("arp    non-linearity and curvature    NDVI scaling    point spread and registration    total [% of variance]")
+print("arp    non-linearity and curvature    NDVI scaling    point spread    registration    total [% of variance]")
 for arp, found in budgets.items():
     mean = 100 * found.sel(variable="lai").mean("realisation")
     share = mean["share"].to_series()
     first = share["non-linearity"] + float(mean["curvature"])
-    third = share["point spread"] + share["registration"]
-    print(f"{arp:.2f} {first:20.1f} {share['NDVI scaling']:22.1f} {third:24.1f} {float(mean['total']):28.1f}")
+    scaling, spread, place = share["NDVI scaling"], share["point spread"], share["registration"]
+    print(f"{arp:.2f} {first:20.1f} {scaling:22.1f} {spread:15.1f} {place:15.1f} {float(mean['total']):17.1f}")

@@ -36,11 +36,15 @@ def silverman_bandwidth(deviation, interquartile_range, n):
     return 0.9 * spread * n**-0.2
 
 
-def gaussian_density(samples, at, bandwidth, weights=None):
+def gaussian_density(samples, at, bandwidth, weights=None, *, reflect=False):
     r"""
     Gaussian kernel density.
 
     .. math:: \hat f(x) = \frac{1}{h \sum w} \sum_i w_i \, \varphi\left( \frac{x - x_i}{h} \right)
+
+    Of what cannot be negative, the part of a kernel that lies below zero is reflected:
+
+    .. math:: \hat f^*(x) = \hat f(x) + \hat f(-x), \quad x \ge 0
 
     Parameters
     ----------
@@ -52,6 +56,8 @@ def gaussian_density(samples, at, bandwidth, weights=None):
         h, in units of the samples.
     weights : array, shape (n,), optional
         Such as counts of the bins; 1 by default.
+    reflect : bool, optional
+        Whether at zero, below which the density is then zero.
 
     Returns
     -------
@@ -61,11 +67,11 @@ def gaussian_density(samples, at, bandwidth, weights=None):
     Raises
     ------
     ValueError
-        If the bandwidth is not positive.
+        If the bandwidth is not positive, or a sample is negative that is to be reflected at zero.
 
     References
     ----------
-    [Silverman1986]_, Section 2.4
+    [Silverman1986]_, Sections 2.4 and 2.10
 
     Examples
     --------
@@ -76,6 +82,11 @@ def gaussian_density(samples, at, bandwidth, weights=None):
     if not 0 < bandwidth < np.inf:
         raise ValueError(f"bandwidth must be positive, got {bandwidth:g}: do the samples vary?")
     samples, at = np.asarray(samples, float), np.asarray(at, float)
+    if reflect:
+        if np.min(samples, initial=0.0) < 0:
+            raise ValueError(f"samples must be at least 0 to be reflected there, got {np.min(samples):g}")
+        upper, mirrored = (gaussian_density(samples, each, bandwidth, weights) for each in (at, -at))
+        return np.where(at >= 0, upper + mirrored, 0.0)
     weights = np.ones(samples.size) if weights is None else np.asarray(weights, float)
     density = np.zeros(at.size)
     for start in range(0, samples.size, _PART):
@@ -85,7 +96,7 @@ def gaussian_density(samples, at, bandwidth, weights=None):
     return density / (np.sqrt(2.0 * np.pi) * bandwidth * weights.sum())
 
 
-def sample_density(samples, at):
+def sample_density(samples, at, *, reflect=False):
     """
     Gaussian kernel density of samples in memory, with the bandwidth of the rule of thumb.
 
@@ -94,6 +105,8 @@ def sample_density(samples, at):
     samples : array, any shape
         NaN is left out.
     at : array, shape (m,)
+    reflect : bool, optional
+        As in `gaussian_density`.
 
     Returns
     -------
@@ -103,11 +116,12 @@ def sample_density(samples, at):
     Raises
     ------
     ValueError
-        If fewer than two samples are left, or they do not vary.
+        If fewer than two samples are left, they do not vary, or one is negative that is to be reflected.
     """
     samples = np.asarray(samples, float)
     samples = samples[np.isfinite(samples)]
     if samples.size < 2:
         raise ValueError(f"a density needs at least 2 values, got {samples.size}")
     quartiles = np.subtract(*np.percentile(samples, (75, 25)))
-    return gaussian_density(samples, at, silverman_bandwidth(samples.std(ddof=1), quartiles, samples.size))
+    bandwidth = silverman_bandwidth(samples.std(ddof=1), quartiles, samples.size)
+    return gaussian_density(samples, at, bandwidth, reflect=reflect)

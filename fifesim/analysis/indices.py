@@ -21,7 +21,7 @@ def normalized_difference(nir, red):
 
     References
     ----------
-    [Rouse1974]_; [Friedl1995]_, Eq. 2
+    [Rouse1974]_; the criterion of [Friedl1995]_, Eq. 2, is `fifesim.analysis.scaling.ndvi_linearity`
 
     Examples
     --------

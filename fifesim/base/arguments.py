@@ -11,7 +11,9 @@ from fifesim.base.kinds import (
     CHUNKS,
     CRS,
     DISTRIBUTION,
+    FILE_BY_BAND,
     FILE_OR_RASTER,
+    FILES_BY_NAME,
     FLAG,
     FUNCTION,
     GEOMETRY,
@@ -20,6 +22,7 @@ from fifesim.base.kinds import (
     INSTRUMENT,
     INSTRUMENTS,
     INTERVAL,
+    LAND,
     LEAF,
     LEAF_ANGLES,
     LIST,
@@ -43,6 +46,7 @@ from fifesim.base.kinds import (
     TEXT,
     TRACK,
     TWO,
+    VARIATION,
     Kind,
     described,
     is_a,
@@ -70,7 +74,7 @@ KINDS = (
     | _of(SURROUNDINGS, "surroundings")
     | _of(LEAF, "leaf_optics brown_leaf")
     | _of(HORIZON, "horizon")
-    | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality")
+    | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality reflect")
     | _of(TEXT, "angles scaling pair quantity method datum vertical_units engine profile along band leaves")
     | _of(NAMES, "bands noise engines")
     | _of(MAPPING, "arps correlations covariates reference")
@@ -92,6 +96,7 @@ KINDS = (
     | _of(PLAIN, "noise_models aerosol axes")
     | _of(DISTRIBUTION, "distribution")
     | _of(LEAF_ANGLES, "leaf_angles")
+    | _of(VARIATION, "cv")
 )
 """What an argument may be, by its name, which means the same everywhere."""
 
@@ -110,6 +115,12 @@ OF_FUNCTION = {
     "instrument": _of(INSTRUMENT, "name"),
     "sun_position": _of(NUMBERS, "latitude longitude altitude"),
     "budget": _of(NUMBER, "cells"),
+    "reproduce": _of(NUMBER, "cells")
+    | _of(LAND, "dem")
+    | _of(FILES_BY_NAME, "densities")
+    | _of(FILE_BY_BAND, "optics background")
+    | _of(PATH, "sensor")
+    | _of(TEXT, "reading"),
 }
 """The same of single functions, where it is another."""
 

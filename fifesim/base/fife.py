@@ -1,6 +1,7 @@
 """The paper's case: where and when."""
 
-# A hypothetical overpass: no Landsat passed the FIFE site on this day (WRS-2 cycle), but the paper simulates it.
+# A hypothetical overpass: the paper simulates TM for this day (section Data), on which no Landsat passed the FIFE site
+# (WRS-2 cycle). It states no time: this is about when one passed on other days.
 TIME = "1987-06-06T16:35:00Z"
 LATITUDE = 39.06  # [degree north]
 LONGITUDE = -96.54  # [degree east]

@@ -266,7 +266,7 @@ def utc(time):
 @lru_cache
 def fife_geometry():
     """
-    The paper's case: the sun of 6 June 1987, 16:35 UTC over the FIFE site, and a nadir view.
+    The sun over the FIFE site on the paper's day, 6 June 1987 (Data), at 16:35 UTC and a nadir view, which are assumed.
 
     Returns
     -------

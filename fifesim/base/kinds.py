@@ -143,6 +143,9 @@ NUMBER_OR_RASTER = Kind(
 )
 PATH = Kind("the path of a file", is_path)
 RASTER = Kind("an xarray.DataArray over (y, x)", _is_raster)
+LAND = Kind("'flat', 'flint-hills' or the path of a raster file", is_path)
+FILES_BY_NAME = Kind("a folder, or a mapping by treatment", lambda value: is_path(value) or _is_mapping(value))
+FILE_BY_BAND = Kind("the path of a CSV file, or a mapping by band", lambda value: is_path(value) or _is_mapping(value))
 FILE_OR_RASTER = Kind("the path of a file, or an xarray.DataArray", lambda value: is_path(value) or _is_raster(value))
 GRID = Kind("an odc.geo.geobox.GeoBox, such as fifesim.grid_at or raster.odc.geobox give", lambda v: is_a(v, "GeoBox"))
 INSTRUMENT = Kind(
@@ -172,6 +175,10 @@ SPREAD = Kind(
     "a line spread function, such as fifesim.instrument('TM').line_spread", lambda value: hasattr(value, "half_width")
 )
 FUNCTION = Kind("a function", callable)
+VARIATION = Kind(
+    "a number, or a function of the means of pixels, such as lambda mean: 0.5 / (1 + mean)",
+    lambda value: callable(value) or _is_number(value),
+)
 HORIZON = Kind(
     "an xarray.DataArray over (direction, y, x), as fifesim.horizon gives it",
     lambda value: _is_raster(value) and "direction" in value.dims,

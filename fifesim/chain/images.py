@@ -1,4 +1,4 @@
-"""What an image of any kind tells: it is brought to planetary reflectance first, as in the paper."""
+"""What an image of any kind tells: it is brought to planetary reflectance first, as in the paper (Results)."""
 
 from fifesim.analysis.rasters import indices
 from fifesim.rasters import cf
@@ -10,7 +10,7 @@ from fifesim.sensor import raster as sensor
 @by_date
 def ndvi(image):
     """
-    Normalized difference vegetation index, from planetary reflectance as in the paper.
+    Normalized difference vegetation index, from planetary reflectance as in the paper (Results).
 
     Parameters
     ----------

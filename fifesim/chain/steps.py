@@ -85,7 +85,7 @@ def surface_reflectance(
     leaf_angles : optional
         A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
     hotspot : float, optional
-        Leaf size over canopy height; 0 is none, as in the paper. [1]
+        Leaf size over canopy height; 0 is none, as in the paper's SAIL. [1]
     brown : float or xarray.DataArray, dims (y, x), optional
         Dead share of the leaf area, 0 to 1. [1]
     dissociation : float or xarray.DataArray, dims (y, x), optional

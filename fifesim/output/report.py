@@ -5,6 +5,7 @@ from pathlib import Path
 from fifesim.chain.engines import TYPICAL_LAI, engine_error
 from fifesim.output import pages
 from fifesim.output.figures import NAMES, detail_figure, fit_figure, histogram_figure, map_figure, terrain_figure
+from fifesim.output.pairing import pairing_rows
 from fifesim.rasters import grid as grids
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words
@@ -61,7 +62,10 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     html = pages.html(
         _TEMPLATE,
         title=title(scenario),
-        summary=_summary(scenario, image, truth, fits, reasons) + _ground(terrain) + engine_rows(scenario),
+        summary=_summary(scenario, image, truth, fits, reasons)
+        + pairing_rows(scenario, fits)
+        + _ground(terrain)
+        + engine_rows(scenario),
         figures=pictures,
         fits=[(NAMES[name], fit) for name, fit in fits.items()],
         parameters=_parameters(scenario),

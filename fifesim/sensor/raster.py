@@ -22,7 +22,7 @@ from fifesim.sensor.response.rasters.pixels import (
     warn_of_others,
 )
 
-# Share of its footprint's weight that a pixel needs on valid cells. The paper's footprint of 30.32 m leaves a
+# Share of its footprint's weight that a pixel needs on valid cells. The footprint of Table 1, 30.32 m, leaves a
 # scene of whole 30 m pixels by 0.16 m.
 MIN_VALID = 0.98
 

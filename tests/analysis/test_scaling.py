@@ -58,6 +58,15 @@ def test_linearity_agrees_with_numpy():
     assert scaling.ndvi_linearity(red, nir) == pytest.approx(expected, rel=1e-12)
 
 
+def test_mean_ndvi_is_that_of_the_mean_where_ndvi_and_brightness_are_uncorrelated():
+    """Exactly: the difference is minus their covariance over the mean brightness. Eq. 2 is near to that."""
+    red, nir = np.random.default_rng(5).uniform(0.03, 0.4, (2, 1000))
+    ratio, total = normalized_difference(nir, red), nir + red
+    difference = ratio.mean() - normalized_difference(nir.mean(), red.mean())
+    assert abs(difference) > 1e-3
+    assert difference == pytest.approx(-np.cov(ratio, total, bias=True)[0, 1] / total.mean(), rel=1e-10)
+
+
 def test_share_kept_leaves_out_what_is_missing():
     cells = np.array([[0.0, 4.0], [np.nan, 2.0]])
     assert scaling.share_kept(np.array([1.0, np.nan, 2.0]), cells) == pytest.approx((0.25, 0.25 / (8 / 3)), rel=1e-12)

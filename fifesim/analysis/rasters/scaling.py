@@ -19,6 +19,9 @@ from fifesim.rasters.reductions import extremes, sums_by_block
 # Bins of the histogram that stands for the values of a raster: 1/2000 of their range is far less than a bandwidth.
 _BINS = 2000
 
+# Quantities whose density is reflected at zero, by name and standard name: they cannot be less, and are often near.
+_AT_LEAST_ZERO = {"lai", "fpar"} | {cf.QUANTITIES[name].standard_name for name in ("lai", "fpar")}
+
 # Blocks of values that are counted together. [cell]
 _BLOCK = 1024
 
@@ -195,7 +198,7 @@ def share_kept(pixels, cells):
     return xr.Dataset({name: value.drop_vars(list(value.coords)).drop_attrs() for name, value in kept.items()})
 
 
-def density(array, points=256, bandwidth=None):
+def density(array, points=256, bandwidth=None, *, reflect=None):
     """
     Gaussian kernel density of the values of a raster; computes.
 
@@ -207,6 +210,9 @@ def density(array, points=256, bandwidth=None):
         Where it is given, evenly over the range of the values.
     bandwidth : float, optional
         Of the kernel, in units of the values; by the rule of thumb by default.
+    reflect : bool, optional
+        Whether the parts of kernels below zero are reflected there, as of what cannot be negative; by default of leaf
+        area and FPAR.
 
     Returns
     -------
@@ -217,7 +223,7 @@ def density(array, points=256, bandwidth=None):
     Raises
     ------
     ValueError
-        If fewer than two values are left or they do not vary.
+        If fewer than two values are left, they do not vary, or some are negative that are to be reflected.
 
     References
     ----------
@@ -229,6 +235,9 @@ def density(array, points=256, bandwidth=None):
     """
     check_no_counts(array)
     low, high = extremes(array)
+    if reflect is None:
+        # A difference of two leaf areas keeps their name.
+        reflect = low >= 0 and bool({array.name, array.attrs.get("standard_name")} & _AT_LEAST_ZERO)
     if not high > low:
         raise ValueError(f"a density needs values that vary, got {low:g} to {high:g}")
     edges = np.linspace(low, high, _BINS + 1)
@@ -237,7 +246,7 @@ def density(array, points=256, bandwidth=None):
     if bandwidth is None:
         bandwidth = _rule_of_thumb(middles, counts)
     at = np.linspace(low, high, points)
-    found = densities.gaussian_density(middles, at, bandwidth, counts)
+    found = densities.gaussian_density(middles, at, bandwidth, counts, reflect=bool(reflect))
     attrs = {"long_name": f"density of {array.name or 'values'}", "bandwidth": float(bandwidth)}
     return xr.DataArray(found, dims="value", coords={"value": at}, name="density", attrs=attrs)
 

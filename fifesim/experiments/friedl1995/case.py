@@ -1,166 +1,216 @@
-"""The experiment of Friedl et al. (1995): nine scenes, what the sensor makes of them, and Table 2."""
+"""The experiment of Friedl et al. (1995): nine scenarios that differ in the ground, and all that they share."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property
+from math import ceil
 
-import numpy as np
-from odc.geo.geobox import GeoBox
-
-from fifesim.analysis.rasters.means import aggregate
-from fifesim.base import datasets
-from fifesim.chain import steps as chain
-from fifesim.chain.images import ndvi
-from fifesim.chain.setup import Setup, image_of, reflectance_of
-from fifesim.ground.canopy import raster as ground
-from fifesim.ground.landscape.distribution import treatments, truncated_normal
-from fifesim.ground.landscape.raster import lai_scene
-from fifesim.ground.terrain.rasters.hills import flint_hills
-from fifesim.rasters import sites
-from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.description.spatial_response import CosineResponse
+from fifesim.base import datasets, fife
+from fifesim.base.foreign import shown
+from fifesim.base.kinds import is_path
+from fifesim.experiments.friedl1995 import inputs
+from fifesim.experiments.friedl1995.readings import CELL, NATIVE, TABLE_1, Reading, reading_of
+from fifesim.ground.landscape.distribution import treatments
+from fifesim.scenario.land import elevation
+from fifesim.scenario.scenario import Scenario
+from fifesim.scenario.simulation import setup_of
 
 ARPS = (0.05, 0.15, 0.24)
 VARIABLES = ("lai", "fpar")
-BANDS = ("TM3", "TM4")
-
-# Nine cells across a pixel of 30 m.
-CELL = 30 / 9
-PIXEL = 30.0
 
 # Along the edge of a scene. The paper states no size; the report shows what others give.
 CELLS = 333
-# With fewer than a hundred pixels increments hold too few for a deviation.
-FEWEST_CELLS = 90
+# With fewer pixels along an edge increments hold too few for a deviation.
+_FEWEST_PIXELS = 10
+_COARSE_PIXELS = 12
 
 # Where in the FIFE site the scene lies, in cells from its corner: only the relief depends on it.
 _CORNER = 1000
-_HILLS_SEED = 7
 
 
-@dataclass(frozen=True)
-class Reading:
-    """
-    How the pixels of Table 1 lie on the blocks of ground that they are compared with.
-
-    Parameters
-    ----------
-    name : str
-    text : str
-        What it takes Table 1 to say.
-    own_interval : bool
-        Pixels at the instrument's own sampling interval, paired with the blocks by row and column.
-    count : int, optional
-        Number of angles of the line spread function; the instrument's by default.
-    offset : float
-        Constant displacement of the image, southward and eastward. [cell]
-    topography : bool
-        Slopes change the light on the ground (Eqs. 4 and 5).
-    """
-
-    name: str
-    text: str
-    own_interval: bool = False
-    count: int | None = None
-    offset: float = 0.0
-    topography: bool = False
-
-
-USED = Reading(
-    "native interval",
-    "pixels every 43 µrad × 705 km = 30.315 m, paired by row and column with the 30 m blocks of the truth",
-    own_interval=True,
-)
-READINGS = (
-    USED,
-    Reading("aligned", "pixels of 30 m on the blocks of the truth"),
-    Reading("narrow response", "aligned, with a line spread of 7 of the 9 angles (23.6 m)", count=7),
-    Reading("constant offset", "aligned, then displaced by 2 cells (6.7 m) along both axes", offset=2.0),
-    Reading("aligned with relief", "aligned, on the synthetic Flint Hills", topography=True),
-    Reading("native interval with relief", "native interval, on the synthetic Flint Hills", True, topography=True),
-)
-
-
-def _setup():
-    """That of the experiment, with its leaf optics."""
-    optics = {band: tuple(pair) for band, *pair in datasets.table("friedl1995_optics.csv").itertuples(index=False)}
-    return Setup(instrument=find_instrument("TM"), bands=BANDS, leaf_optics=optics)
-
-
-def densities(shift=0.0, factor=1.0, bound=0.0):
-    """
-    Distributions of LAI of the experiment, or changed ones.
-
-    Parameters
-    ----------
-    shift : float, optional
-        Added to mean and bounds. [m2 m-2]
-    factor : float, optional
-        Of the standard deviation. [1]
-    bound : float, optional
-        By how many standard deviations the bounds move outward; a lower one of 0 stays. [1]
-
-    Returns
-    -------
-    densities : dict of str to frozen scipy distribution
-        By treatment.
-    """
-    found = {}
-    for name, mean, deviation, low, high in datasets.table("friedl1995_densities.csv").itertuples(index=False):
-        moved = low + shift - bound * deviation if low else low, high + shift + bound * deviation
-        found[name] = truncated_normal(mean + shift, factor * deviation, *moved)
-    return found
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
     """
     What the nine scenes have in common.
 
     Parameters
     ----------
-    cells : int
-        Along the edge of a scene.
     reading : Reading
-    densities : mapping of str to frozen scipy distribution
-        Of LAI, by treatment.
-    setup : fifesim.chain.setup.Setup
-        On level ground, as Table 1 has it before it is read.
+        Of Table 1.
+    dem : str
+        "flat", "flint-hills" or a raster file of elevation.
+    densities : mapping of str
+        By treatment, what `fifesim.lai_distribution` takes.
+    optics : mapping of str to (float, float), optional
+        Leaf reflectance and transmittance by band; by default fifesim's own. [1]
+    background : mapping of str to float, optional
+        By band, or shares of spectra; by default fifesim's own. [1]
+    sensor : str
+        Name of an instrument, or its file.
+    cells : int, optional
+        Along the edge of a scene; 333, or 12 pixels of a coarse sensor, by default.
+    bits : int, optional
+        Of digital numbers; the instrument's by default.
+    upwelling : bool, optional
+        With the view's cosine on slopes (Eq. 5).
+
+    Raises
+    ------
+    ValueError
+        If a scene would have fewer than 10 pixels along its edge, or the sensor lacks a red or near infrared band.
     """
 
-    cells: int = CELLS
-    reading: Reading = USED
-    densities: Mapping = field(default_factory=densities)
-    setup: Setup = field(default_factory=_setup)
+    reading: Reading = NATIVE
+    dem: str = "flat"
+    densities: Mapping = field(default_factory=lambda: inputs.densities_of(None))
+    optics: Mapping | None = None
+    background: Mapping | None = None
+    sensor: str = TABLE_1
+    cells: int | None = None
+    bits: int | None = None
+    upwelling: bool = True
 
     def __post_init__(self):
-        if self.cells < FEWEST_CELLS:
+        if self.cells is None:
+            object.__setattr__(self, "cells", max(CELLS, ceil(_COARSE_PIXELS * self.pixel / CELL)))
+        fewest = ceil(_FEWEST_PIXELS * self.pixel / CELL)
+        if self.cells < fewest:
             raise ValueError(
-                f"cells must be at least {FEWEST_CELLS}, 10 pixels along the edge of a scene, got {self.cells}: "
-                "samples of 200 pixels need 135"
+                f"cells must be at least {fewest}, {_FEWEST_PIXELS} pixels along the edge of a scene, got "
+                f"{self.cells}: samples of 200 pixels need {ceil(15 * self.pixel / CELL)}"
             )
 
-    @property
-    def grid(self):
-        """Grid of the cells, an `odc.geo.geobox.GeoBox`."""
-        site = sites.fife_site(CELL)
-        first = min(_CORNER, max(site.shape.y - self.cells, 0))
-        return GeoBox((self.cells, self.cells), site[first:, first:].affine, site.crs)
+    @cached_property
+    def bands(self):
+        """Names of the red and the near infrared band, a tuple of str."""
+        return inputs.sensor_of(self.sensor)[1]
+
+    @cached_property
+    def instrument(self):
+        """As the reading has it, a `fifesim.sensor.description.instrument_file.Instrument`."""
+        found = self.reading.instrument(inputs.sensor_of(self.sensor)[0])
+        return found if self.bits is None else replace(found, bits=self.bits)
 
     @property
-    def read(self):
-        """The setup as the reading of Table 1 has it, a `fifesim.chain.setup.Setup`."""
-        instrument, reading = self.setup.instrument, self.reading
-        if reading.count is not None:
-            lsf = instrument.lsf
-            instrument = replace(instrument, lsf=CosineResponse(kind=lsf.kind, step=lsf.step, count=reading.count))
-        return replace(
-            self.setup,
-            instrument=instrument,
-            dem=_relief(self.grid) if reading.topography else None,
-            interval="native" if reading.own_interval else None,
-            offset=(reading.offset * CELL / PIXEL,) * 2,
-        )
+    def pixel(self):
+        """Size of a pixel, and of a block of the truth. [m]"""
+        description, (red, _) = inputs.sensor_of(self.sensor)
+        return description.pixel(description.select([red])[0])
+
+    @property
+    def interval(self):
+        """Distance between the instrument's own samples. [m]"""
+        return max(self.instrument.ground_intervals(self.instrument.select(self.bands)[0]))
+
+    @property
+    def drift(self):
+        """How far along an axis the last pixel lies from its block. [m]"""
+        if not self.reading.own_interval:
+            return 0.0
+        return (int(self.cells * CELL / self.interval) - 1) * abs(self.interval - self.pixel)
+
+    def scenario(self, treatment, arp, seed):
+        """
+        One of the nine, which `fifesim simulate` runs.
+
+        Parameters
+        ----------
+        treatment : str
+        arp : float
+            [1]
+        seed : int
+
+        Returns
+        -------
+        scenario : fifesim.scenario.scenario.Scenario
+            All that matters to the ground is said, whatever the defaults are. A response of the reading, other bits and
+            a density without a name are not in it.
+        """
+        crs, west, north = fife.CORNERS["NAD83"]
+        edge = self.cells * CELL
+        first = min(_CORNER * CELL, max(fife.SIZE - edge, 0.0))
+        grid = {"crs": crs, "west": west + first, "north": north - first, "width": edge, "height": edge, "cell": CELL}
+        source = self.densities[treatment]
+        ground = {"distribution": str(source) if is_path(source) else treatment, "arp": arp, "seed": seed}
+        ground |= {"method": "periodic"} | self._leaves()
+        sensor = {"instrument": self.sensor, "bands": list(self.bands)}
+        sensor |= {"interval": "native" if self.reading.own_interval else "product"}
+        sensor |= {"offset": [self.reading.offset * CELL / self.pixel] * 2}
+        return Scenario(grid=grid, ground=ground, terrain={"dem": self.dem, "upwelling": self.upwelling}, sensor=sensor)
+
+    @cached_property
+    def common(self):
+        """What the nine scenarios share, one of them, a `fifesim.scenario.scenario.Scenario`."""
+        return self.scenario(treatments()[0], ARPS[0], 0)
+
+    @cached_property
+    def grid(self):
+        """Grid of the cells, an `odc.geo.geobox.GeoBox`."""
+        return self.common.geobox()
+
+    @cached_property
+    def setup(self):
+        """Ground, air and instrument, without elevation, a `fifesim.chain.setup.Setup`."""
+        return replace(setup_of(self.common), instrument=self.instrument)
+
+    def land(self):
+        """
+        Elevation of the scenes, which is one for all, and the horizon around.
+
+        Returns
+        -------
+        dem, horizon : xarray.DataArray or None
+            As `fifesim.scenario.land.elevation` gives them, in memory.
+        """
+        dem, horizon, _ = elevation(self.common, self.grid)
+        return dem, None if horizon is None else horizon.compute()
+
+    def _leaves(self):
+        keys = {}
+        if self.optics is not None:
+            for number, name in enumerate(inputs.OPTICS):
+                keys[name] = {band: float(pair[number]) for band, pair in self.optics.items()}
+        if self.background is not None:
+            by_band = set(self.background) & set(self.bands)
+            keys["background" if by_band else "background_spectra"] = dict(self.background)
+        return keys
+
+
+def case_of(reading="native", dem="flat", densities=None, optics=None, background=None, sensor=TABLE_1, cells=None):
+    """
+    A case of what a reader gives.
+
+    Parameters
+    ----------
+    reading, dem, densities, optics, background, sensor, cells : optional
+        As in `fifesim.reproduce`.
+
+    Returns
+    -------
+    case : Case
+
+    Raises
+    ------
+    ValueError
+        If one of them is not right.
+    """
+    sensor = os.fspath(sensor)
+    description, bands = inputs.sensor_of(sensor)
+    case = Case(
+        reading=reading_of(reading, description.name),
+        dem=os.fspath(dem),
+        densities=inputs.densities_of(densities),
+        optics=inputs.by_band(optics, bands, inputs.OPTICS, "optics"),
+        background=inputs.background_of(background, bands),
+        sensor=sensor,
+        cells=cells,
+    )
+    if case.dem not in ("flat", "flint-hills") and not os.path.isfile(case.dem):
+        raise ValueError(f'dem = {shown(case.dem)}: type "flat", "flint-hills", or a raster file of elevation')
+    # Physics refuses what cannot be before anything is computed.
+    case.common.complete()
+    return case
 
 
 def scenes():
@@ -177,73 +227,6 @@ def scenes():
     (9, ('burned-grazed', 0.05))
     """
     return [(treatment, arp) for treatment in treatments() for arp in ARPS]
-
-
-def landscape(case, treatment, arp, seed):
-    """
-    Leaf area of a scene and the light that it absorbs.
-
-    Parameters
-    ----------
-    case : Case
-    treatment : str
-    arp : float
-        [1]
-    seed : int
-
-    Returns
-    -------
-    lai, fpar : xarray.DataArray, dims (y, x)
-        By the paper's own route: one Fourier transform of the scene, and exact ranks.
-    """
-    lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method="periodic")
-    return lai, ground.fpar(lai)
-
-
-def pixel_values(truth, *images):
-    """
-    Pixels of several rasters paired by row and column, without those where one has no data.
-
-    Parameters
-    ----------
-    truth, *images : xarray.DataArray, dims (y, x)
-
-    Returns
-    -------
-    values : array, shape (rasters, pixels)
-    """
-    rasters = (truth, *images)
-    rows, columns = min(raster.sizes["y"] for raster in rasters), min(raster.sizes["x"] for raster in rasters)
-    values = np.stack([raster.values[:rows, :columns].ravel() for raster in rasters])
-    return values[:, np.isfinite(values).all(axis=0)]
-
-
-def run(case, treatment, arp, seed):
-    """
-    Pixels of one scene, as Table 2 regresses them.
-
-    Parameters
-    ----------
-    case : Case
-    treatment : str
-    arp : float
-        [1]
-    seed : int
-
-    Returns
-    -------
-    pixels : array, shape (3, n)
-        True LAI, true FPAR, and NDVI at the top of the atmosphere.
-    cells : array, shape (3, 2)
-        Least and largest of the same in the cells; NDVI at the top of the atmosphere, too.
-    """
-    lai, fpar = landscape(case, treatment, arp, seed)
-    reflectance = reflectance_of(case.read, lai)
-    image = image_of(case.read, reflectance)
-    truth = [aggregate(array, PIXEL) for array in (lai, fpar)]
-    of_cells = ndvi(chain.to_toa(reflectance))
-    limits = [(float(array.min()), float(array.max())) for array in (lai, fpar, of_cells)]
-    return pixel_values(*truth, ndvi(image)), np.array(limits)
 
 
 def paper_table():
@@ -268,9 +251,3 @@ def paper_text():
         Columns quantity, variable, arp and value.
     """
     return datasets.table("friedl1995_text.csv")
-
-
-@lru_cache(maxsize=1)
-def _relief(grid):
-    """Elevation of the synthetic hills, with a cell more on each side for the slopes at the border."""
-    return flint_hills(grid.pad(1), _HILLS_SEED)

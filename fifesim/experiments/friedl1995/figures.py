@@ -1,19 +1,12 @@
-"""Figures 3 to 9 of Friedl et al. (1995), from scenes of one seed."""
+"""Figures 3 to 9 of Friedl et al. (1995), from what `fifesim.reproduce` gives."""
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fifesim.analysis import density, regression, scaling
-from fifesim.analysis.rasters import indices
-from fifesim.analysis.rasters.means import aggregate
-from fifesim.chain import steps as chain
-from fifesim.chain.images import ndvi, planetary_reflectance
-from fifesim.chain.setup import image_of, reflectance_of
-from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import ARPS, BANDS, PIXEL, VARIABLES
-from fifesim.ground.landscape.distribution import treatments
+from fifesim.experiments.friedl1995.case import VARIABLES
 
 # Okabe and Ito's colours, which the colour-blind tell apart; dashes and markers tell them apart in grey.
 _COLORS = ("#0072B2", "#D55E00", "#009E73")
@@ -23,77 +16,96 @@ _DOT = {"s": 9, "linewidths": 0, "alpha": 0.75}
 
 _LABELS = {"lai": "LAI [m² m⁻²]", "fpar": "FPAR [1]", "ndvi": "NDVI [1]"}
 _FIGURE_WIDTH = 7.2
-BURNED_GRAZED = "burned-grazed"
+
+NUMBERS = range(3, 10)
+"""Of the figures that are drawn."""
+
+BY_READING = (5, 6, 7, 9)
+"""Of those that differ with the reading of Table 1."""
 
 
-def pixels(case, treatment, seed):
+def plot_reproduction(number, found, *, reading=None):
     """
-    What figures 4 to 9 show, of the three scenes of a treatment.
+    A figure of Friedl et al. (1995), drawn from a repetition of the experiment.
 
     Parameters
     ----------
-    case : fifesim.experiments.friedl1995.case.Case
-    treatment : str
-    seed : int
-
-    Returns
-    -------
-    scenes : list of dict
-        For each arp: ``cells``, LAI by cells; ``of_cells``, a dict of LAI, FPAR and TOA NDVI of all cells;
-        ``pixels``, a dict of values over pixels, among them means of the products of reflectances; ``sample``, the
-        same of a sample of 200.
-    """
-    return [_scene(case, treatment, arp, seed) for arp in ARPS]
-
-
-def figure3(case):
-    """
-    Densities of LAI of the three treatments.
-
-    Parameters
-    ----------
-    case : fifesim.experiments.friedl1995.case.Case
+    number : int
+        3, densities of LAI; 4, LAI of the ground; 5, LAI and FPAR against NDVI; 6, densities of cells and pixels;
+        7, relative equivalent noise; 8, scaling of NDVI; 9, reflectance of image and ground.
+    found : dataset
+        From `reproduce`.
+    reading : str, optional
+        One of those in ``found``, by default the one that was asked for.
 
     Returns
     -------
     figure : matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If there is no such figure or reading.
+
+    See Also
+    --------
+    fifesim.reproduce
     """
+    if number not in NUMBERS:
+        raise ValueError(f"number must be one of {', '.join(map(str, NUMBERS))}, the paper's figures, got {number}")
+    names = [str(name) for name in found["reading"].values]
+    reading = names[0] if reading is None else reading
+    if reading not in names:
+        raise ValueError(f"reading must be one of {', '.join(names)}, which were computed, got {reading!r}")
+    return _DRAWN[number](found, reading)
+
+
+def sample(found, reading, arp):
+    """
+    The sample of 200 pixels of one of the scenes that are shown.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        From `reproduce`.
+    reading : str
+    arp : float
+        [1]
+
+    Returns
+    -------
+    values : dict of str to array, shape (n,)
+        By the names of its pixels, without ``pixel_``.
+    """
+    scene = found.sel(reading=reading, arp=arp)
+    chosen = scene["sampled"].values.astype(bool)
+    return {name[6:]: scene[name].values[chosen] for name in scene.data_vars if str(name).startswith("pixel_")}
+
+
+def _figure3(found, reading):
+    """Densities of LAI of the three treatments."""
     figure = Figure(figsize=(4.6, 3.2), layout="constrained")
     axis = figure.subplots()
-    for treatment, color, dash in zip(treatments(), _COLORS, _DASHES, strict=True):
-        distribution = case.densities[treatment]
-        low, high = distribution.support()
-        at = np.linspace(low, high, 400)
+    for (name, each), color, dash in zip(found["density"].groupby("distribution"), _COLORS, _DASHES, strict=True):
+        known = each.squeeze().dropna("leaf_area")
+        at, low = known["leaf_area"].values, known.values[0]
         # Down to zero where the density is cut off.
-        axis.plot(
-            [low, *at, high], [0, *distribution.pdf(at), 0], dash, color=color, label=treatment.replace("-", ", ")
-        )
+        axis.plot([at[0], *at, at[-1]], [0 if at[0] > 0 or low else low, *known.values, 0], dash, color=color,
+                  label=str(name).replace("-", ", "))  # fmt: skip
     axis.set(xlabel=_LABELS["lai"], ylabel="density [m² m⁻²]⁻¹", xlim=(0, None), ylim=(0, None))
     _finish(axis)
     axis.legend(frameon=False, fontsize=8)
     return figure
 
 
-def figure4(scenes):
-    """
-    LAI of the cells at three values of arp.
-
-    Parameters
-    ----------
-    scenes : list of dict
-        From `pixels`.
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-    """
+def _figure4(found, reading):
+    """LAI of the cells at three values of arp."""
     figure = Figure(figsize=(_FIGURE_WIDTH, 2.75), layout="constrained")
-    axes = figure.subplots(1, len(ARPS), sharey=True)
-    high = max(float(scene["cells"].max()) for scene in scenes)
-    for axis, scene, arp in zip(axes, scenes, ARPS, strict=True):
-        cells = scene["cells"]
-        shown = cells[: min(120, cells.shape[0]), : min(120, cells.shape[1])]
-        extent = np.array([0, shown.shape[1], shown.shape[0], 0]) * friedl1995.CELL
+    axes = figure.subplots(1, found.sizes["arp"], sharey=True)
+    high, size = float(found["cell_lai"].max()), found.attrs["cell"]
+    for axis, arp in zip(axes, found["arp"].values, strict=True):
+        shown = found["cell_lai"].sel(arp=arp).values[:120, :120]
+        extent = np.array([0, shown.shape[1], shown.shape[0], 0]) * size
         drawn = axis.imshow(shown, cmap="viridis", vmin=0, vmax=high, extent=extent, interpolation="nearest")
         axis.set(xlabel="east [m]", title=f"arp {arp:g}")
         axis.title.set_fontsize(9)
@@ -105,22 +117,12 @@ def figure4(scenes):
     return figure
 
 
-def figure5(scenes):
-    """
-    LAI and FPAR against NDVI at the ground and at the top of the atmosphere.
-
-    Parameters
-    ----------
-    scenes : list of dict
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-    """
+def _figure5(found, reading):
+    """LAI and FPAR against NDVI at the ground and at the top of the atmosphere."""
     figure = Figure(figsize=(_FIGURE_WIDTH, 8.2), layout="constrained")
-    axes = figure.subplots(len(ARPS), len(VARIABLES))
-    for row, scene, arp in zip(axes, scenes, ARPS, strict=True):
-        values = scene["sample"]
+    axes = figure.subplots(found.sizes["arp"], len(VARIABLES))
+    for row, arp in zip(axes, found["arp"].values, strict=True):
+        values = sample(found, reading, arp)
         for axis, variable in zip(row, VARIABLES, strict=True):
             truth, toa, boa = values[variable], values["ndvi"], values["boa_ndvi"]
             axis.scatter(boa, truth, color=_COLORS[0], marker="^", label="ground (BOA)", **_DOT)
@@ -140,52 +142,39 @@ def figure5(scenes):
     return figure
 
 
-def figure6(scenes):
-    """
-    Densities of LAI, FPAR and NDVI of the cells and of the pixels.
-
-    Parameters
-    ----------
-    scenes : list of dict
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-    """
-    figure = Figure(figsize=(_FIGURE_WIDTH, 2.9), layout="constrained")
+def _figure6(found, reading):
+    """Densities of LAI, FPAR and NDVI of the cells and of the pixels."""
+    figure = Figure(figsize=(_FIGURE_WIDTH, 3.1), layout="constrained")
+    first = found["arp"].values[0]
     for axis, variable in zip(figure.subplots(1, 3), (*VARIABLES, "ndvi"), strict=True):
-        cells = scenes[-1]["of_cells"][variable]
+        cells = found[f"cell_{variable}"].isel(arp=-1).values.ravel()
+        # Neither leaf area nor FPAR is below zero, where both are dense.
+        options = {"reflect": variable != "ndvi"}
         at = np.linspace(cells.min(), cells.max(), 500)
         counts, edges = np.histogram(cells, bins=400)
         bandwidth = density.silverman_bandwidth(cells.std(), np.subtract(*np.percentile(cells, (75, 25))), cells.size)
-        axis.plot(at, density.gaussian_density((edges[1:] + edges[:-1]) / 2, at, bandwidth, counts), color=_BLACK,
-                  linewidth=1, label="cells")  # fmt: skip
-        for scene, arp, color, dash in zip(scenes, ARPS, _COLORS, _DASHES, strict=True):
-            found = density.sample_density(scene["sample"][variable], at)
-            axis.plot(at, found, dash, color=color, label=f"pixels, arp {arp:g}")
+        of_cells = density.gaussian_density((edges[1:] + edges[:-1]) / 2, at, bandwidth, counts, **options)
+        axis.plot(at, of_cells, color=_BLACK, linewidth=1, label="cells")
+        for arp, color, dash in zip(found["arp"].values, _COLORS, _DASHES, strict=True):
+            values = sample(found, reading, arp)
+            of_pixels = density.sample_density(values[variable], at, **options)
+            axis.plot(at, of_pixels, dash, color=color, label=f"pixels, arp {arp:g}")
+            if variable == "ndvi":
+                smooth = density.sample_density(values["analogue_ndvi"], at)
+                axis.plot(at, smooth, color=_GREY, linewidth=0.9, label="before digitising" if arp == first else None)
         unit = "[m² m⁻²]⁻¹" if variable == "lai" else "[1]"
         axis.set(xlabel=_LABELS[variable], ylabel=f"density {unit}", ylim=(0, None))
         _finish(axis)
-    _legend_below(figure, figure.axes[0])
+    _legend_below(figure, figure.axes[-1])
     return figure
 
 
-def figure7(scenes):
-    """
-    Relative equivalent noise by increments of LAI and FPAR.
-
-    Parameters
-    ----------
-    scenes : list of dict
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-    """
+def _figure7(found, reading):
+    """Relative equivalent noise by increments of LAI and FPAR."""
     figure = Figure(figsize=(_FIGURE_WIDTH, 3.0), layout="constrained")
     for axis, variable in zip(figure.subplots(1, 2), VARIABLES, strict=True):
-        for scene, arp, color, dash, marker in zip(scenes, ARPS, _COLORS, _DASHES, "osD", strict=True):
-            values, increment = scene["sample"], friedl1995_table.INCREMENTS[variable]
+        for arp, color, dash, marker in zip(found["arp"].values, _COLORS, _DASHES, "osD", strict=True):
+            values, increment = sample(found, reading, arp), friedl1995_table.INCREMENTS[variable]
             at, noise = friedl1995_table.mean_noise(values[variable], values["ndvi"], increment)
             axis.plot(at, noise, dash, color=color, marker=marker, markersize=4, linewidth=1.2,
                       label=f"arp {arp:g}, mean {noise.mean():.2f}")  # fmt: skip
@@ -195,22 +184,12 @@ def figure7(scenes):
     return figure
 
 
-def figure8(scenes):
-    """
-    NDVI of the mean reflectance against the mean NDVI of the cells, and their difference.
-
-    Parameters
-    ----------
-    scenes : list of dict
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-    """
+def _figure8(found, reading):
+    """NDVI of the mean reflectance against the mean NDVI of the cells, and their difference."""
     figure = Figure(figsize=(_FIGURE_WIDTH, 4.6), layout="constrained")
-    axes = figure.subplots(2, len(ARPS), height_ratios=(1.25, 1))
-    for column, scene, arp in zip(axes.T, scenes, ARPS, strict=True):
-        values = scene["sample"]
+    axes = figure.subplots(2, found.sizes["arp"], height_ratios=(1.25, 1))
+    for column, arp in zip(axes.T, found["arp"].values, strict=True):
+        values = sample(found, reading, arp)
         mean, of_mean, red, nir = (values[name] for name in ("boa_ndvi", "ndvi_of_mean", "boa_red", "boa_nir"))
         column[0].scatter(mean, of_mean, color=_COLORS[0], **_DOT)
         ends = np.array([mean.min(), mean.max()])
@@ -233,63 +212,28 @@ def figure8(scenes):
     return figure
 
 
-def figure9(scenes):
-    """
-    Reflectance at the top of the atmosphere against the mean of that of the ground.
-
-    Parameters
-    ----------
-    scenes : list of dict
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-    """
+def _figure9(found, reading):
+    """Reflectance at the top of the atmosphere against the mean of that of the ground."""
     figure = Figure(figsize=(_FIGURE_WIDTH, 5.0), layout="constrained")
-    for row, band, name in zip(figure.subplots(len(BANDS), len(ARPS)), BANDS, ("red", "nir"), strict=True):
-        for axis, scene, arp in zip(row, scenes, ARPS, strict=True):
+    axes = figure.subplots(2, found.sizes["arp"])
+    for row, name, words in zip(axes, ("red", "nir"), ("red", "near infrared"), strict=True):
+        for axis, arp in zip(row, found["arp"].values, strict=True):
+            values = sample(found, reading, arp)
             # What the atmosphere alone makes of the mean reflectance of the ground is clear.
-            boa, toa, clear = (scene["sample"][f"{kind}_{name}"] for kind in ("boa", "toa", "clear"))
+            boa, toa, clear = (values[f"{kind}_{name}"] for kind in ("boa", "toa", "clear"))
             axis.scatter(boa, toa, color=_COLORS[1], label="simulated image", **_DOT)
-            at = np.array([boa.min(), boa.max()])
-            order = np.argsort(boa)
+            at, order = np.array([boa.min(), boa.max()]), np.argsort(boa)
             axis.plot(boa[order], clear[order], color=_BLACK, linewidth=1.1, label="atmosphere alone")
             axis.plot(at, at, ":", color=_GREY, linewidth=1, label="1 : 1")
-            axis.set(xlabel=f"{band} reflectance, ground [1]")
+            axis.set(xlabel=f"{words}, ground [1]")
             axis.set_title(f"arp {arp:g}: R² = {np.corrcoef(boa, toa)[0, 1] ** 2:.2f}")
             _finish(axis)
-        row[0].set_ylabel(f"{band} reflectance, TOA [1]")
+        row[0].set_ylabel(f"{words}, TOA [1]")
     _legend_below(figure, figure.axes[0])
     return figure
 
 
-def _scene(case, treatment, arp, seed):
-    lai, fpar = friedl1995.landscape(case, treatment, arp, seed)
-    ground = reflectance_of(case.read, lai)
-    toa = chain.to_toa(ground)
-    image = image_of(case.read, ground)
-    planetary = planetary_reflectance(image)
-    boa_ndvi = indices.ndvi(ground)
-    means = aggregate(ground, PIXEL)
-    clear = chain.to_toa(means)
-    products = {"red_red": ground[0] ** 2, "red_nir": ground[0] * ground[1], "nir_nir": ground[1] ** 2}
-    rasters = {
-        "lai": aggregate(lai, PIXEL),
-        "fpar": aggregate(fpar, PIXEL),
-        "ndvi": ndvi(image),
-        "boa_ndvi": aggregate(boa_ndvi, PIXEL),
-        "ndvi_of_mean": indices.ndvi(means),
-        "boa_red": means[0], "boa_nir": means[1],
-        "toa_red": planetary[0], "toa_nir": planetary[1],
-        "clear_red": clear[0], "clear_nir": clear[1],
-    } | {name: aggregate(product.drop_vars("band", errors="ignore"), PIXEL)
-         for name, product in products.items()}  # fmt: skip
-    values = dict(zip(rasters, friedl1995.pixel_values(*rasters.values()), strict=True))
-    numbers = np.arange(values["ndvi"].size)[None]
-    chosen = friedl1995_table.draw(numbers, friedl1995_table.SAMPLE, [seed, ARPS.index(arp)], 1)[0, 0]
-    sample = {name: value[chosen] for name, value in values.items()}
-    of_cells = {"lai": lai.values.ravel(), "fpar": fpar.values.ravel(), "ndvi": ndvi(toa).values.ravel()}
-    return {"cells": lai.values, "of_cells": of_cells, "pixels": values, "sample": sample}
+_DRAWN = dict(zip(NUMBERS, (_figure3, _figure4, _figure5, _figure6, _figure7, _figure8, _figure9), strict=True))
 
 
 def _legend_below(figure, axis):

@@ -1,41 +1,46 @@
 """The repeated experiment as a folder of files."""
 
+import os
+import shlex
 from pathlib import Path
 
-from fifesim.base.seeds import check_seed
-from fifesim.experiments.friedl1995 import effects, figures
+from fifesim.base.kinds import is_path
+from fifesim.experiments.friedl1995 import case as friedl1995
+from fifesim.experiments.friedl1995 import effects, figures, scenarios
 from fifesim.experiments.friedl1995 import report as friedl1995_report
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import Case
+from fifesim.experiments.friedl1995.readings import TABLE_1, beside
+from fifesim.experiments.friedl1995.reproduction import REALISATIONS, SEED, reproduce_case
 from fifesim.output import pages
 from fifesim.output.folders import check_folder, results
 from fifesim.output.progress import steps
 from fifesim.output.run.size import check_cells
 
-NUMBERS = range(3, 10)
-FILES = ("table2.csv", *(f"figure{number}.png" for number in NUMBERS), "report.html")
+_TABLES = ("readings", "sizes", "sensitivity")
 
 # Differences between cases share their random numbers, and need few realisations.
 _EFFECT_REALISATIONS = 2
 _DPI = 200
 
 
-def reproduce_to_folder(folder, *, realisations=20, cells=333, seed=1995, overwrite=False):
+def reproduce_to_folder(
+    folder, *, realisations=REALISATIONS, cells=None, seed=SEED, scenes=False, overwrite=False, **inputs
+):
     """
-    Repeat the experiment of Friedl et al. (1995): table2.csv, figure3.png to figure9.png and report.html.
+    Repeat the experiment of Friedl et al. (1995): tables, figures, nine scenarios and report.html.
 
     Parameters
     ----------
     folder : str or path
         Made where it does not exist.
-    realisations : int, optional
-        Of each of the nine scenes.
-    cells : int, optional
-        Along the edge of a scene, of 3.33 m each.
-    seed : int, optional
-        Of the first realisation, whose scenes the figures show; the others follow.
+    realisations, cells, seed : optional
+        As in `fifesim.reproduce`.
+    scenes : bool, optional
+        Write image, truth and scene of the first realisation beside each scenario.
     overwrite : bool, optional
         Replace these files where the folder holds something; other files stay.
+    **inputs
+        ``reading``, ``dem``, ``densities``, ``optics``, ``background`` and ``sensor``, as in `fifesim.reproduce`.
 
     Returns
     -------
@@ -44,7 +49,7 @@ def reproduce_to_folder(folder, *, realisations=20, cells=333, seed=1995, overwr
     Raises
     ------
     ValueError
-        If a number is not allowed, or the folder holds something; nothing is written then.
+        If an input is not allowed, or the folder holds something; nothing is written then.
     OSError
         If a file cannot be written; no half-written file is left.
 
@@ -56,29 +61,84 @@ def reproduce_to_folder(folder, *, realisations=20, cells=333, seed=1995, overwr
     check_folder(folder, overwrite)
     if realisations < 1:
         raise ValueError(f"realisations must be at least 1, got {realisations}")
-    case = Case(cells=cells)
-    check_seed(seed)
-    check_cells(cells)
-    seeds = range(seed, seed + realisations)
-    with results(folder, FILES, overwrite=overwrite) as partial:
-        outcome = friedl1995_table.realise(case, seeds, each=_shown("nine scenes"))
-        table, text = friedl1995_table.table2(outcome), friedl1995_table.text_table(outcome)
-        few = range(seed, seed + _EFFECT_REALISATIONS)
-        tables = {
-            "readings": effects.readings(case, few, each=_shown("readings of Table 1")),
-            "sizes": effects.sizes(case, few, each=_shown("sizes of the scene")),
-            "sensitivity": effects.sensitivity(case, few, each=_shown("numbers chosen")),
-        }
-        run = {"realisations": realisations, "effect_realisations": _EFFECT_REALISATIONS, "cells": cells, "seed": seed}
-        table.to_csv(partial / "table2.csv", index=False, float_format="%.6g")
-        scenes = figures.pixels(case, figures.BURNED_GRAZED, seed)
-        drawn = {number: getattr(figures, f"figure{number}")(scenes) for number in NUMBERS[1:]}
-        pictures = {n: pages.png(figure, _DPI) for n, figure in ({3: figures.figure3(case)} | drawn).items()}
-        for number, picture in pictures.items():
-            (partial / f"figure{number}.png").write_bytes(picture)
-        page = friedl1995_report.reproduction_page(case, table, text, tables, pictures, run)
+    case = friedl1995.case_of(cells=cells, **inputs)
+    scenarios.check_named(case)
+    check_cells(case.cells)
+    pictures = pictures_of(case)
+    names = ["table2.csv", *(f"{name}.csv" for name in _TABLES), *pictures.values(), "scenarios", "report.html"]
+    with results(folder, names, overwrite=overwrite) as partial:
+        found = reproduce_case(case, realisations, seed, each=_shown)
+        shown = str(found["reading"].values[0])
+        tables = _effects(case, range(seed, seed + _EFFECT_REALISATIONS))
+        tables["table2"] = friedl1995_table.table2(found.sel(reading=shown))
+        for name, table in tables.items():
+            table.to_csv(partial / f"{name}.csv", index=False, float_format="%.6g")
+        drawn = {key: pages.png(figures.plot_reproduction(key[0], found, reading=key[1]), _DPI) for key in pictures}
+        for key, picture in drawn.items():
+            (partial / pictures[key]).write_bytes(picture)
+        scenarios.write_scenarios(case, partial / "scenarios", seed, scenes, each=_shown("scenarios"))
+        run = {"realisations": realisations, "effect_realisations": _EFFECT_REALISATIONS, "seed": seed}
+        run["command"] = command({"realisations": realisations, "cells": case.cells, "seed": seed} | inputs)
+        page = friedl1995_report.reproduction_page(case, found, tables, drawn, run)
         (partial / "report.html").write_text(page, encoding="utf-8")
-    return [folder / name for name in FILES]
+    return [folder / name for name in names]
+
+
+def pictures_of(case):
+    """
+    Files of the figures, those that the reading changes twice.
+
+    Parameters
+    ----------
+    case : fifesim.experiments.friedl1995.case.Case
+
+    Returns
+    -------
+    pictures : dict of (int, str) to str
+        Names by number and reading.
+    """
+    shown, other = (reading.name for reading in beside(case.reading))
+    names = {}
+    for number in figures.NUMBERS:
+        names[number, shown] = f"figure{number}.png"
+        if number in figures.BY_READING:
+            names[number, other] = f"figure{number}_{other}.png"
+    return names
+
+
+def command(options):
+    """
+    The line that makes the same again.
+
+    Parameters
+    ----------
+    options : mapping of str
+        What is not given is left out.
+
+    Returns
+    -------
+    line : str
+
+    Examples
+    --------
+    >>> command({"reading": "aligned", "dem": None, "realisations": 2})
+    'fifesim reproduce --reading aligned --realisations 2'
+    """
+    words = ["fifesim", "reproduce"]
+    defaults = {"reading": "native", "dem": "flat", "sensor": TABLE_1}
+    for name in (*defaults, "densities", "optics", "background", "realisations", "cells", "seed"):
+        value = options.get(name)
+        if value is not None and value != defaults.get(name):
+            words += [f"--{name}", os.fspath(value) if is_path(value) else str(value)]
+    return shlex.join(words)
+
+
+def _effects(case, seeds):
+    return {
+        "readings": effects.readings(case, seeds, each=_shown("readings of Table 1")),
+        "sizes": effects.sizes(case, seeds, each=_shown("sizes of the scene")),
+        "sensitivity": effects.sensitivity(case, seeds, each=_shown("numbers chosen")),
+    }
 
 
 def _shown(label):

@@ -1,13 +1,17 @@
 """Table 2 of Friedl et al. (1995) over realisations, and how far it agrees with the paper's."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from fifesim.analysis import uncertainty
+from fifesim.chain.images import ndvi
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
+from fifesim.experiments.friedl1995.pixels import block_means, cell_limits, ground_of, pixel_values, scene_image
+from fifesim.ground.landscape.distribution import treatments
 
 SAMPLE = 200
 COEFFICIENTS = ("intercept", "slope", "r2")
@@ -19,31 +23,16 @@ _DRAWS = 25
 INCREMENTS = {"lai": 0.1, "fpar": 0.05}
 _FEWEST = 3
 
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """
-    What the realisations gave.
-
-    Parameters
-    ----------
-    fits : array, shape (realisation, scene, variable, 3)
-        Intercept, slope and R2 of all pixels.
-    sampled : array, shape (realisation, scene, variable, draw, 3)
-        The same of samples of 200 pixels.
-    ren : array, shape (realisation, scene, variable)
-        Mean relative equivalent noise of a sample over its increments, in the mean over samples. [1]
-    kept : array, shape (realisation, scene, 3)
-        Share of the range of the cells of LAI, FPAR and NDVI that a sample has, in the mean over samples. [1]
-    """
-
-    fits: np.ndarray
-    sampled: np.ndarray
-    ren: np.ndarray
-    kept: np.ndarray
+# What one scene gives, and along what.
+_DIMS = {
+    **dict.fromkeys(COEFFICIENTS, ("variable",)),
+    **{f"{name}_200": ("variable", "draw") for name in COEFFICIENTS},
+    "ren": ("variable",),
+    "range_kept": ("quantity",),
+}
 
 
-def realise(case, seeds, scenes=None, each=iter):
+def realise(case, seeds, readings=None, distributions=None, arps=ARPS, each=iter):
     """
     Run scenes with several seeds.
 
@@ -52,29 +41,47 @@ def realise(case, seeds, scenes=None, each=iter):
     case : fifesim.experiments.friedl1995.case.Case
     seeds : sequence of int
         One for each realisation; the scenes of one share their noise.
-    scenes : sequence of (str, float), optional
-        The nine by default.
+    readings : sequence of Reading, optional
+        Of the same ground; by default the case's alone.
+    distributions : sequence of str, optional
+        Treatments; all by default.
+    arps : sequence of float, optional
+        [1]
     each : callable, optional
-        Wraps the sequence of (seed, scene), to show how far it is.
+        Wraps the sequence of scenes, to show how far it is.
 
     Returns
     -------
-    outcome : Outcome
+    found : xarray.Dataset
+        Over (reading, realisation, distribution, arp): ``intercept``, ``slope`` and ``r2`` of all pixels along
+        ``variable``, and those of samples of 200 pixels, ``intercept_200`` and so on, along ``draw``; ``ren``, the mean
+        relative equivalent noise of a sample over its increments, and ``range_kept``, the share of the range of the
+        cells that a sample has, along ``quantity``, both in the mean over samples. [1]
     """
-    scenes = friedl1995.scenes() if scenes is None else scenes
-    found = [_one(case, scene, seed) for seed, scene in each([(seed, scene) for seed in seeds for scene in scenes])]
-    stacked = (np.array(values) for values in zip(*found, strict=True))
-    return Outcome(*(values.reshape(len(seeds), len(scenes), *values.shape[1:]) for values in stacked))
+    cases = [case] if readings is None else [replace(case, reading=reading) for reading in readings]
+    distributions = treatments() if distributions is None else list(distributions)
+    land = case.land()
+    scenes = [(seed, treatment, arp) for seed in seeds for treatment in distributions for arp in arps]
+    found = [_scene(cases, land, *scene) for scene in each(scenes)]
+    shape = (len(seeds), len(distributions), len(arps), len(cases))
+    outer = ("realisation", "distribution", "arp", "reading")
+    variables = {}
+    for name, dims in _DIMS.items():
+        values = np.array([[one[name] for one in scene] for scene in found])
+        variables[name] = (outer + dims, values.reshape(*shape, *values.shape[2:]), {"units": "1"})
+    coords = {"reading": [each.reading.name for each in cases], "realisation": list(seeds), "arp": list(arps)}
+    coords |= {"distribution": distributions, "variable": list(VARIABLES), "quantity": [*VARIABLES, "ndvi"]}
+    return xr.Dataset(variables, coords=coords).transpose("reading", "realisation", "distribution", "arp", ...)
 
 
-def table2(outcome):
+def table2(found):
     """
     Table 2 beside the paper's.
 
     Parameters
     ----------
-    outcome : Outcome
-        Of the nine scenes.
+    found : xarray.Dataset
+        From `realise`, of one reading and the nine scenes.
 
     Returns
     -------
@@ -85,14 +92,17 @@ def table2(outcome):
     """
     paper = friedl1995.paper_table()
     columns = {name: paper[name] for name in ("variable", "distribution", "arp")}
-    # A standard deviation needs two realisations.
-    spread = outcome.fits.std(axis=0, ddof=1) if len(outcome.fits) > 1 else np.full(outcome.fits.shape[1:], np.nan)
-    of_samples = outcome.sampled.std(axis=(0, 3), ddof=1)
-    for suffix, values in (("", outcome.fits.mean(axis=0)), ("_deviation", spread), ("_deviation_200", of_samples)):
-        for k, name in enumerate(COEFFICIENTS):
-            columns[name + suffix] = values[:, :, k].T.ravel()
-    columns |= {f"paper_{name}": paper[name] for name in COEFFICIENTS}
-    return pd.DataFrame(columns)
+    for name in COEFFICIENTS:
+        values, sampled = found[name], found[f"{name}_200"]
+        # A standard deviation needs two realisations.
+        one = values.sizes["realisation"] == 1
+        spread = values.isel(realisation=0) * np.nan if one else values.std("realisation", ddof=1)
+        of_samples = sampled.std(("realisation", "draw"), ddof=1)
+        for suffix, each in (("", values.mean("realisation")), ("_deviation", spread), ("_deviation_200", of_samples)):
+            columns[name + suffix] = each.transpose("variable", "distribution", "arp").values.ravel()
+    order = [name + suffix for suffix in ("", "_deviation", "_deviation_200") for name in COEFFICIENTS]
+    columns = {name: columns[name] for name in ("variable", "distribution", "arp", *order)}
+    return pd.DataFrame(columns | {f"paper_{name}": paper[name] for name in COEFFICIENTS})
 
 
 def agreement(table):
@@ -108,35 +118,41 @@ def agreement(table):
     -------
     agreement : dict of str to float
         By variable, ``lai`` or ``fpar``: root mean square and largest difference of R2, the same of the three rows at
-        arp 0.24, root mean square, mean and largest relative difference of slopes, largest difference of intercepts;
-        and ``chi_square``, the mean over all coefficients of the squared difference in standard deviations of a sample.
+        arp 0.24, root mean square, mean and largest relative difference of slopes, what is left of its root mean square
+        after one common ``factor``, largest difference of intercepts; and the root mean square over all coefficients of
+        the difference in standard deviations, ``if_sampled`` of a sample of 200 pixels, and ``if_all`` of one
+        realisation of all pixels.
     """
     found = {}
     for variable, rows in table.groupby("variable"):
         r2 = rows["r2"] - rows["paper_r2"]
-        slope = rows["slope"] / rows["paper_slope"] - 1
+        ratio = rows["slope"] / rows["paper_slope"]
+        factor = np.exp(np.log(ratio).mean()) if (ratio > 0).all() else np.nan
         found |= {
             f"{variable}_r2_rms": np.sqrt(np.mean(r2**2)),
             f"{variable}_r2_largest": r2.abs().max(),
             f"{variable}_r2_largest_long": r2[rows["arp"] == max(ARPS)].abs().max(),
-            f"{variable}_slope_rms": np.sqrt(np.mean(slope**2)),
-            f"{variable}_slope_mean": slope.mean(),
-            f"{variable}_slope_largest": slope.abs().max(),
+            f"{variable}_slope_rms": np.sqrt(np.mean((ratio - 1) ** 2)),
+            f"{variable}_slope_mean": (ratio - 1).mean(),
+            f"{variable}_slope_largest": (ratio - 1).abs().max(),
+            f"{variable}_slope_factor": factor,
+            f"{variable}_slope_rest": np.sqrt(np.mean((ratio / factor - 1) ** 2)),
             f"{variable}_intercept_largest": (rows["intercept"] - rows["paper_intercept"]).abs().max(),
         }
-    scores = [(table[name] - table[f"paper_{name}"]) / table[f"{name}_deviation_200"] for name in COEFFICIENTS]
-    found["chi_square"] = np.mean(np.square(scores))
+    for name, suffix in (("if_sampled", "_deviation_200"), ("if_all", "_deviation")):
+        scores = [(table[each] - table[f"paper_{each}"]) / table[each + suffix] for each in COEFFICIENTS]
+        found[name] = np.sqrt(np.mean(np.square(scores)))
     return {name: float(value) for name, value in found.items()}
 
 
-def text_table(outcome):
+def text_table(found):
     """
     Mean noise and range kept of the burned, grazed scenes, beside the paper's.
 
     Parameters
     ----------
-    outcome : Outcome
-        Of the nine scenes.
+    found : xarray.Dataset
+        From `realise`, of one reading.
 
     Returns
     -------
@@ -144,15 +160,14 @@ def text_table(outcome):
         Columns quantity, variable, arp, value, deviation over realisations, and paper, NaN where it states none.
     """
     paper = friedl1995.paper_text().set_index(["quantity", "variable", "arp"])["value"]
+    shown = found.sel(distribution=treatments()[0])
     rows = []
-    for quantity, values in (("ren", outcome.ren), ("range_kept", outcome.kept)):
-        # Two variables have REN, NDVI keeps a range as well.
-        for k, variable in enumerate((*VARIABLES, "ndvi")[: values.shape[-1]]):
-            # Burned and grazed is the first treatment of the table.
-            for scene, arp in enumerate(ARPS):
-                found = values[:, scene, k]
-                deviation = found.std(ddof=1) if len(found) > 1 else np.nan
-                rows.append((quantity, variable, arp, found.mean(), deviation, paper.get((quantity, variable, arp))))
+    for quantity, along in (("ren", "variable"), ("range_kept", "quantity")):
+        for name in found[along].values:
+            for arp in ARPS:
+                values = shown[quantity].sel({along: name, "arp": arp}).values
+                deviation = values.std(ddof=1) if values.size > 1 else np.nan
+                rows.append((quantity, name, arp, values.mean(), deviation, paper.get((quantity, name, arp))))
     return pd.DataFrame(rows, columns=["quantity", "variable", "arp", "value", "deviation", "paper"])
 
 
@@ -183,7 +198,7 @@ def line(x, y):
 
 def mean_noise(variable, ndvi, increment):
     """
-    Mean over increments of the relative equivalent noise of a sample.
+    Relative equivalent noise of a sample by increments.
 
     Parameters
     ----------
@@ -225,15 +240,28 @@ def draw(pixels, count, seed, draws):
     return pixels[:, order[:, :count]]
 
 
-def _one(case, scene, seed):
-    treatment, arp = scene
-    pixels, limits = friedl1995.run(case, treatment, arp, seed)
-    samples = draw(pixels, SAMPLE, [seed, friedl1995.scenes().index(scene)], _DRAWS)
-    fits = np.stack([line(pixels[2], pixels[k]) for k in range(2)])
-    sampled = np.stack([line(samples[2], samples[k]) for k in range(2)])
-    ren = [
+def _scene(cases, land, seed, treatment, arp):
+    """What each reading gives of a scene, a list of dicts."""
+    ground = ground_of(cases[0], treatment, arp, seed, land)
+    truth = [block_means(cases[0], ground, array) for array in (ground.lai, ground.fpar)]
+    limits = cell_limits(ground)
+    key = [seed, friedl1995.scenes().index((treatment, arp))]
+    found = []
+    for case in cases:
+        image = scene_image(case, ground)
+        found.append(_statistics(pixel_values(*truth, ndvi(image)), limits, key))
+    return found
+
+
+def _statistics(pixels, limits, key):
+    samples = draw(pixels, SAMPLE, key, _DRAWS)
+    found = {}
+    for suffix, values in (("", pixels), ("_200", samples)):
+        lines = np.stack([line(values[2], values[k]) for k in range(2)])
+        found |= {name + suffix: lines[..., number] for number, name in enumerate(COEFFICIENTS)}
+    found["ren"] = [
         np.mean([mean_noise(*pair, INCREMENTS[name])[1].mean() for pair in zip(samples[k], samples[2], strict=True)])
         for k, name in enumerate(VARIABLES)
     ]
-    kept = np.ptp(samples, axis=-1).mean(axis=-1) / np.ptp(limits, axis=-1)
-    return fits, sampled, np.array(ren), kept
+    found["range_kept"] = np.ptp(samples, axis=-1).mean(axis=-1) / np.ptp(limits, axis=-1)
+    return found

@@ -20,11 +20,12 @@ _TEMPLATE = Path(__file__).with_name("report.html.j2")
 # Okabe and Ito's colours, which the colour-blind tell apart; hatches tell them apart in grey.
 _STYLES = {"lai": ("#0072B2", ""), "fpar": ("#E69F00", "////")}
 
-# The three mechanisms of the paper's discussion, and what it had no need to name.
+# The three mechanisms of the paper's discussion, and what it does not name.
 MECHANISMS = {
     "i. Non-linearity of the relation between NDVI and the variable": ("non-linearity", CURVATURE),
     "ii. NDVI is not scale invariant": ("NDVI scaling",),
-    "iii. Regularization by the sensor": ("point spread", "registration"),
+    "iii. Regularization by the sensor": ("point spread",),
+    "Place of the pixels, which the paper does not name": ("registration",),
     "Digital numbers and noise": ("quantisation", "noise"),
     "Terrain and atmosphere": ("topography", "atmosphere"),
     "Ground that varies beside its leaf area": tuple(PROPERTIES),

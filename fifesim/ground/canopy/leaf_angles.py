@@ -170,12 +170,14 @@ def _verhoef(angle, a, b):
     """Two-parameter cumulative distribution (Verhoef 1998); x - a sin x - b/2 sin 2x = 2 angle."""
     if not abs(a) + abs(b) <= 1:
         raise ValueError(f"verhoef(a, b) needs |a| + |b| <= 1, got a = {a:g}, b = {b:g}")
-    low, high = np.zeros_like(angle), np.full_like(angle, np.pi)
+    # y = x - pi / 2, and its sine by the series where it is small: verhoef(0, -1) has a triple root there.
+    low, high = np.full_like(angle, -np.pi / 2), np.full_like(angle, np.pi / 2)
     for _ in range(60):
-        x = (low + high) / 2
-        below = x - a * np.sin(x) - b / 2 * np.sin(2 * x) < 2 * angle
-        low, high = np.where(below, x, low), np.where(below, high, x)
-    cumulative = 2 * (high - angle) / np.pi
+        y = (low + high) / 2
+        excess = np.where(np.abs(y) < 1e-4, 2 / 3 * y**3, y - np.sin(2 * y) / 2)
+        below = (1 + b) * y - b * excess - a * np.cos(y) < 2 * angle - np.pi / 2
+        low, high = np.where(below, y, low), np.where(below, high, y)
+    cumulative = 1 + 2 * (high - angle) / np.pi
     cumulative[0], cumulative[-1] = 0, 1
     return cumulative
 

@@ -183,7 +183,7 @@ def correlation_length(arp, cell=1.0):
 
     Examples
     --------
-    The paper's three landscapes have length scales of roughly 5, 15 and 30 m:
+    The paper's three landscapes have length scales of "roughly" 5, 15 and 30 m (section Analyses):
 
     >>> [round(correlation_length(arp, 10 / 3), 1) for arp in (0.05, 0.15, 0.24)]
     [4.3, 8.3, 32.1]

@@ -109,7 +109,7 @@ def mixed_field(weights, arp, row, column, shape):
 
 def periodic_field(seed, arp, shape):
     """
-    Field of the paper's own route: one Fourier transform over the whole scene, periodic at its borders.
+    Field by the paper's own route (Fig. 2): one Fourier transform over the whole scene, periodic at its borders.
 
     Parameters
     ----------
@@ -148,13 +148,35 @@ def periodic_field(seed, arp, shape):
 @lru_cache(maxsize=12)
 def _tile(weights, arp, tile_row, tile_column):
     """One tile of a field, in single precision."""
-    around = margin(arp)
-    size = fft.next_fast_len(TILE + 2 * around, real=True)
-    noise = _mixed_noise(weights, tile_row * TILE - around, tile_column * TILE - around, (size, size))
-    inside = slice(around, around + TILE)
-    tile = _filter(noise, _half_response(arp, (size, size), np.float32))[inside, inside].copy()
+    tile = _window(weights, arp, tile_row * TILE, tile_column * TILE, (TILE, TILE)).copy()
     tile.flags.writeable = False
     return tile
+
+
+def window_field(seed, arp, row, column, shape):
+    """
+    Window of the streaming field, filtered by itself instead of by its tiles.
+
+    Parameters
+    ----------
+    seed, arp, row, column, shape
+        As of `streaming_field`, whose cells these are within 1e-5 of their standard deviation.
+
+    Returns
+    -------
+    field : array of float32, shape (rows, columns)
+        [1]
+    """
+    return _window(((seed, 1.0),), arp, row, column, shape)
+
+
+def _window(weights, arp, row, column, shape):
+    """Cells of a field of mixed noises, filtered with a margin."""
+    around = margin(arp)
+    size = tuple(fft.next_fast_len(length + 2 * around, real=True) for length in shape)
+    noise = _mixed_noise(weights, row - around, column - around, size)
+    inside = tuple(slice(around, around + length) for length in shape)
+    return _filter(noise, _half_response(arp, size, np.float32))[inside]
 
 
 def _mixed_noise(weights, row, column, shape):

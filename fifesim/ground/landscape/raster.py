@@ -73,7 +73,7 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     make = _streaming_scene if method == "streaming" else _periodic_scene
     lai = make(grid, density, arp, seed, chunks)
     said = f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}"
-    made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": _distribution_name(distribution)}
+    made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": distribution_name(distribution)}
     made |= made_on_site(grid)
     return cf.label(lai, "lai", history=said, **made, method=method, references=_REFERENCE)
 
@@ -136,7 +136,7 @@ def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
     """
     if isinstance(path_or_raster, xr.DataArray):
         name = in_a_line(str(path_or_raster.name or "raster"), 150)
-        found = raster_onto_grid(_one_layer(unpacked(path_or_raster)), grid, chunks)
+        found = raster_onto_grid(one_layer(unpacked(path_or_raster)), grid, chunks)
     else:
         name = in_a_line(Path(path_or_raster).name, 150)
         found = file_onto_grid(path_or_raster, grid, chunks, allow_remote)
@@ -144,7 +144,23 @@ def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
     return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
 
 
-def _one_layer(raster):
+def one_layer(raster):
+    """
+    A map without the dimensions of which it has one step.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray
+
+    Returns
+    -------
+    raster : xarray.DataArray, dims (y, x)
+
+    Raises
+    ------
+    ValueError
+        If it has several layers.
+    """
     raster = raster.squeeze([name for name in raster.dims if raster.sizes[name] == 1 and name == "band"], drop=True)
     if raster.ndim != 2:
         raise ValueError(f"a map of leaf area has rows and columns, got dimensions {raster.dims}: select one layer")
@@ -176,7 +192,18 @@ def _periodic_scene(grid, density, arp, seed, chunks):
     return grids.place(field if chunks is None else field.chunk(chunks), grid)
 
 
-def _distribution_name(source):
+def distribution_name(source):
+    """
+    What a distribution of leaf area is called in attributes.
+
+    Parameters
+    ----------
+    source : str, path or frozen scipy distribution
+
+    Returns
+    -------
+    name : str
+    """
     if hasattr(source, "dist"):
         return f"{source.dist.name}({', '.join(f'{value:g}' for value in [*source.args, *source.kwds.values()])})"
     return Path(source).name

@@ -154,6 +154,8 @@ def upwelling_factor(mu_v_local, mu_v):
 
     .. math:: \max(\mu_v, 0) / \cos \theta_v
 
+    The paper has no divisor; with it level ground has 1 in any view.
+
     Parameters
     ----------
     mu_v_local : array

@@ -33,6 +33,14 @@ def test_optics_agree_with_6s(name):
     np.testing.assert_allclose(asymmetry, rows["asymmetry"], atol=0.02 if name == "dust" else 2e-3)
 
 
+@pytest.mark.parametrize("aerosol, depth, albedo", [("dust:1", 0.41095, 0.88356), ("continental", 0.07207, 0.8518)])
+def test_optics_at_the_last_wavelength_agree_with_6s(aerosol, depth, albedo):
+    """As 6SV1.1 prints them at 3.75 um, where the depth at .55 um is .5."""
+    found, of_light, _ = aerosol_optics(aerosol, 3.75)
+    assert found == pytest.approx(depth / 0.5, rel=2e-3)
+    assert of_light == pytest.approx(albedo, rel=1e-3)
+
+
 @pytest.mark.parametrize("aerosol", ["maritime", "oceanic"])
 def test_sea_salt_agrees_with_6s(aerosol):
     """1.2 %, asymmetry .01. From 1.54 to 2.25 um albedo is no check: the imaginary index was retrieved from it."""

@@ -1,20 +1,48 @@
-"""What Figures 5, 8 and 9 show."""
+"""Figures 3 to 9."""
 
 import numpy as np
+import pytest
+from matplotlib.figure import Figure
 
-from fifesim.experiments.friedl1995 import folder as reproduction
-from fifesim.experiments.friedl1995.case import Case
+import fifesim
+from fifesim.analysis import density
+from fifesim.experiments.friedl1995 import figures
 
 
-def test_relation_at_the_ground_is_tight_and_scaling_has_the_papers_sign():
-    """Fig. 5: BOA R2 near 1. Fig. 8: NDVI of the mean reflectance is slightly below the mean NDVI. Fig. 9: scatter."""
-    from_figures = reproduction.figures.pixels(Case(), "burned-grazed", 1)
-    for scene in from_figures:
-        values = scene["pixels"]
-        assert np.corrcoef(values["boa_ndvi"], values["fpar"])[0, 1] ** 2 > 0.99
-        assert np.corrcoef(values["boa_ndvi"], values["lai"])[0, 1] ** 2 > 0.95
-        difference = values["ndvi_of_mean"] - values["boa_ndvi"]
-        assert -0.01 < difference.mean() < 0
-        # The atmosphere alone is a line; the image scatters about it.
-        assert np.corrcoef(values["boa_red"], values["clear_red"])[0, 1] ** 2 > 0.9999
-        assert np.corrcoef(values["boa_red"], values["toa_red"])[0, 1] ** 2 < 0.9
+@pytest.mark.parametrize("number", figures.NUMBERS)
+def test_figure_is_drawn_of_every_reading(number, small):
+    for reading in (None, "aligned"):
+        figure = fifesim.plot_reproduction(number, small, reading=reading)
+        assert isinstance(figure, Figure) and all(axis.has_data() for axis in figure.axes)
+
+
+def test_densities_of_figure_6_are_not_halved_at_zero(found):
+    """The cells' curve begins at the .853 of the distribution; without reflection at .447."""
+    axis = figures.plot_reproduction(6, found).axes[0]
+    cells = axis.get_lines()[0].get_ydata()
+    known = float(fifesim.lai_distribution("burned-grazed").pdf(0))
+    assert cells[0] == pytest.approx(known, rel=0.03)
+
+
+def test_reading_is_what_is_drawn(found):
+    native, aligned = (figures.plot_reproduction(9, found, reading=name).axes[0] for name in ("native", "aligned"))
+    points = [axis.collections[0].get_offsets() for axis in (native, aligned)]
+    r2 = [np.corrcoef(*each.T)[0, 1] ** 2 for each in points]
+    assert r2[0] < 0.6 < 0.8 < r2[1]
+    assert f"{r2[0]:.2f}" in native.get_title()
+
+
+def test_sample_is_200_pixels_by_name(found):
+    values = figures.sample(found, "native", 0.15)
+    assert {"lai", "fpar", "ndvi", "analogue_ndvi", "boa_red", "toa_nir"} <= set(values)
+    assert all(each.size == 200 and np.isfinite(each).all() for each in values.values())
+    assert density.sample_density(values["lai"], values["lai"]).max() > 1
+
+
+@pytest.mark.parametrize(
+    ("number", "options", "said"),
+    [(2, {}, "one of 3, 4, 5, 6, 7, 8, 9"), (5, {"reading": "offset"}, "one of native, aligned, which were computed")],
+)
+def test_figure_that_there_is_not_is_refused(small, number, options, said):
+    with pytest.raises(ValueError, match=said):
+        fifesim.plot_reproduction(number, small, **options)

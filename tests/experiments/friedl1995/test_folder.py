@@ -1,25 +1,38 @@
-"""The command: table, figures and page, or nothing."""
+"""The command: tables, figures, scenarios and page, or nothing."""
+
+import re
 
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 from fifesim.cli import app
-from fifesim.experiments.friedl1995 import case as friedl1995
-from fifesim.experiments.friedl1995 import effects as friedl1995_effects
+from fifesim.experiments.friedl1995 import effects
 from fifesim.experiments.friedl1995 import folder as reproduction
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import READINGS, USED
+from fifesim.experiments.friedl1995.case import case_of
+from fifesim.experiments.friedl1995.readings import READINGS
+from fifesim.scenario.scenario import read_scenario
+
+TABLES = {"table2.csv", "readings.csv", "sizes.csv", "sensitivity.csv"}
+
+
+@pytest.fixture(scope="module")
+def tables():
+    """Effects of a few readings, one size and no change, on one scene of 10 x 10 pixels each."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(effects, "SIZES", (333,))
+        few = ("native", "aligned", "offset", "blur-48.6")
+        patch.setattr(effects, "READINGS", {name: READINGS[name] for name in few})
+        patch.setattr(effects, "changes", lambda case: [effects.Change("itself", "1", "1", case)])
+        case = case_of(cells=90)
+        return {name: getattr(effects, name)(case, [1]) for name in ("readings", "sizes", "sensitivity")}
 
 
 @pytest.fixture
 def quick(monkeypatch, tmp_path):
-    """The command on scenes of 10 x 10 pixels, with the tables of effects cut short."""
+    """The command on scenes of 10 x 10 pixels."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(friedl1995_effects, "SIZES", (90,))
-    monkeypatch.setattr(friedl1995, "READINGS", (USED, *(each for each in READINGS if each.topography)))
-    monkeypatch.setattr(friedl1995_effects, "changes", lambda case: [])
-    monkeypatch.setattr(reproduction, "_EFFECT_REALISATIONS", 1)
     monkeypatch.setattr(reproduction, "_DPI", 40)
 
     def call(*arguments):
@@ -28,33 +41,72 @@ def quick(monkeypatch, tmp_path):
     return call
 
 
-def test_command_writes_table_figures_and_page(quick, tmp_path, monkeypatch):
-    tables = {}
-    for name in ("readings", "sizes", "sensitivity"):
-        make = getattr(friedl1995_effects, name)
-        monkeypatch.setattr(
-            friedl1995_effects,
-            name,
-            lambda *arguments, name=name, make=make, **options: tables.setdefault(name, make(*arguments, **options)),
-        )
-    result = quick("-o", "out")
+@pytest.fixture
+def prepared(quick, monkeypatch, tables, small):
+    """The same, whose numbers are there already; the cases that they were asked for."""
+    asked = []
+
+    def ready(case, *arguments, **options):
+        asked.append(case)
+        names = {"native": small, "aligned": small.isel(reading=[1, 0])}
+        return names[case.reading.name]
+
+    monkeypatch.setattr(reproduction, "reproduce_case", ready)
+    for name, table in tables.items():
+        monkeypatch.setattr(effects, name, lambda *arguments, table=table, **options: table)
+    quick.asked = asked
+    return quick
+
+
+def test_command_writes_tables_figures_scenarios_and_page(prepared, tmp_path):
+    result = prepared("-o", "out")
     assert result.exit_code == 0, result.output
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(reproduction.FILES)
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    pictures = set(reproduction.pictures_of(case_of()).values())
+    assert names == TABLES | pictures | {"scenarios", "report.html"}
+    assert {"figure3.png", "figure9.png", "figure9_aligned.png"} <= pictures and len(pictures) == 11
     table = pd.read_csv(tmp_path / "out" / "table2.csv")
     wanted = {f"{before}{name}" for before in ("", "paper_") for name in friedl1995_table.COEFFICIENTS}
     assert len(table) == 18 and wanted <= set(table.columns)
+    scenes = sorted((tmp_path / "out" / "scenarios").iterdir())
+    assert len(scenes) == 9 and all([path.name for path in scene.iterdir()] == ["scenario.toml"] for scene in scenes)
+    assert read_scenario(scenes[0] / "scenario.toml").ground.seed == 1995
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 7
-    # The argument rests on the size of the scene, which is another here.
-    assert f"argued for scenes of {friedl1995.CELLS} cells" in page
-    assert USED.name in page and "http" not in page.replace("http-equiv", "")
-    first = {name: (tmp_path / "out" / name).read_bytes() for name in reproduction.FILES}
-    assert quick("-o", "out").exit_code == 2
-    # The tables of effects are the longest part, and are in the page as they came.
-    for name, made in tables.items():
-        monkeypatch.setattr(friedl1995_effects, name, lambda *arguments, made=made, **options: made)
-    assert quick("-o", "out", "--overwrite").exit_code == 0
-    assert {name: (tmp_path / "out" / name).read_bytes() for name in reproduction.FILES} == first
+    assert page.count("data:image/png;base64,") == 11
+    assert "http" not in page.replace("http-equiv", "") and "nan" not in page.split("base64")[0].lower()
+    # Every reading has a row of R2 and slopes, and the aligned one a column of Table 2.
+    assert "Drift or blur?" in page and "slope: native</th>" in page and "aligned</th>" in page
+    assert prepared("-o", "out").exit_code == 2
+
+
+def test_page_says_the_reading_the_inputs_and_what_is_fitted(prepared, tmp_path, folders):
+    result = prepared("-o", "own", "--reading", "aligned", "--dem", "flint-hills", *given(folders))
+    assert result.exit_code == 0, result.output
+    page = re.sub(r"\s+", " ", (tmp_path / "own" / "report.html").read_text())
+    assert "Pixels are read as <em>aligned</em>" in page and "Beside it stands <em>native</em>" in page
+    assert "The ground is the synthetic Flint Hills." in page
+    assert "0 of the numbers below were fitted to the 54" in page
+    assert "given by you" in page and "--reading aligned --dem flint-hills --densities" in page
+    (case,) = prepared.asked
+    assert case.optics == {"TM3": (0.09, 0.05), "TM4": (0.42, 0.40)} and case.cells == 90
+    keys = read_scenario(tmp_path / "own" / "scenarios" / "burned-ungrazed-0.05" / "scenario.toml")
+    assert keys.ground.distribution == str(folders["densities"] / "burned-ungrazed.csv")
+    assert keys.ground.background == {"TM3": 0.1, "TM4": 0.16} and keys.terrain.dem == "flint-hills"
+
+
+@pytest.mark.slow
+def test_whole_command_gives_the_same_files_again(quick, tmp_path, folders):
+    found = []
+    for name in ("first", "second"):
+        result = quick("-o", name, "--sensor", "OLI", "--background", "soil_dry:0.4+shade:0.6", "--scenes")
+        assert result.exit_code == 0, result.output
+        files = [path for path in (tmp_path / name).rglob("*") if path.is_file()]
+        found.append({path.relative_to(tmp_path / name): path.read_bytes() for path in files})
+    assert found[0] == found[1]
+
+
+def given(folders):
+    return [word for name, path in folders.items() for word in (f"--{name}", str(path))]
 
 
 @pytest.mark.parametrize(
@@ -63,6 +115,12 @@ def test_command_writes_table_figures_and_page(quick, tmp_path, monkeypatch):
         (("--cells", 50), "at least 90, 10 pixels"),
         (("--realisations", 0), "at least 1"),
         (("--seed", -1), "seed must be"),
+        (("--reading", "mine"), "must be one of native, aligned"),
+        (("--densities", "."), "lacks a file of burned-grazed and"),
+        (("--optics", "mine.csv"), "there is no optics file mine.csv"),
+        (("--sensor", "OLI", "--background", "soil.csv"), "no background file soil.csv"),
+        (("--sensor", "NOPE"), "unknown instrument"),
+        (("--dem", "hills.tif"), "a raster file of elevation"),
     ],
 )
 def test_mistake_is_one_line_and_leaves_nothing(quick, tmp_path, arguments, said):
@@ -73,13 +131,15 @@ def test_mistake_is_one_line_and_leaves_nothing(quick, tmp_path, arguments, said
 
 
 def test_failure_in_the_middle_leaves_nothing(quick, tmp_path, monkeypatch):
-    for name in ("readings", "sizes", "sensitivity"):
-        monkeypatch.setattr(friedl1995_effects, name, lambda *arguments, **options: None)
-
-    def full(*arguments):
+    def full(*arguments, **options):
         raise OSError("disk full")
 
-    monkeypatch.setattr(reproduction.friedl1995_report, "reproduction_page", full)
+    monkeypatch.setattr(reproduction, "reproduce_case", full)
     result = quick("-o", "out")
     assert result.exit_code == 1 and "disk full" in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_line_of_the_command_makes_the_same_again():
+    line = reproduction.command({"reading": "native", "dem": "my hills.tif", "optics": None, "cells": 333})
+    assert line == "fifesim reproduce --dem 'my hills.tif' --cells 333"

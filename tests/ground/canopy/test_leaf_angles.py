@@ -38,6 +38,14 @@ def test_verhoef_classes_agree_with_prosail(a, b):
     np.testing.assert_allclose(leaf_angle_classes(("verhoef", a, b), classes=18).fraction, expected, atol=1e-5)
 
 
+@pytest.mark.parametrize("b", [-1, -1 + 1e-12, -0.7, 0.4, 1])
+def test_verhoef_without_a_is_even_about_45_degrees(b):
+    """To rounding, also at b = -1, where the middle is a triple root, and beside it."""
+    fraction = np.array(leaf_angle_classes(("verhoef", 0, b)).fraction)
+    assert abs(fraction[:45].sum() - 0.5) < 1e-14
+    np.testing.assert_allclose(fraction, fraction[::-1], atol=1e-14)
+
+
 def test_verhoef_without_parameters_is_uniform():
     expected = leaf_angle_classes("uniform").fraction
     np.testing.assert_allclose(leaf_angle_classes("verhoef(0, 0)").fraction, expected, atol=1e-12)

@@ -16,7 +16,7 @@ from fifesim.ground.landscape.autoregression import (
     response,
 )
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
-from fifesim.ground.landscape.field import TILE, mixed_field, periodic_field, streaming_field
+from fifesim.ground.landscape.field import TILE, mixed_field, periodic_field, streaming_field, window_field
 from fifesim.ground.landscape.noise import white_noise
 
 ARPS = [0.05, 0.1, 0.15, 0.2, 0.24]
@@ -191,3 +191,10 @@ def test_field_of_mixed_noise_is_the_mixture_of_fields():
     found = mixed_field({7: 0.6, 8: -0.8}, *window)
     np.testing.assert_allclose(found, 0.6 * one - 0.8 * other, rtol=0, atol=5e-6)
     np.testing.assert_array_equal(mixed_field({7: 1.0}, *window), one)
+
+
+@pytest.mark.parametrize("arp", [0.0, 0.15, 0.24])
+def test_window_filtered_by_itself_has_the_cells_of_the_tiles(arp):
+    """Across the corner of four tiles."""
+    found = window_field(20, arp, -50, TILE - 40, (90, 70))
+    np.testing.assert_allclose(found, streaming_field(20, arp, -50, TILE - 40, (90, 70)), rtol=0, atol=1e-5)

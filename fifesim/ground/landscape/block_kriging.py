@@ -1,0 +1,152 @@
+"""
+Cells from means over pixels: block kriging of the autoregressive process on a smooth trend.
+
+A field x of cells is a trend plus the process. Its means over pixels B x are known to be m. The best linear estimate of
+the cells is K m with K = C B' (B C B')^-1, and any field z of the same law becomes one with these means as
+z + K (m - B z). Pixels are whole numbers of cells, so that K is a filter, which a Fourier transform applies exactly.
+"""
+
+import numpy as np
+from scipy import fft
+
+from fifesim.ground.landscape.autoregression import field_variance, response
+
+# Spectral density of the trend of log LAI between pixels at one radian a pixel: second differences of pixels deviate by
+# 0.61 times this, 0.18, as measured of 10 m pixels of Sentinel-2 on Konza Prairie in June 2022. In standard deviations
+# of a field that is mapped to a distribution the same number is small beside the field itself.
+TREND = 0.3
+
+# Of the squared frequency, so that the trend has a spectral density at zero. [radian2 per pixel2]
+_SLOWEST = 1e-5
+
+
+def block_means(cells, ratio):
+    """
+    Means of cells over the pixels that hold them.
+
+    Parameters
+    ----------
+    cells : array, shape (rows * ratio[0], columns * ratio[1])
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+
+    Returns
+    -------
+    means : array, shape (rows, columns)
+
+    Examples
+    --------
+    >>> block_means(np.array([[1.0, 3.0, 5.0, 5.0]]), (1, 2)).tolist()
+    [[2.0, 5.0]]
+    """
+    down, across = ratio
+    # Strides are several times faster than a mean over two axes of a few cells each.
+    rows = sum(cells[i::down] for i in range(1, down)) + cells[::down]
+    return (sum(rows[:, j::across] for j in range(1, across)) + rows[:, ::across]) / (down * across)
+
+
+def by_pixel(pixels, ratio):
+    """
+    Cells that have the value of their pixel.
+
+    Parameters
+    ----------
+    pixels : array, shape (rows, columns)
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+
+    Returns
+    -------
+    cells : array, shape (rows * ratio[0], columns * ratio[1])
+
+    Examples
+    --------
+    >>> by_pixel(np.array([[1, 2]]), (1, 2)).tolist()
+    [[1, 1, 2, 2]]
+    """
+    return np.repeat(np.repeat(pixels, ratio[0], axis=0), ratio[1], axis=1)
+
+
+def kriging_filter(arp, deviation, ratio, shape):
+    r"""
+    Frequency response of block kriging, from pixels to cells.
+
+    .. math::
+
+        K(f) = \frac{S(f) \, \overline{b(f)}}{\frac{1}{n} \sum_{f'} S(f') |b(f')|^2}, \quad
+        S(f) = s^2 \frac{H^2(f)}{\sigma^2} + n \frac{\tau^2}{|\omega|^4}
+
+    with H the response of the process, :math:`\sigma^2` its variance, s the deviation of the cells, b the response of
+    the mean over the n cells of a pixel, and the sum over the frequencies of cells that are one of pixels. The trend's
+    density, where :math:`\omega` is the frequency per pixel and :math:`\tau` is 0.3, makes K reproduce what changes
+    linearly.
+
+    Parameters
+    ----------
+    arp : float
+        Of the cells. [1]
+    deviation : float
+        Standard deviation of the process, in the unit of the pixels; with 0 the trend alone is interpolated.
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+    shape : (int, int)
+        Pixels, down and across, of a periodic lattice.
+
+    Returns
+    -------
+    response : array of complex64, shape (rows * ratio[0], columns * ratio[1] // 2 + 1)
+        Half plane of a real transform of the cells.
+
+    References
+    ----------
+    [Kyriakidis2004]_ for estimates of points from areas; [KyriakidisYoo2005]_ for the simulation
+    """
+    u, v = (2.0 * np.pi * fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
+    number = ratio[0] * ratio[1]
+    squared = 2.0 * (1.0 - np.cos(u[:, None])) * ratio[0] ** 2 + 2.0 * (1.0 - np.cos(v)) * ratio[1] ** 2
+    density = number * (TREND / (squared + _SLOWEST)) ** 2
+    density += deviation**2 * response(arp, u[:, None], v) ** 2 / field_variance(arp)
+    mean = _mean_response(u, ratio[0])[:, None] * _mean_response(v, ratio[1])
+    seen = (density * np.abs(mean) ** 2).reshape(ratio[0], shape[0], ratio[1], shape[1]).sum((0, 2)) / number
+    half = v.size // 2 + 1
+    columns = np.arange(half) % shape[1]
+    estimated = density[:, :half] * np.conj(mean[:, :half]) / np.tile(seen, (ratio[0], 1))[:, columns]
+    return estimated.astype(np.complex64)
+
+
+def _mean_response(frequency, number):
+    """Response of the mean over some cells from each on."""
+    return np.exp(1j * frequency[:, None] * np.arange(number)).mean(axis=1)
+
+
+def kriged(pixels, response, ratio):
+    """
+    Cells that block kriging estimates from pixels.
+
+    Parameters
+    ----------
+    pixels : array, shape (rows, columns)
+    response : array
+        From `kriging_filter`, of this shape.
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+
+    Returns
+    -------
+    cells : array of float32, shape (rows * ratio[0], columns * ratio[1])
+        Their means over pixels are the pixels, within single precision.
+
+    Examples
+    --------
+    What is the same everywhere stays so:
+
+    >>> cells = kriged(np.full((4, 4), 2.0), kriging_filter(0.2, 1.0, (3, 3), (4, 4)), (3, 3))
+    >>> bool(np.allclose(cells, 2.0, atol=1e-5))
+    True
+    """
+    spectrum = fft.fft2(pixels.astype(np.float32))
+    spectrum = spectrum[:, np.arange(response.shape[1]) % pixels.shape[1]]
+    # Frequencies of cells that are one of pixels have its value.
+    repeated = (response.reshape(ratio[0], *spectrum.shape) * spectrum).reshape(response.shape)
+    size = pixels.shape[0] * ratio[0], pixels.shape[1] * ratio[1]
+    return fft.irfft2(repeated, s=size, overwrite_x=True)

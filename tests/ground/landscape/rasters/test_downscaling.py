@@ -1,0 +1,202 @@
+"""A map of leaf area made a ground scene: labels, the same bits in any chunks and windows, and what is refused."""
+
+import dask.array as da
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import ODD_CHUNKS, check_place, no_compute
+
+import fifesim
+from fifesim.ground.landscape.block_kriging import block_means
+from fifesim.rasters import cf
+from fifesim.rasters import grid as grids
+
+# Across the edge of two tiles of 504 cells.
+SOURCE = fifesim.grid_at("EPSG:32614", 1680 * 400 - 300, 1680 * 2600 - 200, 700, 500, 10)
+GRID = SOURCE.zoom_out(1 / 3)
+
+
+@pytest.fixture(scope="module")
+def map_values():
+    y, x = np.mgrid[:50, :70]
+    values = 1.5 + np.sin(x / 9) * np.cos(y / 7)
+    values += 0.2 * np.random.default_rng(1).standard_normal(values.shape)
+    values = np.maximum(values, 0.1)
+    values[20:22, 30:40] = 0.0
+    values[5:8, 50:55] = np.nan
+    return values
+
+
+@pytest.fixture(scope="module")
+def lai_map(map_values):
+    return grids.place(xr.DataArray(map_values, dims=("y", "x"), name="lai", attrs={"history": "mapped"}), SOURCE)
+
+
+@pytest.fixture(scope="module")
+def scene(lai_map):
+    return fifesim.downscale(lai_map, GRID, arp=0.2, cv=0.3, seed=7)
+
+
+def means(cells):
+    return block_means(np.asarray(cells), (3, 3))
+
+
+def test_means_of_the_cells_are_the_map(scene, map_values):
+    np.testing.assert_allclose(means(scene), map_values, rtol=1e-12, atol=0)
+    assert np.nanmin(scene) == 0
+    assert np.all(scene.values.reshape(50, 3, 70, 3)[20:22, :, 30:40] == 0)
+
+
+def test_scene_is_labelled_and_placed(scene):
+    check_place(scene, "EPSG:32614")
+    assert grids.same_grid(grids.geobox(scene), GRID)
+    assert scene.name == "lai" and cf.attributes("lai").items() <= scene.attrs.items()
+    assert scene.attrs["arp"] == 0.2 and scene.attrs["rng_seed"] == "7"
+    assert scene.attrs["lai_distribution"] == "log-normal, cv 0.3"
+    assert scene.attrs["history"].startswith("mapped\ndownscale: 3 x 3 cells a pixel")
+    assert "site" not in scene.attrs
+
+
+@pytest.mark.parametrize("chunks", [{"y": 40, "x": 70}, 100, "auto", {"y": -1}])
+def test_scene_has_the_same_bits_in_any_chunks(scene, lai_map, chunks):
+    lazy_map = lai_map.copy(data=lai_map.variable.chunk(ODD_CHUNKS).data)
+    for given in (lai_map, lazy_map):
+        with no_compute():
+            lazy = fifesim.downscale(given, GRID, arp=0.2, cv=0.3, seed=7, chunks=chunks)
+        assert lazy.chunks is not None
+        xr.testing.assert_identical(lazy.compute(), scene)
+    with no_compute():
+        assert fifesim.downscale(lazy_map, GRID, arp=0.2, cv=0.3, seed=7).chunks is not None
+
+
+def test_window_is_a_slice_of_the_whole_also_where_it_begins_in_a_pixel(scene, lai_map):
+    window = fifesim.downscale(lai_map, GRID[31:95, 44:200], arp=0.2, cv=0.3, seed=7)
+    np.testing.assert_array_equal(window, scene[31:95, 44:200])
+    xr.testing.assert_allclose(window["x"], scene["x"][44:200], rtol=0, atol=1e-6)
+
+
+def test_window_of_the_map_is_a_slice_but_for_its_rim(scene, lai_map):
+    part = fifesim.downscale(lai_map[:, :45], GRID, arp=0.2, cv=0.3, seed=7)
+    assert np.isnan(part[:, 135:]).all()
+    np.testing.assert_allclose(part[:, : 135 - 36], scene[:, : 135 - 36], rtol=1e-3)
+    np.testing.assert_allclose(means(part)[:, :45], lai_map[:, :45], rtol=1e-12)
+
+
+def test_cells_beyond_the_map_are_unknown(scene, lai_map):
+    larger = fifesim.downscale(lai_map, GRID.pad(9), arp=0.2, cv=0.3, seed=7)
+    np.testing.assert_array_equal(larger[9:-9, 9:-9], scene)
+    assert np.isnan(larger[:9]).all() and np.isnan(larger[:, -9:]).all()
+
+
+def test_tiles_leave_no_seams(lai_map):
+    """Cells of a tile are those of others to 1e-4 where these would hold them: by shifting the whole by half a tile."""
+    moved = fifesim.grid_at("EPSG:32614", SOURCE.affine.c + 840, SOURCE.affine.f - 840, 700, 500, 10)
+    there = fifesim.downscale(grids.place(lai_map, moved), moved.zoom_out(1 / 3), arp=0.2, cv=0.0)
+    here = fifesim.downscale(lai_map, GRID, arp=0.2, cv=0.0)
+    np.testing.assert_allclose(there.values, here.values, rtol=1e-4)
+
+
+def test_only_the_part_of_a_map_that_is_asked_for_is_read(lai_map):
+    large = fifesim.grid_at("EPSG:32614", 168 * 10 * 400, 168 * 10 * 2600, 10080, 10080, 10)
+    read = []
+
+    def block(block_info=None):
+        read.append(block_info[None]["chunk-location"])
+        return np.full(block_info[None]["chunk-shape"], 1.5)
+
+    lazy = da.map_blocks(block, chunks=((168,) * 6,) * 2, dtype=float, meta=np.empty((0, 0)))
+    pixels = grids.place(xr.DataArray(lazy, dims=("y", "x"), name="lai"), large)
+    cells = fifesim.downscale(pixels, large.zoom_out(1 / 3), chunks=504)
+    cells[504 * 2 + 5 : 504 * 2 + 9, 504 * 3 + 5 : 504 * 3 + 9].compute()
+    assert sorted(set(read)) == [(i, j) for i in (1, 2, 3) for j in (2, 3, 4)]
+
+
+def test_dates_are_downscaled_one_by_one(lai_map):
+    cube = xr.concat(
+        [lai_map, 2 * lai_map], dim=xr.DataArray(np.array(["2022-06-03", "2022-07-03"], "M8[ns]"), dims="time")
+    )
+    cells = fifesim.downscale(cube, GRID, cv=0.3)
+    assert cells.dims == ("time", "y", "x")
+    np.testing.assert_allclose(means(cells[1]), 2 * lai_map, rtol=1e-12)
+    np.testing.assert_allclose(cells[1], 2 * cells[0], rtol=1e-5)
+
+
+def test_distribution_and_functions_of_the_mean_are_taken(lai_map):
+    low = fifesim.downscale(lai_map * 0.5, GRID, distribution="unburned-ungrazed", seed=1)
+    np.testing.assert_allclose(means(low), 0.5 * lai_map, rtol=1e-12)
+    assert low.attrs["lai_distribution"] == "unburned-ungrazed" and np.nanmax(low) < 2.75 * 1.01
+    of_mean = fifesim.downscale(lai_map, GRID, cv=lambda mean: np.where(mean > 1.5, 0.0, 0.5), seed=1)
+    smooth = fifesim.downscale(lai_map, GRID, cv=0.0)
+    spread, smooth = (
+        each.values.reshape(50, 3, 70, 3).std(axis=(1, 3)) / lai_map.where(lai_map > 0).values
+        for each in (of_mean, smooth)
+    )
+    dense = lai_map.values > 2.2
+    np.testing.assert_allclose(spread[dense].mean(), smooth[dense].mean(), rtol=0.6)
+    assert np.nanmean(spread[lai_map.values < 0.7]) > 0.35
+
+
+def test_default_is_the_grass_of_fife(lai_map):
+    default = fifesim.downscale(lai_map, GRID, seed=1)
+    np.testing.assert_array_equal(
+        default, fifesim.downscale(lai_map, GRID, cv=lambda m: np.minimum(0.4 / m, 0.6), seed=1)
+    )
+    assert default.attrs["arp"] == 0.15
+
+
+@pytest.mark.parametrize("off", [0, 1])
+def test_seed_of_a_scene_gives_its_ups_and_downs(off):
+    """Also where pixels are no whole number of their own size from the origin of the CRS."""
+    source = fifesim.grid_at("EPSG:32614", 672000 + 30 + off * 10 / 3, 4368000 - off * 20 / 3, 450, 450, 10)
+    pixels = grids.place(xr.DataArray(np.ones((45, 45)), dims=("y", "x"), name="lai"), source)
+    grid = source.zoom_out(1 / 3)
+    plain = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.05, seed=7).values.ravel()
+    same, other = (fifesim.downscale(pixels, grid, arp=0.05, cv=0.3, seed=seed).values.ravel() for seed in (7, 8))
+    assert np.corrcoef(plain, same)[0, 1] > 0.85
+    assert abs(np.corrcoef(plain, other)[0, 1]) < 0.05
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"arp": 0.3}, r"arp must be in \[0, 0\.25\), got 0\.3"),
+        ({"arp": 0.2499}, "arp must be at most 0.2498"),
+        ({"seed": -1}, "seed must be"),
+        ({"cv": 0.3, "distribution": "burned-grazed"}, "distribution= of the cells .* or cv= within pixels, not both"),
+        ({"cv": -0.1}, r"cv must be in \[0, .* got -0.1: .* such as 0.3"),
+        ({"cv": 30.0}, r"cv must be in \[0, .* got 30"),
+        ({"cv": lambda mean: mean * np.nan}, r"cv must be in .* got nan"),
+        ({"cv": lambda mean: 3.0}, r"cv must be in .* got 3"),
+        ({"distribution": "grazed"}, "unknown LAI distribution 'grazed'"),
+        ({"grid": SOURCE}, "a whole number of cells"),
+        ({"chunks": {"band": 1}}, "y and x"),
+    ],
+)
+def test_impossible_scene_is_refused_before_it_computes(lai_map, options, message):
+    with no_compute(), pytest.raises(ValueError, match=message):
+        fifesim.downscale(lai_map.copy(data=da.from_array(lai_map.values)), **({"grid": GRID} | options))
+
+
+def test_maps_of_something_else_are_refused(lai_map):
+    with pytest.raises(ValueError, match="scale"):
+        fifesim.downscale(lai_map * 30, GRID)
+    with pytest.raises(ValueError, match="is normalized difference vegetation index by its standard_name"):
+        fifesim.downscale(lai_map.assign_attrs(cf.attributes("ndvi")), GRID)
+    with pytest.raises(ValueError, match="geographic CRS"):
+        degrees = lai_map.assign_coords(x=lai_map["x"] * 1e-5, y=lai_map["y"] * 1e-5).drop_vars("spatial_ref")
+        fifesim.downscale(degrees.rio.write_crs(4326), GRID)
+    with no_compute():
+        lazy = fifesim.downscale((lai_map - 0.5).chunk(100), GRID)
+    with pytest.raises(ValueError, match="negative"):
+        lazy.compute()
+    with pytest.raises(ValueError, match=r"mean LAI 2.*, which cells .* from 0 to 2.2 cannot have"):
+        fifesim.downscale(lai_map, GRID, distribution="burned-grazed")
+    with pytest.raises(TypeError, match="cv must be a number, or a function of the means of pixels"):
+        fifesim.downscale(lai_map, GRID, cv="high")
+
+
+def test_whole_numbers_with_a_scale_and_rows_from_the_south_are_taken(lai_map, scene):
+    packed = (lai_map * 1000).round().fillna(65535).astype("u2").assign_attrs(scale_factor=0.001, _FillValue=65535)
+    cells = packed[::-1].fifesim.downscale(GRID, arp=0.2, cv=0.3, seed=7)
+    np.testing.assert_allclose(means(cells), np.round(lai_map, 3), rtol=1e-9)
+    np.testing.assert_allclose(cells, scene, rtol=0.02, atol=1e-3)
