@@ -242,3 +242,10 @@ def test_variables_of_a_landscape_win_over_its_classes(site, land):
         scene.fifesim.surface_reflectance("TM", bands=TM34, brown=0.1)
     number = fifesim.landscape(site, lai=land.lai, brown=0.3).fifesim.surface_reflectance("TM", bands=TM34)
     xr.testing.assert_equal(number, land.lai.fifesim.surface_reflectance("TM", bands=TM34, brown=0.3))
+
+
+@pytest.mark.slow
+def test_other_processes_make_the_same_bits(site, land, rho):
+    lazy = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=CLASSES, seed=7, chunks=CHUNKS)
+    made = lazy.fifesim.surface_reflectance("TM", bands=TM34)
+    np.testing.assert_array_equal(made.compute(scheduler="processes", num_workers=2), rho)
