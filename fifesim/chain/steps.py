@@ -104,7 +104,7 @@ def surface_reflectance(
 
     References
     ----------
-    [Verhoef1984]_; [Verhoef2007b]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5
+    [Verhoef1984]_; [VerhoefBach2007]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5
 
     See Also
     --------

@@ -6,6 +6,7 @@ from fifesim.experiments.verification import (
     atmosphere,
     benchmarks,
     canopy,
+    foliage,
     landscape,
     line_spread,
     scan,
@@ -16,7 +17,7 @@ from fifesim.experiments.verification import (
 
 AREAS = {
     "random field": landscape.CHECKS,
-    "canopy": (*canopy.CHECKS, *benchmarks.CANOPY),
+    "canopy": (*canopy.CHECKS, *foliage.CHECKS, *benchmarks.CANOPY),
     "terrain": terrain.CHECKS,
     "atmosphere": (*scattering.CHECKS, *benchmarks.CHECKS, *adjacency.CHECKS, *atmosphere.CHECKS),
     "sensor": (*sensor.CHECKS, *line_spread.CHECKS, *scan.CHECKS),

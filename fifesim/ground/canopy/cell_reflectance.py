@@ -14,7 +14,6 @@ from fifesim.ground.canopy.crowns import (
     lai_in_crowns,
 )
 from fifesim.ground.canopy.foliage_table import (
-    LIMIT,
     crown_table,
     interpolate_crowned,
     interpolate_foliage,
@@ -53,12 +52,12 @@ def varied_reflectance(lai, background, scene):
     if isinstance(scene.crown_cover, np.ndarray):
         table = _crown_terms_table(alike._replace(crown_cover=1.0, crown_shape=SHAPE), by_brown)
         crowns = _crown_table(scene.crown_shape, scene.sza, scene.vza, scene.raa)
-        out, beyond = interpolate_crowned(table, crowns, lai, brown, scene.crown_cover, background)
+        out = interpolate_crowned(table, crowns, lai, brown, scene.crown_cover, background)
     else:
         inside = lai if scene.crown_cover == 1 else lai_in_crowns(lai, scene.crown_cover)
-        out, beyond = interpolate_foliage(_joined_table(alike), inside, brown, background)
-    if beyond:
-        cells = np.flatnonzero(lai_in_crowns(lai, scene.crown_cover) > LIMIT)
+        out = interpolate_foliage(_joined_table(alike), inside, brown, background)
+    if np.fmax.reduce(out[0], initial=0.0) == np.inf:
+        cells = np.flatnonzero(out[0] == np.inf)
         out[:, cells] = cell_by_cell(lai[cells], np.broadcast_to(background, out.shape)[:, cells], scene.part(cells))
     return out
 

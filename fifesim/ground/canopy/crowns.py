@@ -62,7 +62,7 @@ def crown_shares(crown_cover, crown_shape, sza, vza, raa):
 
     References
     ----------
-    [Verhoef2007b]_; [Nilson1971]_
+    [VerhoefBach2007]_; [Nilson1971]_
 
     Examples
     --------
@@ -103,7 +103,7 @@ def clumped(canopy, shares):
 
     References
     ----------
-    [Verhoef2007b]_
+    [VerhoefBach2007]_
 
     Examples
     --------
@@ -199,7 +199,7 @@ def crowns_over_background(terms, shares, background):
 
     References
     ----------
-    [Verhoef2007b]_
+    [VerhoefBach2007]_
 
     Examples
     --------

@@ -172,20 +172,18 @@ def interpolate_foliage(table, lai, brown, background):
     table : FoliageTable
         Four columns for each band, the terms of `over_background`.
     lai, brown : array, shape (n,)
-        Leaf area within crowns, and its dead share; NaN, and a leaf area above `LIMIT`, gives NaN. [m2 m-2], [1]
+        Leaf area within crowns, and its dead share; NaN gives NaN. [m2 m-2], [1]
     background : array, shape (band, n) or (band, 1)
         [1]
 
     Returns
     -------
     reflectance : array, shape (band, n)
-        [1]
-    beyond : int
-        Cells whose leaf area is beyond the table.
+        Infinite where the leaf area within crowns is above `LIMIT`. [1]
     """
     values = np.empty((table.coefficients.shape[-1] // 4, lai.size))
-    beyond = _foliage(*(np.ascontiguousarray(each) for each in (lai, brown, background)), table, values)
-    return values, beyond
+    _foliage(*(np.ascontiguousarray(each) for each in (lai, brown, background)), table, values)
+    return values
 
 
 def interpolate_crowned(table, crowns, lai, brown, crown_cover, background):
@@ -199,7 +197,7 @@ def interpolate_crowned(table, crowns, lai, brown, crown_cover, background):
     crowns : array, shape (n, 4)
         From `crown_table`.
     lai : array, shape (n,)
-        Of the ground; NaN, and more than `LIMIT` within the crowns, gives NaN. [m2 m-2]
+        Of the ground; NaN gives NaN. [m2 m-2]
     brown : array, shape (n,) or (1,)
         [1]
     crown_cover : array, shape (n,)
@@ -210,14 +208,12 @@ def interpolate_crowned(table, crowns, lai, brown, crown_cover, background):
     Returns
     -------
     reflectance : array, shape (band, n)
-        [1]
-    beyond : int
-        Cells whose leaf area is beyond the table.
+        Infinite where the leaf area within crowns is above `LIMIT`. [1]
     """
     values = np.empty((table.coefficients.shape[-1] // TERMS, lai.size))
     cells = (np.ascontiguousarray(each) for each in (lai, brown, crown_cover, background))
-    beyond = _crowned(*cells, table, crowns, values)
-    return values, beyond
+    _crowned(*cells, table, crowns, values)
+    return values
 
 
 @register_jitable
@@ -269,12 +265,11 @@ def _blend(flat, start, length, leaves, browns, wide, out):
 def _foliage(lai, brown, background, table, values):
     _, browns, columns = table.coefficients.shape
     flat, wide, terms = table.coefficients.reshape(-1), np.zeros(4 * columns), np.zeros(columns)
-    of_ground, beyond = int(background.shape[1] > 1), 0
+    of_ground = int(background.shape[1] > 1)
     for i in range(lai.size):
         if not (0 <= lai[i] <= LIMIT and 0 <= brown[i] <= 1):
-            beyond += lai[i] > LIMIT
             for band in range(values.shape[0]):
-                values[band, i] = np.nan
+                values[band, i] = np.inf if lai[i] > LIMIT else np.nan
             continue
         row, share = _place_leaves(table, lai[i])
         at, dead = _place_brown(table, brown[i])
@@ -283,7 +278,6 @@ def _foliage(lai, brown, background, table, values):
             alone, hot, through, rdd = terms[4 * band], terms[4 * band + 1], terms[4 * band + 2], terms[4 * band + 3]
             ground = background[band, i * of_ground]
             values[band, i] = over_background(alone, hot, through, rdd, ground)
-    return beyond
 
 
 @njit(nogil=True, cache=True)
@@ -291,14 +285,13 @@ def _crowned(lai, brown, cover, background, table, crowns, values):
     _, browns, columns = table.coefficients.shape
     flat, rooms = table.coefficients.reshape(-1), crowns.reshape(-1)
     wide, terms, parts = np.zeros(4 * columns), np.zeros(columns), np.zeros(4)
-    of_brown, of_ground, beyond = int(brown.size > 1), int(background.shape[1] > 1), 0
+    of_brown, of_ground = int(brown.size > 1), int(background.shape[1] > 1)
     for i in range(lai.size):
         dead = brown[i * of_brown]
         inside = lai[i] / cover[i] if cover[i] > 0 else 0 * lai[i]
         if not (0 <= inside <= LIMIT and 0 <= dead <= 1 and 0 <= cover[i] <= 1):
-            beyond += inside > LIMIT
             for band in range(values.shape[0]):
-                values[band, i] = np.nan
+                values[band, i] = np.inf if inside > LIMIT else np.nan
             continue
         row, share = _place_leaves(table, inside)
         leaves = _weights(share)
@@ -314,7 +307,6 @@ def _crowned(lai, brown, cover, background, table, crowns, values):
             t = terms[TERMS * band : TERMS * (band + 1)]
             of_band = t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]
             values[band, i] = crowns_over_background(of_band, shares, background[band, i * of_ground])
-    return beyond
 
 
 @register_jitable

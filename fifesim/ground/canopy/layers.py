@@ -47,7 +47,7 @@ def layers_of(lai, brown, dissociation):
 
     References
     ----------
-    [Verhoef2007b]_
+    [VerhoefBach2007]_
 
     Examples
     --------
@@ -103,7 +103,7 @@ def two_layers(
 
     References
     ----------
-    [Verhoef2007b]_; [Kuusk1991]_
+    [VerhoefBach2007]_; [Kuusk1991]_
 
     Examples
     --------
@@ -150,10 +150,11 @@ def mixed(green, dead, brown):
 
     Examples
     --------
-    >>> mixed((0.5, 0.25), (0.25, 0.25), 0.5)
-    (0.375, 0.25)
+    >>> [float(each) for each in mixed((0.5, 0.25), (0.25, 0.25), 0.5)]
+    [0.375, 0.25]
     """
-    return tuple(one + brown * (other - one) for one, other in zip(green, dead, strict=True))
+    pairs = ((np.asarray(one, float), np.asarray(other, float)) for one, other in zip(green, dead, strict=True))
+    return tuple(one + brown * (other - one) for one, other in pairs)
 
 
 def added(top, bottom):

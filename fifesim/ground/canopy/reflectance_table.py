@@ -83,7 +83,7 @@ def canopy_reflectance(
 
     References
     ----------
-    [Verhoef2007]_; [Verhoef2007b]_
+    [Verhoef2007]_; [VerhoefBach2007]_
 
     Examples
     --------
