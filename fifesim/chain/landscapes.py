@@ -231,7 +231,6 @@ def fpar(
     return cf.label(out, "fpar", source=land.lai, history=history)
 
 
-@by_date
 def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     """
     Means over square blocks of ground: the truth that a pixel is compared with.

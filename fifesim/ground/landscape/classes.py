@@ -51,7 +51,7 @@ class CoverClass:
     crown_cover : float, optional
         Share of the ground below crowns, in [0, 1]. [1]
     crown_shape : float, optional
-        Diameter of a crown over the height of its middle. [1]
+        Crown diameter over height. [1]
     code : int, optional
         Of the class in a map, 0 to 32767; by default classes count from 1.
 
