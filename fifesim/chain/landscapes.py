@@ -206,7 +206,7 @@ def fpar(
     Notes
     -----
     Both kinds of leaf absorb alike here, as in Eq. 6. SAIL's own shares, of each wavelength, are in
-    `ground.canopy.light_budget`.
+    `ground.canopy.light_sharing`.
 
     References
     ----------
