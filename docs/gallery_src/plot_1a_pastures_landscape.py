@@ -28,7 +28,7 @@ def draw(axis, raster, title, **style):
 
 
 light = dem.coarsen(y=4, x=4).mean().fifesim.illumination(geometry=fifesim.Geometry(sza=60, saa=315, vza=0, vaa=0))
-colours = ListedColormap(["#e2c48d", "#a9c08a", "#4e8a6b"])
+colours = ListedColormap(["#e2c48d", "#4e8a6b", "#a9c08a"])
 figure, axes = plt.subplots(1, 3, figsize=(15, 6), layout="compressed", sharey=True)
 classes = draw(axes[0], land.cover[::3, ::3], "treatments", cmap=colours, vmin=0.5, vmax=3.5)
 draw(axes[0], light, "treatments", cmap="gray", alpha=0.4)

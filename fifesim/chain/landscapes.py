@@ -225,7 +225,7 @@ def fpar(
     Notes
     -----
     Both kinds of leaf absorb alike here, as in Eq. 6. SAIL's own shares, of each wavelength, are in
-    `ground.canopy.light_budget`.
+    `ground.canopy.light_sharing`.
 
     References
     ----------
@@ -250,7 +250,6 @@ def fpar(
     return cf.label(out, "fpar", source=land.lai, history=history)
 
 
-@by_date
 def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     """
     Means over square blocks of ground: the truth that a pixel is compared with.

@@ -242,3 +242,21 @@ def test_variables_of_a_landscape_win_over_its_classes(site, land):
         scene.fifesim.surface_reflectance("TM", bands=TM34, brown=0.1)
     number = fifesim.landscape(site, lai=land.lai, brown=0.3).fifesim.surface_reflectance("TM", bands=TM34)
     xr.testing.assert_equal(number, land.lai.fifesim.surface_reflectance("TM", bands=TM34, brown=0.3))
+
+
+@pytest.mark.slow
+def test_other_processes_make_the_same_bits(site, land, rho):
+    lazy = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=CLASSES, seed=7, chunks=CHUNKS)
+    made = lazy.fifesim.surface_reflectance("TM", bands=TM34)
+    np.testing.assert_array_equal(made.compute(scheduler="processes", num_workers=2), rho)
+
+
+def test_landscape_of_several_dates_goes_date_by_date(land, rho):
+    days = xr.Variable("time", np.array(["1987-06-06T16:35", "1987-07-06T16:35"], "M8[ns]"))
+    season = land.assign(lai=xr.concat([land.lai, 1.2 * land.lai], dim=days, combine_attrs="override"))
+    made = season.fifesim.surface_reflectance("TM", bands=TM34)
+    assert made.dims[0] == "time" and made.sza.dims == ("time",)
+    second = season.isel(time=1).fifesim.surface_reflectance("TM", bands=TM34)
+    np.testing.assert_array_equal(made[1], second)
+    means = season.fifesim.aggregate(30)
+    assert means.lai.dims == ("time", "y", "x") and means.class_share.dims == ("class", "y", "x")

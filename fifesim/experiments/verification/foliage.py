@@ -10,7 +10,7 @@ from fifesim.ground.canopy.background import with_background
 from fifesim.ground.canopy.crowns import clumped, crown_shares, crown_terms, crowns_over_background
 from fifesim.ground.canopy.layers import two_layers
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.light_budget import light_budget
+from fifesim.ground.canopy.light_sharing import light_budget
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
 from fifesim.ground.canopy.sail_model import sail
 

@@ -37,11 +37,27 @@ class Scene(NamedTuple):
     crown_shape: float = SHAPE
 
     def varies(self):
-        """Whether leaves or crowns differ from cell to cell."""
+        """
+        Whether leaves or crowns differ from cell to cell.
+
+        Returns
+        -------
+        answer : bool
+        """
         return any(isinstance(each, np.ndarray) for each in (self.brown, self.dissociation, self.crown_cover))
 
     def part(self, cells):
-        """The same for some of the cells: of arrays that vary, whose last axis they are."""
+        """
+        The same for some of the cells: of arrays that vary, whose last axis they are.
+
+        Parameters
+        ----------
+        cells : slice or array of int
+
+        Returns
+        -------
+        scene : Scene
+        """
         by_cell = {name: v for name, v in self._asdict().items() if isinstance(v, np.ndarray) and v.shape[-1:] > (1,)}
         return self._replace(**{name: values[..., cells] for name, values in by_cell.items()})
 

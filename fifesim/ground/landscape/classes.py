@@ -52,7 +52,7 @@ class CoverClass:
     crown_cover : float, optional
         Share of the ground below crowns, in [0, 1]. [1]
     crown_shape : float, optional
-        Diameter of a crown over the height of its middle. [1]
+        Crown diameter over height. [1]
     soil : float, optional
         Brightness of the soil, a change of its reflectance along the soil line. [1]
     moisture : float, optional

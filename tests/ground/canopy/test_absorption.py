@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fifesim.ground.canopy.absorption import FPAR_INF, extinction_coefficient, fpar
+from fifesim.ground.canopy.absorption import FPAR_INF, extinction_coefficient, fpar, green_fpar
+from fifesim.ground.canopy.layers import layers_of
 from fifesim.ground.canopy.sail_model import sail
 
 
@@ -51,3 +52,20 @@ def test_fpar_ends():
 
 def test_fpar_of_nan_is_nan_in_its_cell():
     np.testing.assert_array_equal(np.isnan(fpar([np.nan, 1.0], 0.5)), [True, False])
+
+
+@pytest.mark.parametrize("dissociation", [0.0, 0.4, 1.0])
+def test_green_leaves_absorb_their_share_of_each_depth(dissociation):
+    """By quadrature: at each depth the light that is left meets green leaves by their share there."""
+    lai, brown, extinction = 3.0, 0.4, 0.6
+    layers = layers_of(lai, brown, dissociation)
+
+    def taken(depth):
+        share = layers.brown if depth < layers.lai else layers.brown_below
+        return 0.94 * extinction * np.exp(-extinction * depth) * (1 - share)
+
+    expected = quad(taken, 0, layers.lai)[0] + quad(taken, layers.lai, lai)[0]
+    np.testing.assert_allclose(green_fpar(lai, extinction, brown, dissociation), expected, rtol=1e-12)
+    for share, all_of_it in ((0.0, fpar(lai, extinction)), (1.0, 0.0)):
+        found = green_fpar(lai, extinction, share, dissociation)
+        np.testing.assert_allclose(found, all_of_it, rtol=1e-14)

@@ -89,7 +89,7 @@ def test_layers_hold_all_leaves_of_both_kinds(dissociation):
 
 
 def test_hot_spot_goes_through_both_layers():
-    """What a hot spot adds to single scattering, with the leaf area that both beams reach by quadrature in each layer."""
+    """What a hot spot adds to single scattering, with what both beams reach in each layer by quadrature."""
     sza, vza, raa, hotspot, lai, brown = 40.0, 30.0, 20.0, 0.2, 3.0, 0.6
     angles = {"sza": sza, "vza": vza, "raa": raa}
     c = [scattering(*optics, *angles.values(), leaf_angle_classes("spherical")) for optics in (GREEN, DEAD)]
@@ -108,8 +108,7 @@ def test_hot_spot_goes_through_both_layers():
 @pytest.mark.parametrize("dissociation", [0.0, 0.5, 1.0])
 def test_sun_and_view_may_be_exchanged(dissociation):
     there, back = (
-        with_background(canopies(BROWN, dissociation, view), 0.2).rso
-        for view in ((60, 25, 50, 0.1), (25, 60, 50, 0.1))
+        with_background(canopies(BROWN, dissociation, view), 0.2).rso for view in ((60, 25, 50, 0.1), (25, 60, 50, 0.1))
     )
     np.testing.assert_allclose(there, back, rtol=1e-11)
 
@@ -117,4 +116,6 @@ def test_sun_and_view_may_be_exchanged(dissociation):
 def test_no_data_stay_where_they_are():
     lai, brown = np.array([1.0, np.nan, 1.0]), np.array([0.3, 0.3, np.nan])
     found = canopies(brown, 0.5, VIEWS[1], lai=lai)
-    assert [np.isnan(getattr(found, name)).tolist() for name in ("rso", "rdd_below", "tdo")] == 3 * [[False, True, True]]
+    assert [np.isnan(getattr(found, name)).tolist() for name in ("rso", "rdd_below", "tdo")] == 3 * [
+        [False, True, True]
+    ]

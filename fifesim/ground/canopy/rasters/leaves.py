@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
 import xarray as xr
 
 from fifesim.ground.canopy import optics
@@ -48,7 +49,7 @@ def leaf_optics(bands, given, lai, *, exact=False):
     if isinstance(given, Mapping):
         if any(_has_raster(pair) for pair in given.values()):
             pairs = [_pair(name, optics.of_band(given, name, "leaf optics")) for name in names]
-            return tuple(by_band(dict(zip(names, each, strict=True)), lai) for each in zip(*pairs, strict=True))
+            return tuple(_of_bands(names, each, lai) for each in zip(*pairs, strict=True))
     elif _has_raster(given):
         return tuple(
             by_band(dict(zip(names, layers_of(value, names, f"leaf {what}"), strict=True)), lai)
@@ -78,6 +79,13 @@ def brown_optics(bands, brown, given, lai, *, exact=False):
     if not isinstance(brown, xr.DataArray) and brown == 0:
         return None
     return leaf_optics(bands, optics.DEAD_LEAF if given is None else given, lai, exact=exact)
+
+
+def _of_bands(names, values, lai):
+    """Reflectances, or transmittances, of which some or none are rasters."""
+    if _has_raster(values):
+        return by_band(dict(zip(names, values, strict=True)), lai)
+    return np.asarray(values, float)
 
 
 def _has_raster(given):

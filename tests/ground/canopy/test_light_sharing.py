@@ -6,7 +6,7 @@ from oracles_canopy import turned_leaves
 from scipy.linalg import expm
 
 from fifesim.ground.canopy.layers import layers_of
-from fifesim.ground.canopy.light_budget import light_budget
+from fifesim.ground.canopy.light_sharing import light_budget
 
 GREEN, DEAD, GROUND = (0.4, 0.3), (0.3, 0.1), 0.25
 
