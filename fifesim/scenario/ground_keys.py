@@ -99,6 +99,10 @@ class LandscapeKeys(Section):
     arps: ByName = text({}, "autoregressive parameters [1] of these fields; by default that of [ground]")
     covary: ByName = text({}, f"correlations [1] of leaf area with {', '.join(COVARIATES + VARYING)}")
 
+    def is_one(self):
+        """Whether one stand is everywhere, and nothing but its leaf area varies."""
+        return self.cover == "none" and not self.moisture and not any(self.deviations.values()) and not self.covary
+
     @field_validator("cover")
     @classmethod
     def _known_cover(cls, value):

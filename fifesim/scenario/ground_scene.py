@@ -3,16 +3,20 @@
 import xarray as xr
 
 from fifesim.chain.landscapes import fpar
+from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.cover import PATTERNS, Patches
+from fifesim.ground.landscape.drawn import Field
 from fifesim.ground.landscape.raster import lai_scene, lai_window
 from fifesim.ground.landscape.rasters.scenes import landscape
+from fifesim.scenario.ground_keys import COVARIATES
+from fifesim.scenario.land import cut
 
 # What `Setup` has of a stand by the same names, and what a class of cover calls otherwise.
 _NUMBERS = ("leaf_angles", "hotspot", "brown", "dissociation", "crown_cover", "crown_shape")
 _OF_A_CLASS = {"leaf_optics": "leaf"}
 
 
-def ground_scene(scenario, grid, chunks=None):
+def ground_scene(scenario, grid, chunks=None, dem=None):
     """
     The ground of a scenario.
 
@@ -23,6 +27,8 @@ def ground_scene(scenario, grid, chunks=None):
         Of ground cells.
     chunks : mapping or int, optional
         Makes it lazy.
+    dem : xarray.DataArray, dims (y, x), optional
+        Elevation on the grid or more, which leaf area may go with. [m]
 
     Returns
     -------
@@ -30,18 +36,42 @@ def ground_scene(scenario, grid, chunks=None):
         Leaf area; or a landscape, where the scenario has classes of cover or properties that vary. [m2 m-2]
     """
     land, own = scenario.ground, scenario.landscape
+    if not own.is_one():
+        return _landscape(scenario, grid, chunks, dem)
+    if land.lai_file:
+        return lai_window(land.lai_file, grid, chunks=chunks)
+    return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+
+
+def _landscape(scenario, grid, chunks, dem):
+    land, own = scenario.ground, scenario.landscape
+    means = {"soil": 0.0, "moisture": own.moisture, "brown": land.brown, "crown_cover": land.crown_cover}
+    drawn = {
+        name: Field(mean=means[name], sd=deviation, arp=own.arps.get(name, land.arp))
+        for name, deviation in own.deviations.items()
+        if deviation
+    }
+    if own.moisture and "moisture" not in drawn:
+        drawn["moisture"] = own.moisture
+    cover = Patches(own.cover, own.size, _shares(scenario)) if own.cover in PATTERNS else own.cover
     if own.cover == "none":
-        if land.lai_file:
-            return lai_window(land.lai_file, grid, chunks=chunks)
-        return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+        # One class, wherever its patches lie.
+        cover = Patches("pastures", own.size)
+    classes = scenario.class_table() if own.cover != "none" else {"ground": CoverClass(lai=land.distribution)}
+    covary = {name: correlation for name, correlation in own.covary.items() if correlation}
+    of_dem = bool(set(covary) & set(COVARIATES))
     return landscape(
         grid,
-        cover=Patches(own.cover, own.size, _shares(scenario)) if own.cover in PATTERNS else own.cover,
-        classes=scenario.class_table(),
+        cover=cover,
+        classes=classes,
         lai=land.lai_file,
         arp=land.arp,
+        covary=covary or None,
+        dem=cut(dem, grid) if of_dem else None,
+        geometry=scenario.sun_and_view() if "illumination" in covary else None,
         seed=land.seed,
         chunks=chunks,
+        **drawn,
     )
 
 

@@ -13,6 +13,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters import whereabouts
 from fifesim.rasters.covering import covering_grid
 from fifesim.rasters.sites import on_fife_site
+from fifesim.scenario.ground_keys import COVARIATES
 from fifesim.scenario.keys import EXTENT, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.scenario.toml import load_values, mistakes
@@ -56,6 +57,11 @@ class Scenario(Keys):
             raise ValueError(
                 'ground.method = "periodic" is for one stand: type method = "streaming", or cover = "none"'
             )
+        needing = [name for name in COVARIATES if self.landscape.covary.get(name)]
+        if needing and self.terrain.dem == "flat":
+            raise ValueError(f"landscape.covary: {', '.join(needing)} is of an elevation, and terrain.dem is flat")
+        if self.landscape.covary and self.ground.lai_file:
+            raise ValueError("landscape.covary: a lai_file goes with the ground as it does: leave covary out")
         shares = [stand.share for stand in self.classes.values()]
         if any(shares) and not all(shares):
             lacking = ", ".join(name for name, stand in self.classes.items() if stand.share is None)

@@ -12,7 +12,7 @@ from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
 from fifesim.scenario.ground_scene import canopy_of, ground_scene, truth_of
-from fifesim.scenario.land import elevation
+from fifesim.scenario.land import cut, elevation
 from fifesim.scenario.scenario import Scenario
 
 
@@ -47,17 +47,17 @@ def simulate(scenario, chunks="auto"):
     def means(rasters):
         return aggregate(rasters, scenario.sensor.size, min_valid=setup.min_valid)
 
-    land = ground_scene(scenario, grid, chunks)
+    dem, horizon, reach = elevation(scenario, grid, chunks)
+    land = ground_scene(scenario, grid, chunks, dem)
     land = land if isinstance(land, xr.Dataset) else land.to_dataset(name="lai")
     level = reflectance_of(setup, land)
     nodes = {"scene": dict(land.data_vars), "truth": dict(means(truth_of(scenario, setup, land)).data_vars)}
-    dem, horizon, reach = elevation(scenario, grid, chunks)
     if dem is None:
         reflectance = level
     else:
         reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land)
         kt = chain.kt(level, dem, horizon=horizon)
-        dem, slope = _cut(dem, grid), _cut(slopes.slope(dem), grid)
+        dem, slope = cut(dem, grid), cut(slopes.slope(dem), grid)
         nodes["scene"]["dem"] = dem
         nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt)}
         nodes["level"] = {"dn": image_of(setup, level)}
@@ -106,9 +106,3 @@ def setup_of(scenario):
         noise_models=own.given_noise(),
         seed=own.seed,
     )
-
-
-def _cut(raster, grid):
-    """A raster cut to a grid of its cells."""
-    rows, columns = grids.lattice_offset(grids.geobox(raster), grid)
-    return raster.isel(y=slice(rows, rows + grid.shape.y), x=slice(columns, columns + grid.shape.x))

@@ -43,7 +43,7 @@ def _has_optics(kind):
     return any(getattr(kind, name) is not None for name in OPTICS)
 
 
-def ground_with(scenario, grid, at_work):
+def ground_with(scenario, grid, at_work, dem=None):
     """
     Ground of a scenario with some of what varies at its ideal, from the same random numbers.
 
@@ -54,6 +54,8 @@ def ground_with(scenario, grid, at_work):
         Of ground cells.
     at_work : collection of str
         Of `PROPERTIES`; the others are ideal.
+    dem : xarray.DataArray, dims (y, x), optional
+        Elevation, which leaf area may go with. [m]
 
     Returns
     -------
@@ -63,7 +65,7 @@ def ground_with(scenario, grid, at_work):
     own, ideal = scenario.landscape, {}
     if "covariance" not in at_work:
         ideal["covary"] = {}
-    land = ground_scene(scenario.model_copy(update={"landscape": own.model_copy(update=ideal)}), grid)
+    land = ground_scene(scenario.model_copy(update={"landscape": own.model_copy(update=ideal)}), grid, dem=dem)
     land = land if hasattr(land, "data_vars") else land.to_dataset(name="lai")
     if "soil" not in at_work:
         land = land.drop_vars("soil", errors="ignore")

@@ -159,7 +159,7 @@ class _Scene:
         """The ground with some stages at work, made once."""
         kind = frozenset(at_work) & set(PROPERTIES)
         if kind not in self.grounds:
-            land = ground_with(self.scenario, self.grid, kind)
+            land = ground_with(self.scenario, self.grid, kind, self.setup.dem)
             self.grounds[kind] = _Ground(land, self.spread_out(land["lai"]))
         return self.grounds[kind]
 
