@@ -11,7 +11,7 @@ from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
-from fifesim.scenario.ground_scene import canopy_of, ground_scene, truth_of
+from fifesim.scenario.ground import canopy_of, ground_scene, truth_of
 from fifesim.scenario.land import cut, elevation
 from fifesim.scenario.scenario import Scenario
 

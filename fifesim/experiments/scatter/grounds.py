@@ -1,7 +1,7 @@
 """The ground of a scenario with any of what varies over it at its ideal."""
 
 from fifesim.ground.landscape.classes import OPTICS
-from fifesim.scenario.ground_scene import ground_scene
+from fifesim.scenario.ground import ground_scene
 
 # In this order along the axes of what `stages.pixels` gives.
 PROPERTIES = {

@@ -9,7 +9,7 @@ from fifesim.analysis.attribution import by_itself, shapley, taken_away
 from fifesim.base.seeds import check_seed
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
 from fifesim.rasters import grid as grids
-from fifesim.scenario.ground_scene import ground_scene
+from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
 
 # Rows of the table beside the stages: what is left when all of them are ideal, and all together.

@@ -174,7 +174,8 @@ def _scene(scenario):
     bands = _red_and_nir(setup.instrument.select(setup.bands))
     blocks = grids.aligned(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
-    dem, horizon, _ = elevation(scenario, grid)
+    # In memory: every set of stages with topography asks for them.
+    dem, horizon = (each if each is None else each.compute() for each in elevation(scenario, grid)[:2])
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, grid, blocks, image)
 
 

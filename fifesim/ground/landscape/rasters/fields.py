@@ -20,8 +20,8 @@ from fifesim.ground.terrain.rasters.slopes import slope
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-from fifesim.rasters.apart import apart
 from fifesim.rasters.crs import with_crs_of
+from fifesim.rasters.sampling import apart
 from fifesim.rasters.sites import made_on_site
 
 # The ground is known by at most so many rows and columns of it, evenly spaced.

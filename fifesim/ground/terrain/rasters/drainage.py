@@ -11,7 +11,7 @@ from fifesim.ground.terrain.wetness import wetness_index
 from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-from fifesim.rasters.apart import apart
+from fifesim.rasters.sampling import apart
 
 _REFERENCE = "Beven and Kirkby (1979), doi:10.1080/02626667909491834"
 
