@@ -50,7 +50,7 @@ def pairing_rows(scenario, fits):
 def _paper_r2(scenario):
     """R2 of LAI that the paper has for the ground of a scenario; None where it has none."""
     ground = scenario.ground
-    if ground.lai_file:
+    if ground.lai_file or not scenario.landscape.is_one():
         return None
     table = datasets.table("friedl1995_table2.csv").set_index(["variable", "distribution", "arp"])["r2"]
     return table.get(("lai", ground.distribution, ground.arp))

@@ -1,0 +1,48 @@
+"""
+Make landscape_budget.csv: what each stage takes from LAI on NDVI over the default landscape, for three instruments.
+
+    python docs/make_landscape_budget.py          # about an hour of processor time
+    python docs/make_landscape_budget.py TM MSI   # some of them
+"""
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+
+from fifesim.experiments.scatter.instruments import instrument_scenario
+from fifesim.experiments.scatter.shares import budget, table
+from fifesim.scenario.scenario import Scenario, default_landscape
+
+TABLE = Path(__file__).with_name("landscape_budget.csv")
+
+# Cells along a window, which hold several pastures and enough pixels, and how many windows.
+WINDOWS = {"TM": (600, 3), "MSI": (600, 3), "MODIS": (900, 2)}
+
+
+def scenario_of(name):
+    """The default landscape as an instrument sees it, with all that is known of that."""
+    sections = default_landscape().model_dump(exclude_unset=True)
+    seen = instrument_scenario(name).model_dump(exclude_unset=True)
+    return Scenario(**sections | {"sensor": seen["sensor"]})
+
+
+def rows_of(name):
+    """Rows of the table of one instrument."""
+    cells, realisations = WINDOWS[name]
+    found = table(budget(scenario_of(name), realisations=realisations, cells=cells))
+    return found.assign(instrument=name, cells=cells, realisations=realisations)
+
+
+def main():
+    kept = pd.read_csv(TABLE) if TABLE.exists() else pd.DataFrame()
+    for name in sys.argv[1:] or WINDOWS:
+        rows = rows_of(name)
+        kept = pd.concat([kept[kept["instrument"] != name], rows] if len(kept) else [rows], ignore_index=True)
+        columns = ["instrument", "cells", "realisations", "variable", "stage"]
+        columns += ["share", "share_error", "alone", "alone_error", "first", "first_error"]
+        kept[columns].to_csv(TABLE, index=False, float_format="%.4g")
+
+
+if __name__ == "__main__":
+    main()
