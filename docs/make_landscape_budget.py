@@ -12,7 +12,7 @@ import pandas as pd
 
 from fifesim.experiments.scatter.instruments import instrument_scenario
 from fifesim.experiments.scatter.shares import budget, table
-from fifesim.scenario.scenario import Scenario, default_landscape
+from fifesim.scenario.scenario import Scenario, default_scenario
 
 TABLE = Path(__file__).with_name("landscape_budget.csv")
 
@@ -22,7 +22,7 @@ WINDOWS = {"TM": (600, 3), "MSI": (600, 3), "MODIS": (900, 2)}
 
 def scenario_of(name):
     """The default landscape as an instrument sees it, with all that is known of that."""
-    sections = default_landscape().model_dump(exclude_unset=True)
+    sections = default_scenario().model_dump(exclude_unset=True)
     seen = instrument_scenario(name).model_dump(exclude_unset=True)
     return Scenario(**sections | {"sensor": seen["sensor"]})
 

@@ -116,6 +116,7 @@ from .scenario.simulation import simulate as simulate
 from .scenario.sweeps import sweep as sweep
 from .experiments.scatter.shares import budget as budget
 from .scenario.scenario import Scenario as Scenario
+from .scenario.scenario import default_scenario as default_scenario
 from .scenario.scenario import read_scenario as read_scenario
 from .experiments.friedl1995.reproduction import reproduce as reproduce
 from .experiments.friedl1995.figures import plot_reproduction as plot_reproduction

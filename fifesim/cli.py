@@ -278,9 +278,9 @@ def _open_remote(context):
 
 def _default(paper):
     """The scenario where none is given."""
-    from fifesim.scenario.scenario import Scenario, default_landscape
+    from fifesim.scenario.scenario import Scenario, default_scenario
 
-    return Scenario() if paper else default_landscape()
+    return Scenario() if paper else default_scenario()
 
 
 def _check_spelling(scenario):

@@ -269,7 +269,7 @@ def fpar(
     kernels = {code: (np.positive, [made[repr(each)]]) for code, each in told.items()}
     out = grids.place(by_class(kernels, land.cover), grids.geobox(land.lai))
     history = next(iter(made.values())).attrs["history"].splitlines()[-1] if len(made) == 1 else "fpar: by class"
-    return cf.label(out, "fpar", source=land.lai, history=history)
+    return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=land.lai, history=history)
 
 
 def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):

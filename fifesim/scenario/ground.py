@@ -45,14 +45,9 @@ def ground_scene(scenario, grid, chunks=None, dem=None):
 
 def _landscape(scenario, grid, chunks, dem):
     land, own = scenario.ground, scenario.landscape
-    means = {"soil": 0.0, "moisture": own.moisture, "brown": land.brown, "crown_cover": land.crown_cover}
-    drawn = {
-        name: Field(mean=means[name], sd=deviation, arp=own.arps.get(name, land.arp))
-        for name, deviation in own.deviations.items()
-        if deviation
-    }
-    if own.moisture and "moisture" not in drawn:
-        drawn["moisture"] = own.moisture
+    properties = drawn_properties(scenario)
+    if own.moisture and "moisture" not in properties:
+        properties["moisture"] = own.moisture
     cover = Patches(own.cover, own.size, _shares(scenario)) if own.cover in PATTERNS else own.cover
     if own.cover == "none":
         # One class, wherever its patches lie.
@@ -71,8 +66,29 @@ def _landscape(scenario, grid, chunks, dem):
         geometry=scenario.sun_and_view() if "illumination" in covary else None,
         seed=land.seed,
         chunks=chunks,
-        **drawn,
+        **properties,
     )
+
+
+def drawn_properties(scenario):
+    """
+    Properties of the ground of a scenario that vary in fields.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Returns
+    -------
+    properties : dict of str to fifesim.ground.landscape.drawn.Field
+    """
+    land, own = scenario.ground, scenario.landscape
+    means = {"soil": 0.0, "moisture": own.moisture, "brown": land.brown, "crown_cover": land.crown_cover}
+    return {
+        name: Field(mean=means[name], sd=deviation, arp=own.arps.get(name, land.arp))
+        for name, deviation in own.deviations.items()
+        if deviation
+    }
 
 
 def canopy_of(scenario):
@@ -91,9 +107,8 @@ def canopy_of(scenario):
     land = scenario.ground
     said = {"leaf_optics": land.leaf_optics(), "background": land.below_canopy(), "brown_leaf": land.dead_leaf()}
     said |= {name: getattr(land, name) for name in _NUMBERS}
-    left_out = {name for name in said if _all_say(scenario, _OF_A_CLASS.get(name, name))} | set(
-        scenario.landscape.deviations
-    )
+    left_out = {name for name in said if _all_say(scenario, _OF_A_CLASS.get(name, name))}
+    left_out |= set(drawn_properties(scenario))
     return {name: value for name, value in said.items() if name not in left_out}
 
 
@@ -114,13 +129,29 @@ def truth_of(scenario, setup, land):
     truth : xarray.Dataset
         ``lai``, ``fpar`` and where leaves are dead ``green_fpar``, and all else that varies but ``cover``.
     """
-    told = {name: getattr(setup, name) for name in ("geometry", "leaf_angles", "brown", "dissociation", "crown_cover")}
     kinds = {"fpar": "all"} | ({"green_fpar": "green"} if _has_dead_leaves(scenario) else {})
-    absorbed = {
-        name: fpar(land, leaves=kind, fpar_inf=scenario.ground.fpar_inf, **told) for name, kind in kinds.items()
-    }
+    absorbed = {name: absorbed_light(scenario, setup, land, kind) for name, kind in kinds.items()}
     varying = {name: each for name, each in land.data_vars.items() if name not in ("lai", "cover") and each.ndim == 2}
     return xr.Dataset({"lai": land["lai"], **absorbed, **varying})
+
+
+def absorbed_light(scenario, setup, land, leaves="all"):
+    """
+    Share of light that the leaves of a scenario absorb, by cells.
+
+    Parameters
+    ----------
+    scenario, setup, land
+        As in `truth_of`.
+    leaves : {"all", "green"}, optional
+
+    Returns
+    -------
+    fpar : xarray.DataArray, dims (y, x)
+        [1]
+    """
+    told = {name: getattr(setup, name) for name in ("geometry", "leaf_angles", "brown", "dissociation", "crown_cover")}
+    return fpar(land, leaves=leaves, fpar_inf=scenario.ground.fpar_inf, **told)
 
 
 def _has_dead_leaves(scenario):

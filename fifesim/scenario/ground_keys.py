@@ -101,7 +101,9 @@ class LandscapeKeys(Section):
 
     def is_one(self):
         """Whether one stand is everywhere, and nothing but its leaf area varies."""
-        return self.cover == "none" and not self.moisture and not any(self.deviations.values()) and not self.covary
+        return (
+            self.cover == "none" and not self.moisture and not any((*self.deviations.values(), *self.covary.values()))
+        )
 
     @field_validator("cover")
     @classmethod

@@ -9,10 +9,12 @@ from fifesim.atmosphere.schemes.engines import check_zenith
 from fifesim.base import datasets, fife, geometry
 from fifesim.base.foreign import shown
 from fifesim.ground.landscape.classes import fife_classes
+from fifesim.ground.landscape.drawn import SHARES
 from fifesim.rasters import grid as grids
 from fifesim.rasters import whereabouts
 from fifesim.rasters.covering import covering_grid
 from fifesim.rasters.sites import on_fife_site
+from fifesim.scenario.ground import drawn_properties
 from fifesim.scenario.ground_keys import COVARIATES
 from fifesim.scenario.keys import EXTENT, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
@@ -53,7 +55,7 @@ class Scenario(Keys):
     def _classes_of_a_cover(self):
         if self.landscape.cover == "none" and self.classes:
             raise ValueError('classes: are given, and landscape.cover is none: say how they lie, such as "pastures"')
-        if self.landscape.cover != "none" and self.ground.method == "periodic":
+        if not self.landscape.is_one() and self.ground.method == "periodic":
             raise ValueError(
                 'ground.method = "periodic" is for one stand: type method = "streaming", or cover = "none"'
             )
@@ -166,6 +168,7 @@ class Scenario(Keys):
         bands = [band.response for band in own.description.select(own.bands)]
         self._check_image(box)
         self._check_air()
+        self._check_fields()
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
         own_time = self.geometry.model_copy(update={"time": self._time()})
@@ -201,6 +204,15 @@ class Scenario(Keys):
                     f"{fitting[1]}: type smaller numbers"
                 )
 
+    def _check_fields(self):
+        """Shares that are drawn must be able to vary as they are asked to."""
+        for name, drawn in drawn_properties(self).items():
+            if name in SHARES:
+                try:
+                    drawn.distribution(name)
+                except ValueError as error:
+                    raise ValueError(f"landscape.deviations: {error}") from None
+
     def _check_air(self):
         """Light must come through it, by an engine that is there."""
         check_zenith("sza", self.sun_and_view().sza)
@@ -213,7 +225,7 @@ class Scenario(Keys):
         return {(*place, key): path for place, table in self.sections().items() for key, path in table.files.items()}
 
 
-def default_landscape():
+def default_scenario():
     """
     The landscape of the FIFE site that a run without a scenario simulates, ``data/fife.toml``.
 

@@ -1,6 +1,6 @@
 """Images of a scene with any of its stages at their ideal."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 
 import numpy as np
@@ -15,9 +15,9 @@ from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
-from fifesim.ground.canopy import raster as canopy
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, operators
+from fifesim.scenario.ground import absorbed_light
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
@@ -237,10 +237,10 @@ def _truths(scene, switches):
 
 def _truth(scene, ground, curve):
     """LAI and FPAR by blocks."""
-    own, geometry = scene.scenario.ground, scene.setup.geometry
+    setup = _setup_over(scene, ground)
 
     def fpar(area):
-        return canopy.fpar(area, geometry=geometry, leaf_angles=own.leaf_angles, fpar_inf=own.fpar_inf)
+        return absorbed_light(scene.scenario, setup, ground.land.assign(lai=area))
 
     lai, size, (rows, columns) = ground.land["lai"], grids.cell_size(scene.blocks)[0], scene.shape
     return [
@@ -249,9 +249,16 @@ def _truth(scene, ground, curve):
     ]
 
 
+def _setup_over(scene, ground):
+    """The setup without what the cells say themselves."""
+    said = {each.name: each.default for each in fields(Setup) if each.name in ground.land}
+    return replace(scene.setup, **said)
+
+
 def _cells(scene, ground, at_work):
     """Red, near infrared and NDVI of the cells, as light leaves the ground or the air, shape (3, y, x)."""
-    setup = scene.setup if "topography" in at_work else replace(scene.setup, dem=None, horizon=None)
+    setup = _setup_over(scene, ground)
+    setup = setup if "topography" in at_work else replace(setup, dem=None, horizon=None)
 
     def reflectance(area):
         return reflectance_of(setup, ground.land.assign(lai=area))

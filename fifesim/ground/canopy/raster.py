@@ -186,7 +186,7 @@ def fpar(
     out = grids.place(out, grids.geobox(lai))
     of = "" if leaves == "all" else "green leaves, "
     said = f"fpar: Beer's law, {of}{canopy_shares.in_words(shares)}K {extinction:.4f}, limit {fpar_inf:g}"
-    return cf.label(out, "fpar", source=lai, history=said)
+    return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=lai, history=said)
 
 
 def checked_scene(lai):

@@ -1,6 +1,7 @@
 """Properties of the ground that vary in fields: what values they have, and how coarsely they vary."""
 
 from dataclasses import dataclass
+from numbers import Real
 
 from scipy import stats
 
@@ -45,7 +46,7 @@ class Field:
     def __post_init__(self):
         for name in ("mean", "sd", "arp"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float):
+            if isinstance(value, bool) or not isinstance(value, Real):
                 raise TypeError(f"Field: {name} must be a number, got {described(value)}: type Field(mean=0.2, sd=0.1)")
         if not 0 <= self.sd < float("inf"):
             raise ValueError(f"Field: sd must be at least 0, got {self.sd:g}: it is a standard deviation")
@@ -74,7 +75,12 @@ class Field:
         ValueError
             If nothing between 0 and 1 has this mean and standard deviation.
         """
-        most = (self.mean * (1 - self.mean)) ** 0.5 if 0 < self.mean < 1 else 0.0
+        if not 0 < self.mean < 1:
+            raise ValueError(
+                f"{name} lies between 0 and 1: for it to vary its mean must lie between them, such as 0.2, got "
+                f"{self.mean:g}"
+            )
+        most = (self.mean * (1 - self.mean)) ** 0.5
         if not 0 < self.sd < most:
             raise ValueError(
                 f"{name} lies between 0 and 1: with a mean of {self.mean:g} its sd must be above 0 and below "

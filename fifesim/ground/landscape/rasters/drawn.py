@@ -40,9 +40,9 @@ def drawn_fields(grid, drawn, covary, arps, **options):
     if not covary:
         made = [landscape_fields(grid, others, **options)] if others else [{}]
     else:
-        made = [landscape_fields(grid, {"lai": arp, **others}, covary, **options) for arp in dict.fromkeys(arps)]
+        # Leaf area comes last: it takes of the noise of the others what its own arp needs, and they stay as they are.
+        made = [landscape_fields(grid, {**others, "lai": arp}, covary, **options) for arp in dict.fromkeys(arps)]
     leaf_area = {arp: fields["lai"] for arp, fields in zip(dict.fromkeys(arps), made, strict=False) if covary}
-    # Classes of another arp have noise of the same places: the properties are those beside the first.
     return leaf_area, {name: _values(name, each, made[0][name]) for name, each in drawn.items()}
 
 
