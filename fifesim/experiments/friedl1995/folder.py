@@ -40,7 +40,8 @@ def reproduce_to_folder(
     overwrite : bool, optional
         Replace these files where the folder holds something; other files stay.
     **inputs
-        ``reading``, ``dem``, ``densities``, ``optics``, ``background`` and ``sensor``, as in `fifesim.reproduce`.
+        ``reading``, ``dem``, ``densities``, ``optics``, ``background``, ``sensor``, ``west`` and ``north``, as in
+        `fifesim.reproduce`.
 
     Returns
     -------
@@ -126,7 +127,7 @@ def command(options):
     """
     words = ["fifesim", "reproduce"]
     defaults = {"reading": "native", "dem": "flat", "sensor": TABLE_1}
-    for name in (*defaults, "densities", "optics", "background", "realisations", "cells", "seed"):
+    for name in (*defaults, "densities", "optics", "background", "west", "north", "realisations", "cells", "seed"):
         value = options.get(name)
         if value is not None and value != defaults.get(name):
             words += [f"--{name}", os.fspath(value) if is_path(value) else str(value)]
