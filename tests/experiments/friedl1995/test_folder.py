@@ -54,8 +54,9 @@ def test_command_writes_tables_figures_scenarios_and_page(prepared, tmp_path):
     assert names == TABLES | pictures | {"scenarios", "report.html"}
     assert {"figure3.png", "figure9.png", "figure9_aligned.png"} <= pictures and len(pictures) == 11
     table = pd.read_csv(tmp_path / "out" / "table2.csv")
-    wanted = {f"{before}{name}" for before in ("", "paper_") for name in friedl1995_table.COEFFICIENTS}
+    wanted = {f"{before}{name}" for before in ("", "paper_", "aligned_") for name in friedl1995_table.COEFFICIENTS}
     assert len(table) == 18 and wanted <= set(table.columns)
+    assert (table["aligned_r2"] > table["r2"]).mean() > 0.5
     scenes = sorted((tmp_path / "out" / "scenarios").iterdir())
     assert len(scenes) == 9 and all([path.name for path in scene.iterdir()] == ["scenario.toml"] for scene in scenes)
     assert read_scenario(scenes[0] / "scenario.toml").ground.seed == 1995
