@@ -64,6 +64,7 @@ app = typer.Typer(
 )
 
 
+_Paper = Annotated[bool, typer.Option("--paper", help="The paper's one stand, in the place of the landscape.")]
 _AllowRemote = Annotated[
     bool, typer.Option("--allow-remote", help="Rasters may come from addresses, in any format of GDAL.")
 ]
@@ -89,7 +90,7 @@ def _main(
 @app.command()
 def simulate(
     context: typer.Context,
-    scenario: Annotated[Path | None, typer.Argument(help="TOML file; the whole FIFE site by default.")] = None,
+    scenario: Annotated[Path | None, typer.Argument(help="TOML file; a landscape on the FIFE site by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("fife"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
@@ -98,6 +99,7 @@ def simulate(
     workers: Annotated[int | None, typer.Option(min=1, help="Compute on so many processes.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")] = False,
+    paper: _Paper = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only estimate time, memory and disk.")] = False,
     allow_remote: _AllowRemote = False,
 ):
@@ -111,13 +113,13 @@ def simulate(
         from fifesim.output.run.folder import simulate_to_folder
         from fifesim.output.run.identity import scenario_to_resume
         from fifesim.output.run.workers import cluster
-        from fifesim.scenario.scenario import Scenario, read_scenario
+        from fifesim.scenario.scenario import read_scenario
 
     if allow_remote:
         _open_remote(context)
     check_folder(output, overwrite, resume)
     found = scenario_to_resume(output) if resume and scenario is None else None
-    found = found or (Scenario() if scenario is None else read_scenario(scenario))
+    found = found or (_default(paper) if scenario is None else read_scenario(scenario))
     if dry_run:
         options = {"threads": workers or threads, "scene": scene, "start": since_start()}
         _say(estimate_in_words(estimate(found, output, **options), as_json))
@@ -211,12 +213,11 @@ def budget(
 
 
 @app.command()
-def scenario():
+def scenario(paper: _Paper = False):
     """Print the default scenario, every key with its unit, to edit."""
-    from fifesim.scenario.scenario import Scenario
     from fifesim.scenario.toml import write_scenario
 
-    _say(write_scenario(Scenario().complete()).rstrip())
+    _say(write_scenario(_default(paper).complete()).rstrip())
 
 
 @app.command()
@@ -282,6 +283,13 @@ def _open_remote(context):
     from fifesim.rasters.opening import remote_allowed
 
     context.with_resource(remote_allowed())
+
+
+def _default(paper):
+    """The scenario where none is given."""
+    from fifesim.scenario.scenario import Scenario, default_landscape
+
+    return Scenario() if paper else default_landscape()
 
 
 def _check_spelling(scenario):

@@ -102,7 +102,7 @@ KINDS = (
 """What an argument may be, by its name, which means the same everywhere."""
 
 OF_FUNCTION = {
-    "landscape": _of(FILE_OR_RASTER, "lai") | _of(ANYTHING, "brown crown_cover"),
+    "landscape": _of(FILE_OR_RASTER, "lai") | _of(ANYTHING, "brown crown_cover soil moisture"),
     "arp_for_length": _of(NUMBER, "length"),
     "sense": _of(OFFSET, "offset"),
     "read_aerosol": _of(TWO, "layer") | _of(TABLES, "source"),

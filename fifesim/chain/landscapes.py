@@ -80,9 +80,9 @@ def land_of(scene):
     return Land(scene["lai"], north_up(scene["cover"]), classes_of(scene["cover"]), cells)
 
 
-def level_reflectance(land, bands, canopy, *, exact, **scene):
+def canopies_of(land, bands, canopy, exact=False):
     """
-    Reflectance factor of the canopies of a scene, for flat ground.
+    Canopies of a scene by their numbers in each band.
 
     Parameters
     ----------
@@ -90,7 +90,36 @@ def level_reflectance(land, bands, canopy, *, exact, **scene):
     bands : sequence of fifesim.sensor.description.band.InstrumentBand
     canopy : dict of str
         What `fifesim.surface_reflectance` was told of the canopy, by the names of its arguments.
-    exact : bool
+    exact : bool, optional
+        As in `fifesim.surface_reflectance`.
+
+    Returns
+    -------
+    canopies : dict of int to dict
+        By codes of the classes, None where there are none: what `ground.canopy.rasters.evaluation.canopy_kernel` takes.
+
+    Raises
+    ------
+    ValueError
+        As in `fifesim.surface_reflectance`; if an argument is given that all classes say themselves.
+    """
+    optics = _Optics(tuple(band.response for band in bands), land.lai, exact)
+    _check_used(land, canopy)
+    if land.cover is None:
+        return {None: optics.of({**canopy, **land.cells})}
+    return {each.code: optics.of(_told(each, canopy, land.cells)) for each in land.classes}
+
+
+def level_reflectance(land, bands, canopies, **scene):
+    """
+    Reflectance factor of the canopies of a scene, for flat ground.
+
+    Parameters
+    ----------
+    land : Land
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
+    canopies : dict
+        From `canopies_of`.
     **scene
         What `ground.canopy.raster.level_reflectance` takes besides.
 
@@ -102,19 +131,12 @@ def level_reflectance(land, bands, canopy, *, exact, **scene):
     Raises
     ------
     ValueError
-        As in `fifesim.surface_reflectance`; if an argument is given that all classes say themselves.
+        As in `fifesim.surface_reflectance`.
     """
-    responses = tuple(band.response for band in bands)
     named = {"bands": [band.name for band in bands], "wavelengths": [band.wavelength for band in bands]}
-    optics = _Optics(responses, land.lai, exact)
-    _check_used(land, canopy)
     if land.cover is None:
-        told = {**canopy, **land.cells}
-        scene |= soils.in_words(told["soil"], told["moisture"])
-        return ground.level_reflectance(land.lai, **optics.of(told), **named, exact=exact, **scene)
-    canopies = {each.code: optics.of(_told(each, canopy, land.cells)) for each in land.classes}
-    scene |= soils.in_words(*({**canopy, **land.cells}[name] for name in ("soil", "moisture")))
-    return reflectance_of_classes(land.lai, land.cover, canopies, **named, exact=exact, **scene)
+        return ground.level_reflectance(land.lai, **canopies[None], **named, **scene)
+    return reflectance_of_classes(land.lai, land.cover, canopies, **named, **scene)
 
 
 def _told(kind, canopy, cells):

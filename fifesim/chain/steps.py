@@ -6,6 +6,7 @@ from fifesim.chain import landscapes
 from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
 from fifesim.ground.canopy.crowns import SHAPE
+from fifesim.ground.canopy.rasters import soils
 from fifesim.ground.terrain.rasters import light as terrain
 from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.rasters import directions
@@ -133,14 +134,17 @@ def surface_reflectance(
     canopy = {"leaf_optics": leaf_optics, "background": background, "leaf_angles": leaf_angles, "hotspot": hotspot}
     canopy |= {"brown": brown, "dissociation": dissociation, "brown_leaf": brown_leaf}
     canopy |= {"crown_cover": crown_cover, "crown_shape": crown_shape, "soil": soil, "moisture": moisture}
+    land = land._replace(lai=lai)
+    canopies = landscapes.canopies_of(land, selected, canopy, exact)
     level = landscapes.level_reflectance(
-        land._replace(lai=lai),
+        land,
         selected,
-        canopy,
+        canopies,
         diffuse_fraction=atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry),
         geometry=geometry,
         exact=exact,
         atmosphere=atmosphere.text,
+        **soils.in_words(*({**canopy, **land.cells}[name] for name in ("soil", "moisture"))),
         **attributes_of(description),
     )
     if dem is None:

@@ -17,7 +17,16 @@ _NO_DATA = (0.85, 0.85, 0.85)
 _LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)))
 _LINE, _BAND = "#b2182b", "#f4a582"
 
-NAMES = {"lai": "leaf area index", "fpar": "FPAR", "ndvi": "NDVI"}
+NAMES = {
+    "lai": "leaf area index",
+    "fpar": "FPAR",
+    "green_fpar": "FPAR of green leaves",
+    "brown": "dead share of the leaf area",
+    "crown_cover": "crown cover",
+    "soil": "brightness of the soil",
+    "moisture": "moisture of the soil",
+    "ndvi": "NDVI",
+}
 """Quantities in words."""
 
 

@@ -7,7 +7,6 @@ from fifesim.output import pages
 from fifesim.output.figures import NAMES, detail_figure, fit_figure, histogram_figure, map_figure, terrain_figure
 from fifesim.output.pairing import pairing_rows
 from fifesim.rasters import grid as grids
-from fifesim.scenario.keys import Keys
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words
 
@@ -115,6 +114,8 @@ def title(scenario):
     """
     ground = scenario.ground
     scene = Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
+    if scenario.landscape.cover != "none":
+        scene = f"{', '.join(scenario.class_table())} in {Path(scenario.landscape.cover).name}"
     return f"{scene}, seen by {Path(scenario.sensor.instrument).name}"
 
 
@@ -163,10 +164,9 @@ def _ground(terrain):
 def _parameters(scenario):
     """Key, value, unit and meaning of every parameter, by section."""
     sections = []
-    for name in Keys.model_fields:
-        section = getattr(scenario, name)
+    for place, section in scenario.sections().items():
         rows = []
-        for key, known in type(section).model_fields.items():
+        for key, known in section.said.items():
             value, unit = getattr(section, key), section.unit(key)
             if isinstance(value, dict):
                 value = ", ".join(f"{band} {number:g}" for band, number in value.items())
@@ -179,7 +179,7 @@ def _parameters(scenario):
             elif section.names_a_file(key, value):
                 value = Path(value).name
             rows.append((key, "not given" if value is None else value, unit, known.description))
-        sections.append((name, rows))
+        sections.append((".".join(place), rows))
     return sections
 
 

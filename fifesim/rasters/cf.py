@@ -28,6 +28,7 @@ QUANTITIES = {
         "fraction_of_surface_downwelling_photosynthetic_radiative_flux_absorbed_by_vegetation",
         "fraction of absorbed photosynthetically active radiation",
     ),
+    "green_fpar": Quantity("1", "", "fraction of photosynthetically active radiation that green leaves absorb"),
     "soil": Quantity("1", "", "brightness of the soil", "change of its reflectance at 0.55 um"),
     "moisture": Quantity("1", "", "moisture of the soil", "0 where it is dry, 1 where it is saturated"),
     "normal_score": Quantity("1", "", "standard normal deviate"),

@@ -3,12 +3,13 @@
 import math
 import re
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from fifesim.base import fife
 from fifesim.base.foreign import shown
+from fifesim.scenario.ground_keys import LONGEST_NAME, ByName, ClassKeys, GroundKeys, LandscapeKeys
 from fifesim.scenario.section import Section, file, nearest, number, seed, text
 
 LAND_FORMS = ("flint-hills", "flat")
@@ -21,12 +22,6 @@ _TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,6})?)?(Z|[+-]\d\d
 _YEARS = 1700, 2200  # what dates in nanoseconds hold
 
 
-# By the name of a band, a spectrum or a part of a leaf.
-_ByName = dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False)]]
-_LONGEST_NAME = 60
-_LEAST_HOTSPOT = 1e-6  # below it the hot spot is narrower than the sun
-
-
 class GridKeys(Section):
     """Ground cells. Without corner and size, a scene that reads a LAI file covers that file."""
 
@@ -36,52 +31,6 @@ class GridKeys(Section):
     width: float = number(fife.SIZE, "m", "west to east", gt=0)
     height: float = number(fife.SIZE, "m", "north to south", gt=0)
     cell: float = number(30 / 9, "m", "size of a cell", ge=0.001)
-
-
-class GroundKeys(Section):
-    """Leaf area, leaves and what lies below them."""
-
-    distribution: str = file("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples", suffix=".csv")
-    arp: float = number(0.15, "1", "autoregressive parameter; larger is smoother", ge=0, lt=0.25)
-    seed: int = seed(7, "of the random field, a whole number")
-    method: Literal["streaming", "periodic"] = text("streaming", "streaming, or the paper's periodic (in memory)")
-    lai_file: str | None = file(None, "a LAI map to use instead of a random field")
-    leaf_angles: str = text("spherical", "leaf angle distribution")
-    hotspot: float = number(0.0, "1", "leaf size over canopy height", ge=0, le=10)
-    fpar_inf: float = number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
-    leaf_reflectance: _ByName = text({}, "by band [1]; all bands or none")
-    leaf_transmittance: _ByName = text({}, "by band [1]; all bands or none")
-    background: _ByName = text({}, "reflectance below the canopy by band [1]; all bands or none")
-    leaf: _ByName = text(
-        {},
-        "instead of leaf optics by band: structure [1], chlorophyll, carotenoids, anthocyanins [ug cm-2], "
-        "brown [1], water [cm], dry_matter [g cm-2]",
-    )
-    background_spectra: _ByName = text(
-        {}, "instead of background by band: shares of soil_dry, soil_wet, dead_grass, golden_grass, shade"
-    )
-
-    @field_validator("hotspot")
-    @classmethod
-    def _wide_enough(cls, value):
-        if 0 < value < _LEAST_HOTSPOT:
-            raise ValueError(f"must be 0, for no hot spot, or at least {_LEAST_HOTSPOT:g}")
-        return value
-
-    @field_validator("leaf_reflectance", "leaf_transmittance", "background", "leaf", "background_spectra")
-    @classmethod
-    def _names_that_print(cls, value):
-        for name in value:
-            if len(name) > _LONGEST_NAME or not name.isprintable():
-                raise ValueError(f"{shown(name)} is no name: names have up to {_LONGEST_NAME} characters that print")
-        return value
-
-    @model_validator(mode="after")
-    def _one_description(self):
-        for spectra, by_band in (("leaf", "leaf_reflectance"), ("background_spectra", "background")):
-            if getattr(self, spectra) and getattr(self, by_band):
-                raise ValueError(f"ground.{spectra} and ground.{by_band} are both given: drop one of them")
-        return self
 
 
 class TerrainKeys(Section):
@@ -206,7 +155,7 @@ class SensorKeys(Section):
     )
     response: str | None = text(None, "spatial: system, what is known of the instrument; detector; or paper, for TM")
     noise: list[str] = text([], "of the detectors: shot, thermal, fixed-pattern")
-    noise_model: _ByName = text(
+    noise_model: ByName = text(
         {},
         "of every band, instead of the instrument's: thermal [W m-2 sr-1 um-1], shot [W m-2 sr-1 um-1], detectors, "
         "gain_spread [1], offset_spread [W m-2 sr-1 um-1]",
@@ -237,14 +186,55 @@ class SensorKeys(Section):
 
 
 class Keys(Section):
-    """The sections of a scenario, spelled as they may be."""
+    """The sections of a scenario, spelled as they may be; that of each class is ``[classes.NAME]``."""
 
     grid: GridKeys = GridKeys()
     ground: GroundKeys = GroundKeys()
+    landscape: LandscapeKeys = LandscapeKeys()
+    classes: dict[str, ClassKeys] = Field({})
     terrain: TerrainKeys = TerrainKeys()
     geometry: SunAndViewKeys = SunAndViewKeys()
     atmosphere: AirKeys = AirKeys()
     sensor: SensorKeys = SensorKeys()
+
+    @field_validator("classes")
+    @classmethod
+    def _words(cls, value):
+        for name in value:
+            if len(name) > LONGEST_NAME or not name.isprintable() or len(name.split()) != 1:
+                raise ValueError(
+                    f"{shown(name)} is no name of a class: names are one word of up to {LONGEST_NAME} characters"
+                )
+        return value
+
+    @classmethod
+    def section(cls, place):
+        """
+        What knows the keys of a table.
+
+        Parameters
+        ----------
+        place : sequence of str
+            ``("ground",)``, or ``("classes", NAME)``.
+
+        Returns
+        -------
+        section : type, or None
+            Where there is none.
+        """
+        name, *inside = place
+        if name not in cls.model_fields or (name == "classes") != bool(inside):
+            return None
+        annotation = cls.model_fields[name].annotation
+        return get_args(annotation)[1] if inside else annotation
+
+    def sections(self):
+        """The tables of a scenario, a dict of `Section` by place as in `section`."""
+        found = {}
+        for name in type(self).model_fields:
+            value = getattr(self, name)
+            found |= {(name, key): each for key, each in value.items()} if name == "classes" else {(name,): value}
+        return found
 
     @model_validator(mode="before")
     @classmethod

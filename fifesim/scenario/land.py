@@ -62,6 +62,24 @@ def elevation(scenario, grid, chunks=None):
     return dem, horizon, reach
 
 
+def cut(raster, grid):
+    """
+    A raster cut to a grid of its cells.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray, dims (..., y, x)
+    grid : odc.geo.geobox.GeoBox
+        Within that of the raster.
+
+    Returns
+    -------
+    raster : xarray.DataArray, dims (..., y, x)
+    """
+    rows, columns = grids.lattice_offset(grids.geobox(raster), grid)
+    return raster.isel(y=slice(rows, rows + grid.shape.y), x=slice(columns, columns + grid.shape.x))
+
+
 def _middle(shape):
     return tuple(slice(max(size // 2 - 8, 0), size // 2 + 8) for size in shape)
 

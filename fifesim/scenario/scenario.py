@@ -2,28 +2,33 @@
 
 import os
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from fifesim.atmosphere.schemes import six_s
 from fifesim.atmosphere.schemes.engines import check_zenith
-from fifesim.base import fife, geometry
+from fifesim.base import datasets, fife, geometry
 from fifesim.base.foreign import shown
+from fifesim.ground.landscape.classes import fife_classes
 from fifesim.rasters import grid as grids
 from fifesim.rasters import whereabouts
 from fifesim.rasters.covering import covering_grid
 from fifesim.rasters.sites import on_fife_site
+from fifesim.scenario.ground_keys import COVARIATES
 from fifesim.scenario.keys import EXTENT, GridKeys, Keys
-from fifesim.scenario.sections import Air, Ground, Sensor, Terrain
+from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.scenario.toml import load_values, mistakes
+
+# Shares of classes may miss 1 by rounding.
+_WHOLE = 1e-6
 
 
 class Scenario(Keys):
     """
-    What a run simulates; the defaults are the paper's case on the whole FIFE site.
+    What a run simulates; the defaults are the paper's case, one stand of plants on the whole FIFE site.
 
     Parameters
     ----------
-    grid, ground, terrain, geometry, atmosphere, sensor : mapping
+    grid, ground, landscape, classes, terrain, geometry, atmosphere, sensor : mapping
         Their keys are those of `keys`, and their meaning is in `sections`.
 
     Raises
@@ -33,6 +38,7 @@ class Scenario(Keys):
     """
 
     ground: Ground = Ground()
+    classes: dict[str, CoverStand] = Field({})
     terrain: Terrain = Terrain()
     atmosphere: Air = Air()
     sensor: Sensor = Sensor()
@@ -42,6 +48,31 @@ class Scenario(Keys):
             super().__init__(**sections)
         except ValidationError as error:
             raise ValueError(mistakes(error)) from None
+
+    @model_validator(mode="after")
+    def _classes_of_a_cover(self):
+        if self.landscape.cover == "none" and self.classes:
+            raise ValueError('classes: are given, and landscape.cover is none: say how they lie, such as "pastures"')
+        if self.landscape.cover != "none" and self.ground.method == "periodic":
+            raise ValueError(
+                'ground.method = "periodic" is for one stand: type method = "streaming", or cover = "none"'
+            )
+        needing = [name for name in COVARIATES if self.landscape.covary.get(name)]
+        if needing and self.terrain.dem == "flat":
+            raise ValueError(f"landscape.covary: {', '.join(needing)} is of an elevation, and terrain.dem is flat")
+        if self.landscape.covary and self.ground.lai_file:
+            raise ValueError("landscape.covary: a lai_file goes with the ground as it does: leave covary out")
+        shares = [stand.share for stand in self.classes.values()]
+        if any(shares) and not all(shares):
+            lacking = ", ".join(name for name, stand in self.classes.items() if stand.share is None)
+            raise ValueError(f"classes: {lacking} has no share, others have: give it to all, or to none")
+        if any(shares) and abs(sum(shares) - 1) > _WHOLE:
+            raise ValueError(f"classes: their shares sum to {sum(shares):g}: they must sum to 1")
+        return self
+
+    def class_table(self):
+        """Classes of cover by name, a dict of `CoverClass`; those of FIFE where the keys say none."""
+        return {name: stand.cover_class(name, self.ground) for name, stand in self.classes.items()} or fife_classes()
 
     def geobox(self):
         """
@@ -128,19 +159,21 @@ class Scenario(Keys):
         ImportError
             If the engine is not installed.
         """
-        for (section, key), path in self.files.items():
+        for place, path in self.files.items():
             if not os.path.exists(path) and not path.startswith("/vsi"):
-                raise ValueError(f"{section}.{key} = {shown(path)}: there is no such file")
+                raise ValueError(f"{'.'.join(place)} = {shown(path)}: there is no such file")
         box, own = self.geobox(), self.sensor
         bands = [band.response for band in own.description.select(own.bands)]
         self._check_image(box)
         self._check_air()
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
-        sections = {"ground": ground, "terrain": self.terrain, "atmosphere": self.atmosphere, "sensor": sensor}
-        sections["geometry"] = self.geometry.model_copy(update={"time": self._time()})
-        whole = {name: section.with_whole_paths() for name, section in sections.items()}
-        return self.model_copy(update={"grid": grid_keys(box), **whole})
+        own_time = self.geometry.model_copy(update={"time": self._time()})
+        known = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor}
+        found = self.model_copy(update=known)
+        whole = {place: section.with_whole_paths() for place, section in found.sections().items()}
+        classes = {place[1]: section for place, section in whole.items() if place[0] == "classes"}
+        return found.model_copy(update={place[0]: each for place, each in whole.items()} | {"classes": classes})
 
     def _check_image(self, box):
         """Pixels must be at least cells, and see them."""
@@ -176,9 +209,19 @@ class Scenario(Keys):
 
     @property
     def files(self):
-        """Paths of the files that the scenario reads, by section and key, a dict of (str, str) to str."""
-        sections = {name: getattr(self, name) for name in type(self).model_fields}
-        return {(name, key): path for name, section in sections.items() for key, path in section.files.items()}
+        """Paths of the files that the scenario reads, by the names of table and key, a dict of tuple to str."""
+        return {(*place, key): path for place, table in self.sections().items() for key, path in table.files.items()}
+
+
+def default_landscape():
+    """
+    The landscape of the FIFE site that a run without a scenario simulates, ``data/fife.toml``.
+
+    Returns
+    -------
+    scenario : Scenario
+    """
+    return read_scenario(datasets.path("fife.toml"))
 
 
 def grid_keys(box):

@@ -171,6 +171,11 @@ class Section(BaseModel):
         return value
 
     @property
+    def said(self):
+        """Keys that the table says, in their order, a dict of `pydantic.fields.FieldInfo`."""
+        return type(self).model_fields
+
+    @property
     def files(self):
         """Files that the section names, a dict of their paths by key."""
         values = {key: getattr(self, key) for key in type(self).model_fields}

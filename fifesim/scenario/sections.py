@@ -13,18 +13,22 @@ from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, spectrum_names
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
+from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.terrain.units import metres_per_unit
-from fifesim.scenario.keys import AirKeys, GroundKeys, SensorKeys, TerrainKeys
+from fifesim.scenario.ground_keys import ClassKeys, GroundKeys, StandKeys
+from fifesim.scenario.keys import AirKeys, SensorKeys, TerrainKeys
 from fifesim.scenario.section import nearest
 from fifesim.sensor.description.instruments import instrument, noise_of
 from fifesim.sensor.response.noise import NoiseModel, check_kinds
 
+# Keys of a stand that a class of cover has by the same names.
+_OF_A_CLASS = ("arp", "leaf_angles", "hotspot", "brown", "dissociation", "crown_cover", "crown_shape")
 _BY_BAND = ("leaf_reflectance", "leaf_transmittance")
 
 
-class Ground(GroundKeys):
-    """Leaf area, leaves and what lies below them."""
+class Stand(StandKeys):
+    """Leaf area, leaves and what lies below them, of a stand of plants."""
 
     @field_validator("distribution")
     @classmethod
@@ -39,7 +43,7 @@ class Ground(GroundKeys):
         leaf_angle_classes(value)
         return value
 
-    @field_validator("leaf")
+    @field_validator("leaf", "brown_leaf")
     @classmethod
     def _known_leaf(cls, value):
         known = [each.name for each in fields(Leaf)]
@@ -56,14 +60,6 @@ class Ground(GroundKeys):
             if name not in spectrum_names():
                 raise ValueError(f"unknown spectrum {name!r}: allowed are {', '.join(spectrum_names())}")
         return Background(value).fractions if value else value
-
-    @model_validator(mode="after")
-    def _streaming_limit(self):
-        if self.method == "streaming" and self.arp > LARGEST_STREAMING_ARP:
-            raise ValueError(
-                f'arp = {self.arp:g}: at most {LARGEST_STREAMING_ARP} when streaming; or method = "periodic"'
-            )
-        return self
 
     def leaf_optics(self):
         """
@@ -82,12 +78,28 @@ class Ground(GroundKeys):
         if self.leaf:
             return Leaf(**self.leaf)
         if set(self.leaf_reflectance) != set(self.leaf_transmittance):
-            raise ValueError("ground.leaf_reflectance and ground.leaf_transmittance must name the same bands")
+            raise ValueError("leaf_reflectance and leaf_transmittance must name the same bands")
         return {band: (value, self.leaf_transmittance[band]) for band, value in self.leaf_reflectance.items()} or None
 
     def below_canopy(self):
         """Background by band or as a mixture of spectra, a dict or `Background`; None for the default."""
         return Background(self.background_spectra) if self.background_spectra else self.background or None
+
+    def dead_leaf(self):
+        """What dead leaves are made of, a `Leaf`; None for the default."""
+        return Leaf(**self.brown_leaf) if self.brown_leaf else None
+
+
+class Ground(Stand, GroundKeys):
+    """Leaf area, leaves and what lies below them."""
+
+    @model_validator(mode="after")
+    def _streaming_limit(self):
+        if self.method == "streaming" and self.arp > LARGEST_STREAMING_ARP:
+            raise ValueError(
+                f'arp = {self.arp:g}: at most {LARGEST_STREAMING_ARP} when streaming; or method = "periodic"'
+            )
+        return self
 
     def complete_optics(self, bands):
         """
@@ -113,6 +125,36 @@ class Ground(GroundKeys):
         if not self.leaf:
             keys |= {key: _by_band(names, each) for key, each in zip(_BY_BAND, leaf, strict=True)}
         return keys if self.background_spectra else keys | {"background": _by_band(names, background)}
+
+
+class CoverStand(Stand, ClassKeys):
+    """A class of cover; what it leaves out is that of [ground]."""
+
+    @field_validator("arp")
+    @classmethod
+    def _streaming_arp(cls, value):
+        if value > LARGEST_STREAMING_ARP:
+            raise ValueError(f"must be at most {LARGEST_STREAMING_ARP} in a landscape")
+        return value
+
+    def cover_class(self, name, ground):
+        """
+        The class; what it leaves out of its canopy is said by the call of `surface_reflectance`.
+
+        Parameters
+        ----------
+        name : str
+        ground : Ground
+            Whose leaf area it has where it says none.
+
+        Returns
+        -------
+        cover_class : fifesim.ground.landscape.classes.CoverClass
+        """
+        optics = {"leaf": self.leaf_optics(), "brown_leaf": self.dead_leaf(), "background": self.below_canopy()}
+        numbers = {key: getattr(self, key) for key in _OF_A_CLASS if key in self.model_fields_set}
+        lai = (self if "distribution" in self.model_fields_set else ground).distribution
+        return CoverClass(name, lai=lai, code=self.code, **optics, **numbers)
 
 
 def _by_band(names, values):

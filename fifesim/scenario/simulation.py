@@ -4,16 +4,15 @@ from dataclasses import replace
 
 import xarray as xr
 
-from fifesim.analysis.rasters.means import aggregate
 from fifesim.chain import steps as chain
 from fifesim.chain.comparison import shows_ndvi
 from fifesim.chain.images import ndvi
+from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, image_of, reflectance_of
-from fifesim.ground.canopy import raster as ground
-from fifesim.ground.landscape.raster import lai_scene, lai_window
 from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
-from fifesim.scenario.land import elevation
+from fifesim.scenario.ground import canopy_of, ground_scene, truth_of
+from fifesim.scenario.land import cut, elevation
 from fifesim.scenario.scenario import Scenario
 
 
@@ -43,22 +42,22 @@ def simulate(scenario, chunks="auto"):
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
-    grid, land, setup = scenario.geobox(), scenario.ground, setup_of(scenario)
+    grid, setup = scenario.geobox(), setup_of(scenario)
 
-    def means(array):
-        return aggregate(array, scenario.sensor.size, min_valid=setup.min_valid)
+    def means(rasters):
+        return aggregate(rasters, scenario.sensor.size, min_valid=setup.min_valid)
 
-    lai = leaf_area(scenario, grid, chunks)
-    fpar = ground.fpar(lai, geometry=setup.geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
-    level = reflectance_of(setup, lai)
-    nodes = {"scene": {"lai": lai}, "truth": {"lai": means(lai), "fpar": means(fpar)}}
     dem, horizon, reach = elevation(scenario, grid, chunks)
+    land = ground_scene(scenario, grid, chunks, dem)
+    land = land if isinstance(land, xr.Dataset) else land.to_dataset(name="lai")
+    level = reflectance_of(setup, land)
+    nodes = {"scene": dict(land.data_vars), "truth": dict(means(truth_of(scenario, setup, land)).data_vars)}
     if dem is None:
         reflectance = level
     else:
-        reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), lai)
+        reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land)
         kt = chain.kt(level, dem, horizon=horizon)
-        dem, slope = _cut(dem, grid), _cut(slopes.slope(dem), grid)
+        dem, slope = cut(dem, grid), cut(slopes.slope(dem), grid)
         nodes["scene"]["dem"] = dem
         nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt)}
         nodes["level"] = {"dn": image_of(setup, level)}
@@ -69,29 +68,6 @@ def simulate(scenario, chunks="auto"):
     if reach:
         tree["terrain"].attrs = {f"reach_{side}": distance for side, distance in reach.items()}
     return tree
-
-
-def leaf_area(scenario, grid, chunks=None):
-    """
-    Leaf area of a scenario.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    grid : odc.geo.geobox.GeoBox
-        Of ground cells.
-    chunks : mapping or int, optional
-        Makes it lazy.
-
-    Returns
-    -------
-    lai : xarray.DataArray, dims (y, x)
-        [m2 m-2]
-    """
-    land = scenario.ground
-    if land.lai_file:
-        return lai_window(land.lai_file, grid, chunks=chunks)
-    return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
 
 
 def setup_of(scenario):
@@ -112,17 +88,14 @@ def setup_of(scenario):
     ValueError
         If the instrument or its bands are unknown.
     """
-    land, own = scenario.ground, scenario.sensor
+    own = scenario.sensor
     aligned = own.interval == "product"
     return Setup(
         instrument=own.description,
         bands=tuple(own.bands),
         atmosphere=scenario.model_atmosphere(),
         geometry=scenario.sun_and_view(),
-        leaf_optics=land.leaf_optics(),
-        background=land.below_canopy(),
-        leaf_angles=land.leaf_angles,
-        hotspot=land.hotspot,
+        **canopy_of(scenario),
         upwelling=scenario.terrain.upwelling,
         adjacency=scenario.atmosphere.adjacency,
         onto=grids.aligned(scenario.geobox(), own.size) if aligned else None,
@@ -133,9 +106,3 @@ def setup_of(scenario):
         noise_models=own.given_noise(),
         seed=own.seed,
     )
-
-
-def _cut(raster, grid):
-    """A raster cut to a grid of its cells."""
-    rows, columns = grids.lattice_offset(grids.geobox(raster), grid)
-    return raster.isel(y=slice(rows, rows + grid.shape.y), x=slice(columns, columns + grid.shape.x))

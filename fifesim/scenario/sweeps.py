@@ -28,9 +28,9 @@ def sweep(scenario, axes, measures=None, *, pair="coordinates"):
     scenario : fifesim.scenario.scenario.Scenario
     axes : mapping
         By name, the values of a key of the scenario, such as ``{"arp": [0.05, 0.15], "visibility": [10, 45]}``; a key
-        that several sections have is written ``"ground.seed"``. Or by any name a pair of values and a function that
-        takes a Scenario and a value and gives a Scenario. Values that are lists, such as an ``offset``, stand in the
-        coordinate as text: "0.2, 0.0".
+        that several sections have is written ``"ground.seed"``, one of a class ``"classes.grass.brown"``. Or by any
+        name a pair of values and a function that takes a Scenario and a value and gives a Scenario. Values that are
+        lists, such as an ``offset``, stand in the coordinate as text: "0.2, 0.0".
     measures : mapping of str to callable, optional
         Each takes the run, an `xarray.DataTree` with ``image`` and ``truth`` in memory, and gives a number. By default
         the regressions of true LAI and FPAR on NDVI.
@@ -96,13 +96,16 @@ def _axis(name, given):
         raise ValueError(f"the axis {name!r} needs a list of values, got {values!r}: write [value], even for one")
     if _has_function(given):
         return list(values), given[1]
-    section, key = _place(name)
+    *place, key = _place(name)
 
     def change(scenario, value):
         values = scenario.model_dump(exclude_unset=True)
+        table = values
+        for part in place:
+            table = table.setdefault(part, {})
         # numpy's numbers are not what a scenario takes.
-        plain = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
-        return parse_scenario(values | {section: values.get(section, {}) | {key: plain}})
+        table[key] = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+        return parse_scenario(values)
 
     return list(given), change
 
@@ -118,8 +121,8 @@ def _meaning(name, given):
     """Attributes of an axis: what plots write beside it."""
     if _has_function(given):
         return {}
-    section, key = _place(name)
-    keys = Keys.model_fields[section].annotation
+    *place, key = _place(name)
+    keys = Keys.section(place)
     # The description's first words name the key; ranges and hints follow them.
     found = {"long_name": keys.model_fields[key].description.split(";")[0], "units": keys.unit(key)}
     return {name: text for name, text in found.items() if text}
@@ -130,17 +133,18 @@ def _has_function(given):
 
 
 def _place(name):
-    """Section and key of an axis."""
-    keys = {section: field.annotation.model_fields for section, field in Keys.model_fields.items()}
-    section, _, key = name.rpartition(".")
-    found = [each for each in keys if key in keys[each] and section in ("", each)]
+    """Names of the tables that an axis lies in, and its key."""
+    *given, key = name.split(".")
+    places = [tuple(given)] if given else [(each,) for each in Keys.model_fields if each != "classes"]
+    sections = {place: Keys.section(place) for place in places}
+    found = [place for place, section in sections.items() if section and key in section.model_fields]
     if len(found) == 1:
-        return found[0], key
+        return *found[0], key
     if found:
-        written = " or ".join(f"{each}.{key!s}" for each in found)
+        written = " or ".join(".".join((*place, key)) for place in found)
         raise ValueError(f"the axis {name!r} is a key of several sections: write {written}")
-    known = ", ".join(sorted({key for fields in keys.values() for key in fields}))
+    known = {each for place in Scenario().sections() for each in Keys.section(place).model_fields}
     raise ValueError(
-        f"the axis {name!r} is no key of a scenario: keys are {known}; or give a pair (values, function of a scenario "
-        "and a value)"
+        f"the axis {name!r} is no key of a scenario: keys are {', '.join(sorted(known))}; or give a pair (values, "
+        "function of a scenario and a value)"
     )

@@ -40,13 +40,21 @@ def load_values(path):
     except OSError as error:
         raise ValueError(in_a_line(f"cannot read the scenario {path}: {error.strerror}")) from None
     folder = path.parent.absolute()
-    for name, field in Keys.model_fields.items():
-        table = values.get(name)
-        for key, value in table.items() if isinstance(table, dict) else ():
+    for place, table in _tables(values):
+        section = Keys.section(place)
+        for key, value in table.items() if section else ():
             # A link stays one: what it leads to may have another suffix.
-            if field.annotation.names_a_file(key, value) and value:
+            if section.names_a_file(key, value) and value:
                 table[key] = str(folder / value)
     return values
+
+
+def _tables(values):
+    """Tables of keys, with their places."""
+    for name, table in values.items():
+        inside = name == "classes" and isinstance(table, dict)
+        found = [((name, key), each) for key, each in table.items()] if inside else [((name,), table)]
+        yield from ((place, each) for place, each in found if isinstance(each, dict))
 
 
 def validated(model, values):
@@ -132,25 +140,25 @@ def write_scenario(scenario):
         Reading it gives the same scenario.
     """
     lines = ["# Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
-    for name in Keys.model_fields:
-        section = getattr(scenario, name)
-        lines += ["", f"[{name}]  # {inspect.getdoc(type(section)).splitlines()[0]}"]
-        tables = []
-        for key, known in type(section).model_fields.items():
-            value, unit = getattr(section, key), section.unit(key)
-            meaning = f"{unit}; {known.description}" if unit else known.description
-            if isinstance(value, dict):
-                tables += [
-                    "",
-                    f"[{name}.{key}]  # {meaning}",
-                    *(f"{_toml_key(part)} = {_toml(number)}" for part, number in value.items()),
-                ]
-            elif value is None:
-                lines.append(f"# {key} =   # {meaning}")
-            else:
-                lines.append(f"{key} = {_toml(value)}  # {meaning}")
-        lines += tables
+    for place, section in scenario.sections().items():
+        lines += ["", *_table(".".join(map(_toml_key, place)), section)]
     return "\n".join(lines) + "\n"
+
+
+def _table(name, section):
+    """Lines of a table and of those in it."""
+    lines, tables = [f"[{name}]  # {inspect.getdoc(type(section)).splitlines()[0]}"], []
+    for key, known in section.said.items():
+        value, unit = getattr(section, key), section.unit(key)
+        meaning = f"{unit}; {known.description}" if unit else known.description
+        if isinstance(value, dict):
+            parts = (f"{_toml_key(part)} = {_toml(number)}" for part, number in value.items())
+            tables += ["", f"[{name}.{key}]  # {meaning}", *parts]
+        elif value is None:
+            lines.append(f"# {key} =   # {meaning}")
+        else:
+            lines.append(f"{key} = {_toml(value)}  # {meaning}")
+    return lines + tables
 
 
 def _toml(value):
@@ -173,9 +181,8 @@ def _explain(error):
     place, value = [str(part) for part in error["loc"]], error["input"]
     key = in_a_line(".".join(place), 100)
     if error["type"] == "extra_forbidden":
-        known = list(Keys.model_fields)
-        if len(place) > 1 and place[0] in Keys.model_fields:
-            known = list(Keys.model_fields[place[0]].annotation.model_fields)
+        section = Keys.section(place[:-1]) if len(place) > 1 else None
+        known = list((section or Keys).model_fields)
         hint = nearest(place[-1], known)
         return in_a_line(f"unknown key {key} = {shown(value)}: {hint}allowed are {', '.join(known)}")
     message = str(error["ctx"]["error"]) if error["type"] == "value_error" else error["msg"]

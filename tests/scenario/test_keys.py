@@ -9,7 +9,8 @@ import pytest
 from pydantic import ValidationError
 
 from fifesim.atmosphere.air import models
-from fifesim.scenario.keys import AirKeys, GridKeys, GroundKeys, Keys, SensorKeys, SunAndViewKeys, TerrainKeys
+from fifesim.scenario.ground_keys import ClassKeys, GroundKeys, LandscapeKeys, StandKeys
+from fifesim.scenario.keys import AirKeys, GridKeys, Keys, SensorKeys, SunAndViewKeys, TerrainKeys
 from fifesim.scenario.scenario import Scenario
 
 
@@ -29,11 +30,14 @@ def test_spelling_needs_no_physics():
 
 def test_sections_of_a_scenario_are_the_keys_in_their_order():
     assert list(Scenario.model_fields) == list(Keys.model_fields)
-    for name, field in Keys.model_fields.items():
-        section = Scenario.model_fields[name].annotation
-        assert issubclass(section, field.annotation) and list(section.model_fields) == list(
-            field.annotation.model_fields
-        )
+    for place in [*((name,) for name in Keys.model_fields if name != "classes"), ("classes", "grass")]:
+        meant, spelled = Scenario.section(place), Keys.section(place)
+        assert issubclass(meant, spelled) and list(meant.model_fields) == list(spelled.model_fields)
+    assert Keys.section(("classes",)) is Keys.section(("ground", "leaf")) is Keys.section(("grund",)) is None
+
+
+def test_a_class_has_the_keys_of_a_stand():
+    assert set(StandKeys.model_fields) == set(ClassKeys.model_fields) & set(GroundKeys.model_fields)
 
 
 @pytest.mark.parametrize(
@@ -44,6 +48,12 @@ def test_sections_of_a_scenario_are_the_keys_in_their_order():
         (SensorKeys, {"interval": 0.0}, "metres above 0"),
         (SensorKeys, {"offset": [float("inf"), 0.0]}, "two finite numbers"),
         (AirKeys, {"aot": 2.5}, "less than or equal to 2"),
+        (LandscapeKeys, {"cover": "pasture"}, "did you mean 'pastures'"),
+        (LandscapeKeys, {"deviations": {"soils": 0.1}}, "did you mean 'soil'"),
+        (LandscapeKeys, {"deviations": {"soil": -0.1}}, r"must be in \[0, 1\]"),
+        (LandscapeKeys, {"covary": {"elevation": 1.1}}, r"elevation = 1.1: must be in \[-1, 1\]"),
+        (LandscapeKeys, {"covary": {"soil": 0.1}}, "give deviations.soil too"),
+        (Keys, {"classes": {"tall grass": {}}}, "one word"),
     ],
 )
 def test_impossible_values_are_refused(section, values, said):

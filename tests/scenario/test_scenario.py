@@ -137,7 +137,7 @@ def test_lengths_are_taken_in_any_of_their_units():
         ("[ground.leaf]\nwater = 12", "water must be in [0, 0.2] cm, got 12"),
         (
             "[ground.leaf]\nwater = 0.01\n[ground.leaf_reflectance]\nTM3 = 0.1",
-            "ground.leaf and ground.leaf_reflectance are both given: drop one",
+            "ground: leaf and leaf_reflectance are both given: drop one",
         ),
         ("[ground.background_spectra]\nsoil = 1.0", "unknown spectrum 'soil': allowed are soil_dry, "),
         ("[ground.background_spectra]\nsoil_dry = 0.9", "must add up to 1, got 0.9"),
@@ -320,3 +320,32 @@ def test_engine_that_is_not_installed_is_told_at_once(monkeypatch):
     engine = parse_scenario(SMALL | {"atmosphere": {"engine": "6S"}})
     with pytest.raises(ImportError, match="engine='6S' needs the 6S engine: type pip install"):
         engine.complete()
+
+
+@pytest.mark.parametrize(
+    ("sections", "said"),
+    [
+        ({"classes": {"grass": {}}}, "landscape.cover is none: say how they lie"),
+        ({"classes": {"a": {"share": 0.5}, "b": {}}, "landscape": {"cover": "voronoi"}}, "b has no share"),
+        ({"classes": {"a": {"share": 0.5}, "b": {"share": 0.6}}, "landscape": {"cover": "levels"}}, "sum to 1.1"),
+        ({"ground": {"method": "periodic"}, "landscape": {"cover": "levels"}}, "is for one stand"),
+        (
+            {"classes": {"a": {"arp": 0.2499}}, "landscape": {"cover": "levels"}},
+            "classes.a.arp = 0.2499: must be at most",
+        ),
+    ],
+)
+def test_landscapes_that_cannot_be(sections, said):
+    with pytest.raises(ValueError, match=said):
+        Scenario(**sections)
+
+
+def test_a_class_without_leaf_area_has_that_of_the_ground():
+    scenario = Scenario(
+        ground={"distribution": "unburned-ungrazed", "arp": 0.2},
+        landscape={"cover": "voronoi"},
+        classes={"grass": {}, "own": {"distribution": "burned-grazed", "brown": 0.3}},
+    )
+    grass, own = (stand.cover_class(name, scenario.ground) for name, stand in scenario.classes.items())
+    assert (grass.lai, grass.arp, grass.brown) == ("unburned-ungrazed", None, None)
+    assert (own.lai, own.brown) == ("burned-grazed", 0.3)

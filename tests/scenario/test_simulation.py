@@ -320,3 +320,41 @@ def test_polar_scene_is_simulated(crs, west, north):
     )
     image = fifesim.simulate(case)["image"]["dn"].compute()
     assert image.rio.crs == crs and image.shape == (2, 3, 4) and (image[:, 1, 1:3] > 0).all()
+
+
+CLASSES = {"thin": {"distribution": "burned-grazed"}, "thick": {"distribution": "unburned-ungrazed", "hotspot": 0.1}}
+
+
+def test_cells_of_a_class_are_those_of_its_own_scenario():
+    """Whatever stands beside it: leaf area and reflectance, to the bit."""
+    small = {"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}
+    both = parse_scenario(small | {"landscape": {"cover": "voronoi", "size": 80}, "classes": CLASSES})
+    scene = fifesim.simulate(both)["scene"]
+    assert set(np.unique(scene["cover"])) == {1, 2}
+    for code, (name, keys) in enumerate(CLASSES.items(), 1):
+        alone = fifesim.simulate(parse_scenario(small | {"ground": keys}))["scene"]
+        cells = (scene["cover"] == code).compute()
+        for variable in ("lai", "surface_reflectance"):
+            found, meant = (each[variable].where(cells).compute() for each in (scene, alone))
+            np.testing.assert_array_equal(found, meant, err_msg=f"{name} {variable}")
+
+
+def test_a_map_of_cover_is_read_and_shares_are_drawn(tmp_path):
+    grid = parse_scenario({"grid": {"width": 600, "height": 600}}).geobox()
+    codes = xr.DataArray(np.full((2, 2), 5, np.int16), dims=("y", "x"))
+    codes[0, 1] = 9
+    with rasterio.open(
+        tmp_path / "cover.tif", "w", driver="GTiff", height=2, width=2, count=1, dtype="int16", crs="EPSG:26914",
+        transform=grid.affine * rasterio.Affine.scale(90),
+    ) as sink:  # fmt: skip
+        sink.write(codes.values, 1)
+    classes = {"grass": {"code": 5}, "wood": {"code": 9, "distribution": "unburned-ungrazed"}}
+    mapped = {"grid": {"width": 600, "height": 600}, "terrain": {"dem": "flat"}, "classes": classes}
+    scene = fifesim.simulate(parse_scenario(mapped | {"landscape": {"cover": str(tmp_path / "cover.tif")}}))["scene"]
+    wood = (scene["cover"] == 9).compute()
+    assert float(wood.mean()) == 0.25 and bool(wood[:90, 90:].all())
+    drawn = mapped | {"landscape": {"cover": "levels", "size": 20}}
+    drawn["classes"] = {"grass": {"share": 0.8}, "wood": {"share": 0.2}}
+    cover = fifesim.simulate(parse_scenario(drawn))["scene"]["cover"]
+    # Some 600 patches: the share's standard error is about .02.
+    assert 0.1 < float((cover == 2).mean()) < 0.3

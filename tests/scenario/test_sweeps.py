@@ -101,3 +101,13 @@ def test_values_of_an_axis_may_be_lists(small, offsets):
     assert found["noise"].values.tolist() == ["none", "shot, thermal"]
     r2 = found.r2.sel(variable="lai", noise="none")
     assert float(r2.sel(offset="0.3, 0.0")) < float(r2.sel(offset="0.0, 0.0"))
+
+
+def test_a_key_of_a_class_is_an_axis(small):
+    sections = small.model_dump(exclude_unset=True) | {"landscape": {"cover": "voronoi"}, "classes": {"grass": {}}}
+    patches, values = parse_scenario(sections), ["burned-grazed", "unburned-ungrazed"]
+    fit = fifesim.sweep(patches, {"classes.grass.distribution": values}).compute()
+    np.testing.assert_array_equal(fit["slope"], fifesim.sweep(patches, {"ground.distribution": values})["slope"])
+    assert len(np.unique(fit["slope"].sel(variable="lai"))) == 2
+    with pytest.raises(ValueError, match="no key of a scenario"):
+        fifesim.sweep(patches, {"classes.grass.brwn": [0.1]})

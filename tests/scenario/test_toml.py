@@ -113,7 +113,7 @@ def refusal(path):
         ("x = " + "[" * 5000, "nests its tables too deeply"),
         ("[" + "a." * 5000 + "a]", "nests its tables too deeply"),
         ("[ground]\n" + "k" * 5000 + " = 1", "allowed are distribution, arp"),
-        ("[ground]\n'\\x' = '\\'\n\"\\u001b[31m\" = 1", "ground.\\x1b[31m = 1"),
+        ("[grid]\n'\\x' = '\\'\n\"\\u001b[31m\" = 1", "grid.\\x1b[31m = 1"),
         ("[ground]\nleaf_angles = 3\ndistribution = 4\n" + "".join(f"k{i} = 1\n" for i in range(999)), "and 99"),
         ("grid.north = 0x" + "f" * 9000, "grid.north"),
         ("grid.north = '1" + " " * 900_000 + "x'", "north is in m"),
@@ -138,3 +138,36 @@ def test_a_link_is_followed_whatever_it_leads_to(tmp_path):
     (tmp_path / "version1").write_text("lai\n1\n2\n3\n")
     (tmp_path / "samples.csv").symlink_to("version1")
     assert read_scenario(written(tmp_path, "ground.distribution = 'samples.csv'")).ground.distribution.endswith(".csv")
+
+
+def test_each_class_is_a_table(tmp_path):
+    """Its files lie beside the text, what it says alone is written, and reading that gives the same."""
+    (tmp_path / "mine.csv").write_text("lai\n1\n2\n3\n4\n5\n")
+    path = written(
+        tmp_path,
+        "[landscape]\ncover = 'voronoi'\n[classes.grass]\nshare = 0.7\n[classes.wood]\nshare = 0.3\n"
+        "distribution = 'mine.csv'\nbackground = { TM3 = 0.1, TM4 = 0.2 }\n",
+    )
+    scenario = read_scenario(path)
+    assert scenario.classes["wood"].distribution == str(tmp_path.resolve() / "mine.csv")
+    assert scenario.files == {("classes", "wood", "distribution"): str(tmp_path.resolve() / "mine.csv")}
+    text = write_scenario(scenario)
+    assert text.count("distribution =") == 2 and "[classes.wood.background]" in text
+    again = parse_scenario(tomllib.loads(text))
+    assert again == scenario and write_scenario(again) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[classes.grass]\narpp = 0.1\n", "unknown key classes.grass.arpp = 0.1: did you mean 'arp'"),
+        ("[classes.grass]\nbrown = 2\n", "classes.grass.brown = 2: "),
+        ("classes = 3\n", "classes"),
+        ("[classes]\ngrass = 3\n", "expected a table of keys, got 3"),
+        ("[landscap]\ncover = 'voronoi'\n", "did you mean 'landscape'"),
+    ],
+)
+def test_mistakes_in_a_landscape_are_told(tmp_path, text, said):
+    with pytest.raises(ValueError) as caught:
+        check_spelling(written(tmp_path, text))
+    assert said in str(caught.value) and len(str(caught.value)) < 500

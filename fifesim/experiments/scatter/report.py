@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from fifesim.experiments.scatter.grounds import PROPERTIES
 from fifesim.experiments.scatter.shares import CURVATURE, TOTAL, VARIATION, standard_error
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES
 from fifesim.output import pages
@@ -27,6 +28,7 @@ MECHANISMS = {
     "Place of the pixels, which the paper does not name": ("registration",),
     "Digital numbers and noise": ("quantisation", "noise"),
     "Terrain and atmosphere": ("topography", "atmosphere"),
+    "Ground that varies beside its leaf area": tuple(PROPERTIES),
 }
 
 
@@ -45,7 +47,7 @@ def chart(table):
     """
     figure = Figure(figsize=(7.2, 4.4), layout="constrained")
     axis = figure.subplots()
-    names = (*STAGES, CURVATURE)
+    names = (*_shown(table), CURVATURE)
     for k, variable in enumerate(VARIABLES):
         rows = table[table["variable"] == variable].set_index("stage")
         total = 100 * rows.loc[TOTAL]
@@ -70,6 +72,12 @@ def chart(table):
     axis.spines[["top", "right", "left"]].set_visible(False)
     axis.legend(frameon=False, fontsize=8.5, loc="lower right")
     return figure
+
+
+def _shown(table):
+    """Stages and their ideals: those of the ground where it has them."""
+    shares = table.groupby("stage")["share"].apply(lambda values: values.any())
+    return {stage: ideal for stage, ideal in STAGES.items() if stage not in PROPERTIES or shares[stage]}
 
 
 def mechanisms(budget):
@@ -123,7 +131,7 @@ def budget_page(scenario, budget, table, picture, run):
     by_variable = {name: table[table["variable"] == name].set_index("stage").to_dict("index") for name in VARIABLES}
     found = mechanisms(budget)
     return pages.html(
-        _TEMPLATE, title=title(scenario), setting=_setting(scenario, run), stages=STAGES, variables=VARIABLES,
+        _TEMPLATE, title=title(scenario), setting=_setting(scenario, run), stages=_shown(table), variables=VARIABLES,
         rows=by_variable, mechanisms=found, largest=max(found, key=lambda row: row["lai"]["share"]),
         curvature=CURVATURE, total=TOTAL, variation=VARIATION, run=run, chart=picture,
     )  # fmt: skip

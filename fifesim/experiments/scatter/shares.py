@@ -9,8 +9,8 @@ from fifesim.analysis.attribution import by_itself, shapley, taken_away
 from fifesim.base.seeds import check_seed
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
 from fifesim.rasters import grid as grids
+from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
-from fifesim.scenario.simulation import leaf_area
 
 # Rows of the table beside the stages: what is left when all of them are ideal, and all together.
 CURVATURE, TOTAL = "curvature", "total"
@@ -254,7 +254,12 @@ def _windows(scenario, cells):
     if not scenario.ground.lai_file:
         return found
     # A map may be empty in its corners.
-    filled = [window for window in found if float(leaf_area(scenario, window).notnull().mean()) > _FILLED]
+    filled = [window for window in found if float(_leaf_area(scenario, window).notnull().mean()) > _FILLED]
     if not filled:
         raise ValueError(f"no scene of {size[0]} x {size[1]} cells of the LAI map holds enough data: take fewer cells")
     return filled
+
+
+def _leaf_area(scenario, window):
+    land = ground_scene(scenario, window)
+    return land["lai"] if isinstance(land, xr.Dataset) else land

@@ -1,6 +1,6 @@
 """Images of a scene with any of its stages at their ideal."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -14,12 +14,13 @@ from fifesim.base.footprints import regularize
 from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
 from fifesim.chain.setup import Setup, reflectance_of
-from fifesim.ground.canopy import raster as ground
+from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
+from fifesim.ground.canopy import raster as canopy
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, operators
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
-from fifesim.scenario.simulation import leaf_area, setup_of
+from fifesim.scenario.simulation import setup_of
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters.noise import noisy
@@ -35,7 +36,8 @@ STAGES = {
     "noise": "none",
     "topography": "level ground",
     "atmosphere": "reflectance at the ground",
-}
+} | PROPERTIES
+_SENSED = ("NDVI scaling", "point spread", "registration", "quantisation", "noise")
 VARIABLES = ("lai", "fpar")
 
 # Half of the step of LAI by which tangents are taken: wide beside the error of the table of reflectance, 1e-6. [1]
@@ -89,6 +91,7 @@ def working_stages(scenario):
         "noise": not own.noise,
         "topography": scenario.terrain.dem == "flat",
     }
+    ideal |= {name: name not in varying(scenario) for name in PROPERTIES}
     return tuple(stage for stage in STAGES if not ideal.get(stage, False))
 
 
@@ -113,36 +116,57 @@ def pixels(scenario):
     scene, stages = _scene(scenario), working_stages(scenario)
     # False is ideal, True at work.
     switches = {name: (False, True) if name in stages else (False,) for name in STAGES}
-    first, *sensed, relief, air = switches.values()
-    truth = [_truth(scene, scene.lai, curve) for curve in first]
-    images = [
-        [[_images(scene, _cells(scene, scene.lai, curve, *light), sensed) for light in product([slope], air)]
-         for slope in relief]
-        for curve in first
-    ]  # fmt: skip
-    # Axes come as non-linearity, topography, atmosphere, the sensor's, y and x.
-    images = np.moveaxis(np.array(images), (1, 2), (-4, -3))
-    light = relief[-1], air[-1]
-    even = _images(scene, _cells(scene, scene.middle, True, *light), [each[-1:] for each in sensed])
-    return _with_data(stages, images, np.array(truth), even.reshape(scene.shape), _truth(scene, scene.middle, True))
+    lit = [name for name in STAGES if name not in _SENSED]
+    sensed = [switches[name] for name in _SENSED]
+    images = []
+    for states in product(*(switches[name] for name in lit)):
+        at_work = {name for name, state in zip(lit, states, strict=True) if state}
+        images.append(_images(scene, _cells(scene, scene.ground(at_work), at_work), sensed))
+    order = [*lit, *_SENSED]
+    images = np.reshape(images, (*(len(switches[name]) for name in order), *scene.shape))
+    images = np.moveaxis(images, [order.index(name) for name in STAGES], range(len(STAGES)))
+    even = _even(scene)
+    of_even = _images(scene, _cells(scene, even, set(stages)), [each[-1:] for each in sensed])
+    return _with_data(stages, images, _truths(scene, switches), of_even.reshape(scene.shape), _truth(scene, even, True))
+
+
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """What varies over the cells, and the mean leaf area of the pixel that each lies in."""
+
+    land: xr.Dataset
+    middle: xr.DataArray
 
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """Ground of a scenario, and the instrument over it."""
+    """A scenario, and the instrument over it."""
 
     scenario: Scenario
     setup: Setup
     bands: tuple
-    lai: xr.DataArray
-    middle: xr.DataArray
+    grid: GeoBox
     blocks: GeoBox
     image: GeoBox
+    grounds: dict = field(default_factory=dict)
 
     @property
     def shape(self):
         """Rows and columns that the image and the blocks of the truth share."""
         return tuple(min(pair) for pair in zip(self.blocks.shape, self.image.shape, strict=True))
+
+    def ground(self, at_work):
+        """The ground with some stages at work, made once."""
+        kind = frozenset(at_work) & set(PROPERTIES)
+        if kind not in self.grounds:
+            land = ground_with(self.scenario, self.grid, kind, self.setup.dem)
+            self.grounds[kind] = _Ground(land, self.spread_out(land["lai"]))
+        return self.grounds[kind]
+
+    def spread_out(self, cells):
+        """Means over the pixels of the truth, on the cells."""
+        means = aggregate(cells, grids.cell_size(self.blocks)[0], min_valid=self.setup.min_valid)
+        return _spread_out(means, cells)
 
 
 def _scene(scenario):
@@ -150,10 +174,18 @@ def _scene(scenario):
     bands = _red_and_nir(setup.instrument.select(setup.bands))
     blocks = grids.aligned(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
-    lai = leaf_area(scenario, grid).compute()
-    middle = _spread_out(aggregate(lai, grids.cell_size(blocks)[0], min_valid=setup.min_valid), lai)
-    dem, horizon, _ = elevation(scenario, grid)
-    return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, lai, middle, blocks, image)
+    # In memory: every set of stages with topography asks for them.
+    dem, horizon = (each if each is None else each.compute() for each in elevation(scenario, grid)[:2])
+    return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, grid, blocks, image)
+
+
+def _even(scene):
+    """The ground with all stages at work, but uniform within each pixel: means, and the class in the middle."""
+    whole = scene.ground(PROPERTIES)
+    land = {name: scene.spread_out(each) for name, each in whole.land.items() if name != "cover" and each.ndim == 2}
+    if "cover" in whole.land:
+        land["cover"] = _middle_cells(whole.land["cover"], scene.blocks)
+    return _Ground(whole.land.assign(land), whole.middle)
 
 
 def _red_and_nir(bands):
@@ -165,13 +197,27 @@ def _red_and_nir(bands):
 
 def _spread_out(means, cells):
     """Means of blocks over their cells; a cell of no block keeps its own, and one without data has none."""
-    down, across = grids.cell_size(grids.geobox(cells))
-    tall, wide = grids.cell_size(grids.geobox(means))
-    rows = np.floor((np.arange(cells.sizes["y"]) + 0.5) * down / tall + 1e-9).astype(int)
-    columns = np.floor((np.arange(cells.sizes["x"]) + 0.5) * across / wide + 1e-9).astype(int)
-    inside = (rows < means.sizes["y"])[:, None] & (columns < means.sizes["x"])
-    spread = means.values[np.minimum(rows, means.sizes["y"] - 1)][:, np.minimum(columns, means.sizes["x"] - 1)]
+    (rows, columns), inside = _places(cells, grids.geobox(means))
+    spread = means.values[rows][:, columns]
     return cells.copy(data=np.where(inside & np.isfinite(spread) & np.isfinite(cells.values), spread, cells.values))
+
+
+def _middle_cells(cells, blocks):
+    """The cell in the middle of each block over its cells; one of no block keeps its own."""
+    (rows, columns), inside = _places(cells, blocks)
+    sizes = zip(grids.cell_size(blocks), grids.cell_size(grids.geobox(cells)), strict=True)
+    down, across = (block / cell for block, cell in sizes)
+    middle = cells.values[((rows + 0.5) * down).astype(int)][:, ((columns + 0.5) * across).astype(int)]
+    return cells.copy(data=np.where(inside & (cells.values >= 0), middle, cells.values))
+
+
+def _places(cells, blocks):
+    """Row and column of the block of each cell, at most the last, and whether the cell lies in it."""
+    sizes = zip(grids.cell_size(grids.geobox(cells)), grids.cell_size(blocks), cells.shape, strict=True)
+    places = [np.floor((np.arange(count) + 0.5) * cell / block + 1e-9).astype(int) for cell, block, count in sizes]
+    inside = [place < count for place, count in zip(places, blocks.shape, strict=True)]
+    last = [np.minimum(place, count - 1) for place, count in zip(places, blocks.shape, strict=True)]
+    return last, inside[0][:, None] & inside[1]
 
 
 def _tangent(function, lai, middle):
@@ -181,29 +227,38 @@ def _tangent(function, lai, middle):
     return at.copy(data=at.data + ((function(high) - function(low)) / (high - low) * (lai - middle)).data)
 
 
-def _truth(scene, lai, curve):
+def _truths(scene, switches):
+    """LAI and FPAR by blocks, shape (2, one axis for each stage but the first, variable, y, x)."""
+    drawn = switches["covariance"]
+    found = [[_truth(scene, scene.ground({"covariance"} if goes else ()), curve) for goes in drawn] for curve in (0, 1)]
+    shape = [len(switches[name]) if name in ("non-linearity", "covariance") else 1 for name in STAGES]
+    return np.reshape(found, (*shape, len(VARIABLES), *scene.shape))
+
+
+def _truth(scene, ground, curve):
     """LAI and FPAR by blocks."""
-    land, geometry = scene.scenario.ground, scene.setup.geometry
+    own, geometry = scene.scenario.ground, scene.setup.geometry
 
     def fpar(area):
-        return ground.fpar(area, geometry=geometry, leaf_angles=land.leaf_angles, fpar_inf=land.fpar_inf)
+        return canopy.fpar(area, geometry=geometry, leaf_angles=own.leaf_angles, fpar_inf=own.fpar_inf)
 
-    size, (rows, columns) = grids.cell_size(scene.blocks)[0], scene.shape
+    lai, size, (rows, columns) = ground.land["lai"], grids.cell_size(scene.blocks)[0], scene.shape
     return [
         aggregate(array, size, min_valid=scene.setup.min_valid).values[:rows, :columns]
-        for array in (lai, fpar(lai) if curve else _tangent(fpar, lai, scene.middle))
+        for array in (lai, fpar(lai) if curve else _tangent(fpar, lai, ground.middle))
     ]
 
 
-def _cells(scene, lai, curve, relief, air):
+def _cells(scene, ground, at_work):
     """Red, near infrared and NDVI of the cells, as light leaves the ground or the air, shape (3, y, x)."""
-    setup = scene.setup if relief else replace(scene.setup, dem=None, horizon=None)
+    setup = scene.setup if "topography" in at_work else replace(scene.setup, dem=None, horizon=None)
 
     def reflectance(area):
-        return reflectance_of(setup, area)
+        return reflectance_of(setup, ground.land.assign(lai=area))
 
-    seen = reflectance(lai) if curve else _tangent(reflectance, lai, scene.middle)
-    if air:
+    lai = ground.land["lai"]
+    seen = reflectance(lai) if "non-linearity" in at_work else _tangent(reflectance, lai, ground.middle)
+    if "atmosphere" in at_work:
         seen = chain.to_toa(seen, adjacency=setup.adjacency)
     red, nir = red_and_nir(seen)
     return np.stack([red.values, nir.values, indices.normalized_difference(nir.values, red.values)])
@@ -228,7 +283,7 @@ def _images(scene, cells, switches):
 def _means(scene, cells, blurred, displaced):
     """Means over footprints, shape (3, y, x)."""
     red, nir = scene.bands
-    setup, grid = scene.setup, scene.scenario.geobox()
+    setup, grid = scene.setup, scene.grid
     box = scene.image if displaced else scene.blocks
     sizes = grids.cell_size(box)
     shifts = [offset * size for offset, size in zip(setup.offset, sizes, strict=True)] if displaced else (0.0, 0.0)
@@ -267,10 +322,10 @@ def _with_data(stages, images, truth, even, even_truth):
     found = np.logical_and.reduce([np.isfinite(each).reshape(-1, *even.shape).all(axis=0) for each in rasters])
     if found.sum() < 3:
         raise ValueError(f"{found.sum()} pixels have data in every image, and a line needs 3: simulate a larger scene")
-    axes = len(stages)
     # Stages that are ideal already have an axis of one.
-    ndvi = images[..., found].reshape(*(2,) * axes, -1)
-    by_name = dict(zip(VARIABLES, np.moveaxis(truth[..., found], 1, 0), strict=True))
-    truths = {name: values.reshape(-1, *(1,) * (axes - 1), values.shape[-1]) for name, values in by_name.items()}
+    kept = [axis for axis, stage in enumerate(STAGES) if stage in stages]
+    ndvi = images[..., found].reshape(*(images.shape[axis] for axis in kept), -1)
+    by_name = dict(zip(VARIABLES, np.moveaxis(truth[..., found], -2, 0), strict=True))
+    truths = {name: values.reshape(*(truth.shape[axis] for axis in kept), -1) for name, values in by_name.items()}
     even_truths = {name: values[found] for name, values in zip(VARIABLES, even_truth, strict=True)}
     return Pixels(stages, ndvi, truths, even[found], even_truths)

@@ -27,6 +27,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
 from fifesim.rasters.files import to_geotiff
 from fifesim.scenario.simulation import simulate
+from fifesim.scenario.sweeps import VARIABLES
 from fifesim.scenario.toml import write_scenario
 
 FILES = ("image.tif", "truth.tif", "quicklook.png", "report.html", "scenario.toml")
@@ -167,7 +168,7 @@ def _write_files(scenario, tree, found, folder):
     image = xr.Dataset({"dn": saved["image"]})
     if "ndvi" in tree["image"]:
         image["ndvi"] = ndvi(saved["image"])
-    truth = xr.Dataset({name: saved[name] for name in ("lai", "fpar")})
+    truth = xr.Dataset({name: saved[name] for name in tree["truth"].data_vars})
     to_geotiff(image["dn"], folder / "image.tif", overwrite=True)
     # Seven digits are more than a mean of leaf area has.
     to_geotiff(truth.astype(np.float32), folder / "truth.tif", overwrite=True)
@@ -195,7 +196,7 @@ def _check_some_data(scenario, image):
 def _fits(image, truth):
     """Regressions of the true means on NDVI where there is one, and why a line fits to none of some."""
     fits, reasons = {}, {}
-    for name in truth.data_vars if "ndvi" in image else ():
+    for name in VARIABLES if "ndvi" in image else ():
         try:
             # By row and column: with an interval of its own, the image lies on other places than its truth.
             fits[name] = regress(*matched(truth[name], image["ndvi"], "index"), pair="index")

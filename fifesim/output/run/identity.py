@@ -70,7 +70,7 @@ def inputs_of(scenario):
         Size [byte] and time of the last change [ns] by path.
     """
     found = {}
-    for (_, key), name in scenario.files.items():
+    for (*_, key), name in scenario.files.items():
         for path in filter(os.path.isfile, _read_with(key, name) if os.path.isfile(name) else ()):
             status = os.stat(path)
             found[str(path)] = [status.st_size, status.st_mtime_ns]
@@ -80,7 +80,7 @@ def inputs_of(scenario):
 def _read_with(key, name):
     if key == "instrument":
         return [name, *tables_of(name)]
-    if key in ("lai_file", "dem"):
+    if key in ("lai_file", "dem", "cover"):
         with raster_file(name).opened() as source:
             return [name, *source.files]
     return [name]

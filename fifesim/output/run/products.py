@@ -44,7 +44,7 @@ def products_of(tree, zarr_path=None):
     -------
     products : Products
     """
-    rasters = {"image": tree["image"]["dn"], "lai": tree["truth"]["lai"], "fpar": tree["truth"]["fpar"]}
+    rasters = {"image": tree["image"]["dn"], **tree["truth"].data_vars}
     rasters["detail"] = _middle_cells(tree["scene"]["lai"], tree["image"]["dn"])
     if "terrain" in tree.children:
         terrain = _shown(tree["terrain"].to_dataset())

@@ -44,7 +44,7 @@ def test_command_writes_table_chart_and_page(command, tmp_path):
 def test_one_realisation_has_no_error(command, tmp_path):
     assert command("mine.toml", "-o", "out", "--realisations", 1).exit_code == 0
     table = pd.read_csv(tmp_path / "out" / "budget.csv")
-    assert table["share_error"].isna().all() and table["share"].notna().sum() == 20
+    assert table["share_error"].isna().all() and table["share"].notna().sum() == 2 * (len(STAGES) + 2)
     assert "nan" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8").split("base64")[0]
 
 

@@ -6,13 +6,14 @@ import rasterio
 
 import fifesim
 from fifesim.experiments.scatter import shares as scatter
+from fifesim.experiments.scatter.grounds import PROPERTIES
 from fifesim.experiments.scatter.stages import STAGES, working_stages
 from fifesim.scenario.scenario import parse_scenario
 
 
 def test_shares_and_curvature_add_up_to_the_scatter(rough):
     found = fifesim.budget(rough, realisations=2)
-    assert (found["share"] != 0).all()
+    assert (found["share"].drop_sel(stage=list(PROPERTIES)) != 0).all()
     np.testing.assert_allclose(found["share"].sum("stage") + found["curvature"], found["total"], rtol=1e-12)
     table = scatter.table(found)
     for _, rows in table.set_index("stage").groupby("variable"):
@@ -22,10 +23,11 @@ def test_shares_and_curvature_add_up_to_the_scatter(rough):
 
 def test_stage_that_is_ideal_already_has_exactly_nothing(scenario):
     case = scenario()
-    assert set(STAGES) - set(working_stages(case)) == {"registration", "noise", "topography"}
+    nothing = ["registration", "noise", "topography", *PROPERTIES]
+    assert set(STAGES) - set(working_stages(case)) == set(nothing)
     found = fifesim.budget(case, realisations=2)
     for name in ("share", "alone", "first"):
-        ideal = found[name].sel(stage=["registration", "noise", "topography"])
+        ideal = found[name].sel(stage=nothing)
         assert (ideal == 0).all()
         assert (found[name].drop_sel(stage=ideal["stage"].values) != 0).all()
 

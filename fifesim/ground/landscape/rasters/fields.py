@@ -7,7 +7,6 @@ import dask
 import dask.array as da
 import numpy as np
 import xarray as xr
-from dask.graph_manipulation import clone
 
 from fifesim.base.arguments import check
 from fifesim.base.kinds import NUMBER, Kind
@@ -22,6 +21,7 @@ from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.crs import with_crs_of
+from fifesim.rasters.sampling import apart
 from fifesim.rasters.sites import made_on_site
 
 # The ground is known by at most so many rows and columns of it, evenly spaced.
@@ -243,12 +243,8 @@ def _copula(arps, pairs, covariates, reference):
         return out
 
     arrays = [each.data for each in known.values()]
-    lazy = [each for each in arrays if isinstance(each, da.Array)]
-    # A copy of the graph: else all that is sampled would wait in memory for the last sample. Of one array dask gives
-    # one, of more a tuple.
-    copies = iter((clone(*lazy),) if len(lazy) == 1 else clone(*lazy) if lazy else ())
-    samples = [_evenly(next(copies) if isinstance(each, da.Array) else each) for each in arrays]
-    if not lazy:
+    samples = [apart(_evenly(each)) if isinstance(each, da.Array) else _evenly(each) for each in arrays]
+    if not any(isinstance(each, da.Array) for each in arrays):
         return found(*samples)
     return xr.DataArray(da.from_delayed(dask.delayed(boxed)(*samples), (), dtype=object))
 

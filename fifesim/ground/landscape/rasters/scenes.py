@@ -8,14 +8,17 @@ import xarray as xr
 
 from fifesim.base.kinds import described, is_path
 from fifesim.base.seeds import check_seed
+from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape.autoregression import check_arp
 from fifesim.ground.landscape.classes import class_table, fife_classes
 from fifesim.ground.landscape.compression import cells_by_class
 from fifesim.ground.landscape.cover import Patches
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.drawn import Field
 from fifesim.ground.landscape.field import streaming_field
 from fifesim.ground.landscape.raster import lai_window
 from fifesim.ground.landscape.rasters.cover import classes_of, cover_map, drawn_cover
+from fifesim.ground.landscape.rasters.drawn import drawn_fields
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -38,6 +41,12 @@ def landscape(
     arp=0.15,
     brown=None,
     crown_cover=None,
+    soil=None,
+    moisture=None,
+    covary=None,
+    dem=None,
+    reference=None,
+    geometry=None,
     seed=0,
     chunks=None,
     allow_remote=False,
@@ -59,10 +68,18 @@ def landscape(
         Your own leaf area, as `open_lai` takes it, in the place of the classes' distributions. [m2 m-2]
     arp : float, optional
         Autoregressive parameter of the classes that say none, in [0, 0.2498]. [1]
-    brown : float, xarray.DataArray, str or path, optional
-        Share of dead leaf area, in the place of the classes'. [1]
-    crown_cover : float, xarray.DataArray, str or path, optional
-        Share of the ground below crowns, in the place of the classes'. [1]
+    brown, crown_cover, soil, moisture : float, Field, xarray.DataArray, str or path, optional
+        Share of dead leaf area, share of the ground below crowns, brightness of the soil and its moisture, as
+        `surface_reflectance` takes them, in the place of the classes': a number, a `Field` that is drawn, or a map. [1]
+    covary : dict of str to float, optional
+        Correlations of leaf area with ``elevation``, ``wetness``, ``illumination`` and ``slope``, and with what is
+        drawn, such as ``{"wetness": 0.5, "soil": -0.4}``: those of standard normal scores at the same cell. [1]
+    dem : xarray.DataArray, dims (y, x), optional
+        Elevation on the grid, where ``covary`` names something of it. [m]
+    reference : dict of str to xarray.DataArray, optional
+        As in `correlated_fields`: the same of a larger ground, of which the grid is a window.
+    geometry : Geometry, optional
+        Of the sun, where ``covary`` names the illumination.
     seed : int, optional
         In [0, 2**63).
     chunks : mapping or int or "auto", optional
@@ -79,8 +96,9 @@ def landscape(
     Raises
     ------
     ValueError
-        If the grid, arp, seed, a class or its share is not one allowed, a map is not usable, or a class has no leaf
-        area; of a lazy map when it computes, if it has a code without a class.
+        If the grid, arp, seed, a class or its share is not one allowed, correlations cannot be, a deviation is too
+        large, a map is not usable, or a class has no leaf area; of a lazy map when it computes, if it has a code
+        without a class.
     TypeError
         If an argument is of another kind.
 
@@ -103,18 +121,24 @@ def landscape(
     grids.check_grid(grid)
     check_arp(arp)
     seed = check_seed(seed)
+    given = {"brown": brown, "crown_cover": crown_cover, "soil": soil, "moisture": moisture}
+    drawn = {name: each for name, each in given.items() if isinstance(each, Field)}
+    options = {"seed": seed, "dem": dem, "reference": reference, "geometry": geometry, "chunks": chunks}
+    if covary and lai is not None:
+        raise ValueError("lai is a map, which goes with the ground as it does: leave covary out, or the map")
     variables = {}
     if classes is not None or cover is not None or lai is None:
         table = class_table(_default_classes(cover) if classes is None else classes)
         variables["cover"] = _cover(grid, cover, table, seed, chunks, allow_remote)
+    arps = [arp if lai is not None or each.arp is None else each.arp for each in (table if lai is None else [None])]
+    scores, made = drawn_fields(grid, drawn, covary, arps, **options)
     if lai is None:
-        variables["lai"] = _lai(grid, variables["cover"], table, arp, seed)
+        variables["lai"] = _lai(grid, variables["cover"], table, arp, seed, scores)
     else:
         variables["lai"] = _own_lai(lai, grid, chunks, allow_remote)
-    for name, given in {"brown": brown, "crown_cover": crown_cover}.items():
-        if given is not None:
-            variables[name] = _share(name, given, grid, chunks, allow_remote)
-    # Fields that are drawn, and that go with the ground, have their place here.
+    for name, each in given.items():
+        if each is not None:
+            variables[name] = made[name] if name in made else _property(name, each, grid, chunks, allow_remote)
     order = ["lai", *(name for name in variables if name != "lai")]
     site = {key: variables["lai"].attrs[key] for key in ("site",) if key in variables["lai"].attrs}
     return xr.Dataset({name: variables[name] for name in order}, attrs=site)
@@ -152,8 +176,8 @@ def _cover(grid, cover, table, seed, chunks, allow_remote):
     return cover_map(cover, grid, table, chunks, allow_remote=allow_remote)
 
 
-def _lai(grid, cover, table, arp, seed):
-    """Leaf area of each class, from its own distribution and arp."""
+def _lai(grid, cover, table, arp, seed, scores):
+    """Leaf area of each class, from its own distribution and arp; of scores by arp where it goes with the ground."""
     lacking = [each.name for each in table if each.lai is None]
     if lacking:
         raise ValueError(
@@ -165,8 +189,12 @@ def _lai(grid, cover, table, arp, seed):
     # What streaming_field refuses is known before anything lazy is built.
     for _, of_class in kinds:
         streaming_field(seed, of_class, 0, 0, (0, 0))
-    kernel = partial(_leaf_area, codes, kinds, seed, grids.lattice_position(grid))
-    lai = grids.place(places.located(kernel, cover.drop_attrs()), grid)
+    if scores:
+        kernel = partial(_leaf_area_of_scores, codes, kinds, tuple(scores))
+        lai = grids.place(chunking.pointwise(kernel, cover.drop_attrs(), *scores.values()), grid)
+    else:
+        kernel = partial(_leaf_area, codes, kinds, seed, grids.lattice_position(grid))
+        lai = grids.place(places.located(kernel, cover.drop_attrs()), grid)
     history = "\n".join([cover.attrs["history"], f"landscape: leaf area of {len(table)} classes, seed {seed}"])
     made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": "by class"} | made_on_site(grid)
     return cf.label(lai, "lai", history=history, **made, method="streaming", references=_REFERENCE)
@@ -192,9 +220,19 @@ def _leaf_area(codes, kinds, seed, lattice, cover, starts):
     return out.reshape(cover.shape)
 
 
-def _share(name, given, grid, chunks, allow_remote):
-    """A number, or a raster on the grid, of a share."""
-    check = partial(_check_share, name)
+def _leaf_area_of_scores(codes, kinds, arps, cover, *scores):
+    """Leaf area of cells from the standard normal scores of each arp."""
+    out, fields = np.full(cover.size, np.nan), dict(zip(arps, scores, strict=True))
+    for cells, (quantiles, arp) in zip(cells_by_class(cover.ravel(), codes), kinds, strict=True):
+        uniform = isinstance(quantiles, float)
+        if cells.size:
+            out[cells] = quantiles if uniform else quantile_map(fields[arp].ravel()[None, cells], quantiles)[0]
+    return out.reshape(cover.shape)
+
+
+def _property(name, given, grid, chunks, allow_remote):
+    """A number, or a raster on the grid, of a property."""
+    check = _check_soil if name == "soil" else partial(_check_share, name)
     if isinstance(given, Number):
         return cf.label(xr.DataArray(check(float(given))), name, history=f"landscape: {name} {given:g}")
     if isinstance(given, xr.DataArray):
@@ -202,9 +240,18 @@ def _share(name, given, grid, chunks, allow_remote):
     elif is_path(given):
         found = file_onto_grid(given, grid, chunks, allow_remote)
     else:
-        raise TypeError(f"{name} must be a number, the path of a raster or an xarray.DataArray, got {described(given)}")
+        raise TypeError(
+            f"{name} must be a number, a fifesim.Field, the path of a raster or an xarray.DataArray, got "
+            f"{described(given)}"
+        )
     shares = grids.place(chunking.pointwise(check, found), grid)
     return cf.label(shares, name, history=f"landscape: {name} of a raster")
+
+
+def _check_soil(values):
+    """Refuse what is no brightness of a soil; NaN passes."""
+    check_brightness(np.asarray(values))
+    return values
 
 
 def _check_share(name, values):

@@ -3,7 +3,6 @@
 import dask.array as da
 import numpy as np
 import xarray as xr
-from dask.graph_manipulation import clone
 from scipy import ndimage
 
 from fifesim.ground.terrain.rasters.dem import elevation_grid, source_resolution
@@ -12,6 +11,7 @@ from fifesim.ground.terrain.wetness import wetness_index
 from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.sampling import apart
 
 _REFERENCE = "Beven and Kirkby (1979), doi:10.1080/02626667909491834"
 
@@ -78,6 +78,5 @@ def _at_places(data, places):
 
     if not isinstance(data, da.Array):
         return index(np.asarray(data[np.ix_(rows, columns)], float))
-    # A copy of the graph: else all elevation would wait in memory for the last place.
-    samples = clone(data)[rows][:, columns].rechunk(-1)
+    samples = apart(data[rows][:, columns])
     return samples.map_blocks(index, dtype=float, meta=np.empty((0, 0)))

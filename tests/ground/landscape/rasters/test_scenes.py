@@ -139,7 +139,7 @@ def test_cover_that_carries_its_classes_needs_no_others(site, land):
         (
             {"brown": [0.5]},
             TypeError,
-            "brown must be a number, the path of a raster or an xarray.DataArray",
+            "brown must be a number, a fifesim.Field, the path of a raster or an xarray.DataArray",
         ),
         ({"arp": 0.24999}, ValueError, "at most"),
         ({"seed": -1}, ValueError, "seed must be"),

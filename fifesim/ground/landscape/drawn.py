@@ -1,0 +1,84 @@
+"""Properties of the ground that vary in fields: what values they have, and how coarsely they vary."""
+
+from dataclasses import dataclass
+
+from scipy import stats
+
+from fifesim.base.kinds import described
+from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
+
+SHARES = ("moisture", "brown", "crown_cover")
+"""Properties between 0 and 1."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """
+    A property of a landscape that varies in a field.
+
+    Parameters
+    ----------
+    mean : float, optional
+        [1]
+    sd : float
+        Standard deviation. [1]
+    arp : float, optional
+        Autoregressive parameter of the field, in [0, 0.2498]. [1]
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range.
+    TypeError
+        If one is no number.
+
+    Examples
+    --------
+    >>> Field(mean=0.2, sd=0.1).distribution("brown").mean()
+    0.2
+    """
+
+    mean: float = 0.0
+    sd: float = 0.0
+    arp: float = 0.15
+
+    def __post_init__(self):
+        for name in ("mean", "sd", "arp"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise TypeError(f"Field: {name} must be a number, got {described(value)}: type Field(mean=0.2, sd=0.1)")
+        if not 0 <= self.sd < float("inf"):
+            raise ValueError(f"Field: sd must be at least 0, got {self.sd:g}: it is a standard deviation")
+        if not abs(self.mean) <= 1:
+            raise ValueError(f"Field: mean must be in [-1, 1], got {self.mean:g}")
+        check_arp(self.arp)
+        if self.arp > LARGEST_STREAMING_ARP:
+            raise ValueError(f"Field: arp must be at most {LARGEST_STREAMING_ARP}, got {self.arp:g}")
+
+    def distribution(self, name):
+        """
+        Distribution of a share: the beta distribution of its mean and standard deviation.
+
+        Parameters
+        ----------
+        name : str
+            Of the property, one of `SHARES`.
+
+        Returns
+        -------
+        distribution : frozen scipy distribution
+            [1]
+
+        Raises
+        ------
+        ValueError
+            If nothing between 0 and 1 has this mean and standard deviation.
+        """
+        most = (self.mean * (1 - self.mean)) ** 0.5 if 0 < self.mean < 1 else 0.0
+        if not 0 < self.sd < most:
+            raise ValueError(
+                f"{name} lies between 0 and 1: with a mean of {self.mean:g} its sd must be above 0 and below "
+                f"{most:.3g}, got {self.sd:g}"
+            )
+        weight = most**2 / self.sd**2 - 1
+        return stats.beta(self.mean * weight, (1 - self.mean) * weight)

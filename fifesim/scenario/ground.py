@@ -1,0 +1,148 @@
+"""The ground of a scenario: leaf area or a landscape, its canopies, and what of it an image is compared with."""
+
+import xarray as xr
+
+from fifesim.chain.landscapes import fpar
+from fifesim.ground.landscape.classes import CoverClass
+from fifesim.ground.landscape.cover import PATTERNS, Patches
+from fifesim.ground.landscape.drawn import Field
+from fifesim.ground.landscape.raster import lai_scene, lai_window
+from fifesim.ground.landscape.rasters.scenes import landscape
+from fifesim.scenario.ground_keys import COVARIATES
+from fifesim.scenario.land import cut
+
+# What `Setup` has of a stand by the same names, and what a class of cover calls otherwise.
+_NUMBERS = ("leaf_angles", "hotspot", "brown", "dissociation", "crown_cover", "crown_shape")
+_OF_A_CLASS = {"leaf_optics": "leaf"}
+
+
+def ground_scene(scenario, grid, chunks=None, dem=None):
+    """
+    The ground of a scenario.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells.
+    chunks : mapping or int, optional
+        Makes it lazy.
+    dem : xarray.DataArray, dims (y, x), optional
+        Elevation on the grid or more, which leaf area may go with. [m]
+
+    Returns
+    -------
+    land : xarray.DataArray, dims (y, x), or xarray.Dataset
+        Leaf area; or a landscape, where the scenario has classes of cover or properties that vary. [m2 m-2]
+    """
+    land, own = scenario.ground, scenario.landscape
+    if not own.is_one():
+        return _landscape(scenario, grid, chunks, dem)
+    if land.lai_file:
+        return lai_window(land.lai_file, grid, chunks=chunks)
+    return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+
+
+def _landscape(scenario, grid, chunks, dem):
+    land, own = scenario.ground, scenario.landscape
+    means = {"soil": 0.0, "moisture": own.moisture, "brown": land.brown, "crown_cover": land.crown_cover}
+    drawn = {
+        name: Field(mean=means[name], sd=deviation, arp=own.arps.get(name, land.arp))
+        for name, deviation in own.deviations.items()
+        if deviation
+    }
+    if own.moisture and "moisture" not in drawn:
+        drawn["moisture"] = own.moisture
+    cover = Patches(own.cover, own.size, _shares(scenario)) if own.cover in PATTERNS else own.cover
+    if own.cover == "none":
+        # One class, wherever its patches lie.
+        cover = Patches("pastures", own.size)
+    classes = scenario.class_table() if own.cover != "none" else {"ground": CoverClass(lai=land.distribution)}
+    covary = {name: correlation for name, correlation in own.covary.items() if correlation}
+    of_dem = bool(set(covary) & set(COVARIATES))
+    return landscape(
+        grid,
+        cover=cover,
+        classes=classes,
+        lai=land.lai_file,
+        arp=land.arp,
+        covary=covary or None,
+        dem=cut(dem, grid) if of_dem else None,
+        geometry=scenario.sun_and_view() if "illumination" in covary else None,
+        seed=land.seed,
+        chunks=chunks,
+        **drawn,
+    )
+
+
+def canopy_of(scenario):
+    """
+    What the keys of [ground] say of the canopy.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Returns
+    -------
+    canopy : dict
+        Fields of a `Setup`, without what is drawn, and without what every class says itself.
+    """
+    land = scenario.ground
+    said = {"leaf_optics": land.leaf_optics(), "background": land.below_canopy(), "brown_leaf": land.dead_leaf()}
+    said |= {name: getattr(land, name) for name in _NUMBERS}
+    left_out = {name for name in said if _all_say(scenario, _OF_A_CLASS.get(name, name))} | set(
+        scenario.landscape.deviations
+    )
+    return {name: value for name, value in said.items() if name not in left_out}
+
+
+def truth_of(scenario, setup, land):
+    """
+    What of the ground of a scenario an image is compared with, by cells.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    setup : fifesim.chain.setup.Setup
+        From `setup_of`.
+    land : xarray.Dataset
+        From `ground_scene`.
+
+    Returns
+    -------
+    truth : xarray.Dataset
+        ``lai``, ``fpar`` and where leaves are dead ``green_fpar``, and all else that varies but ``cover``.
+    """
+    told = {name: getattr(setup, name) for name in ("geometry", "leaf_angles", "brown", "dissociation", "crown_cover")}
+    kinds = {"fpar": "all"} | ({"green_fpar": "green"} if _has_dead_leaves(scenario) else {})
+    absorbed = {
+        name: fpar(land, leaves=kind, fpar_inf=scenario.ground.fpar_inf, **told) for name, kind in kinds.items()
+    }
+    varying = {name: each for name, each in land.data_vars.items() if name not in ("lai", "cover") and each.ndim == 2}
+    return xr.Dataset({"lai": land["lai"], **absorbed, **varying})
+
+
+def _has_dead_leaves(scenario):
+    said = [
+        scenario.ground.brown,
+        scenario.landscape.deviations.get("brown"),
+        *(each.brown for each in _classes(scenario)),
+    ]
+    return any(said)
+
+
+def _all_say(scenario, name):
+    """Whether every class of cover has a value of its own."""
+    classes = _classes(scenario)
+    return bool(classes) and all(getattr(each, name) is not None for each in classes)
+
+
+def _classes(scenario):
+    return list(scenario.class_table().values()) if scenario.landscape.cover != "none" else []
+
+
+def _shares(scenario):
+    """Shares of the classes that are drawn, None where they are equal."""
+    shares = {name: stand.share for name, stand in scenario.classes.items()}
+    return shares if any(shares.values()) else None
