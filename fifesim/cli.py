@@ -155,6 +155,8 @@ def reproduce(
         str | None, typer.Option(help="CSV file: band,background; or shares, soil_dry:0.5+shade:0.5; else fitted.")
     ] = None,
     sensor: Annotated[str, typer.Option(help="An instrument with red and near infrared, or its file.")] = "TM",
+    west: Annotated[float | None, typer.Option(help="Easting of the scenes, EPSG:26914: relief depends on it.")] = None,
+    north: Annotated[float | None, typer.Option(help="Northing of their upper edge.")] = None,
     realisations: Annotated[int, typer.Option(help="How many of each of the nine scenes.")] = 20,
     cells: Annotated[int | None, typer.Option(help="Along the edge of a scene, of 3.33 m each; 333 for TM.")] = None,
     seed: Annotated[int, typer.Option(help="Of the first realisation; the others follow.")] = 1995,
@@ -166,7 +168,14 @@ def reproduce(
         from fifesim.experiments.friedl1995.folder import reproduce_to_folder
 
     inputs = {"reading": reading, "dem": dem, "densities": densities, "optics": optics, "background": background}
-    inputs |= {"sensor": sensor, "realisations": realisations, "cells": cells, "seed": seed}
+    inputs |= {
+        "sensor": sensor,
+        "west": west,
+        "north": north,
+        "realisations": realisations,
+        "cells": cells,
+        "seed": seed,
+    }
     _say(*reproduce_to_folder(output, **inputs, scenes=scenes, overwrite=overwrite))
 
 

@@ -38,6 +38,7 @@ from fifesim.base.kinds import (
     PLAIN,
     RASTER,
     REGRESSION,
+    REPRODUCED,
     SCENARIO,
     SETUP,
     SPREAD,
@@ -121,6 +122,7 @@ OF_FUNCTION = {
     | _of(FILE_BY_BAND, "optics background")
     | _of(PATH, "sensor")
     | _of(TEXT, "reading"),
+    "plot_reproduction": _of(NUMBER, "number") | _of(REPRODUCED, "found") | _of(TEXT, "reading"),
 }
 """The same of single functions, where it is another."""
 

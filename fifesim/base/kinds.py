@@ -143,6 +143,10 @@ NUMBER_OR_RASTER = Kind(
 )
 PATH = Kind("the path of a file", is_path)
 RASTER = Kind("an xarray.DataArray over (y, x)", _is_raster)
+REPRODUCED = Kind(
+    "an xarray.Dataset, as fifesim.reproduce gives it",
+    lambda value: is_a(value, "Dataset") and "paper_slope" in value.variables,
+)
 LAND = Kind("'flat', 'flint-hills' or the path of a raster file", is_path)
 FILES_BY_NAME = Kind("a folder, or a mapping by treatment", lambda value: is_path(value) or _is_mapping(value))
 FILE_BY_BAND = Kind("the path of a CSV file, or a mapping by band", lambda value: is_path(value) or _is_mapping(value))

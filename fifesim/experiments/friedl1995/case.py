@@ -54,6 +54,9 @@ class Case:
         Of digital numbers; the instrument's by default.
     upwelling : bool, optional
         With the view's cosine on slopes (Eq. 5).
+    west, north : float, optional
+        Upper left corner of the scenes in EPSG:26914, on which the relief depends; by default 3.33 km from that of the
+        site, which the paper does not give. [m]
 
     Raises
     ------
@@ -70,6 +73,8 @@ class Case:
     cells: int | None = None
     bits: int | None = None
     upwelling: bool = True
+    west: float | None = None
+    north: float | None = None
 
     def __post_init__(self):
         if self.cells is None:
@@ -130,7 +135,9 @@ class Case:
         crs, west, north = fife.CORNERS["NAD83"]
         edge = self.cells * CELL
         first = min(_CORNER * CELL, max(fife.SIZE - edge, 0.0))
-        grid = {"crs": crs, "west": west + first, "north": north - first, "width": edge, "height": edge, "cell": CELL}
+        west = west + first if self.west is None else self.west
+        north = north - first if self.north is None else self.north
+        grid = {"crs": crs, "west": west, "north": north, "width": edge, "height": edge, "cell": CELL}
         source = self.densities[treatment]
         ground = {"distribution": str(source) if is_path(source) else treatment, "arp": arp, "seed": seed}
         ground |= {"method": "periodic"} | self._leaves()
@@ -177,13 +184,23 @@ class Case:
         return keys
 
 
-def case_of(reading="native", dem="flat", densities=None, optics=None, background=None, sensor=TABLE_1, cells=None):
+def case_of(
+    reading="native",
+    dem="flat",
+    densities=None,
+    optics=None,
+    background=None,
+    sensor=TABLE_1,
+    cells=None,
+    west=None,
+    north=None,
+):
     """
     A case of what a reader gives.
 
     Parameters
     ----------
-    reading, dem, densities, optics, background, sensor, cells : optional
+    reading, dem, densities, optics, background, sensor, cells, west, north : optional
         As in `fifesim.reproduce`.
 
     Returns
@@ -205,6 +222,8 @@ def case_of(reading="native", dem="flat", densities=None, optics=None, backgroun
         background=inputs.background_of(background, bands),
         sensor=sensor,
         cells=cells,
+        west=west,
+        north=north,
     )
     if case.dem not in ("flat", "flint-hills") and not os.path.isfile(case.dem):
         raise ValueError(f'dem = {shown(case.dem)}: type "flat", "flint-hills", or a raster file of elevation')

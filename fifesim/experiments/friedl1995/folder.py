@@ -40,7 +40,8 @@ def reproduce_to_folder(
     overwrite : bool, optional
         Replace these files where the folder holds something; other files stay.
     **inputs
-        ``reading``, ``dem``, ``densities``, ``optics``, ``background`` and ``sensor``, as in `fifesim.reproduce`.
+        ``reading``, ``dem``, ``densities``, ``optics``, ``background``, ``sensor``, ``west`` and ``north``, as in
+        `fifesim.reproduce`.
 
     Returns
     -------
@@ -68,9 +69,8 @@ def reproduce_to_folder(
     names = ["table2.csv", *(f"{name}.csv" for name in _TABLES), *pictures.values(), "scenarios", "report.html"]
     with results(folder, names, overwrite=overwrite) as partial:
         found = reproduce_case(case, realisations, seed, each=_shown)
-        shown = str(found["reading"].values[0])
         tables = _effects(case, range(seed, seed + _EFFECT_REALISATIONS))
-        tables["table2"] = friedl1995_table.table2(found.sel(reading=shown))
+        tables["table2"] = _both(found)
         for name, table in tables.items():
             table.to_csv(partial / f"{name}.csv", index=False, float_format="%.6g")
         drawn = {key: pages.png(figures.plot_reproduction(key[0], found, reading=key[1]), _DPI) for key in pictures}
@@ -126,11 +126,18 @@ def command(options):
     """
     words = ["fifesim", "reproduce"]
     defaults = {"reading": "native", "dem": "flat", "sensor": TABLE_1}
-    for name in (*defaults, "densities", "optics", "background", "realisations", "cells", "seed"):
+    for name in (*defaults, "densities", "optics", "background", "west", "north", "realisations", "cells", "seed"):
         value = options.get(name)
         if value is not None and value != defaults.get(name):
             words += [f"--{name}", os.fspath(value) if is_path(value) else str(value)]
     return shlex.join(words)
+
+
+def _both(found):
+    """Table 2 of the reading, and the coefficients of the one that stands beside it."""
+    shown, other = (str(name) for name in found["reading"].values)
+    table, second = (friedl1995_table.table2(found.sel(reading=name)) for name in (shown, other))
+    return table.assign(**{f"{other}_{name}": second[name] for name in friedl1995_table.COEFFICIENTS})
 
 
 def _effects(case, seeds):

@@ -26,6 +26,8 @@ def reproduce(
     realisations=REALISATIONS,
     cells=None,
     seed=SEED,
+    west=None,
+    north=None,
 ):
     """
     Repeat the experiment of Friedl et al. (1995): Table 2 over realisations, and what Figures 3 to 9 show.
@@ -55,6 +57,8 @@ def reproduce(
         Along the edge of a scene, of 3.33 m each; 333, or 12 pixels of a coarse sensor, by default.
     seed : int, optional
         Of the first realisation, whose scenes the figures show; the others follow.
+    west, north : float, optional
+        Upper left corner of the scenes, easting and northing in EPSG:26914: the relief depends on it. [m]
 
     Returns
     -------
@@ -80,7 +84,7 @@ def reproduce(
     fifesim.plot_reproduction
     """
     given = {"dem": dem, "densities": densities, "optics": optics, "background": background}
-    case = friedl1995.case_of(reading, sensor=sensor, cells=cells, **given)
+    case = friedl1995.case_of(reading, sensor=sensor, cells=cells, west=west, north=north, **given)
     return reproduce_case(case, realisations, seed)
 
 

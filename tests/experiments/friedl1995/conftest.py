@@ -2,7 +2,10 @@
 
 import pytest
 
+import fifesim
+from fifesim.experiments.friedl1995 import effects
 from fifesim.experiments.friedl1995.case import case_of
+from fifesim.experiments.friedl1995.readings import READINGS
 from fifesim.experiments.friedl1995.reproduction import reproduce_case
 
 
@@ -15,7 +18,19 @@ def found():
 @pytest.fixture(scope="session")
 def small():
     """One realisation of scenes of 10 x 10 pixels."""
-    return reproduce_case(case_of(cells=90), 1, 1995)
+    return fifesim.reproduce(cells=90, realisations=1)
+
+
+@pytest.fixture(scope="session")
+def effect_tables():
+    """Effects of four readings, one size and no change, on one realisation of scenes of 10 x 10 pixels."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(effects, "SIZES", (333,))
+        few = ("native", "aligned", "offset", "blur-48.6")
+        patch.setattr(effects, "READINGS", {name: READINGS[name] for name in few})
+        patch.setattr(effects, "changes", lambda case: [effects.Change("itself", "1", "1", case)])
+        case = case_of(cells=90)
+        return {name: getattr(effects, name)(case, [1]) for name in ("readings", "sizes", "sensitivity")}
 
 
 @pytest.fixture(scope="session")

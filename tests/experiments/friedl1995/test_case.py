@@ -31,9 +31,18 @@ def test_another_sensor_brings_its_bands_pixels_and_a_scene_that_holds_some():
     assert case.cells == 900 and case_of(sensor="OLI").cells == 333
 
 
+def test_corner_of_the_scenes_is_where_it_is_asked_for():
+    """Three kilometres and a third from that of the site by default."""
+    box = case_of().grid.boundingbox
+    assert (box.left, box.top) == pytest.approx((704970 + 10000 / 3, 4334220 - 10000 / 3))
+    box = case_of(west=706000.0, north=4333000.0).grid.boundingbox
+    assert (box.left, box.top) == (706000.0, 4333000.0)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        ({"west": 600000.0}, "is not on the site of FIFE"),
         ({"cells": 50}, "at least 90, 10 pixels"),
         ({"dem": "nowhere.tif"}, "a raster file of elevation"),
         ({"sensor": "SuperDove"}, "smaller than a cell"),

@@ -49,12 +49,10 @@ def test_row_of_a_reading_has_r2_and_slopes_of_the_table(found):
     assert row["paper_growth"] == pytest.approx(np.mean([3.09 / 2.46, 4.08 / 3.44, 3.47 / 2.58]))
 
 
-def test_readings_stand_side_by_side_on_both_kinds_of_ground(monkeypatch):
-    few = {name: READINGS[name] for name in ("native", "aligned", "blur-48.6")}
-    monkeypatch.setattr(effects, "READINGS", few)
-    table = effects.readings(Case(cells=90), [1])
-    assert list(table["name"]) == [*few, "native", "aligned"]
-    assert list(table["dem"]) == ["flat"] * len(few) + ["flint-hills"] * 2
+def test_readings_stand_side_by_side_on_both_kinds_of_ground(effect_tables):
+    table = effect_tables["readings"]
+    assert list(table["name"]) == ["native", "aligned", "offset", "blur-48.6", "native", "aligned"]
+    assert list(table["dem"]) == ["flat"] * 4 + ["flint-hills"] * 2
     rows = table.set_index(["name", "dem"])
     # Blur narrows NDVI, so that slopes rise above those of the sharper response; relief scatters what is aligned.
     assert rows.loc[("blur-48.6", "flat"), "lai_slope_factor"] > 1.3 * rows.loc[("aligned", "flat"), "lai_slope_factor"]
@@ -67,13 +65,12 @@ def test_another_sensor_has_no_line_spread_of_table_1():
     assert [each.name for each in effects.readings_for(Case(sensor="OLI"))] == ["native", "aligned", "offset"]
 
 
-def test_sensitivity_is_the_difference_that_a_change_makes(monkeypatch):
-    monkeypatch.setattr(effects, "changes", lambda case: [effects.Change("itself", "1", "1", case)])
-    (row,) = effects.sensitivity(Case(cells=90), [1]).to_dict("records")
+def test_sensitivity_is_the_difference_that_a_change_makes(effect_tables):
+    """A change to the same is none."""
+    (row,) = effect_tables["sensitivity"].to_dict("records")
     assert all(value == 0 for name, value in row.items() if name not in ("name", "before", "after"))
 
 
-def test_sizes_are_those_of_a_scene(monkeypatch):
-    monkeypatch.setattr(effects, "SIZES", (333,))
-    table = effects.sizes(Case(cells=90), [1])
-    assert list(table["name"]) == ["90 cells, 300 m"]
+def test_sizes_are_those_of_a_scene(effect_tables):
+    assert list(effect_tables["sizes"]["name"]) == ["90 cells, 300 m"]
+    assert effect_tables["sizes"]["lai_r2_rms"][0] == effect_tables["readings"]["lai_r2_rms"][0]

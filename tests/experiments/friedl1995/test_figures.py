@@ -41,8 +41,17 @@ def test_sample_is_200_pixels_by_name(found):
 
 @pytest.mark.parametrize(
     ("number", "options", "said"),
-    [(2, {}, "one of 3, 4, 5, 6, 7, 8, 9"), (5, {"reading": "offset"}, "one of native, aligned, which were computed")],
+    [
+        ("5", {}, "number must be a number"),
+        (2, {}, "one of 3, 4, 5, 6, 7, 8, 9"),
+        (5, {"reading": "offset"}, "one of native, aligned, which were computed"),
+    ],
 )
 def test_figure_that_there_is_not_is_refused(small, number, options, said):
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises((ValueError, TypeError), match=said):
         fifesim.plot_reproduction(number, small, **options)
+
+
+def test_what_reproduce_did_not_give_is_refused(small):
+    with pytest.raises(TypeError, match=r"found must be an xarray\.Dataset, as fifesim\.reproduce gives it"):
+        fifesim.plot_reproduction(5, small[["slope"]])

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import fifesim
 from fifesim.experiments.friedl1995.case import case_of
@@ -19,10 +18,6 @@ def test_dataset_holds_54_numbers_by_realisation_beside_the_papers(found):
     assert float(found["paper_ren"].sel(variable="fpar", arp=0.15)) == 0.11
     assert np.isnan(found["paper_range_kept"].sel(quantity="lai", arp=0.15))
     assert found.attrs["drift"] == pytest.approx(11.025) and "30.315 m" in str(found["text"].values[0])
-
-
-def test_same_arguments_give_the_same_dataset(small):
-    xr.testing.assert_identical(fifesim.reproduce(cells=90, realisations=1), small)
 
 
 def slopes(**options):

@@ -20,23 +20,37 @@ def read(path):
 
 
 def test_nine_scenarios_give_the_images_of_the_experiment_to_the_bit(tmp_path):
-    scenarios.write_scenarios(case_of(cells=90), tmp_path / "nine", 11, scenes=True)
-    images = []
+    case, images = case_of(cells=90), []
+    scenarios.write_scenarios(case, tmp_path, 11)
     for treatment, arp in friedl1995.scenes():
-        folder = tmp_path / "nine" / f"{treatment}-{arp:g}"
-        run = simulate(read_scenario(folder / "scenario.toml"))
-        images.append(read(folder / "image.tif"))
+        run = simulate(read_scenario(tmp_path / f"{treatment}-{arp:g}" / "scenario.toml"))
+        images.append(scene_image(case, ground_of(case, treatment, arp, 11)).values)
         np.testing.assert_array_equal(run["image"]["dn"].values, images[-1])
-        truth = np.stack([run["truth"][name].values for name in ("lai", "fpar")]).astype(np.float32)
-        np.testing.assert_array_equal(truth, read(folder / "truth.tif"))
-        cells = read(folder / "scene.tif")
-        np.testing.assert_array_equal(run["scene"]["lai"].values.astype(np.float32), cells[0])
-        np.testing.assert_array_equal(run["scene"]["surface_reflectance"].values.astype(np.float32), cells[2:])
     assert len(images) == 9 and len({image.tobytes() for image in images}) == 9
-    # The last one by the command itself.
-    simulate_to_folder(read_scenario(folder / "scenario.toml"), tmp_path / "run")
+
+
+@pytest.fixture
+def one_of_nine(tmp_path, monkeypatch):
+    """Folder of one of the nine with its rasters."""
+    monkeypatch.setattr(friedl1995, "scenes", lambda: [("burned-ungrazed", 0.24)])
+    scenarios.write_scenarios(case_of(cells=90), tmp_path / "nine", 11, scenes=True)
+    return tmp_path / "nine" / "burned-ungrazed-0.24"
+
+
+def test_files_of_a_scene_hold_what_its_scenario_gives(one_of_nine):
+    run, cells = simulate(read_scenario(one_of_nine / "scenario.toml")), read(one_of_nine / "scene.tif")
+    np.testing.assert_array_equal(run["image"]["dn"].values, read(one_of_nine / "image.tif"))
+    truth = np.stack([run["truth"][name].values for name in ("lai", "fpar")])
+    np.testing.assert_array_equal(truth.astype(np.float32), read(one_of_nine / "truth.tif"))
+    np.testing.assert_array_equal(run["scene"]["lai"].values.astype(np.float32), cells[0])
+    np.testing.assert_array_equal(run["scene"]["surface_reflectance"].values.astype(np.float32), cells[2:])
+
+
+@pytest.mark.slow
+def test_command_gives_the_same_files(one_of_nine, tmp_path):
+    simulate_to_folder(read_scenario(one_of_nine / "scenario.toml"), tmp_path / "run")
     for name in ("image.tif", "truth.tif"):
-        np.testing.assert_array_equal(read(tmp_path / "run" / name), read(folder / name), err_msg=name)
+        np.testing.assert_array_equal(read(tmp_path / "run" / name), read(one_of_nine / name), err_msg=name)
 
 
 @pytest.mark.parametrize(
