@@ -1,0 +1,239 @@
+"""Fields of a landscape: their means, deviations and correlations, where they are the same, and what is refused."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import check_place, in_chunks, no_compute
+from scipy import stats
+
+import fifesim
+from fifesim.ground.landscape.autoregression import response
+from fifesim.ground.landscape.drawn import Field
+from fifesim.ground.landscape.rasters.drawn import drawn_fields
+from fifesim.rasters import cf
+
+DRAWN = {
+    "soil": Field(sd=0.04, arp=0.2),
+    "brown": Field(mean=0.2, sd=0.1, arp=0.1),
+    "crown_cover": Field(mean=0.7, sd=0.15),
+}
+COVARY = {"elevation": 0.3, "soil": -0.4, "brown": 0.2}
+CLASSES = {
+    "grass": fifesim.CoverClass(lai="burned-grazed", arp=0.05),
+    "wood": fifesim.CoverClass(lai="unburned-ungrazed", arp=0.2),
+}
+WINDOW = (slice(60, 150), slice(37, 111))
+
+
+@pytest.fixture(scope="module")
+def grid():
+    return fifesim.fife_site(30 / 9, window=((300, 660), (1000, 1360)))
+
+
+@pytest.fixture(scope="module")
+def hills(grid):
+    return fifesim.flint_hills(grid, seed=7)
+
+
+@pytest.fixture(scope="module")
+def make(grid, hills):
+    """A function that makes the landscape of this file, or parts of it."""
+
+    def made(grid=grid, dem=hills, **changes):
+        options = {"cover": fifesim.Patches("voronoi", 200), "classes": CLASSES, "covary": COVARY, "seed": 7}
+        return fifesim.landscape(grid, **options | DRAWN | {"dem": dem} | changes)
+
+    return made
+
+
+@pytest.fixture(scope="module")
+def land(make):
+    return make()
+
+
+def summed(*arps):
+    """Sum over lags of the product of the autocorrelations of fields, of one or two arps."""
+    u = 2 * np.pi * np.arange(512) / 512
+    spectra = [response(arp, u[:, None], u) ** 2 for arp in arps]
+    spectra = [each / each.mean() for each in spectra]
+    return spectra[0][0, 0] if len(spectra) == 1 else np.mean(spectra[0] * spectra[1])
+
+
+def scores_of(land):
+    """Standard normal scores of leaf area by its class's own distribution, from scipy."""
+    names = land["cover"].attrs["flag_meanings"].split()
+    known = {code: fifesim.lai_distribution(CLASSES[name].lai) for code, name in enumerate(names, 1)}
+    lai = land["lai"].values
+    return np.select(
+        [land["cover"].values == code for code in known], [stats.norm.ppf(each.cdf(lai)) for each in known.values()]
+    )
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_mean_and_deviation_are_as_asked(land, name):
+    """
+    Standard errors of correlated fields.
+
+    What a field becomes by its quantiles correlates no farther than the field does; of squares, with their kurtosis.
+    """
+    given, values = DRAWN[name], land[name].values
+    kind = stats.norm(0, given.sd) if name == "soil" else given.distribution(name)
+    fourth = float(kind.stats("k")) + 2
+    error = given.sd * np.sqrt(summed(given.arp) / values.size)
+    of_variance = np.sqrt(fourth * summed(given.arp) / values.size)
+    assert values.mean() == pytest.approx(given.mean, abs=4 * error)
+    assert values.var() / given.sd**2 == pytest.approx(1, abs=4 * of_variance) and 4 * of_variance < 0.15
+    # One cell in some: those correlate little.
+    assert stats.kstest(values[::7, ::7].ravel(), kind.cdf).pvalue > 0.01
+
+
+def test_mean_of_a_field_is_added_to_what_may_be_negative(grid):
+    drawn = {"soil": Field(sd=0.04)}, {"soil": Field(mean=-0.1, sd=0.04)}
+    level, dark = (drawn_fields(grid, each, None, (), seed=7)[1]["soil"] for each in drawn)
+    np.testing.assert_array_equal(dark, level + -0.1)
+    assert cf.attributes("soil").items() <= dark.attrs.items()
+
+
+@pytest.mark.parametrize("name", ["soil", "brown"])
+@pytest.mark.parametrize("code", [1, 2])
+def test_leaf_area_of_each_class_correlates_as_asked(land, name, code):
+    """Normal scores in the cells of a class; Bartlett's standard error, at most, since fields correlate positively."""
+    of_class = land["cover"].values == code
+    given, arp = DRAWN[name], list(CLASSES.values())[code - 1].arp
+    kind = stats.norm(0, given.sd) if name == "soil" else given.distribution(name)
+    leaf_area = scores_of(land)[of_class]
+    other = stats.norm.ppf(kind.cdf(land[name].values[of_class]))
+    error = np.sqrt(2 * summed(arp, given.arp) / of_class.sum())
+    assert of_class.sum() > 40_000 and 4 * error < 0.05
+    assert np.corrcoef(leaf_area, other)[0, 1] == pytest.approx(COVARY[name], abs=4 * error)
+
+
+@pytest.mark.parametrize("code", [1, 2])
+def test_leaf_area_of_each_class_follows_the_hills(land, hills, code):
+    """The hills of a class are a part of all: the slope of scores on theirs is the correlation wherever it is taken."""
+    of_class, arp = land["cover"].values == code, list(CLASSES.values())[code - 1].arp
+    ranks = stats.rankdata(hills.values) - 0.5
+    heights = stats.norm.ppf(ranks / ranks.size).reshape(hills.shape)[of_class]
+    # The hills vary over kilometres: noise is summed over its neighbours, as in a mean.
+    error = np.sqrt((1 - COVARY["elevation"] ** 2) * summed(arp) / (heights**2).sum())
+    slope = (heights * scores_of(land)[of_class]).sum() / (heights**2).sum()
+    assert 4 * error < 0.1
+    assert slope == pytest.approx(COVARY["elevation"], abs=4 * error)
+
+
+def test_what_nothing_is_asked_of_is_independent(land):
+    """Bartlett again; half of its sum, since nothing correlates across."""
+    for name, other in (("soil", "brown"), ("soil", "crown_cover"), ("brown", "crown_cover")):
+        error = np.sqrt(summed(DRAWN[name].arp, DRAWN[other].arp) / land["soil"].size)
+        assert np.corrcoef(land[name].values.ravel(), land[other].values.ravel())[0, 1] == pytest.approx(
+            0, abs=4 * error
+        )
+
+
+def test_each_class_is_as_if_it_were_everywhere(land, make):
+    """Beyond a fence the field goes on with the texture of another arp, and what varies beside it is the same."""
+    for code, (name, kind) in enumerate(CLASSES.items(), 1):
+        alone = make(cover=None, classes={name: kind})
+        cells = land["cover"].values == code
+        np.testing.assert_array_equal(land["lai"].values[cells], alone["lai"].values[cells])
+        for other in DRAWN:
+            np.testing.assert_array_equal(land[other], alone[other])
+
+
+def test_fields_of_two_arps_are_filters_of_one_noise(grid):
+    """Their correlation is that of the two filters, over all frequencies."""
+    fields, _ = drawn_fields(grid, DRAWN, {"soil": 0.0}, (0.05, 0.2, 0.05), seed=7)
+    assert list(fields) == [0.05, 0.2]
+    u = 2 * np.pi * np.arange(512) / 512
+    one, other = (response(arp, u[:, None], u) for arp in fields)
+    known = np.mean(one * other) / np.sqrt(np.mean(one**2) * np.mean(other**2))
+    found = np.corrcoef(*(each.values.ravel() for each in fields.values()))[0, 1]
+    assert found == pytest.approx(known, abs=4 * np.sqrt(2 * summed(0.05, 0.2) / grid.shape.y / grid.shape.x))
+
+
+def test_without_covariance_leaf_area_is_that_of_the_scene(grid, make):
+    plain = make(covary=None)
+    bare = fifesim.landscape(grid, cover=fifesim.Patches("voronoi", 200), classes=CLASSES, seed=7)
+    xr.testing.assert_identical(plain[["lai", "cover"]], bare)
+    fields, made = drawn_fields(grid, DRAWN, None, (0.15,), seed=7)
+    assert fields == {} and list(made) == list(DRAWN)
+    assert drawn_fields(grid, {}, None, (0.15,), seed=7) == ({}, {})
+
+
+def test_a_property_is_the_same_beside_any_others(grid, land):
+    alone = drawn_fields(grid, {"brown": DRAWN["brown"]}, None, (), seed=7)[1]["brown"]
+    np.testing.assert_array_equal(land["brown"], alone)
+    other = drawn_fields(grid, {"brown": DRAWN["brown"]}, None, (), seed=8)[1]["brown"]
+    assert (other != alone).mean() > 0.99
+
+
+def test_windows_and_chunks_are_slices_of_the_whole(grid, hills, land, make):
+    with no_compute():
+        lazy = make(dem=in_chunks(hills, {"y": 211, "x": 97}), chunks={"y": 211, "x": 97})
+    assert all(each.chunks is not None for each in lazy.data_vars.values())
+    found = lazy.compute()
+    for name in land:
+        xr.testing.assert_identical(found[name], land[name])
+    part = make(grid[WINDOW], hills[WINDOW], reference={"elevation": hills})
+    with no_compute():
+        lazy_part = make(
+            grid[WINDOW], hills[WINDOW], reference={"elevation": in_chunks(hills, {"y": 50})}, chunks=33
+        )  # fmt: skip
+    for name in land:
+        np.testing.assert_array_equal(part[name], land[name][WINDOW], err_msg=name)
+        np.testing.assert_array_equal(lazy_part[name], land[name][WINDOW], err_msg=name)
+
+
+def test_what_is_drawn_is_labelled_and_placed(grid, land):
+    assert list(land) == ["lai", "cover", "brown", "crown_cover", "soil"]
+    for name, given in DRAWN.items():
+        check_place(land[name], grid.crs)
+        assert cf.attributes(name).items() <= land[name].attrs.items()
+        assert (land[name].attrs["arp"], land[name].attrs["rng_seed"]) == (given.arp, "7")
+    assert "lai-soil -0.4" in land["soil"].attrs["history"]
+
+
+def test_numbers_and_rasters_are_in_the_place_of_fields(grid, make, land):
+    numbers = make(soil=-0.02, moisture=0.3, crown_cover=1, covary={"brown": 0.2})
+    for name, value in (("soil", -0.02), ("moisture", 0.3), ("crown_cover", 1.0)):
+        assert numbers[name].ndim == 0 and numbers[name] == value
+    np.testing.assert_array_equal(numbers["brown"], land["brown"])
+    mine = (land["soil"] * 0.5).assign_attrs(units="1")
+    rasters = make(soil=mine, moisture=land["brown"].rename("moisture"), covary=None)
+    np.testing.assert_array_equal(rasters["soil"], mine)
+    np.testing.assert_array_equal(rasters["moisture"], land["brown"])
+    assert rasters["moisture"].attrs["long_name"] == "moisture of the soil"
+
+
+def test_a_field_without_deviation_is_a_number_everywhere(make):
+    even = make(soil=Field(mean=0.03), brown=None, covary=None)
+    assert (even["soil"] == 0.03).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "said"),
+    [
+        ({"brown": Field(mean=0.2, sd=0.5)}, ValueError, "brown lies between 0 and 1: with a mean of 0.2"),
+        ({"moisture": Field(sd=0.1)}, ValueError, "moisture lies between 0 and 1"),
+        ({"soil": 0.02}, ValueError, "soil"),
+        ({"dem": None}, ValueError, r"covary names elevation, .* give dem="),
+        ({"covary": {"soil": -0.9, "brown": 0.9}}, ValueError, "lai-soil -0.9, lai-brown 0.9 cannot be"),
+        ({"covary": {"soil": 1.5}}, ValueError, r"must be in \[-1, 1\], got 1.5"),
+        ({"reference": {}}, ValueError, "reference has no 'elevation'"),
+        ({"soil": "none.tif", "covary": None}, ValueError, "cannot read none.tif as a raster"),
+        ({"moisture": 1.2, "covary": None}, ValueError, r"moisture must be in \[0, 1\], got 1.2"),
+        ({"moisture": [0.2]}, TypeError, "moisture must be a number, a fifesim.Field, the path of"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_it_computes(make, changes, error, said):
+    with pytest.raises(error, match=said) as caught:
+        make(**changes)
+    assert len(str(caught.value)) <= 500
+
+
+def test_a_map_of_leaf_area_goes_with_the_ground_as_it_does(make, land):
+    with pytest.raises(ValueError, match="lai is a map, which goes with the ground as it does: leave covary out"):
+        make(lai=land["lai"])
+    mine = make(lai=land["lai"], covary=None)
+    np.testing.assert_array_equal(mine["lai"], land["lai"])
+    np.testing.assert_array_equal(mine["brown"], land["brown"])
