@@ -67,12 +67,12 @@ text = r2.map("{:.2f}".format) + " ± " + error.map("{:.3f}".format)
 print(text.to_string())
 
 # %%
-# What the table says; the shares below are of those instruments whose error is stated. **Place first**: where the agency states the error of its product's place,
-# that error alone takes most of what is lost, because the ground varies within some ten metres and truth is read where
-# the map says. **Then blur**, wherever it is known; an instrument without a known blur looks flawless beside one whose
-# blur was measured. **Noise and counts** matter where a pixel holds little variance: six bits, ten bits over a
-# kilometre, the finest bands of MODIS. **Air that is the same everywhere** takes next to nothing from R²: it turns the
-# line, which is another error.
+# What the table says; the shares below are of those instruments whose error is stated. **Place first**: where the
+# agency states the error of its product's place, that error alone takes most of what is lost, because the ground varies
+# within some ten metres and truth is read where the map says. **Then blur**, wherever it is known; an instrument
+# without a known blur looks flawless beside one whose blur was measured. **Noise and counts** matter where a pixel
+# holds little variance: six bits, ten bits over a kilometre, the finest bands of MODIS. **Air that is the same
+# everywhere** takes next to nothing from R²: it turns the line, which is another error.
 
 shares = table.pivot(index=["arp", "instrument"], columns="stage", values="share")
 known["all"] = True
