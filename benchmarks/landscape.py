@@ -28,6 +28,21 @@ def chain(seed):
     return lai.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM")
 
 
+FIELDS = {
+    "soil": fifesim.Field(sd=0.03, arp=0.24),
+    "brown": fifesim.Field(mean=0.15, sd=0.06, arp=0.24),
+    "crown_cover": fifesim.Field(mean=0.8, sd=0.1, arp=0.24),
+    "moisture": fifesim.Field(mean=0.25, sd=0.08, arp=0.24),
+}
+
+
+def landscape_chain(seed, names, **options):
+    """The same of a landscape of three classes with some properties that vary."""
+    grid = fifesim.fife_site(30 / 9, window=((0, CELLS), (0, CELLS)))
+    land = fifesim.landscape(grid, seed=next(seed), **{name: FIELDS[name] for name in names}, **options)
+    return land.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM")
+
+
 def main():
     """Print a table of processor time a cell, and of ratios to the flat chain."""
     lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, CELLS), (0, CELLS))), seed=1)
@@ -59,6 +74,14 @@ def main():
     for name, options in cases.items():
         spent = seconds(lambda given=options: fifesim.surface_reflectance(lai, "TM", bands=BANDS, **given))
         print(f"| {name} | {spent / lai.size * 1e9:.0f} | {spent / whole:.2f} |", flush=True)
+    dem = fifesim.flint_hills(fifesim.fife_site(30 / 9, window=((0, CELLS), (0, CELLS))), seed=7)
+    go = {"covary": {"wetness": 0.4, "elevation": -0.2, "soil": -0.3}, "dem": dem}
+    print("\n| whole chain, level ground | flat chains |\n|---|---|")
+    for names, options in (((), {}), *((list(FIELDS)[: n + 1], {}) for n in range(4)), (list(FIELDS), go)):
+        seeds = iter(range(200, 300))
+        spent = seconds(lambda given=names, more=options, seed=seeds: landscape_chain(seed, given, **more), times=3)
+        said = ", ".join(["three classes", *names]) + (", leaf area that goes with three" if options else "")
+        print(f"| {said} | {spent / whole:.2f} |", flush=True)
 
 
 if __name__ == "__main__":

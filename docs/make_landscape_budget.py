@@ -1,7 +1,7 @@
 """
 Make landscape_budget.csv: what each stage takes from LAI on NDVI over the default landscape, for three instruments.
 
-    python docs/make_landscape_budget.py          # about an hour of processor time
+    python docs/make_landscape_budget.py          # a quarter of an hour of processor time
     python docs/make_landscape_budget.py TM MSI   # some of them
 """
 
@@ -17,7 +17,7 @@ from fifesim.scenario.scenario import Scenario, default_scenario
 TABLE = Path(__file__).with_name("landscape_budget.csv")
 
 # Cells along a window, which hold several pastures and enough pixels, and how many windows.
-WINDOWS = {"TM": (600, 3), "MSI": (600, 3), "MODIS": (900, 2)}
+WINDOWS = {"TM": (600, 12), "MSI": (600, 12), "MODIS": (900, 8)}
 
 
 def scenario_of(name):

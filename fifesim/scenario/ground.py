@@ -155,12 +155,26 @@ def absorbed_light(scenario, setup, land, leaves="all"):
 
 
 def _has_dead_leaves(scenario):
-    said = [
-        scenario.ground.brown,
-        scenario.landscape.deviations.get("brown"),
-        *(each.brown for each in _classes(scenario)),
-    ]
-    return any(said)
+    return any(said_by_stands(scenario, "brown")) or "brown" in drawn_properties(scenario)
+
+
+def said_by_stands(scenario, name):
+    """
+    Numbers of a property that hold somewhere on the ground of a scenario, where it is not drawn.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    name : str
+        Of the property, such as ``"crown_cover"``.
+
+    Returns
+    -------
+    numbers : list of float
+    """
+    own = [getattr(each, name) for each in _classes(scenario)]
+    ground = [] if _all_say(scenario, name) else [getattr(scenario.ground, name)]
+    return [*ground, *(number for number in own if number is not None)]
 
 
 def _all_say(scenario, name):

@@ -1,7 +1,7 @@
 """The ground of a scenario with any of what varies over it at its ideal."""
 
 from fifesim.ground.landscape.classes import OPTICS
-from fifesim.scenario.ground import ground_scene
+from fifesim.scenario.ground import drawn_properties, ground_scene, said_by_stands
 
 # In this order along the axes of what `stages.pixels` gives.
 PROPERTIES = {
@@ -27,13 +27,12 @@ def varying(scenario):
         In the order of `PROPERTIES`.
     """
     own, classes = scenario.landscape, scenario.class_table() if scenario.landscape.cover != "none" else {}
-    drawn, gaps = {name for name, deviation in own.deviations.items() if deviation}, [scenario.ground.crown_cover]
-    gaps += [each.crown_cover for each in classes.values() if each.crown_cover is not None]
+    drawn = drawn_properties(scenario)
     found = {
-        "soil": bool({"soil", "moisture"} & drawn),
+        "soil": bool({"soil", "moisture"} & set(drawn)),
         "dead leaves": "brown" in drawn,
         "cover": len(classes) > 1 and any(_has_optics(each) for each in classes.values()),
-        "clumping": "crown_cover" in drawn or min(gaps) < 1,
+        "clumping": "crown_cover" in drawn or min(said_by_stands(scenario, "crown_cover")) < 1,
         "covariance": any(own.covary.values()),
     }
     return tuple(name for name in PROPERTIES if found[name])

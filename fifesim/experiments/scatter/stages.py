@@ -37,6 +37,8 @@ STAGES = {
     "topography": "level ground",
     "atmosphere": "reflectance at the ground",
 } | PROPERTIES
+# What of the ground changes its leaf area, or the light that that absorbs, in their order.
+_TRUE = ("cover", "clumping", "covariance")
 _SENSED = ("NDVI scaling", "point spread", "registration", "quantisation", "noise")
 VARIABLES = ("lai", "fpar")
 
@@ -119,7 +121,7 @@ def pixels(scenario):
     lit = [name for name in STAGES if name not in _SENSED]
     sensed = [switches[name] for name in _SENSED]
     images = []
-    for states in product(*(switches[name] for name in lit)):
+    for states in _states(switches, lit):
         at_work = {name for name, state in zip(lit, states, strict=True) if state}
         images.append(_images(scene, _cells(scene, scene.ground(at_work), at_work), sensed))
     order = [*lit, *_SENSED]
@@ -228,11 +230,18 @@ def _tangent(function, lai, middle):
 
 
 def _truths(scene, switches):
-    """LAI and FPAR by blocks, shape (2, one axis for each stage but the first, variable, y, x)."""
-    drawn = switches["covariance"]
-    found = [[_truth(scene, scene.ground({"covariance"} if goes else ()), curve) for goes in drawn] for curve in (0, 1)]
-    shape = [len(switches[name]) if name in ("non-linearity", "covariance") else 1 for name in STAGES]
+    """LAI and FPAR by blocks, shape (one axis for each stage, variable, y, x)."""
+    kinds = [
+        [name for name, at_work in zip(_TRUE, states, strict=True) if at_work] for states in _states(switches, _TRUE)
+    ]
+    found = [[_truth(scene, scene.ground(kind), curve) for kind in kinds] for curve in (0, 1)]
+    shape = [len(switches[name]) if name in ("non-linearity", *_TRUE) else 1 for name in STAGES]
     return np.reshape(found, (*shape, len(VARIABLES), *scene.shape))
+
+
+def _states(switches, names):
+    """All states of some stages."""
+    return product(*(switches[name] for name in names))
 
 
 def _truth(scene, ground, curve):

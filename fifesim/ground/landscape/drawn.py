@@ -1,6 +1,7 @@
 """Properties of the ground that vary in fields: what values they have, and how coarsely they vary."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from numbers import Real
 
 from scipy import stats
@@ -86,5 +87,11 @@ class Field:
                 f"{name} lies between 0 and 1: with a mean of {self.mean:g} its sd must be above 0 and below "
                 f"{most:.3g}, got {self.sd:g}"
             )
-        weight = most**2 / self.sd**2 - 1
-        return stats.beta(self.mean * weight, (1 - self.mean) * weight)
+        return _beta(float(self.mean), float(self.sd))
+
+
+# The same object each time: what is tabulated of a distribution is kept with it.
+@lru_cache(maxsize=32)
+def _beta(mean, sd):
+    weight = mean * (1 - mean) / sd**2 - 1
+    return stats.beta(mean * weight, (1 - mean) * weight)

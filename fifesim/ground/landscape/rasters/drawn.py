@@ -36,6 +36,13 @@ def drawn_fields(grid, drawn, covary, arps, **options):
     ValueError
         As `landscape_fields`, or if a property cannot have its standard deviation.
     """
+    for name in set(covary or {}) & {"soil", *SHARES} - set(drawn):
+        raise ValueError(
+            f"covary names {name}, which is not drawn: type {name}=fifesim.Field(mean=..., sd=...), or leave it out"
+        )
+    # Before anything is computed.
+    for name in set(drawn) & set(SHARES):
+        drawn[name].distribution(name)
     others = {name: each.arp for name, each in drawn.items()}
     if not covary:
         made = [landscape_fields(grid, others, **options)] if others else [{}]

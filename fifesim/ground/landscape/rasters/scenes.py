@@ -126,7 +126,11 @@ def landscape(
     options = {"seed": seed, "dem": dem, "reference": reference, "geometry": geometry, "chunks": chunks}
     if covary and lai is not None:
         raise ValueError("lai is a map, which goes with the ground as it does: leave covary out, or the map")
-    variables = {}
+    variables = {
+        name: _property(name, each, grid, chunks, allow_remote)
+        for name, each in given.items()
+        if each is not None and name not in drawn
+    }
     if classes is not None or cover is not None or lai is None:
         table = class_table(_default_classes(cover) if classes is None else classes)
         variables["cover"] = _cover(grid, cover, table, seed, chunks, allow_remote)
@@ -136,10 +140,8 @@ def landscape(
         variables["lai"] = _lai(grid, variables["cover"], table, arp, seed, scores)
     else:
         variables["lai"] = _own_lai(lai, grid, chunks, allow_remote)
-    for name, each in given.items():
-        if each is not None:
-            variables[name] = made[name] if name in made else _property(name, each, grid, chunks, allow_remote)
-    order = ["lai", *(name for name in variables if name != "lai")]
+    variables |= made
+    order = [name for name in ("lai", "cover", *given) if name in variables]
     site = {key: variables["lai"].attrs[key] for key in ("site",) if key in variables["lai"].attrs}
     return xr.Dataset({name: variables[name] for name in order}, attrs=site)
 

@@ -1,0 +1,313 @@
+"""The ground of a scenario against the same written out, and limits at which it is the plain one."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from elevations import write
+from lazy import no_compute
+
+import fifesim
+from fifesim.rasters import grid as grids
+from fifesim.scenario.ground import canopy_of, drawn_properties, ground_scene, truth_of
+from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.simulation import setup_of
+
+SMALL = {"grid": {"width": 300.0, "height": 240.0}, "terrain": {"dem": "flat"}}
+BACKGROUND = {"TM3": 0.1, "TM4": 0.2}
+OWN = {
+    "ground": {
+        "distribution": "burned-ungrazed",
+        "arp": 0.1,
+        "seed": 11,
+        "leaf_angles": "planophile",
+        "hotspot": 0.1,
+        "brown": 0.2,
+        "dissociation": 0.5,
+        "crown_cover": 0.8,
+        "crown_shape": 0.7,
+        "fpar_inf": 0.9,
+        "background": BACKGROUND,
+        "brown_leaf": {"brown": 1.0},
+    },
+    "landscape": {
+        "cover": "voronoi",
+        "size": 80.0,
+        "moisture": 0.2,
+        "deviations": {"soil": 0.03, "brown": 0.06, "crown_cover": 0.0},
+        "arps": {"soil": 0.24},
+        "covary": {"soil": -0.3, "brown": 0.0},
+    },
+    "classes": {
+        "grass": {"share": 0.7, "hotspot": 0.2, "arp": 0.2, "leaf_angles": "spherical"},
+        "wood": {"share": 0.3, "distribution": "unburned-ungrazed", "leaf_angles": "erectophile"},
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    return parse_scenario(SMALL | OWN)
+
+
+@pytest.fixture(scope="module")
+def by_hand(scenario):
+    """The landscape of `OWN`, each key in its place."""
+    return fifesim.landscape(
+        scenario.geobox(),
+        cover=fifesim.Patches("voronoi", 80, {"grass": 0.7, "wood": 0.3}),
+        classes={
+            "grass": fifesim.CoverClass(lai="burned-ungrazed", hotspot=0.2, arp=0.2, leaf_angles="spherical"),
+            "wood": fifesim.CoverClass(lai="unburned-ungrazed", leaf_angles="erectophile"),
+        },
+        arp=0.1,
+        moisture=0.2,
+        brown=fifesim.Field(mean=0.2, sd=0.06, arp=0.1),
+        soil=fifesim.Field(sd=0.03, arp=0.24),
+        covary={"soil": -0.3},
+        seed=11,
+    )
+
+
+def scene_of(**sections):
+    case = parse_scenario(SMALL | sections)
+    return ground_scene(case, case.geobox())
+
+
+def test_landscape_of_a_scenario_is_that_written_out(scenario, by_hand):
+    land = ground_scene(scenario, scenario.geobox())
+    assert set(land) == {"lai", "cover", "brown", "soil", "moisture"}
+    for name in land:
+        xr.testing.assert_identical(land[name].drop_attrs(), by_hand[name].drop_attrs())
+        assert land[name].attrs["history"] == by_hand[name].attrs["history"]
+
+
+def test_light_and_truth_of_a_scenario_are_those_written_out(scenario, by_hand):
+    bands, sun = ["TM3", "TM4"], scenario.sun_and_view()
+    canopy = {"hotspot": 0.1, "dissociation": 0.5, "crown_cover": 0.8, "crown_shape": 0.7}
+    optics = {"background": BACKGROUND, "brown_leaf": fifesim.Leaf(brown=1.0)}
+    rho = fifesim.surface_reflectance(by_hand, bands=bands, geometry=sun, **canopy, **optics)
+    with no_compute():
+        tree = fifesim.simulate(scenario)
+    np.testing.assert_array_equal(tree["scene"]["surface_reflectance"], rho)
+    onto = grids.aligned(scenario.geobox(), 30.0)
+    image = fifesim.sense(fifesim.to_toa(rho), onto=onto)
+    np.testing.assert_array_equal(tree["image"]["dn"], image)
+    shares = {"dissociation": 0.5, "crown_cover": 0.8}
+    truth = {
+        "lai": by_hand["lai"],
+        "fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, **shares),
+        "green_fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, leaves="green", **shares),
+        "soil": by_hand["soil"],
+    }
+    assert set(tree["truth"].data_vars) == {*truth, "brown"}
+    for name, each in truth.items():
+        np.testing.assert_array_equal(tree["truth"][name], fifesim.aggregate(each, 30.0), err_msg=name)
+    # Of the leaf area of a pixel, not of its ground.
+    dead = fifesim.aggregate(by_hand["lai"] * by_hand["brown"], 30.0) / fifesim.aggregate(by_hand["lai"], 30.0)
+    np.testing.assert_allclose(tree["truth"]["brown"], dead, rtol=1e-12)
+
+
+def test_leaf_area_goes_with_the_hills_of_a_scenario():
+    sections = {
+        "terrain": {"dem": "flint-hills", "seed": 3, "horizon_reach": 300},
+        "landscape": {"covary": {"elevation": 0.3, "wetness": 0.4, "illumination": -0.3}},
+    }
+    case = parse_scenario(SMALL | sections)
+    scene = fifesim.simulate(case)["scene"]
+    grid = case.geobox()
+    dem = fifesim.flint_hills(grid.pad(1), 3)[1:-1, 1:-1]
+    land = fifesim.landscape(
+        grid,
+        classes=fifesim.CoverClass("ground", lai="burned-grazed"),
+        dem=dem,
+        covary=sections["landscape"]["covary"],
+        geometry=case.sun_and_view(),
+        seed=7,
+    )
+    np.testing.assert_array_equal(scene["lai"], land["lai"])
+    heights = np.corrcoef(scene["lai"].values.ravel(), dem.values.ravel())[0, 1]
+    assert heights > 0.1
+
+
+def test_one_stand_is_leaf_area_alone():
+    found = scene_of(ground={"seed": 3, "arp": 0.2})
+    grid = parse_scenario(SMALL).geobox()
+    xr.testing.assert_identical(found, fifesim.lai_scene(grid, "burned-grazed", arp=0.2, seed=3))
+
+
+def test_one_stand_with_what_varies_has_its_own_leaf_area():
+    plain, land = scene_of(), scene_of(landscape={"deviations": {"soil": 0.02}})
+    np.testing.assert_array_equal(land["lai"], plain)
+    assert (land["cover"] == 1).all() and set(land) == {"lai", "cover", "soil"}
+
+
+def test_map_of_leaf_area_keeps_it_and_has_what_varies(tmp_path):
+    lai = scene_of(ground={"seed": 5})
+    ground = {"lai_file": str(write(tmp_path / "lai.tif", lai.values, parse_scenario(SMALL).geobox().affine))}
+    land = scene_of(ground=ground, landscape={"deviations": {"soil": 0.02}})
+    np.testing.assert_array_equal(land["lai"], lai)
+    np.testing.assert_array_equal(land["soil"], scene_of(landscape={"deviations": {"soil": 0.02}})["soil"])
+
+
+def test_scene_is_lazy_in_its_chunks(scenario):
+    whole = ground_scene(scenario, scenario.geobox())
+    with no_compute():
+        lazy = ground_scene(scenario, scenario.geobox(), {"y": 31, "x": 47})
+    assert all(each.chunks is not None for each in lazy.data_vars.values() if each.ndim)
+    xr.testing.assert_identical(lazy.compute(), whole)
+
+
+def test_moisture_without_deviation_is_a_number():
+    land = scene_of(landscape={"moisture": 0.3})
+    assert land["moisture"].ndim == 0 and land["moisture"] == 0.3
+    drawn = scene_of(landscape={"moisture": 0.3, "deviations": {"moisture": 0.1}})["moisture"]
+    assert drawn.ndim == 2 and float(drawn.mean()) == pytest.approx(0.3, abs=0.02)
+
+
+def test_drawn_properties_are_about_their_means_with_the_arp_of_the_ground():
+    deviations = {"soil": 0.03, "moisture": 0.1, "brown": 0.05, "crown_cover": 0.07}
+    arps = {"soil": 0.24, "brown": 0.0}
+    case = parse_scenario(
+        {"ground": {"arp": 0.1, "brown": 0.2, "crown_cover": 0.8}}
+        | {"landscape": {"moisture": 0.3, "deviations": deviations, "arps": arps}}
+    )
+    assert drawn_properties(case) == {
+        "soil": fifesim.Field(sd=0.03, arp=0.24),
+        "moisture": fifesim.Field(mean=0.3, sd=0.1, arp=0.1),
+        "brown": fifesim.Field(mean=0.2, sd=0.05, arp=0.0),
+        "crown_cover": fifesim.Field(mean=0.8, sd=0.07, arp=0.1),
+    }
+
+
+def test_what_every_class_says_and_what_is_drawn_is_not_passed(scenario):
+    """It would change nothing, which `surface_reflectance` refuses."""
+    said = canopy_of(scenario)
+    assert set(said) == {
+        *("leaf_optics", "background", "brown_leaf", "hotspot", "dissociation", "crown_cover", "crown_shape")
+    }
+    assert (said["leaf_optics"], said["background"], said["brown_leaf"]) == (None, BACKGROUND, fifesim.Leaf(brown=1.0))
+    assert (said["hotspot"], said["dissociation"], said["crown_cover"], said["crown_shape"]) == (0.1, 0.5, 0.8, 0.7)
+    assert canopy_of(parse_scenario({"ground": OWN["ground"]})) == said | {"leaf_angles": "planophile", "brown": 0.2}
+
+
+@pytest.mark.parametrize("key", ["leaf", "background_spectra"])
+def test_leaf_and_spectra_of_every_class_are_theirs(key):
+    value = {"leaf": {"chlorophyll": 30.0}, "background_spectra": {"shade": 1.0}}[key]
+    field = {"leaf": "leaf_optics", "background_spectra": "background"}[key]
+    sections = {"ground": {key: value}, "landscape": {"cover": "voronoi"}}
+    both, one = ({"a": {key: value}, "b": {key: value}}, {"a": {key: value}, "b": {}})
+    assert field not in canopy_of(parse_scenario(sections | {"classes": both}))
+    assert field in canopy_of(parse_scenario(sections | {"classes": one}))
+
+
+@pytest.mark.parametrize(
+    ("sections", "dead"),
+    [
+        ({}, False),
+        ({"ground": {"brown": 0.2}}, True),
+        ({"ground": {"dissociation": 0.5}}, False),
+        ({"ground": {"brown": 0.2}, "landscape": {"deviations": {"brown": 0.05}}}, True),
+        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"brown": 0.1}, "b": {}}}, True),
+        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"brown": 0.0}, "b": {}}}, False),
+        ({"ground": {"brown": 0.2}, "landscape": {"cover": "voronoi"}, "classes": {"a": {"brown": 0.0}}}, False),
+    ],
+    ids=str,
+)
+def test_green_leaves_are_told_apart_where_some_are_dead(sections, dead):
+    case = parse_scenario(SMALL | sections)
+    land = ground_scene(case, case.geobox(), 50)
+    land = land if isinstance(land, xr.Dataset) else land.to_dataset(name="lai")
+    truth = truth_of(case, setup_of(case), land)
+    assert ("green_fpar" in truth) == dead
+    if dead:
+        assert truth["green_fpar"].attrs["long_name"].endswith("that green leaves absorb")
+        assert float(truth["green_fpar"].mean()) < float(truth["fpar"].mean())
+
+
+LEVEL_LAND = [
+    {"landscape": {"deviations": {"soil": 0.0, "moisture": 0.0, "brown": 0.0, "crown_cover": 0.0}}},
+    {"ground": {"brown": 0.0, "dissociation": 1.0, "brown_leaf": {"brown": 1.0}}},
+    {"ground": {"crown_cover": 1.0, "crown_shape": 0.3}},
+    {"landscape": {"covary": {"elevation": 0.0}, "moisture": 0.0}},
+    {"landscape": {"cover": "pastures"}, "classes": {"a": {"brown": 0.0, "crown_cover": 1.0}}},
+    {"landscape": {"cover": "levels", "size": 50.0}, "classes": {"a": {}, "b": {"hotspot": 0.0}}},
+]
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return fifesim.simulate(parse_scenario(SMALL)).compute()
+
+
+@pytest.mark.parametrize("sections", LEVEL_LAND, ids=str)
+def test_limits_of_what_varies_are_the_plain_ground(plain, sections):
+    """To the bit: what is nothing is not computed beside."""
+    found = fifesim.simulate(parse_scenario(SMALL | sections))
+    for node, name in (("scene", "lai"), ("scene", "surface_reflectance"), ("image", "dn"), ("truth", "fpar")):
+        np.testing.assert_array_equal(found[node][name], plain[node][name], err_msg=name)
+
+
+@pytest.mark.parametrize(
+    "properties",
+    [
+        {"soil": fifesim.Field(sd=0.0, arp=0.24)},
+        {"soil": 0.0, "brown": 0.0, "crown_cover": 1.0, "moisture": 0.0},
+        {"crown_cover": 1.0, "dissociation": 0.7},
+    ],
+    ids=["field", "numbers", "crowns"],
+)
+def test_landscape_of_soil_without_variance_is_leaf_area_alone(properties):
+    """Along the soil line by 0, cell by cell."""
+    case = parse_scenario(SMALL)
+    lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
+    given = {name: each for name, each in properties.items() if name != "dissociation"}
+    land = fifesim.landscape(case.geobox(), lai=lai, **given)
+    options = {"bands": ["TM3", "TM4"], "geometry": case.sun_and_view(), "exact": True}
+    found = fifesim.surface_reflectance(land, dissociation=properties.get("dissociation", 0.0), **options)
+    np.testing.assert_array_equal(found, fifesim.surface_reflectance(lai, **options))
+
+
+def test_number_of_a_property_that_is_not_drawn_stays_beside_what_is():
+    """A deviation of 0 says nothing: the number of [ground] is still that of its leaves."""
+    ground = {"brown": 0.15, "crown_cover": 0.8}
+    asked = {"deviations": {"soil": 0.02, "brown": 0.0, "crown_cover": 0.0}}
+    both = (
+        fifesim.simulate(parse_scenario(SMALL | {"ground": ground, "landscape": land}))["image"]["dn"]
+        for land in (asked, {"deviations": {"soil": 0.02}})
+    )
+    np.testing.assert_array_equal(*both)
+
+
+@pytest.mark.parametrize(
+    ("sections", "said"),
+    [
+        (
+            {"landscape": {"covary": {"elevation": 0.3}}},
+            "landscape.covary: elevation is of an elevation, and terrain.dem",
+        ),
+        ({"landscape": {"covary": {"wetness": 0.3, "illumination": 0.1}}}, "wetness, illumination is of an elevation"),
+        (
+            {"ground": {"lai_file": "lai.tif"}, "landscape": {"covary": {"soil": 0.1}, "deviations": {"soil": 0.1}}},
+            "a lai_file goes with the ground as it does: leave covary out",
+        ),
+        ({"ground": {"method": "periodic"}, "landscape": {"moisture": 0.1}}, "is for one stand"),
+        ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"soil": 0.1}}}, "is for one stand"),
+    ],
+)
+def test_ground_that_cannot_be_is_refused(sections, said):
+    with pytest.raises(ValueError, match=said):
+        parse_scenario(SMALL | sections)
+
+
+@pytest.mark.parametrize(
+    ("ground", "deviation", "said"),
+    [
+        ({}, "brown", "landscape.deviations: brown lies between 0 and 1"),
+        ({}, "crown_cover", "landscape.deviations: crown_cover lies between 0 and 1"),
+        ({"brown": 0.01}, "brown", "with a mean of 0.01 its sd must be above 0 and below 0.0995, got 0.2"),
+    ],
+)
+def test_share_that_cannot_vary_so_much_is_told_before_a_run(ground, deviation, said):
+    case = parse_scenario(SMALL | {"ground": ground, "landscape": {"deviations": {deviation: 0.2}}})
+    with pytest.raises(ValueError, match=said):
+        case.complete()
