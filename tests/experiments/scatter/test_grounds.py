@@ -1,0 +1,232 @@
+"""Ground with what varies over it at its ideal, and what a budget makes of it."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+import xarray as xr
+from elevations import write
+
+import fifesim
+from fifesim.experiments.scatter import shares as scatter
+from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
+from fifesim.experiments.scatter.stages import STAGES, pixels, working_stages
+from fifesim.scenario.ground import ground_scene
+from fifesim.scenario.scenario import parse_scenario
+
+# 13 x 13 pixels of 30 m.
+GRID = {"west": 707970.0, "north": 4331220.0, "width": 400.0, "height": 400.0}
+FLAT = {"grid": GRID, "terrain": {"dem": "flat"}}
+ALL = {
+    "ground": {"brown": 0.2, "crown_cover": 0.8},
+    "landscape": {
+        "cover": "voronoi",
+        "size": 60.0,
+        "moisture": 0.2,
+        "deviations": {"soil": 0.04, "moisture": 0.1, "brown": 0.1, "crown_cover": 0.1},
+        "arps": {"soil": 0.24},
+        "covary": {"soil": -0.4},
+    },
+    "classes": {
+        "grass": {"background_spectra": {"soil_dry": 0.5, "shade": 0.5}},
+        "litter": {"background_spectra": {"dead_grass": 0.6, "shade": 0.4}, "distribution": "unburned-ungrazed"},
+    },
+}
+
+
+def case_of(**sections):
+    return parse_scenario(FLAT | sections)
+
+
+@pytest.fixture(scope="module")
+def everything():
+    return case_of(**ALL)
+
+
+@pytest.fixture(scope="module")
+def whole(everything):
+    """The ground as it is."""
+    return ground_scene(everything, everything.geobox())
+
+
+@pytest.fixture(scope="module")
+def ideal(everything):
+    """A function that makes this ground without one property, or without more."""
+
+    def made(*left_out):
+        return ground_with(everything, everything.geobox(), set(PROPERTIES) - set(left_out))
+
+    return made
+
+
+def test_properties_are_the_last_stages():
+    assert tuple(STAGES)[-len(PROPERTIES) :] == tuple(PROPERTIES)
+
+
+@pytest.mark.parametrize(
+    ("sections", "found"),
+    [
+        ({}, ()),
+        ({"ground": {"brown": 0.2, "hotspot": 0.1}}, ()),
+        ({"landscape": {"moisture": 0.2}}, ()),
+        ({"landscape": {"deviations": {"soil": 0.02}}}, ("soil",)),
+        ({"landscape": {"deviations": {"soil": 0.0}}}, ()),
+        ({"landscape": {"moisture": 0.2, "deviations": {"moisture": 0.1}}}, ("soil",)),
+        ({"ground": {"brown": 0.2}, "landscape": {"deviations": {"brown": 0.1}}}, ("dead leaves",)),
+        ({"ground": {"crown_cover": 0.8}}, ("clumping",)),
+        ({"ground": {"crown_cover": 0.8}, "landscape": {"deviations": {"crown_cover": 0.1}}}, ("clumping",)),
+        ({"landscape": {"cover": "voronoi"}}, ()),
+        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"hotspot": 0.1}}}, ()),
+        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"hotspot": 0.1}, "b": {}}}, ("cover",)),
+        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"arp": 0.1}, "b": {}}}, ()),
+        ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"crown_cover": 0.9}}}, ("clumping",)),
+        ({"landscape": {"deviations": {"soil": 0.02}, "covary": {"soil": 0.3}}}, ("soil", "covariance")),
+        ({"landscape": {"deviations": {"soil": 0.02}, "covary": {"soil": 0.0}}}, ("soil",)),
+        (ALL, tuple(PROPERTIES)),
+    ],
+    ids=str,
+)
+def test_what_varies_is_found(sections, found):
+    case = case_of(**sections)
+    assert varying(case) == found
+    assert tuple(name for name in working_stages(case) if name in PROPERTIES) == found
+
+
+def test_with_all_at_work_the_ground_is_as_it_is(ideal, whole):
+    xr.testing.assert_identical(ideal(), whole)
+    assert all(each.chunks is None for each in ideal().data_vars.values())
+
+
+def test_without_a_property_only_that_is_even(ideal, whole):
+    """As `PROPERTIES` says; all else has the same bits, of the same random numbers."""
+    changed = {
+        "soil": {"soil", "moisture"},
+        "dead leaves": {"brown"},
+        "cover": {"cover"},
+        "clumping": {"crown_cover"},
+    }
+    for name, variables in changed.items():
+        found = ideal(name)
+        for other in set(whole) - variables:
+            np.testing.assert_array_equal(found[other], whole[other], err_msg=f"{name}: {other}")
+    assert "soil" not in ideal("soil") and ideal("soil")["moisture"].item() == 0.2
+    assert ideal("dead leaves")["brown"].item() == 0.2
+    assert ideal("clumping")["crown_cover"].item() == 1.0
+    first = ideal("cover")["cover"]
+    assert (first == 1).all() and first.dtype == whole["cover"].dtype
+    assert first.attrs["flag_meanings"] == whole["cover"].attrs["flag_meanings"] and (whole["cover"] == 2).any()
+
+
+def test_without_covariance_leaf_area_is_that_of_no_other_property(everything, ideal, whole):
+    """What else varies is the same; leaf area of each class is that of its own scene."""
+    found = ideal("covariance")
+    for name in set(whole) - {"lai"}:
+        np.testing.assert_array_equal(found[name], whole[name], err_msg=name)
+    for code, treatment in ((1, "burned-grazed"), (2, "unburned-ungrazed")):
+        alone = fifesim.lai_scene(everything.geobox(), treatment, arp=0.15, seed=7)
+        cells = (whole["cover"] == code).values
+        np.testing.assert_array_equal(found["lai"].values[cells], alone.values[cells])
+    soil = whole["soil"].values.ravel()
+    with_soil, without = (np.corrcoef(each["lai"].values.ravel(), soil)[0, 1] for each in (whole, found))
+    # Leaf area is no normal score: part of its correlation. Some 2,000 independent cells: .02.
+    assert with_soil < -0.2 and abs(without) < 0.1
+
+
+def test_missing_cover_stays_missing(tmp_path, everything):
+    """Where no class is known there is none to take."""
+    codes = ground_scene(everything, everything.geobox())["cover"]
+    holed = codes.where((codes["x"] > codes["x"][9]) | (codes["y"] > codes["y"][20]), -1).astype("int16")
+    path = write(tmp_path / "cover.tif", holed.values, everything.geobox().affine, nodata=-1)
+    case = case_of(**ALL | {"landscape": ALL["landscape"] | {"cover": str(path)}})
+    found = ground_with(case, case.geobox(), ["soil"])["cover"]
+    assert (found == -1).sum() == (holed == -1).sum() > 0
+    assert set(np.unique(found)) == {-1, 1}
+
+
+def test_one_stand_is_a_dataset_of_leaf_area():
+    case = case_of()
+    found = ground_with(case, case.geobox(), ())
+    assert list(found) == ["lai"]
+    np.testing.assert_array_equal(found["lai"], ground_scene(case, case.geobox()))
+
+
+DRAWN = {"deviations": {"soil": 0.04}, "covary": {"soil": -0.4}}
+OF_CLASSES = {
+    "ground": {"crown_cover": 0.6},
+    "landscape": {"cover": "voronoi", "size": 60.0},
+    "classes": {"a": {"leaf_angles": "planophile"}, "b": {"brown": 0.3, "distribution": "unburned-ungrazed"}},
+}
+
+
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {"ground": {"brown": 0.2}, "landscape": DRAWN},
+        {"ground": {"crown_cover": 0.6}, "landscape": {"deviations": {"crown_cover": 0.1}}},
+        OF_CLASSES,
+        pytest.param(ALL, marks=pytest.mark.slow),
+    ],
+    ids=["drawn", "gaps", "classes", "all"],
+)
+def test_with_all_at_work_pixels_are_those_of_the_simulation(sections):
+    case = case_of(**sections)
+    seen, run = pixels(case), fifesim.simulate(case)
+    at_work = (1,) * len(seen.stages)
+    rows, columns = (min(run[name].sizes[axis] for name in ("truth", "image")) for axis in ("y", "x"))
+    assert set(varying(case)) < set(seen.stages)
+    found = {"ndvi": seen.ndvi} | {name: np.broadcast_to(each, seen.ndvi.shape) for name, each in seen.truth.items()}
+    for name, node in (("ndvi", "image"), ("lai", "truth"), ("fpar", "truth")):
+        expected = run[node][name].values[:rows, :columns].ravel()
+        np.testing.assert_array_equal(found[name][at_work], expected, err_msg=name)
+
+
+def test_pixels_without_a_property_are_those_of_a_scenario_without_it():
+    """Of all others as they are; the image is that of the scenario which says nothing of it."""
+    land = {"deviations": {"soil": 0.04}}
+    seen = pixels(case_of(ground={"crown_cover": 0.8}, landscape=land))
+    for keys in product((0, 1), repeat=2):
+        soil, gaps = keys
+        ground = {"crown_cover": 0.8} if gaps else {}
+        run = fifesim.simulate(case_of(ground=ground, landscape=land if soil else {}))
+        at = tuple({"soil": soil, "clumping": gaps}.get(stage, 1) for stage in seen.stages)
+        np.testing.assert_array_equal(seen.ndvi[at], run["image"]["ndvi"].values.ravel(), err_msg=str(keys))
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Budget of soil over two classes."""
+    land = {"cover": "voronoi", "size": 60.0, "deviations": {"soil": 0.05}, "arps": {"soil": 0.24}}
+    case = case_of(ground={"brown": 0.2}, landscape=land, classes=ALL["classes"])
+    return case, fifesim.budget(case, realisations=1)
+
+
+def test_shares_of_a_landscape_add_up(found):
+    _, budget = found
+    np.testing.assert_allclose(budget["share"].sum("stage") + budget["curvature"], budget["total"], rtol=1e-12)
+
+
+def test_soil_and_cover_scatter_and_what_does_not_vary_has_exactly_nothing(found):
+    case, budget = found
+    assert varying(case) == ("soil", "cover")
+    for name in ("share", "alone", "first"):
+        nothing = budget[name].sel(stage=["dead leaves", "covariance", "clumping", "topography"])
+        assert (nothing == 0).all()
+        assert (budget[name].sel(stage=["soil", "cover"]) != 0).all()
+    assert (budget["share"].sel(stage="soil") > 0).all() and (budget["first"].sel(stage="soil") > 0).all()
+    assert (budget["share"].sel(stage="cover") > 0).all()
+
+
+def test_brighter_and_darker_soils_scatter_more():
+    shares = []
+    for deviation in (0.02, 0.05):
+        case = case_of(landscape={"deviations": {"soil": deviation}, "arps": {"soil": 0.24}})
+        shares.append(fifesim.budget(case, realisations=1)["share"].sel(stage="soil", realisation=0))
+    assert (shares[1] > 2 * shares[0]).all() and (shares[0] > 0).all()
+
+
+def test_realisations_of_a_landscape_have_fields_of_their_own():
+    case = case_of(landscape={"deviations": {"soil": 0.05}})
+    one, other = (
+        ground_scene(each, each.geobox())["soil"] for each in scatter.realise(case, realisations=2, cells=120)
+    )
+    assert (one.values != other.values).mean() > 0.99
