@@ -42,9 +42,9 @@ def test_shares_of_green_and_dead_leaves_mirror_each_other():
         (0.2, 0.4, "below 0.4, got 0.4"),
         (0.2, 0.5, "brown lies between 0 and 1: with a mean of 0.2 its sd must be above 0 and below 0.4, got 0.5"),
         (0.2, 0.0, "its sd must be above 0 and below 0.4, got 0"),
-        (0.0, 0.1, "for it to vary give it a mean between them, such as 0.2, got 0$"),
-        (1.0, 0.1, "a mean between them, such as 0.2, got 1$"),
-        (-0.2, 0.1, "a mean between them, such as 0.2, got -0.2$"),
+        (0.0, 0.1, "brown lies between 0 and 1: for it to vary .* such as 0.2, got 0$"),
+        (1.0, 0.1, "for it to vary .*, got 1$"),
+        (-0.2, 0.1, "for it to vary .*, got -0.2$"),
     ],
 )
 def test_what_no_share_has_is_refused(mean, sd, said):
