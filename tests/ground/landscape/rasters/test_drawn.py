@@ -27,7 +27,7 @@ WINDOW = (slice(60, 150), slice(37, 111))
 
 @pytest.fixture(scope="module")
 def grid():
-    return fifesim.fife_site(30 / 9, window=((300, 660), (1000, 1360)))
+    return fifesim.fife_site(30 / 9, window=((300, 600), (1000, 1300)))
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def test_leaf_area_of_each_class_correlates_as_asked(land, name, code):
     leaf_area = scores_of(land)[of_class]
     other = stats.norm.ppf(kind.cdf(land[name].values[of_class]))
     error = np.sqrt(2 * summed(arp, given.arp) / of_class.sum())
-    assert of_class.sum() > 40_000 and 4 * error < 0.05
+    assert of_class.sum() > 30_000 and 4 * error < 0.06
     assert np.corrcoef(leaf_area, other)[0, 1] == pytest.approx(COVARY[name], abs=4 * error)
 
 
