@@ -123,17 +123,24 @@ def scenarios(draw):
         # The whole site, or what a map covers.
         del found["grid"]
         found["ground"] = {"lai_file": "lai.tif"} if draw(st.booleans()) else {}
+    classes = [("classes", "grass"), ("classes", "wood")]
+    places = st.sampled_from([*((name,) for name in Keys.model_fields if name != "classes"), *classes])
     sections = st.sampled_from(list(Keys.model_fields))
     wild = draw(st.integers(0, 2)) == 0
     for _ in range(draw(st.integers(1, 3))):
-        section = draw(sections)
-        fields = Keys.model_fields[section].annotation.model_fields
+        place = draw(places)
+        fields = Keys.section(place).model_fields
         key = draw(st.sampled_from(list(fields)))
         field = fields[key]
         value = of_type(field.annotation, field, sound_numbers, sound_texts)
         if wild:
             value |= of_type(field.annotation, field, odd_numbers, odd_texts) | ANYTHING
-        found.setdefault(section, {})[key] = draw(value)
+        table = found
+        for name in place:
+            table = table.setdefault(name, {})
+        table[key] = draw(value)
+        if place in classes and draw(st.integers(0, 3)):
+            found.setdefault("landscape", {}).setdefault("cover", draw(st.sampled_from(["voronoi", "levels", "pastures"])))
     if wild and draw(st.integers(0, 5)) == 0:
         found.setdefault(draw(sections), {})[draw(st.text() | st.just("k" * 5000))] = draw(ANYTHING)
     if wild and draw(st.integers(0, 5)) == 0:

@@ -36,7 +36,7 @@ class Field:
 
     Examples
     --------
-    >>> Field(mean=0.2, sd=0.1).distribution("brown").mean()
+    >>> float(Field(mean=0.2, sd=0.1).distribution("brown").mean())
     0.2
     """
 

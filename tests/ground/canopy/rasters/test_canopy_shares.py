@@ -65,7 +65,7 @@ def test_green_leaves_absorb_less_than_all(lai, rasters):
     brown, cover = rasters
     green = check_raster_function(
         lambda area, brown, cover: fifesim.fpar(area, leaves="green", brown=brown, crown_cover=cover),
-        lai, brown, cover, quantity="fpar",
+        lai, brown, cover, quantity="green_fpar",
     )  # fmt: skip
     total = fifesim.fpar(lai, crown_cover=cover)
     np.testing.assert_allclose(green, total * (1 - brown), rtol=1e-12)
