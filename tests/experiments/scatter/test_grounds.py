@@ -183,7 +183,8 @@ def test_pixels_without_a_property_are_those_of_a_scenario_without_it():
 def found():
     """Budget of soil over two classes."""
     land = {"cover": "voronoi", "size": 60.0, "deviations": {"soil": 0.05}, "arps": {"soil": 0.24}}
-    case = case_of(ground={"brown": 0.2}, landscape=land, classes=ALL["classes"])
+    litter = {"background_spectra": {"dead_grass": 0.6, "shade": 0.4}, "distribution": "unburned-ungrazed"}
+    case = case_of(ground={"brown": 0.2}, landscape=land, classes={"grass": {}, "litter": litter})
     return case, fifesim.budget(case, realisations=1)
 
 
