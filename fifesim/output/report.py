@@ -143,7 +143,12 @@ def _summary(scenario, image, truth, fits, reasons):
     ]
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
         label = f"{NAMES[name][0].upper()}{NAMES[name][1:]} of the pixels"
-        rows.append((label, f"mean {float(values.mean()):.3f}, standard deviation {float(values.std()):.3f}"))
+        rows.append(
+            (
+                label,
+                f"mean {pages.fixed(float(values.mean()), 3)}, standard deviation {pages.fixed(float(values.std()), 3)}",
+            )
+        )
     found = {name: f"{fit.r2:.3f}" for name, fit in fits.items()} | {name: f"none, {reasons[name]}" for name in reasons}
     return rows + [(f"R² of {NAMES[name]} on NDVI", text) for name, text in found.items()]
 
