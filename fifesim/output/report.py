@@ -143,12 +143,8 @@ def _summary(scenario, image, truth, fits, reasons):
     ]
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
         label = f"{NAMES[name][0].upper()}{NAMES[name][1:]} of the pixels"
-        rows.append(
-            (
-                label,
-                f"mean {pages.fixed(float(values.mean()), 3)}, standard deviation {pages.fixed(float(values.std()), 3)}",
-            )
-        )
+        mean, deviation = (pages.fixed(float(each), 3) for each in (values.mean(), values.std()))
+        rows.append((label, f"mean {mean}, standard deviation {deviation}"))
     found = {name: f"{fit.r2:.3f}" for name, fit in fits.items()} | {name: f"none, {reasons[name]}" for name in reasons}
     return rows + [(f"R² of {NAMES[name]} on NDVI", text) for name, text in found.items()]
 

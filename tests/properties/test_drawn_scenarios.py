@@ -140,7 +140,8 @@ def scenarios(draw):
             table = table.setdefault(name, {})
         table[key] = draw(value)
         if place in classes and draw(st.integers(0, 3)):
-            found.setdefault("landscape", {}).setdefault("cover", draw(st.sampled_from(["voronoi", "levels", "pastures"])))
+            cover = draw(st.sampled_from(["voronoi", "levels", "pastures"]))
+            found.setdefault("landscape", {}).setdefault("cover", cover)
     if wild and draw(st.integers(0, 5)) == 0:
         found.setdefault(draw(sections), {})[draw(st.text() | st.just("k" * 5000))] = draw(ANYTHING)
     if wild and draw(st.integers(0, 5)) == 0:

@@ -67,7 +67,8 @@ def test_what_a_file_does_not_know_it_says_with_who_does(name):
 def test_a_line_says_which_bands_lack_noise_or_blur_and_who_published_it():
     oli = instrument("OLI")
     assert noise_in_words(oli, ["OLI4"]) == "none is added"
-    assert noise_in_words(oli, ["OLI4", "OLI6"]).startswith("none is added; that of OLI6 is not known, of bands 1 and 6")
+    said = "none is added; that of OLI6 is not known, of bands 1 and 6"
+    assert noise_in_words(oli, ["OLI4", "OLI6"]).startswith(said)
     assert noise_in_words(oli, ["OLI6"], ["thermal", "shot"]) == "thermal, shot"
     assert blur_in_words(oli, ["OLI4"]).endswith(f"sharper than the instrument's, {oli.not_found['blur']}")
     assert "sharper" not in blur_in_words(instrument("MSI"), ["MSI4"])
