@@ -160,7 +160,7 @@ def noise(rows, lines):
     Returns
     -------
     noise : dict
-        ``largest`` relative difference; ``growth`` of LAI from the least to the largest arp and the ``paper_growth``; and
+        ``largest`` relative difference; ``growth`` of LAI from least to largest arp and the ``paper_growth``; and
         noise of LAI by arp with the slope of the line of LAI on NDVI, which makes it R2 times as large, ``by_other``.
     """
     rows = [row for row in rows if row["quantity"] == "ren"]

@@ -76,7 +76,7 @@ def origins(case):
         ),
         Origin(
             "form of the random field", 1, FITTED_TO_TEXT,
-            "simultaneous, of two forms that were tried; the length scales and the range kept are nearer to the paper's",
+            "simultaneous, of two forms that were tried; its length scales and range kept are nearer to the paper's",
         ),
         _land(case),
         Origin(
@@ -89,7 +89,7 @@ def origins(case):
         Origin("air", 2, FOUND, "section Data: midlatitude summer, continental, visibility 45 km, by 5S"),
         Origin("leaf angles, FPAR of a thick canopy", 2, FOUND, "sections Data and Analyses: spherical, 0.94"),
         Origin("date", 1, FOUND, "section Data: 6 June 1987"),
-        Origin("hour and view", 2, CHOSEN, "16:35 UTC, at which a Landsat passes, and nadir; the paper states neither"),
+        Origin("hour and view", 2, CHOSEN, "16:35 UTC, the hour of a Landsat, and nadir; the paper states neither"),
     ]  # fmt: skip
 
 
