@@ -130,15 +130,48 @@ def text(values):
     """
     environment = jinja2.Environment(trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
     environment.filters["fixed"] = fixed
-    environment.globals["between"] = between
-    for reading in values["readings"]:
-        reading["slope_highest"] = max(nine(reading, "slope"))
-    return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(**values) + "\n"
+    environment.globals |= {"between": between, "highest": highest}
+    environment.globals["slope_of"] = lambda cosine: np.degrees(np.arccos(cosine))
+    ren = noise(values["text"], values["table2"]["native"])
+    return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(**values, ren=ren) + "\n"
 
 
 def nine(reading, name):
     """The nine values of LAI of a row of readings: ``r2``, ``slope``, or these of the paper, an array."""
     return np.array([reading[f"{name} {treatment} {arp:g}"] for treatment, arp in friedl1995.scenes()])
+
+
+def highest(reading):
+    """The highest of the nine slopes of LAI of a row of readings, and its treatment and arp."""
+    slopes = nine(reading, "slope")
+    treatment, arp = friedl1995.scenes()[slopes.argmax()]
+    return {"slope": slopes.max(), "treatment": treatment, "arp": arp}
+
+
+def noise(rows, lines):
+    """
+    Mean relative equivalent noise beside the paper's.
+
+    Parameters
+    ----------
+    rows, lines : list of dict
+        ``text``, and ``table2`` of one reading, from `numbers`.
+
+    Returns
+    -------
+    noise : dict
+        ``largest`` relative difference; ``growth`` of LAI from least to largest arp and the ``paper_growth``; and
+        noise of LAI by arp with the slope of the line of LAI on NDVI, which makes it R2 times as large, ``by_other``.
+    """
+    rows = [row for row in rows if row["quantity"] == "ren"]
+    lai = [row for row in rows if row["variable"] == "lai"]
+    r2 = {row["arp"]: row["r2"] for row in lines if (row["variable"], row["distribution"]) == ("lai", "burned-grazed")}
+    return {
+        "largest": max(abs(row["value"] / row["paper"] - 1) for row in rows),
+        "growth": lai[-1]["value"] / lai[0]["value"],
+        "paper_growth": lai[-1]["paper"] / lai[0]["paper"],
+        "by_other": [row["value"] * r2[row["arp"]] for row in lai],
+    }
 
 
 def between(reading, other):

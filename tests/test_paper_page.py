@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fifesim.experiments.friedl1995 import case as friedl1995
+from fifesim.experiments.friedl1995.readings import READINGS
 
 DOCS = Path(__file__).parents[1] / "docs"
 NUMBERS = json.loads((DOCS / "paper.json").read_text(encoding="utf-8"))
@@ -55,9 +56,17 @@ def test_pixels_on_the_blocks_do_not_make_the_scatter_of_the_paper():
     assert (nine(hills, "r2")[0] > nine(hills, "paper_r2")[0] + 0.1).all()
 
 
-def test_a_shift_makes_r2_and_slopes_like_the_paper():
-    for name in ("native", "offset"):
-        assert reading(name)["lai_r2_rms"] < 0.08 and reading(name)["lai_slope_largest"] < 0.25
+def test_a_shift_makes_r2_and_slopes_like_the_paper_and_the_drift_does_better():
+    """Within the limits that were wanted; the constant shift misses that of slopes."""
+    drift, shift = reading("native"), reading("offset")
+    assert drift["lai_r2_rms"] < shift["lai_r2_rms"] < 0.06
+    assert drift["lai_slope_largest"] < 0.15 < shift["lai_slope_largest"] < 0.2
+    for name in READINGS.keys() - {"native", "offset"}:
+        assert reading(name)["lai_r2_rms"] > 0.08 and reading(name)["lai_slope_largest"] > 0.2
+
+
+def test_narrower_spread_makes_a_part_of_the_scatter():
+    assert 0.1 < reading("narrow")["lai_r2_rms"] < reading("aligned")["lai_r2_rms"] / 2
     assert reading("narrow")["lai_r2_largest_long"] > 0.15
 
 
@@ -79,6 +88,37 @@ def test_what_was_fitted_hardly_moves_r2():
 def test_hills_and_drift_are_not_both_in_the_paper():
     one = reading("native", "flint-hills")
     assert one["r2 burned-ungrazed 0.05"] < one["paper_r2 burned-ungrazed 0.05"] - 0.1
+
+
+def test_hills_alone_give_one_row_like_the_paper_and_not_the_others():
+    one = reading("aligned", "flint-hills")
+    assert one["r2 burned-ungrazed 0.05"] == pytest.approx(one["paper_r2 burned-ungrazed 0.05"], abs=0.03)
+    assert (np.delete(nine(one, "r2") - nine(one, "paper_r2"), 3) > 0.15).all()
+
+
+def test_noise_is_the_papers_by_one_of_two_slopes(make_paper):
+    found = make_paper.noise(NUMBERS["text"], NUMBERS["table2"]["native"])
+    stated = [row["paper"] for row in NUMBERS["text"] if row["quantity"] == "ren" and row["variable"] == "lai"]
+    assert found["largest"] < 0.2 and found["growth"] == pytest.approx(found["paper_growth"], rel=0.1)
+    assert (np.divide(found["by_other"], stated) < 0.75).all()
+
+
+def test_pixels_keep_more_of_the_range_than_the_papers():
+    rows = [row for row in NUMBERS["text"] if row["quantity"] == "range_kept" and row["paper"] is not None]
+    assert len(rows) == 6 and all(row["value"] > row["paper"] for row in rows)
+    (widest,) = (row for row in rows if (row["variable"], row["arp"]) == ("lai", 0.24))
+    assert widest["value"] > widest["paper"] + 3 * widest["deviation"]
+
+
+def test_every_choice_made_in_view_of_the_paper_is_called_fitted():
+    origins = {row["name"]: row["origin"] for row in NUMBERS["origins"]}
+    assert origins["reading of Table 1"] == origins["size of the scenes"] == "fitted to Table 2"
+    assert origins["form of the random field"] == origins["bounds of LAI"] == "fitted to the text"
+    assert {name for name, origin in origins.items() if origin == "assumed"} == {
+        "shape of the densities",
+        "elevation",
+        "hour and view",
+    }
 
 
 def test_no_threshold_gives_the_lengths_of_the_paper():

@@ -140,7 +140,7 @@ READINGS = {
     for reading in (
         NATIVE,
         ALIGNED,
-        Reading("narrow", "aligned, with a line spread of 7 of the 9 angles (23.6 m)", count=7),
+        Reading("narrow", "aligned, with a line spread of 7 steps (23.6 m) instead of 9 (30.3 m)", count=7),
         Reading("offset", "aligned, then displaced by 2 cells (6.7 m) along both axes", offset=2.0),
         Reading("blur-40.8", "aligned, with " + _BLUR.format(eifov=40.8), eifov=40.8),
         Reading("blur-48.6", "aligned, with " + _BLUR.format(eifov=48.6), eifov=48.6),

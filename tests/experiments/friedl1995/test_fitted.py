@@ -15,7 +15,10 @@ def by_name(case):
 def test_fitted_numbers_are_counted():
     """Three means and deviations, four of leaves, two of background, the size of the scenes, and the reading."""
     assert fitted.fitted_count(case_of()) == 3 + 3 + 4 + 2 + 1 + 1
-    assert by_name(case_of())["elevation"].origin == fitted.CHOSEN
+    rows = by_name(case_of())
+    assert rows["elevation"].origin == rows["hour and view"].origin == fitted.CHOSEN
+    assert rows["bounds of LAI"].origin == rows["form of the random field"].origin == fitted.FITTED_TO_TEXT
+    assert rows["mean LAI"].text.startswith("0.74, 1.41, 1.18 (burned-grazed, burned-ungrazed, unburned-ungrazed)")
 
 
 def test_what_a_reader_gives_is_not_called_fitted(folders, tmp_path):
