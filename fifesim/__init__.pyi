@@ -60,7 +60,7 @@ from .sensor.scan.rasters.view import scan_geometry as scan_geometry
 from .sensor.scan.track import Track as Track
 from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method
 from .rasters.swaths import grid_swath as grid_swath  # method
-from .chain.comparison import compare as compare  # method
+from .chain.comparison import compare as compare  # method, of a Dataset too
 from .chain.adjustment import as_seen_by as as_seen_by  # method, of a Dataset too
 from .chain.adjustment import adjust_bands as adjust_bands  # method, of a Dataset too
 from .chain.adjustment import spectral_adjustment as spectral_adjustment

@@ -138,3 +138,11 @@ def test_images_of_an_instrument_s_other_pixels_have_rows_of_their_own(lai):
 def test_table_of_something_else_is_refused(lai):
     with pytest.raises(ValueError, match="TM holds no dn and no toa_radiance, but lai"):
         xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")}).fifesim.comparison_table()
+
+
+def test_a_landscape_is_compared_as_its_chain_sees_it(site):
+    land = fifesim.landscape(site, seed=3, soil=fifesim.Field(sd=0.03))
+    images = land.fifesim.compare(["TM", "MSI"])
+    rho = land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    xr.testing.assert_equal(images["TM"]["dn"], rho.fifesim.to_toa().fifesim.sense("TM"))
+    assert list(images.children) == ["TM", "MSI"]

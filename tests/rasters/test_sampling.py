@@ -1,9 +1,12 @@
 """Lazy arrays that are computed by themselves."""
 
+import threading
+
 import dask
 import dask.array as da
 import numpy as np
 import pytest
+from distributed import Client, LocalCluster
 from lazy import no_compute
 
 from fifesim.rasters.sampling import apart
@@ -35,10 +38,21 @@ def test_values_are_those_of_the_array(scheduler):
     np.testing.assert_array_equal(found.compute(scheduler=scheduler, **workers), array.compute())
 
 
-def test_values_are_those_where_the_pool_has_one_thread():
-    """The task waits for others: those must not need the thread that it has."""
-    with dask.config.set(scheduler="threads", num_workers=1):
-        np.testing.assert_array_equal(apart(rechunked()).compute(), rechunked().compute())
+def test_one_task_keeps_to_its_thread():
+    """It waits for no other: a pool of one thread, and a cluster of one worker, come to an end."""
+    threads = set()
+
+    def note(block):
+        threads.add(threading.get_ident())
+        return block
+
+    blocks = da.ones((60, 80), chunks=(5, 5)).map_blocks(note, dtype=float, meta=np.empty((0, 0)))
+    with dask.config.set(scheduler="threads", num_workers=2):
+        assert apart(blocks).sum().compute() == 4800
+    assert len(threads) == 1
+    options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    with LocalCluster(**options) as cluster, Client(cluster) as client:
+        assert client.compute(apart(blocks).sum()).result(timeout=20) == 4800
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.int16, bool])

@@ -111,6 +111,7 @@ def test_leaf_area_goes_with_the_hills_of_a_scenario():
     sections = {
         "terrain": {"dem": "flint-hills", "seed": 3, "horizon_reach": 300},
         "landscape": {"covary": {"elevation": 0.3, "wetness": 0.4, "illumination": -0.3}},
+        "geometry": {"sza": 50.0, "saa": 200.0},
     }
     case = parse_scenario(SMALL | sections)
     scene = fifesim.simulate(case)["scene"]

@@ -14,6 +14,7 @@ def test_share_has_exactly_its_mean_and_deviation(name, mean, sd):
     found = Field(mean=mean, sd=sd).distribution(name)
     assert found.support() == (0, 1)
     assert (found.mean(), found.std()) == pytest.approx((mean, sd), rel=1e-12)
+    assert Field(mean=mean, sd=sd, arp=0.24).distribution(name) is found
 
 
 @pytest.mark.parametrize(("mean", "sd"), [(0.2, 0.1), (0.7, 0.15)])

@@ -122,6 +122,7 @@ def landscape(
     check_arp(arp)
     seed = check_seed(seed)
     given = {"brown": brown, "crown_cover": crown_cover, "soil": soil, "moisture": moisture}
+    given = {name: each.mean if isinstance(each, Field) and not each.sd else each for name, each in given.items()}
     drawn = {name: each for name, each in given.items() if isinstance(each, Field)}
     options = {"seed": seed, "dem": dem, "reference": reference, "geometry": geometry, "chunks": chunks}
     if covary and lai is not None:

@@ -237,3 +237,11 @@ def test_a_map_of_leaf_area_goes_with_the_ground_as_it_does(make, land):
     mine = make(lai=land["lai"], covary=None)
     np.testing.assert_array_equal(mine["lai"], land["lai"])
     np.testing.assert_array_equal(mine["brown"], land["brown"])
+
+
+def test_a_field_without_deviation_is_its_mean(site):
+    land = fifesim.landscape(site, brown=fifesim.Field(mean=0.2), soil=fifesim.Field())
+    assert (float(land["brown"]), float(land["soil"])) == (0.2, 0.0)
+    plain = fifesim.landscape(site, brown=0.2)
+    found, meant = (each.fifesim.surface_reflectance("TM", bands=["TM3"]) for each in (land, plain))
+    np.testing.assert_array_equal(found, meant)
