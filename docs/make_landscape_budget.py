@@ -17,7 +17,7 @@ from fifesim.scenario.scenario import Scenario, default_scenario
 TABLE = Path(__file__).with_name("landscape_budget.csv")
 
 # Cells along a window, which hold several pastures and enough pixels, and how many windows.
-WINDOWS = {"TM": (600, 12), "MSI": (600, 12), "MODIS": (900, 8)}
+WINDOWS = {"TM": (600, 12), "MSI": (600, 12), "MODIS": (900, 4)}
 
 
 def scenario_of(name):
