@@ -71,8 +71,8 @@ def percent(stage):
 
 side, windows = tm["cells"].iloc[0] / 300, tm["realisations"].iloc[0]
 sentences = [
-    f"In {windows} windows of {side:g} km of a simulated tallgrass landscape (fifesim, default scenario), a line of leaf",
-    f"area on the NDVI of the Thematic Mapper leaves {percent('total')} of the variance between pixels of 30 m.",
+    f"In {windows} windows of {side:g} km of a simulated tallgrass landscape (fifesim, default scenario), a line of",
+    f"leaf area on the NDVI of the Thematic Mapper leaves {percent('total')} of the variance between pixels of 30 m.",
     f"Soil adds {percent('soil')}, dead leaves {percent('dead leaves')}, leaves and litter that differ by",
     f"treatment {percent('cover')}; pixels displaced by the product's stated error add {percent('registration')},",
     f"blur {percent('point spread')}. That grass is denser where it is wet and the soil dark changes this by",
