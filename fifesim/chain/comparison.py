@@ -23,7 +23,8 @@ def compare(lai, instruments, setup=None, *, bands=None):
     Parameters
     ----------
     lai : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area index, or a landscape that has it as ``lai``; in chunks, the images are lazy, and one pass over the scene makes them all. [m2 m-2]
+        Leaf area index, or a landscape that has it as ``lai``; in chunks, the images are lazy, and one pass over the
+        scene makes them all. [m2 m-2]
     instruments : sequence of str or Instrument
     setup : Setup, optional
         Ground, air and sampling that they share; its instrument and bands do not count. Spectra of leaf and background,
