@@ -118,7 +118,9 @@ def simulate(
     if allow_remote:
         _open_remote(context)
     check_folder(output, overwrite, resume)
-    found = scenario_to_resume(output) if resume and scenario is None else None
+    if paper and scenario:
+        raise ValueError("--paper stands for a scenario of its own: type either that or a file")
+    found = scenario_to_resume(output) if resume and scenario is None and not paper else None
     found = found or (_default(paper) if scenario is None else read_scenario(scenario))
     if dry_run:
         options = {"threads": workers or threads, "scene": scene, "start": since_start()}

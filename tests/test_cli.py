@@ -80,6 +80,16 @@ def test_printed_scenario_is_the_default_one(invoke, tmp_path):
     printed = invoke("scenario").stdout
     (tmp_path / "default.toml").write_text(printed)
     assert write_scenario(read_scenario(tmp_path / "default.toml")) == printed
+    assert 'cover = "pastures"' in printed and printed.count("[classes.") == 6
+    paper = invoke("scenario", "--paper").stdout
+    assert 'cover = "none"' in paper and "[classes." not in paper and 'bands = ["TM3", "TM4"]' in paper
+
+
+def test_the_papers_ground_stands_for_no_file(invoke, tmp_path):
+    (tmp_path / "mine.toml").write_text("[grid]\nwidth = 600\nheight = 600\n")
+    result = invoke("simulate", "mine.toml", "--paper", "-o", "out")
+    assert result.exit_code == 2 and "--paper stands for a scenario of its own" in result.output
+    assert not (tmp_path / "out").exists()
 
 
 def test_sensors_lists_every_instrument_in_a_line(invoke):

@@ -48,11 +48,12 @@ def _landscape(scenario, grid, chunks, dem):
     properties = drawn_properties(scenario)
     if own.moisture and "moisture" not in properties:
         properties["moisture"] = own.moisture
-    cover = Patches(own.cover, own.size, _shares(scenario)) if own.cover in PATTERNS else own.cover
     if own.cover == "none":
-        # One class, wherever its patches lie.
-        cover = Patches("pastures", own.size)
-    classes = scenario.class_table() if own.cover != "none" else {"ground": CoverClass(lai=land.distribution)}
+        cover, classes = None, CoverClass("ground", lai=land.distribution)
+    else:
+        cover, classes = own.cover, scenario.class_table()
+    if own.cover in PATTERNS:
+        cover = Patches(own.cover, own.size, _shares(scenario))
     covary = {name: correlation for name, correlation in own.covary.items() if correlation}
     of_dem = bool(set(covary) & set(COVARIATES))
     return landscape(
