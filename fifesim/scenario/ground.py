@@ -32,15 +32,17 @@ def ground_scene(scenario, grid, chunks=None, dem=None):
 
     Returns
     -------
-    land : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area; or a landscape, where the scenario has classes of cover or properties that vary. [m2 m-2]
+    land : xarray.Dataset
+        ``lai`` [m2 m-2], and ``cover`` and properties that vary where the scenario has them.
     """
     land, own = scenario.ground, scenario.landscape
     if not own.is_one():
         return _landscape(scenario, grid, chunks, dem)
     if land.lai_file:
-        return lai_window(land.lai_file, grid, chunks=chunks)
-    return lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+        lai = lai_window(land.lai_file, grid, chunks=chunks)
+    else:
+        lai = lai_scene(grid, land.distribution, arp=land.arp, seed=land.seed, method=land.method, chunks=chunks)
+    return lai.to_dataset(name="lai")
 
 
 def _landscape(scenario, grid, chunks, dem):

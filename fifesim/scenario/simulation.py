@@ -49,7 +49,6 @@ def simulate(scenario, chunks="auto"):
 
     dem, horizon, reach = elevation(scenario, grid, chunks)
     land = ground_scene(scenario, grid, chunks, dem)
-    land = land if isinstance(land, xr.Dataset) else land.to_dataset(name="lai")
     level = reflectance_of(setup, land)
     nodes = {"scene": dict(land.data_vars), "truth": dict(means(truth_of(scenario, setup, land)).data_vars)}
     if dem is None:

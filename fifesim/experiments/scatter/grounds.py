@@ -65,7 +65,6 @@ def ground_with(scenario, grid, at_work, dem=None):
     if "covariance" not in at_work:
         ideal["covary"] = {}
     land = ground_scene(scenario.model_copy(update={"landscape": own.model_copy(update=ideal)}), grid, dem=dem)
-    land = land if hasattr(land, "data_vars") else land.to_dataset(name="lai")
     if "soil" not in at_work:
         land = land.drop_vars("soil", errors="ignore")
         land = land.assign(moisture=own.moisture) if "moisture" in land else land

@@ -254,12 +254,7 @@ def _windows(scenario, cells):
     if not scenario.ground.lai_file:
         return found
     # A map may be empty in its corners.
-    filled = [window for window in found if float(_leaf_area(scenario, window).notnull().mean()) > _FILLED]
+    filled = [window for window in found if float(ground_scene(scenario, window)["lai"].notnull().mean()) > _FILLED]
     if not filled:
         raise ValueError(f"no scene of {size[0]} x {size[1]} cells of the LAI map holds enough data: take fewer cells")
     return filled
-
-
-def _leaf_area(scenario, window):
-    land = ground_scene(scenario, window)
-    return land["lai"] if isinstance(land, xr.Dataset) else land

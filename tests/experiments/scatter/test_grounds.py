@@ -149,7 +149,7 @@ def test_one_stand_is_a_dataset_of_leaf_area():
     case = case_of()
     found = ground_with(case, case.geobox(), ())
     assert list(found) == ["lai"]
-    np.testing.assert_array_equal(found["lai"], ground_scene(case, case.geobox()))
+    xr.testing.assert_equal(found, ground_scene(case, case.geobox()))
 
 
 @pytest.mark.parametrize(
