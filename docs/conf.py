@@ -33,7 +33,7 @@ extensions = [
     "sphinx-mathjax-offline",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "bounds.md", "gallery_src", "gallery/**/*.ipynb", "gallery/*.ipynb"]
+exclude_patterns = ["_build", "bounds.md", "gallery_src", "paper/*", "gallery/**/*.ipynb", "gallery/*.ipynb"]
 templates_path = ["_templates"]
 default_role = "py:obj"
 
