@@ -1,5 +1,6 @@
 """Mixtures of spectra, means over bands, and the defaults of bands without a calibrated value."""
 
+import dataclasses
 from itertools import pairwise
 
 import numpy as np
@@ -71,6 +72,17 @@ def test_a_mapping_of_spectra_is_a_mixture_and_one_of_bands_is_not():
     mixture = {"soil_dry": 0.5, "dead_grass": 0.5}
     np.testing.assert_array_equal(optics.background(TM, mixture), optics.background(TM, fifesim.Background(mixture)))
     np.testing.assert_array_equal(optics.background(TM[2:4], {"TM3": 0.1, "TM4": 0.2}), [0.1, 0.2])
+
+
+def test_names_of_bands_are_bands_although_spectra_have_them_too():
+    """Shares of a mixture add up to 1 and reflectances of bands do not: .2 and .3 are no mixture."""
+    given = {"soil_dry": 0.2, "dead_grass": 0.3}
+    np.testing.assert_array_equal(optics.background(list(given), given), [0.2, 0.3])
+    with pytest.raises(ValueError, match="no background for band 'soil_dry'"):
+        optics.background(["soil_dry", "shade"], {"shade": 0.3})
+    dry = dataclasses.replace(TM[2], name="soil_dry")
+    mixture = {"soil_dry": 0.5, "dead_grass": 0.5}
+    np.testing.assert_array_equal(optics.background([dry], mixture), optics.background(TM[2:3], mixture))
 
 
 def test_own_spectrum_is_a_file_or_a_dataset(tmp_path, lai):

@@ -36,6 +36,14 @@ def test_scores_are_those_of_a_line_between_the_nodes(places):
     np.testing.assert_allclose(normal_scores(values, table), expected, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("sample", [[-1e6, 0, 1, 2, 3], [-3, -2, -1, 0, 1e6], [-1e6, 0, 1, 2, 1e6]])
+def test_nodes_that_lie_close_at_an_end_are_told_apart(sample):
+    """All but one in the same of the even steps that the search starts from."""
+    table, values = score_table(np.array(sample, float)), np.linspace(-4, 4, 81)
+    expected = np.interp(values, table.values, table.scores)
+    np.testing.assert_allclose(normal_scores(values, table), expected, rtol=0, atol=1e-9)
+
+
 def test_missing_values_have_no_score_and_shapes_stay(places):
     table = score_table(places["wetness"])
     found = normal_scores(np.array([[np.nan, 1.0], [2.0, 3.0]]), table)
