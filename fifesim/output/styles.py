@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import jinja2
 import numpy as np
-import rasterio
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 

@@ -13,6 +13,7 @@ import xarray as xr
 
 from fifesim.analysis.rasters.pairs import matched
 from fifesim.analysis.rasters.regression import regress
+from fifesim.base.logs import LOG
 from fifesim.chain.images import ndvi
 from fifesim.output import report, stac
 from fifesim.output.folders import UNFINISHED, check_folder, results
@@ -20,7 +21,7 @@ from fifesim.output.progress import CellProgress
 from fifesim.output.run.engine import run_engine
 from fifesim.output.run.identity import NotThisRun, begin, check_inputs, identity_of
 from fifesim.output.run.origin import origin_tags
-from fifesim.output.run.products import make_scene_store, products_of, chunk_checksum, wanted_blocks
+from fifesim.output.run.products import chunk_checksum, make_scene_store, products_of, wanted_blocks
 from fifesim.output.run.saved import SUFFIX, save_block, saved_array, saved_block, saved_blocks
 from fifesim.output.run.schedule import run_on_client, run_on_threads, tasks_of
 from fifesim.output.run.size import check_size
@@ -110,12 +111,14 @@ def simulate_to_folder(
         if scene and not (unfinished / SCENE).exists():
             make_scene_store(unfinished / f"{SCENE}.partial", found.scene)
             os.replace(unfinished / f"{SCENE}.partial", unfinished / SCENE)
+        LOG.info("simulating %s into %s", grids.in_words(complete.geobox()), folder)
         _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads or usable_cores(), as_json)
         # The scheduler by itself: by its name, dask would look for a client, and import all that one needs.
         scheduler = {"scheduler": dask.threaded.get, "num_workers": threads or usable_cores()}
         with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}):
             _write_files(complete, tree, found, unfinished, folder if home is None else home)
         check_inputs(complete, identity)
+    LOG.info("wrote %s into %s", ", ".join(names), folder)
     return [folder / name for name in names]
 
 
@@ -148,10 +151,12 @@ def _compute(found, lai, folder, client, threads, as_json):
     per_pixel = cells.shape.x * cells.shape.y / (image.shape[-1] * image.shape[-2])
     sizes = {index: round(per_pixel * _pixels(image, index)) for index in np.ndindex(image.numblocks)}
     done = sum(sizes[index] for index in saved["image"])
+    LOG.info("%d blocks to make, %d are saved", len(wanted), sum(map(len, saved.values())))
     with CellProgress(sum(sizes.values()), done, as_json) as progress:
 
         def deliver(name, index, block):
             save_block(blocks, name, index, block)
+            LOG.debug("saved block %s of %s", index, name)
             if name == "image":
                 progress.advance(sizes[index])
 
@@ -181,13 +186,16 @@ def _write_files(scenario, tree, found, folder, home):
         for name, raster in found.rasters.items()
     }
     _check_some_data(scenario, saved["image"])
+    LOG.info("files and report of the saved blocks")
     image = xr.Dataset({"dn": saved["image"]})
     if "ndvi" in tree["image"]:
         image["ndvi"] = ndvi(saved["image"])
     truth = xr.Dataset({name: saved[name] for name in tree["truth"].data_vars})
     # Seven digits are more than a mean of leaf area has.
     for name, raster in (("image", image["dn"]), ("truth", truth.astype(np.float32))):
-        path = to_geotiff(raster, folder / f"{name}.tif", overwrite=True, tags=origin_tags(scenario, f"{name}.tif", home))
+        path = to_geotiff(
+            raster, folder / f"{name}.tif", overwrite=True, tags=origin_tags(scenario, f"{name}.tif", home)
+        )
         write_style(path, overwrite=True)
     terrain = level = None
     if "terrain" in tree.children:

@@ -202,7 +202,5 @@ def test_a_chunk_that_changed_is_made_again(tmp_path, monkeypatch):
         simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True)
     zarr.open_array(str(tmp_path / "out" / UNFINISHED / "scene.zarr"), path="lai")[3, 4] = 9.0
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True, resume=True)
-    found, whole = (
-        xr.open_zarr(tmp_path / name / "scene.zarr")["lai"].values for name in ("out", "whole")
-    )
+    found, whole = (xr.open_zarr(tmp_path / name / "scene.zarr")["lai"].values for name in ("out", "whole"))
     np.testing.assert_array_equal(found, whole)

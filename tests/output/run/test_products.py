@@ -4,7 +4,7 @@ import pytest
 import xarray as xr
 import zarr
 
-from fifesim.output.run.products import make_scene_store, products_of, chunk_checksum, wanted_blocks
+from fifesim.output.run.products import chunk_checksum, make_scene_store, products_of, wanted_blocks
 from fifesim.rasters import grid as grids
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate

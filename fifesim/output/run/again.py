@@ -66,15 +66,14 @@ def rerun(path, output=None, *, overwrite=False, threads=None):
     Raises
     ------
     ValueError
-        If the file has no scenario in its tags, or the scenario cannot be simulated, such as for want of an input.
-    FileExistsError
-        If there is such an output, and ``overwrite`` is not given.
+        If the file has no scenario in its tags, the scenario cannot be simulated, such as for want of an input, or
+        there is such an output and ``overwrite`` is not given.
     """
     path = Path(path)
     scenario, product, before = read_origin(path)
     output = None if output is None else Path(output)
     if output is not None and output.exists() and not overwrite:
-        raise FileExistsError(f"there is a file {in_a_line(output, 150)}: name another with -o, or add --overwrite")
+        raise ValueError(f"there is a file {in_a_line(output, 150)}: name another with -o, or add --overwrite")
     home = (path if output is None else output).absolute().parent
     with tempfile.TemporaryDirectory(prefix=".rerun-", dir=home if output is not None else None) as folder:
         run = Path(folder) / "run"
