@@ -1,6 +1,7 @@
 """Results as STAC: an item says what lies in a folder, where and when, a collection what several items share."""
 
 import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -132,6 +133,34 @@ def collection(identifier, description, items, *, license="other"):
         links = [_link(relation, up) for relation in ("collection", "parent", "root")]
         linked[path] = each | {"collection": identifier, "links": links}
     return found, linked
+
+
+def write_collection(folder, identifier, description, items, *, license="other"):
+    """
+    Write a collection, ``collection.json``, and its items.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Of the collection; those of the items are there.
+    identifier, description, items, license
+        As in `collection`.
+    """
+    found, linked = collection(identifier, description, items, license=license)
+    for path, each in {"collection.json": found, **linked}.items():
+        write(each, folder / path)
+
+
+def write(thing, path):
+    """
+    Write an item or a collection.
+
+    Parameters
+    ----------
+    thing : dict
+    path : pathlib.Path
+    """
+    path.write_text(json.dumps(thing, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _link(relation, href, kind="application/json"):

@@ -1,6 +1,5 @@
 """A run: a scenario simulated into a folder of files, block by block, which can be stopped and gone on with."""
 
-import json
 import os
 from contextlib import contextmanager
 from pathlib import Path
@@ -207,8 +206,7 @@ def _write_files(scenario, tree, found, folder, home):
     (folder / "quicklook.png").write_bytes(quicklook)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "scenario.toml").write_text(write_scenario(scenario), encoding="utf-8")
-    item = stac.item(scenario, folder, report.title(scenario))
-    (folder / "item.json").write_text(json.dumps(item, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    stac.write(stac.item(scenario, folder, report.title(scenario)), folder / "item.json")
 
 
 def _check_some_data(scenario, image):
