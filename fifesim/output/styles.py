@@ -65,6 +65,14 @@ def write_style(path, *, overwrite=False):
     Near infrared, red and green become red, green and blue, red twice where there is no green; else red, green and
     blue. A first band that is called ``lai``, ``ndvi``, ``dem`` or the like gets a ramp, and any other is grey. Bands
     are stretched between their percentiles 2 and 98, in the unit that scale and offset lead to, as QGIS counts.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import fifesim
+    >>> lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 90), (0, 90))), seed=7)
+    >>> write_style(lai.fifesim.to_geotiff(f"{mkdtemp()}/lai.tif")).name
+    'lai.qml'
     """
     file, style = raster_file(path), Path(path).with_suffix(".qml")
     if style.exists() and not overwrite:
