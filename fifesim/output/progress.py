@@ -3,13 +3,23 @@
 import json
 import sys
 import time
+from contextlib import contextmanager
 from importlib.util import find_spec
 from operator import length_hint
 
 import psutil
 from dask.utils import format_time
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn, track
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+    track,
+)
 
 from fifesim.base.logs import LOG, is_quiet
 
@@ -160,6 +170,23 @@ def steps(sequence, label):
     ):
         yield each
         LOG.debug("%s: %d of %d", label, number, total)
+
+
+@contextmanager
+def doing(label):
+    """
+    A context around work of unknown length, which a terminal or a notebook shows going on.
+
+    Parameters
+    ----------
+    label : str
+        What is being done.
+    """
+    LOG.info(label)
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=Console(file=sys.stderr), disable=not _shows_bars(), transient=True) as bar:
+        bar.add_task(label)
+        yield
 
 
 def _shows_bars():

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jinja2
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import to_hex
+from matplotlib.colors import ListedColormap, to_hex
 
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest
 from fifesim.base.foreign import in_a_line
@@ -14,13 +14,17 @@ from fifesim.rasters.opening import ErrorsOfGdal, raster_file
 
 _TEMPLATE = Path(__file__).with_name("style.qml.j2")
 
+_GREEN = colormaps["YlGn"]
+# Without the blue of the map's seas.
+_LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)))
+
 # Colours of a quantity, and the values of the first and of the last where they are the same for all files.
 _RAMPS = {
-    "lai": ("YlGn", 0.0, None),
-    **dict.fromkeys(("fpar", "green_fpar", "ndvi", "evi", "evi2", "savi", "msavi", "nirv"), ("YlGn", 0.0, 1.0)),
-    **dict.fromkeys(("ndwi", "ndmi"), ("YlGnBu", None, None)),
-    "dem": ("terrain", None, None),
-    "slope": ("YlOrBr", 0.0, None),
+    "lai": (_GREEN, 0.0, None),
+    **dict.fromkeys(("fpar", "green_fpar", "ndvi", "evi", "evi2", "savi", "msavi", "nirv"), (_GREEN, 0.0, 1.0)),
+    **dict.fromkeys(("ndwi", "ndmi"), (colormaps["YlGnBu"], None, None)),
+    "dem": (_LAND, None, None),
+    "slope": (colormaps["YlOrBr"], 0.0, None),
 }
 _COLOURS = 9
 
@@ -117,6 +121,6 @@ def _stretched(source, number, low, high):
     return _Shown(number, low, high if high > low else low + 1.0)
 
 
-def _ramp(name, band):
+def _ramp(colours, band):
     places = np.linspace(0, 1, _COLOURS)
-    return [(f"{band.low + at * (band.high - band.low):.6g}", to_hex(colormaps[name](at))) for at in places]
+    return [(f"{band.low + at * (band.high - band.low):.6g}", to_hex(colours(at))) for at in places]

@@ -9,7 +9,7 @@ import pytest
 
 from fifesim.base.logs import quiet
 from fifesim.output import progress
-from fifesim.output.progress import CellProgress, memory, since_start, steps
+from fifesim.output.progress import CellProgress, doing, memory, since_start, steps
 
 
 def test_lines_say_where_the_run_is(capsys):
@@ -49,6 +49,8 @@ def test_nothing_is_printed_of_a_short_run_without_a_terminal(capsys):
     with CellProgress(cells=2) as progress:
         progress.advance(2)
     assert list(steps([1, 2], "counting")) == [1, 2]
+    with doing("a report"):
+        pass
     assert capsys.readouterr() == ("", "")
 
 

@@ -126,7 +126,16 @@ def read_origin(path):
         values = with_folder(tomllib.loads(tags[SCENARIO]), Path(path).absolute().parent)
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{file.name} has tags that fifesim did not write: {in_a_line(error, 100)}") from None
-    return parse_scenario(values), product, before
+    try:
+        return parse_scenario(values), product, before
+    except ValueError as error:
+        maker, here = before.get("fifesim", "unknown"), versions()["fifesim"]
+        if maker == here:
+            raise
+        raise ValueError(
+            f"{file.name} was made by fifesim {in_a_line(maker, 20)}, here is {here}, which refuses its scenario: "
+            f"{in_a_line(str(error).splitlines()[0], 200)}"
+        ) from None
 
 
 def in_words(path, found):

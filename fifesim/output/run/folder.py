@@ -16,7 +16,7 @@ from fifesim.base.logs import LOG
 from fifesim.chain.images import ndvi
 from fifesim.output import report, stac
 from fifesim.output.folders import UNFINISHED, check_folder, results
-from fifesim.output.progress import CellProgress
+from fifesim.output.progress import CellProgress, doing
 from fifesim.output.run.engine import run_engine
 from fifesim.output.run.identity import NotThisRun, begin, check_inputs, identity_of
 from fifesim.output.run.origin import origin_tags
@@ -114,7 +114,7 @@ def simulate_to_folder(
         _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads or usable_cores(), as_json)
         # The scheduler by itself: by its name, dask would look for a client, and import all that one needs.
         scheduler = {"scheduler": dask.threaded.get, "num_workers": threads or usable_cores()}
-        with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}):
+        with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}), doing("writing files and report"):
             _write_files(complete, tree, found, unfinished, folder if home is None else home)
         check_inputs(complete, identity)
     LOG.info("wrote %s into %s", ", ".join(names), folder)
@@ -185,7 +185,6 @@ def _write_files(scenario, tree, found, folder, home):
         for name, raster in found.rasters.items()
     }
     _check_some_data(scenario, saved["image"])
-    LOG.info("files and report of the saved blocks")
     image = xr.Dataset({"dn": saved["image"]})
     if "ndvi" in tree["image"]:
         image["ndvi"] = ndvi(saved["image"])

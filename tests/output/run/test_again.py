@@ -88,3 +88,13 @@ def test_a_file_that_is_there_is_kept(travelled, tmp_path):
     with pytest.raises(ValueError, match="--overwrite"):
         rerun(travelled / "image.tif", tmp_path / "mine.tif")
     assert (tmp_path / "mine.tif").read_text() == "mine"
+
+
+def test_a_scenario_that_only_another_version_knows_names_both(travelled, tmp_path):
+    with rasterio.open(travelled / "image.tif") as source:
+        tags = {name: value for name, value in source.tags().items() if name.startswith("FIFESIM_")}
+    tags["FIFESIM_SCENARIO"] = "[ground]\nmood = 1\n"
+    image = fifesim.open_image(travelled / "image.tif")
+    path = fifesim.to_geotiff(image, tmp_path / "image.tif", tags=tags | {VERSIONS: '{"fifesim": "9.9"}'})
+    with pytest.raises(ValueError, match=r"made by fifesim 9\.9, here is .*unknown key ground\.mood"):
+        rerun(path)
