@@ -112,6 +112,7 @@ from .sensor.products.rasters.calibrated import calibrate as calibrate  # method
 # Files and runs
 from .rasters.files import to_geotiff as to_geotiff  # method, of a Dataset too
 from .rasters.files import open_image as open_image
+from .output.styles import write_style as write_style
 from .scenario.simulation import simulate as simulate
 from .scenario.sweeps import sweep as sweep
 from .experiments.scatter.shares import budget as budget

@@ -1,61 +1,20 @@
 """The command line. Everything slow to import is imported by the command that needs it, so that --help is instant."""
 
-import gc
 import json
 import os
-import sys
-import warnings
-from contextlib import contextmanager
-from enum import IntEnum
+import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
-from fifesim.base.foreign import in_a_line
-
-# Of a message, and of a line in one of many. [character]
-_LONGEST, _SHORTEST = 500, 50
-
-# What click, or the one that typer brings, says of arguments.
-_UsageError = typer.BadParameter.__base__
-
-
-class Exit(IntEnum):
-    """Exit codes: what was asked cannot be done, what could be done failed, and somebody pressed Ctrl-C."""
-
-    MISTAKE = 2
-    FAILURE = 1
-    INTERRUPTED = 130
-
-
-class _Door(TyperGroup):
-    """The one way out of all commands: a mistake is a line, and the exit code says whose it is."""
-
-    def invoke(self, context):
-        try:
-            return super().invoke(context)
-        except KeyboardInterrupt:
-            _stop("interrupted; nothing is written", Exit.INTERRUPTED)
-
-    def main(self, *arguments, **options):
-        try:
-            with warnings.catch_warnings():
-                warnings.showwarning = _tell
-                sys.exit(super().main(*arguments, **options | {"standalone_mode": False}))
-        except _UsageError as error:
-            error.message = in_a_line(error.message)
-            error.show()
-            sys.exit(error.exit_code)
-        except (ValueError, FileNotFoundError, IsADirectoryError) as error:
-            _stop(error, Exit.MISTAKE)
-        except (OSError, MemoryError, RuntimeError, ImportError) as error:
-            _stop(error or "memory does not suffice", Exit.FAILURE)
-
+from fifesim.output.terminal import Door, Exit, Quiet, Verbose, report
+from fifesim.output.terminal import importing as _importing
+from fifesim.output.terminal import say as _say
+from fifesim.output.terminal import stop as _stop
 
 app = typer.Typer(
-    cls=_Door,
+    cls=Door,
     help="Simulate what a satellite would have seen.",
     no_args_is_help=True,
     add_completion=False,
@@ -102,8 +61,11 @@ def simulate(
     paper: _Paper = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only estimate time, memory and disk.")] = False,
     allow_remote: _AllowRemote = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
 ):
-    """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml."""
+    """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml, item.json (STAC)."""
+    start = time.monotonic()
     _check_spelling(scenario)
 
     with _importing():
@@ -134,10 +96,31 @@ def simulate(
     except KeyboardInterrupt:
         kept = f"what is finished is kept, go on with --resume -o {output}" if output.exists() else "nothing is written"
         _stop(f"interrupted; {kept}", Exit.INTERRUPTED)
+    seconds = time.monotonic() - start
     if as_json:
-        _say(json.dumps({"event": "finished", "files": [str(path) for path in files]}))
+        _say(json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)}))
         return
-    _say(*files)
+    report(files, seconds, f"{output / 'report.html'} in a browser, {output / 'image.tif'} in a GIS")
+
+
+@app.command()
+def rerun(
+    file: Annotated[Path, typer.Argument(help="image.tif or truth.tif of a run.")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Keep the new file under this name.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file of that name.")] = False,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; one for each core by default.")] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+):
+    """Make a file of a run again from its own tags; exit code 1 where its bits are not the same."""
+    with _importing():
+        from fifesim.output.run.again import in_words
+        from fifesim.output.run.again import rerun as make_again
+
+    found = make_again(file, output, overwrite=overwrite, threads=threads)
+    _say(in_words(file, found))
+    if found.differing:
+        raise typer.Exit(Exit.FAILURE)
 
 
 @app.command()
@@ -164,8 +147,12 @@ def reproduce(
     seed: Annotated[int, typer.Option(help="Of the first realisation; the others follow.")] = 1995,
     scenes: Annotated[bool, typer.Option("--scenes", help="Write image, truth and scene of each scenario.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
 ):
     """Repeat the paper: table2.csv, figures 3 to 9, the nine scenarios, report.html."""
+    start = time.monotonic()
+
     with _importing():
         from fifesim.experiments.friedl1995.folder import reproduce_to_folder
 
@@ -178,7 +165,8 @@ def reproduce(
         "cells": cells,
         "seed": seed,
     }
-    _say(*reproduce_to_folder(output, **inputs, scenes=scenes, overwrite=overwrite))
+    files = reproduce_to_folder(output, **inputs, scenes=scenes, overwrite=overwrite)
+    report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
 
 
 @app.command()
@@ -192,8 +180,11 @@ def budget(
     sensor: Annotated[str | None, typer.Option(help="An instrument over level ground, instead of a file.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
     allow_remote: _AllowRemote = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
 ):
     """Find where the scatter comes from, stage by stage: budget.csv, budget.png, report.html, scenario.toml."""
+    start = time.monotonic()
     _check_spelling(scenario)
     if sensor and scenario:
         raise ValueError("--sensor stands for a scenario of its own: type either that or a file")
@@ -211,7 +202,8 @@ def budget(
     if cells is None:
         cells = window_cells(found) if sensor else 333
     options = {"realisations": realisations, "cells": cells, "seed": seed}
-    _say(*budget_to_folder(found, output, overwrite=overwrite, **options))
+    files = budget_to_folder(found, output, overwrite=overwrite, **options)
+    report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
 
 
 @app.command()
@@ -269,17 +261,6 @@ def _kept(items, kept):
         yield item
 
 
-@contextmanager
-def _importing():
-    """Imports make objects that stay: to look for garbage among them takes a sixth of their time."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.freeze()
-        gc.enable()
-
-
 def _open_remote(context):
     """For as long as the command runs."""
     from fifesim.rasters.opening import remote_allowed
@@ -300,28 +281,3 @@ def _check_spelling(scenario):
 
     if scenario is not None:
         check_spelling(scenario)
-
-
-def _say(*texts, err=False):
-    """Print texts, in which names and values from elsewhere cannot steer a terminal."""
-    for text in texts:
-        typer.echo("\n".join(in_a_line(line, sys.maxsize) for line in str(text).split("\n")), err=err)
-
-
-def _tell(message, *_):
-    """A warning is a line too."""
-    _say(in_a_line(f"fifesim: warning: {message}"), err=True)
-
-
-def _stop(error, code):
-    lines = str(error).split("\n")
-    length = max(_LONGEST // len(lines), 40)
-    _say(
-        "\n".join(in_a_line(line, length) for line in ["fifesim: " + lines[0], *lines[1:]][: _LONGEST // 40]), err=True
-    )
-    try:
-        sys.stdout.flush()
-    except OSError:
-        # What standard output does not take would be said again, at length, when the interpreter ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    sys.exit(code)

@@ -15,6 +15,7 @@ from fifesim.base import datasets
 from fifesim.base.warned import warn
 from fifesim.cli import app
 from fifesim.output import pages
+from fifesim.output.run.again import Rerun
 from fifesim.output.run.folder import FILES
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.toml import write_scenario
@@ -55,11 +56,45 @@ def first(tmp_path_factory):
     return folder / "out", CliRunner().invoke(app, ["simulate", str(folder / "small.toml"), "-o", str(folder / "out")])
 
 
-def test_simulate_writes_its_five_files_and_names_them(first):
+def test_simulate_writes_its_files_and_names_them(first):
     out, result = first
     assert result.exit_code == 0, result.output
     assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
     assert all(name in result.output for name in FILES)
+
+
+def test_the_last_line_says_how_long_it_took_and_what_to_open(first):
+    out, result = first
+    said = rf"done in \d[\w. ]* s: open {out}/report\.html in a browser, {out}/image\.tif in a GIS"
+    assert re.fullmatch(said, result.stdout.splitlines()[-1])
+
+
+def test_rerun_makes_the_same_file_again(first, invoke, monkeypatch, tmp_path):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    result = invoke("rerun", first[0] / "image.tif", "-o", "again.tif")
+    assert result.exit_code == 0, result.output
+    assert result.stdout == f"{first[0]}/image.tif made again: the same bits in all of 1200 values\n"
+    assert (tmp_path / "again.tif").read_bytes() == (first[0] / "image.tif").read_bytes()
+    refused = invoke("rerun", first[0] / "image.tif", "-o", "again.tif")
+    assert refused.exit_code == 2 and "--overwrite" in refused.stderr
+
+
+def test_rerun_of_other_bits_ends_with_code_1(first, invoke, monkeypatch):
+    monkeypatch.setattr("fifesim.output.run.again.rerun", lambda *given, **options: Rerun(1200, 3, 1.0, {}))
+    result = invoke("rerun", first[0] / "image.tif")
+    assert result.exit_code == 1
+    assert "3 of 1200 values differ, by 1 at most; the versions are the same" in result.stdout
+
+
+def test_quiet_says_nothing_and_verbose_each_step(invoke, small, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    quiet = invoke("simulate", small, "-o", "quiet", "--quiet")
+    assert (quiet.exit_code, quiet.stdout, quiet.stderr) == (0, "", "")
+    told = invoke("simulate", small, "-o", "told", "-v")
+    assert "180 x 270 cells" in told.stderr and "blocks to make, 0 are saved" in told.stderr
+    assert "saved block (" not in told.stderr
+    assert "saved block (" in invoke("simulate", small, "-o", "all", "-vv").stderr
+    assert invoke("simulate", small, "-o", "quiet", "--quiet").exit_code == 2
 
 
 def test_image_lies_where_the_scenario_says(first):
@@ -216,6 +251,7 @@ def test_json_says_how_far_it_is(invoke, small, monkeypatch):
     assert lines[-1]["event"] == "finished"
     assert (lines[0]["cells_done"], lines[-2]["cells_done"]) == (0, 270 * 180)
     assert len(lines[-1]["files"]) == len(FILES)
+    assert lines[-1]["seconds"] > 0
 
 
 def test_workers_and_a_scheduler_are_not_asked_for_together(invoke, small):

@@ -78,7 +78,7 @@ KINDS = (
     | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality reflect")
     | _of(TEXT, "angles scaling pair quantity method datum vertical_units engine profile along band leaves")
     | _of(NAMES, "bands noise engines")
-    | _of(MAPPING, "arps correlations covariates reference")
+    | _of(MAPPING, "arps correlations covariates reference tags")
     | _of(PATH, "path")
     | _of(FILE_OR_RASTER, "path_or_raster")
     | _of(RASTER, "dem elevation beside truth ndvi variable lai")

@@ -148,3 +148,5 @@ def _replace(source, target):
     if target.is_dir() and not target.is_symlink():
         shutil.rmtree(target)
     os.replace(source, target)
+    # What GDAL, or a GIS, kept of a raster that was there before: it would be taken for that of this one.
+    target.with_name(f"{target.name}.aux.xml").unlink(missing_ok=True)

@@ -1,13 +1,27 @@
-"""How far a run is: a bar on a terminal, lines of JSON for batch systems, else a line a minute."""
+"""How far a run is: a bar on a terminal or in a notebook, lines of JSON for batch systems, else a line a minute."""
 
 import json
 import sys
 import time
+from contextlib import contextmanager
+from importlib.util import find_spec
+from operator import length_hint
 
 import psutil
 from dask.utils import format_time
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn, track
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+    track,
+)
+
+from fifesim.base.logs import LOG, is_quiet
 
 # Between two lines of JSON, and between two in words where no terminal shows a bar. [s]
 _PAUSE, _LONG_PAUSE = 1.0, 60.0
@@ -70,7 +84,7 @@ class CellProgress:
             TextColumn("{task.fields[said]}"),
             TimeRemainingColumn(),
             console=Console(file=sys.stderr),
-            disable=as_json or not sys.stderr.isatty(),
+            disable=as_json or not _shows_bars(),
             transient=True,
         )
         self._task = self._bar.add_task("simulating", total=cells, completed=done, said="")
@@ -101,7 +115,7 @@ class CellProgress:
             print(json.dumps(self.state()), flush=True)
         elif not self._bar.disable:
             self._bar.update(self._task, completed=self._done, said=self._in_words(self.state()))
-        elif now - self._told >= _LONG_PAUSE:
+        elif now - self._told >= _LONG_PAUSE and not is_quiet():
             self._told, state = now, self.state()
             left = f", {format_time(state['seconds_left'])} left" if state["seconds_left"] else ""
             print(f"simulating: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
@@ -136,7 +150,7 @@ class CellProgress:
 
 def steps(sequence, label):
     """
-    Go through a sequence and show how far it is, on a terminal only.
+    Go through a sequence and show how far it is, on a terminal or in a notebook.
 
     Parameters
     ----------
@@ -148,5 +162,35 @@ def steps(sequence, label):
     -------
     sequence : iterator
     """
+    total = length_hint(sequence)
+    LOG.info("%s: %d", label, total)
     console = Console(file=sys.stderr)
-    return track(sequence, label, console=console, disable=not sys.stderr.isatty(), transient=True)
+    for number, each in enumerate(
+        track(sequence, label, console=console, disable=not _shows_bars(), transient=True), 1
+    ):
+        yield each
+        LOG.debug("%s: %d of %d", label, number, total)
+
+
+@contextmanager
+def doing(label):
+    """
+    A context around work of unknown length, which a terminal or a notebook shows going on.
+
+    Parameters
+    ----------
+    label : str
+        What is being done.
+    """
+    LOG.info(label)
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=Console(file=sys.stderr), disable=not _shows_bars(), transient=True) as bar:
+        bar.add_task(label)
+        yield
+
+
+def _shows_bars():
+    """Whether there is a terminal or a notebook that shows a bar; a notebook needs ipywidgets for it."""
+    if is_quiet():
+        return False
+    return sys.stderr.isatty() or (Console().is_jupyter and find_spec("ipywidgets") is not None)

@@ -38,7 +38,7 @@ _COG = {"driver": "COG", "compress": "deflate", "predictor": "yes", "overview_re
 _COG |= {"copy_src_mdd": "yes"}
 
 
-def to_geotiff(raster, path, *, overwrite=False):
+def to_geotiff(raster, path, *, overwrite=False, tags=None):
     """
     Write a raster as a cloud-optimised GeoTIFF.
 
@@ -51,6 +51,8 @@ def to_geotiff(raster, path, *, overwrite=False):
     path : str or path
     overwrite : bool, optional
         Replace a file of that name.
+    tags : mapping of str to str, optional
+        Further tags of the file, which `open_image` leaves there.
 
     Returns
     -------
@@ -96,7 +98,7 @@ def to_geotiff(raster, path, *, overwrite=False):
             "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()"
         )
     with _whole(path) as (streamed, finished), ErrorsOfGdal(f"cannot write {path}"):
-        _stream(array, grid, streamed, described=raster)
+        _stream(array, grid, streamed, raster, tags or {})
         rasterio.shutil.copy(streamed, finished, blocksize=_BLOCK, **_COG)
         _check_written(streamed, finished, array)
     return path
@@ -205,9 +207,11 @@ def _whole(path):
         streamed, finished = Path(folder) / "streamed.tif", Path(folder) / "finished.tif"
         yield streamed, finished
         os.replace(finished, path)
+        # What GDAL, or a GIS, kept of the file that was there before: it would be taken for that of this one.
+        path.with_name(f"{path.name}.aux.xml").unlink(missing_ok=True)
 
 
-def _stream(array, grid, path, described):
+def _stream(array, grid, path, described, further):
     """A tiled GeoTIFF, block by block, with all metadata."""
     dtype = array.dtype
     profile = {
@@ -222,6 +226,7 @@ def _stream(array, grid, path, described):
     }
     with rasterio.open(path, "w", **_TILED, **profile) as sink:
         _describe(sink, array, described)
+        sink.update_tags(**{name: str(text) for name, text in further.items()})
         if not isinstance(array.data, da.Array):
             sink.write(array.values)
     if isinstance(array.data, da.Array):

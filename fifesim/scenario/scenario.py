@@ -174,9 +174,24 @@ class Scenario(Keys):
         own_time = self.geometry.model_copy(update={"time": self._time()})
         known = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor}
         found = self.model_copy(update=known)
-        whole = {place: section.with_whole_paths() for place, section in found.sections().items()}
-        classes = {place[1]: section for place, section in whole.items() if place[0] == "classes"}
-        return found.model_copy(update={place[0]: each for place, each in whole.items()} | {"classes": classes})
+        return found.with_paths(os.path.abspath)
+
+    def with_paths(self, change):
+        """
+        The same with other paths of its files.
+
+        Parameters
+        ----------
+        change : callable
+            Gives a path for a path.
+
+        Returns
+        -------
+        scenario : Scenario
+        """
+        changed = {place: section.with_paths(change) for place, section in self.sections().items()}
+        classes = {place[1]: section for place, section in changed.items() if place[0] == "classes"}
+        return self.model_copy(update={place[0]: each for place, each in changed.items()} | {"classes": classes})
 
     def _check_image(self, box):
         """Pixels must be at least cells, and see them."""

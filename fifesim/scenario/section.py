@@ -181,9 +181,20 @@ class Section(BaseModel):
         values = {key: getattr(self, key) for key in type(self).model_fields}
         return {key: value for key, value in values.items() if self.names_a_file(key, value)}
 
-    def with_whole_paths(self):
-        """The same with the full paths of its files, so that it can be run from elsewhere."""
-        return self.model_copy(update={key: str(Path(value).absolute()) for key, value in self.files.items()})
+    def with_paths(self, change):
+        """
+        The same with other paths of its files.
+
+        Parameters
+        ----------
+        change : callable
+            Gives a path for a path.
+
+        Returns
+        -------
+        section : Section
+        """
+        return self.model_copy(update={key: change(value) for key, value in self.files.items()})
 
 
 def _in_length(value, given, wanted):

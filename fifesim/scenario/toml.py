@@ -39,7 +39,26 @@ def load_values(path):
         values = read_toml(path)
     except OSError as error:
         raise ValueError(in_a_line(f"cannot read the scenario {path}: {error.strerror}")) from None
-    folder = path.parent.absolute()
+    return with_folder(values, path.parent)
+
+
+def with_folder(values, folder):
+    """
+    Values of a scenario with the full paths of the files that they name.
+
+    Parameters
+    ----------
+    values : dict
+        As TOML gives it.
+    folder : str or path
+        That they lie relative to.
+
+    Returns
+    -------
+    values : dict
+        The same, changed.
+    """
+    folder = Path(folder).absolute()
     for place, table in _tables(values):
         section = Keys.section(place)
         for key, value in table.items() if section else ():

@@ -37,6 +37,14 @@ def test_files_replace_those_of_their_names_and_no_others(tmp_path):
     assert contents(tmp_path) == {"one.txt": "new", "two.txt": "new", "notes.txt": "mine"}
 
 
+def test_what_gdal_kept_of_a_replaced_raster_goes_with_it(tmp_path):
+    for name in ("image.tif", "image.tif.aux.xml", "other.tif.aux.xml"):
+        (tmp_path / name).write_text("old")
+    with results(tmp_path, ["image.tif"], overwrite=True) as partial:
+        (partial / "image.tif").write_text("new")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["image.tif", "other.tif.aux.xml"]
+
+
 def test_a_folder_replaces_a_folder(tmp_path):
     for text in ("old", "new"):
         with results(tmp_path, ["store"], overwrite=True) as hidden:

@@ -1,10 +1,15 @@
 """Progress as lines of JSON, and nothing where nobody looks."""
 
 import json
+import logging
 import re
 import time
 
-from fifesim.output.progress import CellProgress, memory, since_start, steps
+import pytest
+
+from fifesim.base.logs import quiet
+from fifesim.output import progress
+from fifesim.output.progress import CellProgress, doing, memory, since_start, steps
 
 
 def test_lines_say_where_the_run_is(capsys):
@@ -44,8 +49,35 @@ def test_nothing_is_printed_of_a_short_run_without_a_terminal(capsys):
     with CellProgress(cells=2) as progress:
         progress.advance(2)
     assert list(steps([1, 2], "counting")) == [1, 2]
+    with doing("a report"):
+        pass
     assert capsys.readouterr() == ("", "")
 
 
 def test_memory_is_that_of_a_python_with_numpy():
     assert 20e6 < memory() < 100e9
+
+
+@pytest.mark.parametrize(("widgets", "shown"), [(True, True), (False, False)])
+def test_a_notebook_shows_bars_where_it_has_widgets(monkeypatch, widgets, shown):
+    """A notebook's standard error is no terminal; what rich draws there are widgets."""
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    monkeypatch.setattr(progress, "find_spec", lambda name: widgets or None)
+    assert progress._shows_bars() == shown
+    with quiet():
+        assert not progress._shows_bars()
+
+
+def test_steps_are_logged(caplog):
+    with caplog.at_level(logging.DEBUG, logger="fifesim"):
+        assert list(steps(["a", "b"], "scenes")) == ["a", "b"]
+    assert caplog.messages == ["scenes: 2", "scenes: 1 of 2", "scenes: 2 of 2"]
+
+
+def test_quiet_has_no_lines_either(capsys, monkeypatch):
+    now = iter(range(0, 10**6, 100))
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(now)))
+    with quiet(), CellProgress(cells=10) as progress:
+        for _ in range(5):
+            progress.advance(2)
+    assert capsys.readouterr() == ("", "")

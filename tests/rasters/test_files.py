@@ -292,3 +292,22 @@ def test_a_file_is_replaced_only_where_that_is_said(lai, tmp_path):
     assert path.read_bytes() == before
     fifesim.to_geotiff((lai + 1).rename("lai"), path, overwrite=True)
     np.testing.assert_array_equal(fifesim.open_image(path), lai + 1)
+
+
+def test_tags_of_ones_own_are_written_and_stay_in_the_file(image, tmp_path):
+    path = fifesim.to_geotiff(image, tmp_path / "image.tif", tags={"PROJECT": "trial"})
+    with rasterio.open(path) as source:
+        assert source.tags()["PROJECT"] == "trial"
+    xr.testing.assert_identical(fifesim.open_image(path), image)
+
+
+def test_what_gdal_kept_of_a_replaced_file_goes_with_it(image, tmp_path):
+    """A GIS writes statistics and names of bands beside a file, which would hide those of the new one."""
+    path = fifesim.to_geotiff(image, tmp_path / "image.tif")
+    kept = "<PAMDataset><PAMRasterBand band='1'><Description>stale</Description></PAMRasterBand></PAMDataset>"
+    (tmp_path / "image.tif.aux.xml").write_text(kept)
+    with rasterio.open(path) as source:
+        assert source.descriptions[0] == "stale"
+    fifesim.to_geotiff(image, path, overwrite=True)
+    with rasterio.open(path) as source:
+        assert source.descriptions[0] == str(image["band"].values[0])

@@ -1,5 +1,7 @@
 """Keys of the ground: what is one stand, what a class says, and what is refused."""
 
+import os
+
 import pytest
 from pydantic import ValidationError
 
@@ -49,7 +51,7 @@ def test_a_class_says_what_it_was_given_and_no_default():
 
 def test_a_class_keeps_what_it_says_in_another_place():
     """As a complete scenario has it: with the full path of its file."""
-    whole = ClassKeys(distribution="samples.csv", brown=0.0).with_whole_paths()
+    whole = ClassKeys(distribution="samples.csv", brown=0.0).with_paths(os.path.abspath)
     assert list(whole.said) == ["distribution", "brown"]
     assert whole.distribution.endswith("samples.csv") and len(whole.distribution) > len("samples.csv")
 

@@ -1,5 +1,6 @@
 """Sections: units, and which keys name files."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -57,10 +58,10 @@ def test_a_key_says_whether_its_value_is_a_file(key, value, answer):
 def test_files_get_their_whole_paths_and_names_stay():
     shelf = Shelf(picture="a.png", list_of="b.csv")
     assert shelf.files == {"picture": "a.png", "list_of": "b.csv"}
-    whole = shelf.with_whole_paths()
+    whole = shelf.with_paths(os.path.abspath)
     assert whole.picture == str(Path("a.png").resolve()) and whole.list_of == str(Path("b.csv").resolve())
     assert (whole.map_of, whole.colour) == ("flat", "red")
-    assert whole.with_whole_paths() == whole
+    assert whole.with_paths(os.path.abspath) == whole
 
 
 @pytest.mark.parametrize("value", [-1, 2**63, 1.0, "1", True])

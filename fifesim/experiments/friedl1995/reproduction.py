@@ -1,5 +1,7 @@
 """The experiment of Friedl et al. (1995) as one call: its 54 numbers by realisation, and what its figures show."""
 
+from functools import partial
+
 import numpy as np
 import xarray as xr
 
@@ -10,6 +12,7 @@ from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
 from fifesim.experiments.friedl1995.readings import TABLE_1, beside
 from fifesim.experiments.friedl1995.table import COEFFICIENTS, realise
 from fifesim.ground.landscape.distribution import treatments
+from fifesim.output.progress import steps
 
 SEED = 1995
 REALISATIONS = 20
@@ -85,7 +88,7 @@ def reproduce(
     """
     given = {"dem": dem, "densities": densities, "optics": optics, "background": background}
     case = friedl1995.case_of(reading, sensor=sensor, cells=cells, west=west, north=north, **given)
-    return reproduce_case(case, realisations, seed)
+    return reproduce_case(case, realisations, seed, each=lambda label: partial(steps, label=label))
 
 
 def reproduce_case(case, realisations, seed, each=lambda label: iter):

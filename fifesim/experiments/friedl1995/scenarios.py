@@ -6,7 +6,10 @@ import xarray as xr
 from fifesim.base.kinds import is_path
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995.pixels import block_means, ground_of, scene_image
+from fifesim.output import stac
+from fifesim.output.styles import write_style
 from fifesim.rasters.files import to_geotiff
+from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.toml import write_scenario
 
 
@@ -23,7 +26,8 @@ def write_scenarios(case, folder, seed, scenes=False, each=iter):
         Of the realisation.
     scenes : bool, optional
         Beside ``scenario.toml`` write ``image.tif``, ``truth.tif`` (LAI and FPAR of the pixels) and ``scene.tif`` (LAI,
-        FPAR and reflectance of the cells), as the experiment has them.
+        FPAR and reflectance of the cells), as the experiment has them, with their styles, and a STAC item,
+        ``item.json``; the folder gets a collection, ``collection.json``.
     each : callable, optional
         Wraps the sequence of scenes.
 
@@ -33,13 +37,19 @@ def write_scenarios(case, folder, seed, scenes=False, each=iter):
         If a density has no name and no file, so that no scenario can name it.
     """
     check_named(case)
-    land = case.land() if scenes else None
+    land, items = case.land() if scenes else None, {}
     for treatment, arp in each(friedl1995.scenes()):
         own = folder / f"{treatment}-{arp:g}"
         own.mkdir(parents=True)
         (own / "scenario.toml").write_text(scenario_text(case, own, treatment, arp, seed), encoding="utf-8")
         if scenes:
             _write_rasters(case, own, land, treatment, arp, seed)
+            found = read_scenario(own / "scenario.toml")
+            items[f"{own.name}/item.json"] = stac.item(
+                found, own, f"{treatment}, arp {arp:g}, seen by {case.instrument.name}"
+            )
+    if items:
+        stac.write_collection(folder, "friedl1995", "The nine scenes of Friedl et al. (1995), repeated.", items)
 
 
 def scenario_text(case, own, treatment, arp, seed):
@@ -100,6 +110,6 @@ def _write_rasters(case, own, land, treatment, arp, seed):
     cells = {"lai": ground.lai, "fpar": ground.fpar}
     for band in ground.reflectance["band"].values:
         cells[str(band)] = ground.reflectance.sel(band=band).drop_vars(["band", "wavelength"], errors="ignore")
-    to_geotiff(scene_image(case, ground), own / "image.tif")
-    to_geotiff(xr.Dataset(truth).astype(np.float32), own / "truth.tif")
-    to_geotiff(xr.Dataset(cells).astype(np.float32), own / "scene.tif")
+    rasters = {"image": scene_image(case, ground), "truth": xr.Dataset(truth), "scene": xr.Dataset(cells)}
+    for name, raster in rasters.items():
+        write_style(to_geotiff(raster if name == "image" else raster.astype(np.float32), own / f"{name}.tif"))

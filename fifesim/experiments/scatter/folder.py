@@ -6,7 +6,6 @@ from fifesim.experiments.scatter import report as scatter_report
 from fifesim.experiments.scatter import shares as scatter
 from fifesim.output import pages
 from fifesim.output.folders import check_folder, results
-from fifesim.output.progress import steps
 from fifesim.output.run.size import check_cells
 from fifesim.scenario.toml import write_scenario
 
@@ -47,7 +46,7 @@ def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None,
     check_cells(min(cells, *complete.geobox().shape))
     options = {"realisations": realisations, "cells": cells, "seed": seed}
     with results(folder, FILES, overwrite=overwrite) as partial:
-        found = scatter.budget(complete, **options, each=lambda cases: steps(cases, "stage by stage"))
+        found = scatter.budget(complete, **options)
         table = scatter.table(found)
         rows, columns = (min(cells, size) for size in complete.geobox().shape)
         run = {"realisations": found.sizes["realisation"], "rows": rows, "columns": columns}

@@ -88,7 +88,7 @@ def compare_instruments(names, *, arps=(0.05, 0.15, 0.24), realisations=20, each
     for name, arp in each([(name, arp) for name in names for arp in arps]):
         scenario, description = instrument_scenario(name, arp=arp), instrument(name)
         bands, pixel = description.select(scenario.sensor.bands), scenario.sensor.size
-        rows = table(budget(scenario, realisations=realisations, cells=window_cells(scenario)))
+        rows = table(budget(scenario, realisations=realisations, cells=window_cells(scenario), each=iter))
         known = {
             "blur": all(knows_blur(description, band) for band in bands),
             "noise": bool(scenario.sensor.noise),

@@ -8,6 +8,7 @@ from odc.geo.geobox import GeoBox
 from fifesim.analysis.attribution import by_itself, shapley, taken_away
 from fifesim.base.seeds import check_seed
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
+from fifesim.output.progress import steps
 from fifesim.rasters import grid as grids
 from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
@@ -23,7 +24,7 @@ _FEWEST = 10
 _FILLED = 0.5
 
 
-def budget(scenario=None, *, realisations=20, cells=333, seed=None, each=iter):
+def budget(scenario=None, *, realisations=20, cells=333, seed=None, each=None):
     r"""
     Shares of the stages of a scenario in the scatter of LAI and FPAR about their lines on NDVI.
 
@@ -44,7 +45,7 @@ def budget(scenario=None, *, realisations=20, cells=333, seed=None, each=iter):
     seed : int, optional
         Of the first random field; the others follow, and so do those of the noise. By default the scenario's.
     each : callable, optional
-        Wraps the sequence of realisations, to show how far it is.
+        Wraps the sequence of realisations, to show how far it is; by default a bar on a terminal or in a notebook.
 
     Returns
     -------
@@ -73,7 +74,7 @@ def budget(scenario=None, *, realisations=20, cells=333, seed=None, each=iter):
     if not isinstance(scenario, Scenario):
         raise TypeError(f"budget takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     cases = realise(scenario, realisations=realisations, cells=cells, seed=seed)
-    found = [_one(case) for case in each(cases)]
+    found = [_one(case) for case in (_shown if each is None else each)(cases)]
     names = {"stage": list(STAGES), "variable": list(VARIABLES)}
     stacked = {name: np.stack([one[name] for one in found]) for name in found[0]}
     dims = {3: ("realisation", "variable", "stage"), 2: ("realisation", "variable")}
@@ -213,6 +214,10 @@ def unexplained(truth, ndvi):
     # Of NDVI that is one number, as counts of six bits may be, a line explains nothing.
     explained = (truth * ndvi).sum(axis=-1) ** 2 / np.where(of_ndvi > 0, of_truth * of_ndvi, np.inf)
     return 1 - explained
+
+
+def _shown(cases):
+    return steps(cases, "stage by stage")
 
 
 def _one(scenario):

@@ -14,6 +14,7 @@ from fifesim.experiments.verification import (
     sensor,
     terrain,
 )
+from fifesim.output.progress import steps
 
 AREAS = {
     "random field": landscape.CHECKS,
@@ -50,7 +51,7 @@ def verify():
     >>> [each.what for each in fifesim.verify() if not each.within]  # doctest: +SKIP
     []
     """
-    return list(deviations())
+    return [deviation for checks in steps(list(AREAS.values()), "areas") for check in checks for deviation in check()]
 
 
 def deviations():

@@ -12,17 +12,20 @@ import xarray as xr
 
 from fifesim.analysis.rasters.pairs import matched
 from fifesim.analysis.rasters.regression import regress
+from fifesim.base.logs import LOG
 from fifesim.chain.images import ndvi
-from fifesim.output import report
+from fifesim.output import report, stac
 from fifesim.output.folders import UNFINISHED, check_folder, results
-from fifesim.output.progress import CellProgress
+from fifesim.output.progress import CellProgress, doing
 from fifesim.output.run.engine import run_engine
 from fifesim.output.run.identity import NotThisRun, begin, check_inputs, identity_of
-from fifesim.output.run.products import make_scene_store, products_of, shard_checksum, wanted_blocks
+from fifesim.output.run.origin import origin_tags
+from fifesim.output.run.products import chunk_checksum, make_scene_store, products_of, wanted_blocks
 from fifesim.output.run.saved import SUFFIX, save_block, saved_array, saved_block, saved_blocks
 from fifesim.output.run.schedule import run_on_client, run_on_threads, tasks_of
 from fifesim.output.run.size import check_size
 from fifesim.output.run.workers import usable_cores
+from fifesim.output.styles import write_style
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
 from fifesim.rasters.files import to_geotiff
@@ -30,7 +33,9 @@ from fifesim.scenario.simulation import simulate
 from fifesim.scenario.sweeps import VARIABLES
 from fifesim.scenario.toml import write_scenario
 
-FILES = ("image.tif", "truth.tif", "quicklook.png", "report.html", "scenario.toml")
+FILES = (
+    "image.tif", "image.qml", "truth.tif", "truth.qml", "quicklook.png", "report.html", "scenario.toml", "item.json",
+)  # fmt: skip
 SCENE = "scene.zarr"
 
 # GDAL's own limit is a share of the machine's memory. [byte]
@@ -41,10 +46,19 @@ _CHUNK_SIZE = "4MiB"
 
 
 def simulate_to_folder(
-    scenario, folder, *, overwrite=False, resume=False, scene=False, threads=None, client=None, as_json=False
+    scenario,
+    folder,
+    *,
+    overwrite=False,
+    resume=False,
+    scene=False,
+    threads=None,
+    client=None,
+    as_json=False,
+    home=None,
 ):
     """
-    Simulate a scenario into a folder: image.tif, truth.tif, quicklook.png, report.html and scenario.toml.
+    Simulate a scenario into a folder: image and truth, their styles, pictures, scenario and a STAC item.
 
     Parameters
     ----------
@@ -56,13 +70,15 @@ def simulate_to_folder(
     resume : bool, optional
         Go on with a run of the same scenario that was stopped in this folder; begin where there is none.
     scene : bool, optional
-        Write leaf area index, elevation and reflectance of the cells too, as sharded Zarr.
+        Write leaf area index, elevation and reflectance of the cells too, as Zarr.
     threads : int, optional
         By default one for each core that this process may use.
     client : distributed.Client, optional
         Compute on the workers of a cluster, by default on those of the current client where there is one.
     as_json : bool, optional
         Print progress as lines of JSON.
+    home : str or path, optional
+        Where the files are to lie in the end, from which their tags name files of the scenario; the folder by default.
 
     Returns
     -------
@@ -94,12 +110,14 @@ def simulate_to_folder(
         if scene and not (unfinished / SCENE).exists():
             make_scene_store(unfinished / f"{SCENE}.partial", found.scene)
             os.replace(unfinished / f"{SCENE}.partial", unfinished / SCENE)
+        LOG.info("simulating %s into %s", grids.in_words(complete.geobox()), folder)
         _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads or usable_cores(), as_json)
         # The scheduler by itself: by its name, dask would look for a client, and import all that one needs.
         scheduler = {"scheduler": dask.threaded.get, "num_workers": threads or usable_cores()}
-        with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}):
-            _write_files(complete, tree, found, unfinished)
+        with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}), doing("writing files and report"):
+            _write_files(complete, tree, found, unfinished, folder if home is None else home)
         check_inputs(complete, identity)
+    LOG.info("wrote %s into %s", ", ".join(names), folder)
     return [folder / name for name in names]
 
 
@@ -132,10 +150,12 @@ def _compute(found, lai, folder, client, threads, as_json):
     per_pixel = cells.shape.x * cells.shape.y / (image.shape[-1] * image.shape[-2])
     sizes = {index: round(per_pixel * _pixels(image, index)) for index in np.ndindex(image.numblocks)}
     done = sum(sizes[index] for index in saved["image"])
+    LOG.info("%d blocks to make, %d are saved", len(wanted), sum(map(len, saved.values())))
     with CellProgress(sum(sizes.values()), done, as_json) as progress:
 
         def deliver(name, index, block):
             save_block(blocks, name, index, block)
+            LOG.debug("saved block %s of %s", index, name)
             if name == "image":
                 progress.advance(sizes[index])
 
@@ -147,9 +167,9 @@ def _compute(found, lai, folder, client, threads, as_json):
 
 
 def _is_in_store(folder, name, index):
-    """Whether the shard of a block that is said to be saved holds what was written."""
+    """Whether the chunk of a block that is said to be saved holds what was written."""
     try:
-        return shard_checksum(folder / SCENE, name, index) == saved_block(folder / "blocks", f"scene-{name}", index)
+        return chunk_checksum(folder / SCENE, name, index) == saved_block(folder / "blocks", f"scene-{name}", index)
     except (OSError, ValueError, RuntimeError):
         return False
 
@@ -158,7 +178,7 @@ def _pixels(array, index):
     return int(np.prod([sizes[at] for sizes, at in zip(array.chunks[-2:], index[-2:], strict=True)]))
 
 
-def _write_files(scenario, tree, found, folder):
+def _write_files(scenario, tree, found, folder, home):
     """The files of a run from its saved blocks."""
     saved = {
         name: raster.copy(data=saved_array(folder / "blocks", name, found.arrays[name]))
@@ -169,9 +189,12 @@ def _write_files(scenario, tree, found, folder):
     if "ndvi" in tree["image"]:
         image["ndvi"] = ndvi(saved["image"])
     truth = xr.Dataset({name: saved[name] for name in tree["truth"].data_vars})
-    to_geotiff(image["dn"], folder / "image.tif", overwrite=True)
     # Seven digits are more than a mean of leaf area has.
-    to_geotiff(truth.astype(np.float32), folder / "truth.tif", overwrite=True)
+    for name, raster in (("image", image["dn"]), ("truth", truth.astype(np.float32))):
+        path = to_geotiff(
+            raster, folder / f"{name}.tif", overwrite=True, tags=origin_tags(scenario, f"{name}.tif", home)
+        )
+        write_style(path, overwrite=True)
     terrain = level = None
     if "terrain" in tree.children:
         level = saved["level"].compute()
@@ -182,6 +205,7 @@ def _write_files(scenario, tree, found, folder):
     (folder / "quicklook.png").write_bytes(quicklook)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "scenario.toml").write_text(write_scenario(scenario), encoding="utf-8")
+    stac.write(stac.item(scenario, folder, report.title(scenario)), folder / "item.json")
 
 
 def _check_some_data(scenario, image):

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from dask.base import tokenize
 
+from fifesim.rasters import geozarr
 from fifesim.rasters import grid as grids
 from fifesim.rasters.windows import array_from_windows
 
@@ -17,8 +18,8 @@ _DETAIL = 16
 # The report shows terrain over this many pixels across at most, in the middle. [pixel]
 _TERRAIN = 512
 
-# Side of a shard, the file of a scene product, and of a chunk, the part of it that is read at once. [cell]
-_SHARD, _CHUNK = 1008, 252
+# Side of a chunk of a scene product, which is a file. [cell]
+_SIDE = 1008
 
 
 class Products(NamedTuple):
@@ -79,7 +80,7 @@ def wanted_blocks(found, grid_chunks, cells):
         grid = cells if raster is None else grids.geobox(raster)
         for index in np.ndindex(array.numblocks):
             if raster is None:
-                middle = [(index[axis] + 0.5) * _SHARD for axis in (0, 1)]
+                middle = [(index[axis] + 0.5) * _SIDE for axis in (0, 1)]
             else:
                 middle = [
                     _cell(grid, cells, axis, sum(sizes[:at]) + sizes[at] / 2)
@@ -98,19 +99,18 @@ def make_scene_store(path, scene):
     ----------
     path : pathlib.Path
     scene : mapping of str to xarray.DataArray, dims ([band], y, x)
+
+    Notes
+    -----
+    In format 2: GDAL before 3.13 reads no shards, and in some releases no array of format 3.
     """
     dataset = xr.Dataset(dict(scene))
-    for name, array in dataset.data_vars.items():
-        leading = array.shape[:-2]
-        dataset[name].encoding = {
-            "chunks": (*leading, _CHUNK, _CHUNK),
-            "shards": (*leading, _SHARD, _SHARD),
-            "grid_mapping": "spatial_ref",
-        }
     written = dataset.map(lambda array: array.copy(data=da.zeros(array.shape, chunks=-1)), keep_attrs=True)
-    for name, array in dataset.data_vars.items():
-        written[name].encoding = array.encoding
-    written.to_zarr(path, compute=False, mode="w", zarr_format=3, consolidated=False)
+    for array in written.data_vars.values():
+        chunks = (1,) * (array.ndim - 2) + (_SIDE, _SIDE)
+        array.encoding = {"chunks": chunks, "grid_mapping": "spatial_ref"}
+    written.attrs = geozarr.attributes(grids.geobox(dataset[next(iter(scene))]))
+    written.to_zarr(path, compute=False, mode="w", zarr_format=2, consolidated=True)
 
 
 def _middle(size, shown):
@@ -144,28 +144,28 @@ def _cell(grid, cells, axis, at):
 
 
 def _written(array, path, name):
-    """Blocks that write a shard each, and give its checksum."""
+    """Blocks that write a place of the store each, and give its checksum."""
     array = _one_chunk_of_bands(array)
-    sizes = [tuple(min(_SHARD, size - start) for start in range(0, size, _SHARD)) for size in array.shape[-2:]]
+    sizes = [tuple(min(_SIDE, size - start) for start in range(0, size, _SIDE)) for size in array.shape[-2:]]
 
     def ask(rows, columns):
-        return (rows.start, columns.start), [tuple(slice(p.start * _SHARD, p.stop * _SHARD) for p in (rows, columns))]
+        return (rows.start, columns.start), [tuple(slice(p.start * _SIDE, p.stop * _SIDE) for p in (rows, columns))]
 
     counts = tuple((1,) * len(each) for each in sizes)
 
     def write(row, column, block):
-        sink, place = _shard(path, name, (row, column))
+        sink, place = _place(path, name, (row, column))
         sink[place] = block[..., : place[1].stop - place[1].start, : place[2].stop - place[2].start]
-        return np.array([[shard_checksum(path, name, (row, column))]])
+        return np.array([[chunk_checksum(path, name, (row, column))]])
 
     return array_from_windows(
         write, [array], counts, ask, token=tokenize("scene", str(path), name, array.name), dtype=np.uint32
     )
 
 
-def shard_checksum(path, name, index):
+def chunk_checksum(path, name, index):
     """
-    Checksum of what a shard of a scene product holds.
+    Checksum of what a scene product holds in one place.
 
     Parameters
     ----------
@@ -174,20 +174,20 @@ def shard_checksum(path, name, index):
     name : str
         Of the product.
     index : (int, int)
-        Row and column of the shard.
+        Of the chunk, over y and x.
 
     Returns
     -------
     checksum : numpy.uint32
     """
-    sink, place = _shard(path, name, index)
+    sink, place = _place(path, name, index)
     return np.uint32(zlib.crc32(np.ascontiguousarray(sink[place])))
 
 
-def _shard(path, name, index):
-    """An array of a store, and the place of a shard in it."""
+def _place(path, name, index):
+    """An array of a store, and the place of a chunk in it."""
     import zarr  # slow, and few runs write cells
 
     sink = zarr.open_array(str(path), path=name, mode="r+")
-    sides = [slice(at * _SHARD, min((at + 1) * _SHARD, size)) for at, size in zip(index, sink.shape[-2:], strict=True)]
+    sides = [slice(at * _SIDE, min((at + 1) * _SIDE, size)) for at, size in zip(index, sink.shape[-2:], strict=True)]
     return sink, (..., *sides)

@@ -1,5 +1,7 @@
 """The reproduction is nine scenarios: each gives the same bits by itself."""
 
+import json
+
 import numpy as np
 import pytest
 import rasterio
@@ -44,6 +46,18 @@ def test_files_of_a_scene_hold_what_its_scenario_gives(one_of_nine):
     np.testing.assert_array_equal(truth.astype(np.float32), read(one_of_nine / "truth.tif"))
     np.testing.assert_array_equal(run["scene"]["lai"].values.astype(np.float32), cells[0])
     np.testing.assert_array_equal(run["scene"]["surface_reflectance"].values.astype(np.float32), cells[2:])
+
+
+def test_scenes_are_a_collection(one_of_nine):
+    """The item of each lies beside its rasters, those of the image with bands, and the collection leads to it."""
+    found = json.loads((one_of_nine.parent / "collection.json").read_text(encoding="utf-8"))
+    (path,) = [link["href"] for link in found["links"] if link["rel"] == "item"]
+    item = json.loads((one_of_nine.parent / path).read_text(encoding="utf-8"))
+    assert item["collection"] == found["id"] and found["extent"]["spatial"]["bbox"] == [item["bbox"]]
+    assert set(item["assets"]) == {"image", "truth", "scene", "scenario"}
+    assert [band["eo:common_name"] for band in item["assets"]["image"]["bands"]] == ["red", "nir"]
+    assert [band["name"] for band in item["assets"]["scene"]["bands"]] == ["lai", "fpar", "TM3", "TM4"]
+    assert "singlebandpseudocolor" in (one_of_nine / "truth.qml").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

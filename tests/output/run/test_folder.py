@@ -127,12 +127,12 @@ def test_a_run_gives_the_bits_of_the_chain_under_any_chunks(hills, chunks):
         np.testing.assert_array_equal(truth.sel(band=name), tree["truth"][name].values.astype(np.float32))
 
 
-def test_the_scene_holds_the_cells_in_shards(hills):
+def test_the_scene_holds_the_cells(hills):
     tree = fifesim.simulate(parse_scenario(HILLS).complete())
-    with xr.open_zarr(hills / "scene.zarr", decode_coords="all", consolidated=False) as scene:
+    with xr.open_zarr(hills / "scene.zarr", decode_coords="all") as scene:
         for name in ("lai", "dem", "surface_reflectance"):
             np.testing.assert_array_equal(scene[name].values, tree["scene"][name].values)
-            assert scene[name].encoding["shards"][-2:] == (1008, 1008)
+            assert scene[name].encoding["chunks"][-2:] == (1008, 1008)
             assert scene[name].attrs["units"] == tree["scene"][name].attrs["units"]
         assert scene.rio.crs.to_epsg() == 26914
         np.testing.assert_array_equal(scene["x"], tree["scene"]["x"])
@@ -190,7 +190,7 @@ def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_shard_that_changed_is_made_again(tmp_path, monkeypatch):
+def test_a_chunk_that_changed_is_made_again(tmp_path, monkeypatch):
     monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "whole", scene=True)
 
@@ -202,7 +202,5 @@ def test_a_shard_that_changed_is_made_again(tmp_path, monkeypatch):
         simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True)
     zarr.open_array(str(tmp_path / "out" / UNFINISHED / "scene.zarr"), path="lai")[3, 4] = 9.0
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True, resume=True)
-    found, whole = (
-        xr.open_zarr(tmp_path / name / "scene.zarr", consolidated=False)["lai"].values for name in ("out", "whole")
-    )
+    found, whole = (xr.open_zarr(tmp_path / name / "scene.zarr")["lai"].values for name in ("out", "whole"))
     np.testing.assert_array_equal(found, whole)

@@ -1,0 +1,265 @@
+"""Results as STAC: an item says what lies in a folder, where and when, a collection what several items share."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pyproj
+import rasterio
+
+from fifesim.base.bands import COMMON_NAMES
+from fifesim.output.provenance import versions
+from fifesim.rasters import cf
+from fifesim.rasters.geozarr import crs_fields
+from fifesim.rasters.tags import read_tag
+from fifesim.scenario.toml import write_scenario
+
+VERSION = "1.1.0"
+
+_EXTENSIONS = [
+    f"https://stac-extensions.github.io/{name}/schema.json"
+    for name in ("projection/v2.0.0", "eo/v2.0.0", "raster/v2.0.0", "view/v1.0.0", "processing/v1.2.0")
+]
+_COG = "image/tiff; application=geotiff; profile=cloud-optimized"
+
+# What a folder may hold, in the order of the item: key, title, media type and roles by file.
+_ASSETS = {
+    "image.tif": ("image", "What the instrument records, digital numbers", _COG, ["data"]),
+    "truth.tif": ("truth", "True means of the ground below the pixels", _COG, ["data"]),
+    "scene.tif": ("scene", "Ground by cells", _COG, ["data"]),
+    "scene.zarr": ("scene", "Ground by cells", "application/vnd+zarr", ["data"]),
+    "quicklook.png": ("thumbnail", "Scene and image", "image/png", ["thumbnail"]),
+    "report.html": ("report", "Report of the run", "text/html", ["metadata"]),
+    "scenario.toml": ("scenario", "All that the run needs to be made again", "application/toml", ["metadata"]),
+}
+
+# Names of the same bands that STAC has not.
+_ALIASES = {"rededge1", "rededge2", "rededge3", "swir1", "swir2"}
+
+# Where a scenario names no date: STAC asks for one, or for a range.
+_ANY_TIME = ("1900-01-01T00:00:00Z", "2100-01-01T00:00:00Z")
+
+# Mean radius of the Earth, as spherical trigonometry has it. [m]
+_EARTH = 6_371_000.0
+
+# Of an edge of a footprint, which is straight on the map and bent in degrees.
+_POINTS = 5
+
+
+def item(scenario, folder, title):
+    """
+    STAC item of the folder of a simulated scenario.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+        Complete.
+    folder : str or path
+        That holds ``image.tif``, and perhaps truth, scene, pictures and scenario by their usual names.
+    title : str
+
+    Returns
+    -------
+    item : dict
+        That JSON holds, of STAC 1.1.0 with its extensions for projection, electro-optical bands, rasters, view and
+        processing. Paths are relative to the folder. The same scenario gives the same item.
+
+    Notes
+    -----
+    A scenario without a date has ``datetime`` null, and a range that says nothing.
+    """
+    folder = Path(folder)
+    found = {name: about for name, about in _ASSETS.items() if (folder / name).exists()}
+    assets = {about[0]: _asset(folder / name, *about[1:]) for name, about in found.items()}
+    with rasterio.open(folder / "image.tif") as image:
+        ring, crs = _footprint(image), _crs(image)
+    longitudes, latitudes = zip(*ring, strict=True)
+    digest = hashlib.sha256(write_scenario(scenario).encode()).hexdigest()[:12]
+    return {
+        "type": "Feature",
+        "stac_version": VERSION,
+        "stac_extensions": list(_EXTENSIONS),
+        "id": f"fifesim-{scenario.sensor.description.name.lower()}-{digest}",
+        "geometry": {"type": "Polygon", "coordinates": [[list(point) for point in ring]]},
+        "bbox": [min(longitudes), min(latitudes), max(longitudes), max(latitudes)],
+        "properties": {"title": title} | _properties(scenario) | crs,
+        "links": [],
+        "assets": assets,
+    }
+
+
+def collection(identifier, description, items, *, license="other"):
+    """
+    STAC collection of items.
+
+    Parameters
+    ----------
+    identifier, description : str
+    items : mapping of str to dict
+        Items by their paths, relative to the collection, such as ``"a/item.json"``.
+    license : str, optional
+        SPDX identifier, or ``"other"``.
+
+    Returns
+    -------
+    collection : dict
+    items : dict of str to dict
+        The items with links to the collection, ``collection.json``, by their paths.
+
+    Examples
+    --------
+    >>> one = {"id": "a", "bbox": [0.0, 1.0, 2.0, 3.0], "properties": {"datetime": "2022-06-01T10:00:00Z"}}
+    >>> whole, linked = collection("trial", "Two scenes.", {"a/item.json": one})
+    >>> whole["extent"]["spatial"]["bbox"], linked["a/item.json"]["links"][0]["href"]
+    ([[0.0, 1.0, 2.0, 3.0]], '../collection.json')
+    """
+    boxes = np.array([each["bbox"] for each in items.values()])
+    whole = [*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist()]
+    starts, ends = zip(*(_times(each["properties"]) for each in items.values()), strict=True)
+    found = {
+        "type": "Collection",
+        "stac_version": VERSION,
+        "id": identifier,
+        "description": description,
+        "license": license,
+        "extent": {"spatial": {"bbox": [whole]}, "temporal": {"interval": [[min(starts), max(ends)]]}},
+        "links": [_link("root", "./collection.json")]
+        + [_link("item", f"./{path}", "application/geo+json") for path in items],
+    }
+    linked = {}
+    for path, each in items.items():
+        up = "../" * path.count("/") + "collection.json"
+        links = [_link(relation, up) for relation in ("collection", "parent", "root")]
+        linked[path] = each | {"collection": identifier, "links": links}
+    return found, linked
+
+
+def write_collection(folder, identifier, description, items, *, license="other"):
+    """
+    Write a collection, ``collection.json``, and its items.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Of the collection; those of the items are there.
+    identifier, description, items, license
+        As in `collection`.
+    """
+    found, linked = collection(identifier, description, items, license=license)
+    for path, each in {"collection.json": found, **linked}.items():
+        write(each, folder / path)
+
+
+def write(thing, path):
+    """
+    Write an item or a collection.
+
+    Parameters
+    ----------
+    thing : dict
+    path : pathlib.Path
+    """
+    path.write_text(json.dumps(thing, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _link(relation, href, kind="application/json"):
+    return {"rel": relation, "href": href, "type": kind}
+
+
+def _times(properties):
+    """First and last time of an item; text in this form sorts as time does."""
+    if properties["datetime"]:
+        return properties["datetime"], properties["datetime"]
+    return properties["start_datetime"], properties["end_datetime"]
+
+
+def _properties(scenario):
+    own, directions, time = scenario.sensor, scenario.sun_and_view(), scenario.geometry.time
+    view = {"view:sun_azimuth": directions.saa, "view:sun_elevation": 90 - directions.sza}
+    # fifesim's azimuth points from the ground to the sensor, STAC's from below the sensor to the scene.
+    view |= {"view:incidence_angle": directions.vza, "view:azimuth": (directions.vaa + 180) % 360}
+    view["view:off_nadir"] = _off_nadir(directions.vza, own.description.altitude)
+    when = {"datetime": time}
+    if time is None:
+        when |= dict(zip(("start_datetime", "end_datetime"), _ANY_TIME, strict=True))
+    return {
+        **when,
+        "instruments": [own.description.name.lower()],
+        "gsd": own.size,
+        **{name: round(float(value), 9) for name, value in view.items()},
+        "processing:software": versions(),
+        "processing:lineage": "Simulated by fifesim; the asset scenario holds every number that it took.",
+    }
+
+
+def _off_nadir(vza, altitude):
+    """Angle at the sensor between nadir and the pixel, over a spherical Earth. [degree]"""
+    return np.degrees(np.arcsin(_EARTH / (_EARTH + altitude) * np.sin(np.radians(vza))))
+
+
+def _footprint(source):
+    """Ring of longitudes and latitudes around a raster, counterclockwise from its lower left corner. [degree]"""
+    steps = np.linspace(0, 1, _POINTS)[:-1]
+    along, none, all_of = steps, np.zeros_like(steps), np.ones_like(steps)
+    x = np.concatenate([along, all_of, 1 - along, none]) * source.width
+    y = np.concatenate([all_of, 1 - along, none, along]) * source.height
+    to_degrees = pyproj.Transformer.from_crs(source.crs, 4326, always_xy=True)
+    places = np.round(np.transpose(to_degrees.transform(*(source.transform * (x, y)))), 7).tolist()
+    return [*places, places[0]]
+
+
+def _crs(source):
+    """The CRS of a file; one without a code says so."""
+    return {"proj:code": None} | crs_fields(source.crs.to_wkt())
+
+
+def _asset(path, title, kind, roles):
+    asset = {"href": f"./{path.name}", "title": title, "type": kind, "roles": roles}
+    if kind != _COG:
+        return asset
+    with rasterio.open(path) as source:
+        box = source.bounds
+        return asset | {
+            **_crs(source),
+            "proj:shape": list(source.shape),
+            "proj:transform": list(source.transform)[:6],
+            "proj:bbox": [box.left, box.bottom, box.right, box.top],
+            "data_type": source.dtypes[0],
+            "raster:spatial_resolution": source.res[0],
+            "raster:sampling": "area",
+            "bands": [_band(source, number) for number in source.indexes],
+        }
+
+
+def _band(source, number):
+    """A band of a file, as its own metadata have it."""
+    name, nodata, unit = source.descriptions[number - 1], source.nodata, source.units[number - 1]
+    band = {"name": name, "data_type": source.dtypes[number - 1]}
+    if name in cf.QUANTITIES:
+        band["description"] = cf.QUANTITIES[name].long_name
+    if nodata is not None:
+        band["nodata"] = "nan" if np.isnan(nodata) else nodata
+    if unit:
+        band["unit"] = unit
+    scale, offset = source.scales[number - 1], source.offsets[number - 1]
+    if (scale, offset) != (1, 0):
+        band |= {"raster:scale": scale, "raster:offset": offset}
+    return band | _spectral(source, number)
+
+
+def _spectral(source, number):
+    """Where a band lies in the spectrum, and the sunlight in it."""
+    kept = read_tag(source, source.name)
+    coords = {} if kept is None else kept["coords"]
+    fields = {}
+    if "wavelength" in coords:
+        wavelength = float(np.atleast_1d(coords["wavelength"])[number - 1])
+        known = {name: window for name, window in COMMON_NAMES.items() if name not in _ALIASES}
+        inside = {name: abs(wavelength - at.best) for name, at in known.items() if at.low <= wavelength <= at.high}
+        if inside:
+            fields["eo:common_name"] = min(inside, key=inside.get)
+        fields["eo:center_wavelength"] = wavelength
+    if "solar_irradiance" in coords:
+        fields["eo:solar_illumination"] = float(np.atleast_1d(coords["solar_irradiance"])[number - 1])
+    return fields

@@ -1,0 +1,25 @@
+"""A small run with its cells, which other programs are to open."""
+
+import pytest
+
+from fifesim.output import pages
+from fifesim.output.run.folder import simulate_to_folder
+from fifesim.scenario.scenario import parse_scenario
+
+TRAVELLED = {
+    "grid": {"width": 900, "height": 600},
+    "ground": {"arp": 0.24, "seed": 3},
+    "terrain": {"dem": "flat"},
+    "sensor": {"bands": ["TM2", "TM3", "TM4"]},
+    "geometry": {"vza": 20.0, "vaa": 100.0},
+}
+
+
+@pytest.fixture(scope="session")
+def travelled(tmp_path_factory):
+    """Its folder; nobody looks at its pictures."""
+    folder = tmp_path_factory.mktemp("travelled") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pages, "png", lambda figure, dpi: b"")
+        simulate_to_folder(parse_scenario(TRAVELLED), folder, scene=True, threads=1)
+    return folder

@@ -1,0 +1,100 @@
+"""A file made again from its tags has the same bits, and where it has not, that is said."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import rasterio
+
+import fifesim
+from fifesim.output import pages
+from fifesim.output.run.again import Rerun, in_words, read_origin, rerun
+from fifesim.output.run.folder import simulate_to_folder
+from fifesim.output.run.origin import VERSIONS
+from fifesim.scenario.scenario import parse_scenario
+
+
+@pytest.fixture(autouse=True)
+def no_pictures(monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+
+
+def test_an_image_alone_is_made_again_to_the_byte(travelled, tmp_path):
+    alone = shutil.copy(travelled / "image.tif", tmp_path / "sent.tif")
+    found = rerun(alone, tmp_path / "again.tif")
+    assert found == Rerun(3 * 20 * 30, 0, 0.0, {})
+    assert (tmp_path / "again.tif").read_bytes() == (travelled / "image.tif").read_bytes()
+    assert in_words("sent.tif", found) == "sent.tif made again: the same bits in all of 1800 values"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["again.tif", "sent.tif"]
+
+
+def test_what_differs_is_counted_and_versions_are_named(travelled, tmp_path):
+    path = shutil.copy(travelled / "truth.tif", tmp_path / "truth.tif")
+    with rasterio.open(path, "r+", IGNORE_COG_LAYOUT_BREAK="YES") as sink:
+        values = sink.read()
+        values[1, 4, 5] += 0.25
+        values[0, 0, 0] = np.nan
+        sink.write(values)
+        sink.update_tags(**{VERSIONS: json.dumps(json.loads(sink.tags()[VERSIONS]) | {"numpy": "1.0"})})
+    found = rerun(path)
+    assert (found.cells, found.differing, found.versions) == (1200, 2, {"numpy": ("1.0", np.__version__)})
+    assert found.largest == pytest.approx(0.25, rel=1e-6)
+    said = in_words("truth.tif", found)
+    assert "2 of 1200 values differ, by 0.25 at most; it was made with numpy 1.0, here" in said
+    assert [each.name for each in tmp_path.iterdir()] == ["truth.tif"]
+
+
+def test_inputs_move_with_the_file(tmp_path):
+    profile = {"driver": "GTiff", "width": 12, "height": 12, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
+    (tmp_path / "one").mkdir()
+    place = rasterio.transform.from_origin(704970, 4334220, 30, 30)
+    with rasterio.open(tmp_path / "one" / "lai.tif", "w", **profile, transform=place) as sink:
+        sink.write(np.random.default_rng(1).uniform(1, 3, (1, 12, 12)).astype("float32"))
+    scenario = {"ground": {"lai_file": str(tmp_path / "one" / "lai.tif")}, "terrain": {"dem": "flat"}}
+    simulate_to_folder(parse_scenario(scenario), tmp_path / "one" / "out")
+    moved = (tmp_path / "one").rename(tmp_path / "two")
+    assert rerun(moved / "out" / "image.tif").differing == 0
+    (moved / "lai.tif").unlink()
+    with pytest.raises(ValueError, match=r"ground\.lai_file = .*lai\.tif.*no such file"):
+        rerun(moved / "out" / "image.tif")
+
+
+def test_a_file_without_the_tags_is_refused_with_what_to_do(travelled, tmp_path):
+    other = fifesim.to_geotiff(fifesim.open_image(travelled / "image.tif"), tmp_path / "other.tif")
+    with pytest.raises(ValueError, match=r"does not say what it was made of.*scenario\.toml"):
+        rerun(other)
+
+
+@pytest.mark.parametrize(
+    ("tag", "text", "said"),
+    [
+        ("FIFESIM_PRODUCT", "report.html", "a product that no run has"),
+        ("FIFESIM_VERSIONS", "[1]", "no versions"),
+        ("FIFESIM_SCENARIO", "[ground", "fifesim did not write"),
+    ],
+)
+def test_tags_of_another_hand_are_refused(travelled, tmp_path, tag, text, said):
+    image = fifesim.open_image(travelled / "image.tif")
+    with rasterio.open(travelled / "image.tif") as source:
+        tags = {name: value for name, value in source.tags().items() if name.startswith("FIFESIM_")}
+    path = fifesim.to_geotiff(image, tmp_path / "image.tif", tags=tags | {tag: text})
+    with pytest.raises(ValueError, match=said):
+        read_origin(path)
+
+
+def test_a_file_that_is_there_is_kept(travelled, tmp_path):
+    (tmp_path / "mine.tif").write_text("mine")
+    with pytest.raises(ValueError, match="--overwrite"):
+        rerun(travelled / "image.tif", tmp_path / "mine.tif")
+    assert (tmp_path / "mine.tif").read_text() == "mine"
+
+
+def test_a_scenario_that_only_another_version_knows_names_both(travelled, tmp_path):
+    with rasterio.open(travelled / "image.tif") as source:
+        tags = {name: value for name, value in source.tags().items() if name.startswith("FIFESIM_")}
+    tags["FIFESIM_SCENARIO"] = "[ground]\nmood = 1\n"
+    image = fifesim.open_image(travelled / "image.tif")
+    path = fifesim.to_geotiff(image, tmp_path / "image.tif", tags=tags | {VERSIONS: '{"fifesim": "9.9"}'})
+    with pytest.raises(ValueError, match=r"made by fifesim 9\.9, here is .*unknown key ground\.mood"):
+        rerun(path)

@@ -1,0 +1,153 @@
+"""What a run writes, as other programs open it: in the right place, with the right values."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import rasterio
+import rioxarray
+import xarray as xr
+
+import fifesim
+
+# Corner and size of the run, as its scenario says them. [m]
+WEST, NORTH, PIXEL, ROWS, COLUMNS = 704970.0, 4334220.0, 30.0, 20, 30
+
+
+def radiance(folder):
+    return fifesim.to_radiance(fifesim.open_image(folder / "image.tif"))
+
+
+def check_place(array):
+    """Centres of pixels, to the millimetre."""
+    np.testing.assert_allclose(array["x"], WEST + PIXEL * (np.arange(COLUMNS) + 0.5), rtol=0, atol=1e-3)
+    np.testing.assert_allclose(array["y"], NORTH - PIXEL * (np.arange(ROWS) + 0.5), rtol=0, atol=1e-3)
+    assert array.rio.crs.to_epsg() == 26914
+
+
+def test_gdal_opens_them_in_the_right_place(travelled):
+    for name in ("image.tif", "truth.tif"):
+        with rasterio.open(travelled / name) as source:
+            assert (source.crs.to_epsg(), tuple(source.bounds)) == (26914, (WEST, NORTH - 600, WEST + 900, NORTH))
+    with rasterio.open(travelled / "image.tif") as source:
+        gains, offsets = (np.array(each)[:, None, None] for each in (source.scales, source.offsets))
+        np.testing.assert_allclose(source.read() * gains + offsets, radiance(travelled), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["image.tif", "truth.tif"])
+def test_rio_cogeo_finds_them_cloud_optimised(travelled, name):
+    cogeo = pytest.importorskip("rio_cogeo")
+    valid, errors, warnings = cogeo.cog_validate(travelled / name, strict=True)
+    assert valid, (errors, warnings)
+
+
+def test_engine_rasterio_of_xarray_masks_and_scales(travelled):
+    with xr.open_dataset(
+        travelled / "image.tif", engine="rasterio", band_as_variable=True, mask_and_scale=True
+    ) as found:
+        check_place(found)
+        for number, band in enumerate(("TM2", "TM3", "TM4"), 1):
+            expected = radiance(travelled).sel(band=band)
+            # rioxarray computes in single precision, where the counts are of 8 bits.
+            np.testing.assert_allclose(found[f"band_{number}"], expected, rtol=1e-6)
+            assert found[f"band_{number}"].attrs["long_name"] == band
+
+
+def test_rioxarray_opens_what_the_item_names(travelled):
+    found = json.loads((travelled / "item.json").read_text(encoding="utf-8"))
+    image = rioxarray.open_rasterio(travelled / found["assets"]["image"]["href"])
+    check_place(image)
+    bands = found["assets"]["image"]["bands"]
+    gain, offset = (np.array([band[key] for band in bands])[:, None, None] for key in ("raster:scale", "raster:offset"))
+    np.testing.assert_allclose(image.where(image != bands[0]["nodata"]) * gain + offset, radiance(travelled))
+
+
+def test_odc_stac_loads_the_item(travelled):
+    stac = pytest.importorskip("odc.stac")
+    pystac = pytest.importorskip("pystac")
+    item = pystac.Item.from_file(str(travelled / "item.json"))
+    found = stac.load([item]).isel(time=0)
+    check_place(found)
+    assert found["time"].values == np.datetime64("1987-06-06T16:35:00")
+    image, truth = (fifesim.open_image(travelled / name) for name in ("image.tif", "truth.tif"))
+    for number in (1, 2, 3):
+        loaded = found[f"image.{number}"]
+        np.testing.assert_array_equal(loaded, image[number - 1])
+        assert (loaded.dtype, loaded.attrs["nodata"]) == ("uint8", 0)
+    for number, name in enumerate(("lai", "fpar"), 1):
+        np.testing.assert_array_equal(found[f"truth.{number}"], truth.sel(band=name))
+        assert np.isnan(found[f"truth.{number}"].attrs["nodata"])
+
+
+def test_gdal_opens_the_cells_with_their_crs(travelled):
+    """The wheels of rasterio bring the driver; a cell is a ninth of a pixel."""
+    with rasterio.Env() as env:
+        if "Zarr" not in env.drivers():
+            pytest.skip("this GDAL has no driver for Zarr")
+    with xr.open_zarr(travelled / "scene.zarr", decode_coords="all") as cells:
+        lai, reflectance = cells["lai"].values, cells["surface_reflectance"].values
+    with rasterio.open(f'ZARR:"{travelled}/scene.zarr":/lai') as source:
+        assert source.crs.to_epsg() == 26914
+        np.testing.assert_allclose(source.bounds, (WEST, NORTH - 600, WEST + 900, NORTH), rtol=0, atol=1e-6)
+        np.testing.assert_array_equal(source.read(1), lai)
+    with rasterio.open(f'ZARR:"{travelled}/scene.zarr":/surface_reflectance') as source:
+        assert source.crs.to_epsg() == 26914 and np.isnan(source.nodata)
+        np.testing.assert_array_equal(source.read(), reflectance)
+
+
+def test_xarray_and_rioxarray_open_the_cells(travelled):
+    with xr.open_zarr(travelled / "scene.zarr", decode_coords="all") as cells:
+        assert cells.rio.crs.to_epsg() == 26914
+        np.testing.assert_allclose(cells.rio.bounds(), (WEST, NORTH - 600, WEST + 900, NORTH), rtol=0, atol=1e-6)
+        assert list(cells["band"].values) == ["TM2", "TM3", "TM4"]
+
+
+QGIS = """
+import json, sys
+from qgis.core import QgsApplication, QgsRasterLayer
+application = QgsApplication([], False)
+application.initQgis()
+found = {}
+for name in ("image", "truth"):
+    layer = QgsRasterLayer(f"{sys.argv[1]}/{name}.tif", name)
+    renderer = layer.renderer()
+    found[name] = {"valid": layer.isValid(), "type": renderer.type(), "crs": layer.crs().authid()}
+    if renderer.type() == "multibandcolor":
+        stretches = [getattr(renderer, f"{each}ContrastEnhancement")() for each in ("red", "green", "blue")]
+        found[name]["bands"] = [renderer.redBand(), renderer.greenBand(), renderer.blueBand()]
+        found[name]["limits"] = [(each.minimumValue(), each.maximumValue()) for each in stretches]
+    else:
+        items = renderer.shader().rasterShaderFunction().colorRampItemList()
+        found[name]["ramp"] = [(item.value, item.color.name()) for item in items]
+print(json.dumps(found))
+"""
+
+
+def qgis_python():
+    """A Python that has QGIS: named by a variable of the environment, this one, or that of the system."""
+    for name in (os.environ.get("FIFESIM_QGIS_PYTHON"), sys.executable, shutil.which("python3")):
+        if name and subprocess.run([name, "-c", "import qgis.core"], capture_output=True).returncode == 0:
+            return name
+    return None
+
+
+def test_qgis_takes_the_styles_by_itself(travelled, tmp_path):
+    python = qgis_python()
+    if python is None:
+        pytest.skip("no Python here has QGIS")
+    shutil.copytree(travelled, tmp_path / "run")
+    command = [python, "-c", QGIS, str(tmp_path / "run")]
+    said = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"QT_QPA_PLATFORM": "offscreen"})
+    found = json.loads(said.stdout.strip().splitlines()[-1])
+    assert all(layer["valid"] and layer["crs"] == "EPSG:26914" for layer in found.values())
+    assert (found["image"]["type"], found["image"]["bands"]) == ("multibandcolor", [3, 2, 1])
+    for band, limits in zip(("TM4", "TM3", "TM2"), found["image"]["limits"], strict=True):
+        np.testing.assert_allclose(limits, np.percentile(radiance(travelled).sel(band=band), (2, 98)), rtol=1e-5)
+    lai = fifesim.open_image(travelled / "truth.tif").sel(band="lai")
+    assert found["truth"]["type"] == "singlebandpseudocolor"
+    (low, _), *_, (high, _) = found["truth"]["ramp"]
+    assert low == 0 and high == pytest.approx(float(np.percentile(lai, 98)), rel=1e-5)

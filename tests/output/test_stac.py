@@ -1,0 +1,125 @@
+"""STAC items and collections: valid, and saying what the files say."""
+
+import json
+
+import numpy as np
+import pytest
+import rasterio
+from rasterio.warp import transform
+
+from fifesim.output import stac
+from fifesim.scenario.scenario import parse_scenario, read_scenario
+
+
+@pytest.fixture(scope="module")
+def item(travelled):
+    return json.loads((travelled / "item.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def pystac():
+    return pytest.importorskip("pystac")
+
+
+def test_an_item_is_valid(item, pystac):
+    """By the schemas of the core, which pystac brings; those of extensions lie on servers."""
+    pytest.importorskip("jsonschema")
+    core = pystac.Item.from_dict(item | {"stac_extensions": []})
+    (schema,) = core.validate()
+    assert schema.endswith("item.json")
+
+
+def test_its_extensions_are_read(item, pystac):
+    from pystac.extensions.projection import ProjectionExtension
+    from pystac.extensions.view import ViewExtension
+
+    found = pystac.Item.from_dict(item)
+    image = ProjectionExtension.ext(found.assets["image"])
+    assert (image.code, image.shape) == ("EPSG:26914", [20, 30])
+    assert image.transform == [30.0, 0.0, 704970.0, 0.0, -30.0, 4334220.0]
+    view = ViewExtension.ext(found)
+    assert view.incidence_angle == 20.0
+    # From below the sensor, which stands in the east, to the scene.
+    assert view.azimuth == 280.0
+    assert found.properties["instruments"] == ["tm"] and found.datetime.isoformat() == "1987-06-06T16:35:00+00:00"
+
+
+def test_every_field_of_an_extension_has_it_declared(item):
+    text = json.dumps(item)
+    declared = {"proj": "projection", "eo": "eo", "raster": "raster", "view": "view", "processing": "processing"}
+    for prefix, name in declared.items():
+        assert f'"{prefix}:' in text
+        assert any(f"/{name}/v" in each for each in item["stac_extensions"])
+
+
+def test_sun_and_view_are_those_of_the_image(item, travelled):
+    with rasterio.open(travelled / "image.tif") as image:
+        tags = image.tags()
+    assert item["properties"]["view:sun_elevation"] == pytest.approx(90 - float(tags["sza"]), abs=1e-8)
+    assert item["properties"]["view:sun_azimuth"] == pytest.approx(float(tags["saa"]), abs=1e-8)
+
+
+def test_off_nadir_is_the_angle_at_the_satellite(item):
+    """By the law of sines: the pixel, the satellite 705 km above the ground, and the middle of the Earth."""
+    earth, angle = 6371.0, np.radians(item["properties"]["view:off_nadir"])
+    at_pixel = np.pi - np.radians(20.0)
+    assert np.sin(angle) / earth == pytest.approx(np.sin(at_pixel) / (earth + 705), rel=1e-9)
+    assert angle < np.radians(20.0)
+
+
+def test_bands_say_what_the_file_says(item, travelled):
+    bands = item["assets"]["image"]["bands"]
+    with rasterio.open(travelled / "image.tif") as image:
+        assert [band["name"] for band in bands] == list(image.descriptions)
+        assert [band["raster:scale"] for band in bands] == list(image.scales)
+        assert [band["raster:offset"] for band in bands] == list(image.offsets)
+        assert {(band["data_type"], band["nodata"]) for band in bands} == {("uint8", 0)}
+    assert [band["eo:common_name"] for band in bands] == ["green", "red", "nir"]
+    assert bands[2]["eo:solar_illumination"] == 1031.0
+    assert {band["nodata"] for band in item["assets"]["truth"]["bands"]} == {"nan"}
+
+
+def test_the_footprint_is_that_of_the_pixels(item):
+    """Corners by GDAL's own transformation, to a tenth of a metre; the ring is closed and runs counterclockwise."""
+    (ring,) = item["geometry"]["coordinates"]
+    corners = transform(
+        "EPSG:26914", "EPSG:4326", [704970, 705870, 705870, 704970], [4333620, 4333620, 4334220, 4334220]
+    )
+    assert ring[0] == ring[-1] and len(ring) == 17
+    np.testing.assert_allclose(ring[:-1:4], np.transpose(corners), rtol=0, atol=1e-6)
+    x, y = np.transpose(ring)
+    assert np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) > 0
+    assert item["bbox"] == [x.min(), y.min(), x.max(), y.max()]
+
+
+def test_names_are_those_of_the_folder(item, travelled):
+    assert {asset["href"][2:] for asset in item["assets"].values()} == {
+        "image.tif", "truth.tif", "scene.zarr", "quicklook.png", "report.html", "scenario.toml",
+    }  # fmt: skip
+    again = stac.item(read_scenario(travelled / "scenario.toml").complete(), travelled, item["properties"]["title"])
+    assert again == item
+
+
+def test_a_scenario_without_a_date_has_a_range_instead(travelled, pystac):
+    given = {"sza": 30.0, "saa": 120.0}
+    place = {"grid": {"crs": "EPSG:32735", "west": 601020, "north": 7220040, "width": 900, "height": 600}}
+    scenario = parse_scenario(place | {"geometry": given, "terrain": {"dem": "flat"}, "atmosphere": {"altitude": 1.2}})
+    found = pystac.Item.from_dict(stac.item(scenario.complete(), travelled, "no date"))
+    assert found.datetime is None
+    assert found.properties["start_datetime"] < found.properties["end_datetime"]
+    found.stac_extensions = []
+    assert found.validate()
+
+
+def test_a_collection_is_valid_and_leads_to_its_items(item, tmp_path, pystac):
+    moved = item | {"id": "moved", "bbox": [-96.0, 39.0, -95.9, 39.1]}
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    stac.write_collection(tmp_path, "trial", "Two scenes.", {"a/item.json": item, "b/item.json": moved}, license="MIT")
+    found = pystac.Collection.from_file(str(tmp_path / "collection.json"))
+    assert found.validate()[0].endswith("collection.json")
+    assert {each.id for each in found.get_items()} == {item["id"], "moved"}
+    assert all(each.get_collection().id == "trial" for each in found.get_items())
+    west, south, east, north = found.extent.spatial.bboxes[0]
+    assert (west, south, east, north) == (item["bbox"][0], 39.0, -95.9, item["bbox"][3])
+    assert [str(each.date()) for each in found.extent.temporal.intervals[0]] == ["1987-06-06", "1987-06-06"]

@@ -1,0 +1,36 @@
+"""How commands speak."""
+
+import logging
+
+import pytest
+
+from fifesim.base.logs import LOG, quiet
+from fifesim.output.terminal import in_time, listening, report
+
+
+def test_the_last_line_says_how_long_it_took_and_what_to_open(capsys):
+    report(["out/image.tif"], 75.2, "out/report.html in a browser")
+    assert capsys.readouterr().out.splitlines() == [
+        "out/image.tif",
+        "done in 1 min 15 s: open out/report.html in a browser",
+    ]
+    with quiet():
+        report(["out/image.tif"], 75.2, "out/report.html")
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.04, "0.0 s"), (59.94, "59.9 s"), (59.96, "1 min 0 s"), (3599.6, "1 h 0 min")]
+)
+def test_a_time_has_no_sixty_seconds_or_minutes(seconds, said):
+    assert in_time(seconds) == said
+
+
+def test_the_logger_is_heard_within_a_context_only(capsys):
+    with listening(logging.INFO):
+        LOG.info("a name \x1b[31m")
+        LOG.debug("a part")
+    LOG.info("afterwards")
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("a name \\x1b[31m")
+    assert not LOG.handlers and LOG.level == logging.NOTSET
