@@ -4,11 +4,13 @@ const $ = (id) => document.getElementById(id);
 const NAMES = { lai: "LAI", fpar: "FPAR" };
 const UNITS = { lai: "LAI [m² m⁻²]", fpar: "FPAR" };
 const VIEWS = { ndvi: "NDVI", red: "red reflectance", nir: "near-infrared reflectance" };
+// Where bars begin, and the shares that they may end at.
+const ZERO = 12;
+const SCALES = [0.05, 0.1, 0.25, 0.5, 1];
 const START = { ...Object.fromEntries(data.sliders.map(({ key, start }) => [key, start])), variable: 0, view: "ndvi" };
 
 function main(arrays) {
   let state = { ...START, ...settingInAddress() };
-  let before = null;
   let marked = null;
   let shown = pixelsOf(arrays, state);
 
@@ -64,13 +66,13 @@ function main(arrays) {
     $("n").textContent = fixed(line.n, 0);
     $("then").textContent = isStart() ? "" : `at the start ${fixed(start.r2, 3)}`;
     $("headline").replaceChildren(...headline(line, shares, variable));
-    $("scene-about").textContent = `${data.sliders[0].texts[state.arp]}`;
+    $("scene-about").textContent = data.sliders[0].texts[state.arp];
     $("image-about").textContent = `${camera.name}, pixels of ${camera.pixel} m, ${camera.bits} bits; ${VIEWS[state.view]}`;
     $("scatter-about").textContent = `true ${NAMES[variable]} against NDVI, ${fixed(line.n, 0)} pixels`;
     $("explained").style.width = `${100 * Math.max(line.r2, 0)}%`;
     $("explained-said").textContent = `the line explains ${fixed(100 * line.r2, 1)} %`;
     $("left-said").textContent = `scatter ${fixed(100 * (1 - line.r2), 1)} %`;
-    shares.forEach(bar);
+    bars(shares);
     legend("scene", data.ranges.scene, "green", "LAI");
     legend("image", data.ranges[state.view], state.view === "ndvi" ? "green" : "grey", VIEWS[state.view]);
     $("image").setAttribute("aria-label", `The image of ${camera.name}: ${shown.rows} by ${shown.columns} pixels. Arrow keys mark another pixel.`);
@@ -94,15 +96,18 @@ function main(arrays) {
       bold(data.stages[largest].name), `, ${fixed(100 * shares[largest], 1)} %.`];
   }
 
-  // A bar of the budget grows from zero; a stage that makes the relation straighter goes to the left.
-  function bar(share, k) {
-    const { share: most, below } = data.largest;
-    const unit = 100 / (most - below);
-    const style = $(`stage${k}`).style;
-    style.left = `${unit * (Math.min(share, 0) - below)}%`;
-    style.width = `${unit * Math.abs(share)}%`;
-    $(`stage${k}`).classList.toggle("below", share < 0);
-    $(`share${k}`).textContent = share === 0 ? "0" : fixed(100 * share, 1);
+  // Bars of the budget grow from zero; a stage that makes the relation straighter goes to the left. [%]
+  function bars(shares) {
+    const needed = Math.max(...shares, (-Math.min(...shares) * (100 - ZERO)) / ZERO);
+    const end = SCALES.find((scale) => scale >= needed) || 1;
+    $("scale-end").textContent = `${fixed(100 * end, 0)} %`;
+    shares.forEach((share, k) => {
+      const length = ((100 - ZERO) * Math.abs(share)) / end;
+      $(`stage${k}`).style.left = `${ZERO - (share < 0 ? length : 0)}%`;
+      $(`stage${k}`).style.width = `${length}%`;
+      $(`stage${k}`).classList.toggle("below", share < 0);
+      $(`share${k}`).textContent = share === 0 ? "0" : fixed(100 * share, 1);
+    });
   }
 
   function legend(name, [low, high], colours, text) {
@@ -118,19 +123,21 @@ function main(arrays) {
   function compare(past) {
     const changed = (...keys) => keys.some((key) => past.state[key] !== state[key]);
     const slider = data.sliders.find(({ key }) => past.state[key] !== state[key]);
-    if (!slider) return;
+    const named = (at) => (slider ? slider.marks[at[slider.key]]
+      : changed("variable") ? NAMES[data.variables[at.variable]] : VIEWS[at.view]);
+    const title = slider ? slider.name : changed("variable") ? "Compared with" : "Image in";
     const variable = data.variables[state.variable];
     const other = Array.from(shown.counts).filter((count, k) => count !== past.shown.counts[k]).length;
     const line = lineOf(arrays, state);
     const image = changed("instrument") ? "another instrument's"
-      : other ? `${fixed((100 * other) / shown.counts.length, 0)} % of its numbers are others` : "the same";
+      : other ? `${fixed((100 * other) / shown.counts.length, 0)} % other numbers` : "the same";
     const truth = shown.size === past.shown.size && shown.truth.every((value, k) => Object.is(value, past.shown.truth[k]));
     chip("ground", changed("arp") ? "another" : "the same", !changed("arp"));
-    chip("truth", truth ? "the same" : changed("instrument") ? "of other pixels" : "another", truth);
+    chip("truth", truth ? "the same" : changed("instrument") ? "of other pixels" : "others", truth);
     chip("image", image, image === "the same");
     chip("line", line.r2 === past.line.r2 ? "the same" : `R² ${fixed(past.line.r2, 3)} → ${fixed(line.r2, 3)}`, line.r2 === past.line.r2);
     $("truth-name").textContent = `True ${NAMES[variable]}`;
-    $("moved-what").textContent = `${slider.name}: ${slider.texts[past.state[slider.key]]} → ${slider.texts[state[slider.key]]}`;
+    $("moved-what").textContent = `${title}: ${named(past.state)} → ${named(state)}`;
   }
 
   function chip(name, text, same) {
@@ -139,12 +146,12 @@ function main(arrays) {
   }
 
   function move(change) {
-    before = { state, shown, line: lineOf(arrays, state) };
+    const before = { state, shown, line: lineOf(arrays, state) };
     state = { ...state, ...change };
     shown = pixelsOf(arrays, state);
     say();
     draw();
-    if (before.state.variable === state.variable) compare(before);
+    compare(before);
     const said = [...KEYS, "variable", "view"].filter((key) => state[key] !== START[key]).map((key) => `${key}=${state[key]}`);
     history.replaceState(null, "", said.length ? `#${said.join("&")}` : "#");
   }

@@ -74,7 +74,7 @@ function ticks(low, high, count) {
 
 // Points of NDVI and truth with their line, that of the start, and the pixel that is marked.
 function drawScatter(canvas, { x, y, line, first, marked, ranges, names }) {
-  const { pen, width, height } = fitted(canvas, canvas.clientWidth < 300 ? 1 : 0.86);
+  const { pen, width, height } = fitted(canvas, window.innerWidth <= 760 && !printing ? 0.64 : 0.86);
   const ink = inks();
   const [left, right, top, bottom] = [44, width - 10, 10, height - 38];
   const [[x0, x1], [y0, y1]] = ranges.map(([low, high]) => [low - 0.04 * (high - low), high + 0.04 * (high - low)]);

@@ -87,7 +87,6 @@ def page_data(sweep, outcomes):
         "variables": list(VARIABLES),
         "numbers": list(NUMBERS),
         "stages": [{"name": name, "meaning": MEANINGS[name]} for name in names],
-        "largest": {"share": float(shares.max()), "below": float(min(shares.min(), 0.0))},
         "instruments": [_instrument(sweep, k, camera) for k, camera in enumerate(outcomes.cameras)],
         "offsets": [list(offset) for offset in sweep.offsets],
         "szas": list(sweep.szas),
@@ -102,9 +101,7 @@ def _arrays(outcomes):
     """Images and truths in the steps that a page holds them in, and these steps."""
     arrays, steps = {}, {}
     arrays["scenes"], *steps["scenes"] = stepped(outcomes.scenes, "u1")
-    for k, (image, truth, camera) in enumerate(
-        zip(outcomes.images, outcomes.truths, outcomes.cameras, strict=True)
-    ):
+    for k, (image, truth, camera) in enumerate(zip(outcomes.images, outcomes.truths, outcomes.cameras, strict=True)):
         arrays[f"image{k}"] = image
         arrays[f"reflectance{k}"] = camera.reflectance
         # Leaf area does not go with the sun.
@@ -115,12 +112,15 @@ def _arrays(outcomes):
 
 def _instrument(sweep, number, camera):
     own = camera.scenario.sensor
+    keys = sweep.values(sweep.settings[number])["sensor"]
+    if "instrument" in own.files:
+        keys["instrument"] = Path(own.instrument).name
     return {
         "name": own.description.name,
         "pixel": own.size,
         "bits": own.description.bits,
         "bands": camera.bands,
-        "keys": sweep.values(sweep.settings[number])["sensor"],
+        "keys": keys,
     }
 
 

@@ -12,7 +12,7 @@ from fifesim.sensor.description.instruments import instrument
 
 # Where a scenario's own value is none of these, it takes the place of the nearest.
 _VALUES = {
-    "arp": (0.05, 0.15, 0.24),
+    "arp": (0.15, 0.24, 0.249),
     "visibility": (10.0, 23.0, 45.0),
     "aot": (0.05, 0.2, 0.5),
     "sza": (20.0, 40.0, 60.0),
@@ -135,7 +135,7 @@ def sweep_of(scenario=None):
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario, optional
-        By default the paper's case on level ground.
+        By default the paper's case with its largest patches, on level ground.
 
     Returns
     -------
@@ -146,7 +146,7 @@ def sweep_of(scenario=None):
     ValueError
         If the scenario asks for what cannot be, or its grid holds fewer than 12 pixels along an edge.
     """
-    scenario = Scenario(terrain={"dem": "flat"}) if scenario is None else scenario
+    scenario = default_scenario() if scenario is None else scenario
     scenario.complete()
     scenario = scenario.model_copy(update={"grid": _window(scenario)})
     scenario = parse_scenario(scenario.model_dump(exclude_unset=True))
@@ -163,6 +163,17 @@ def sweep_of(scenario=None):
         offsets=_offsets(own.offset),
     )
     return Sweep(**{**vars(sweep), "instruments": _instruments(sweep)})
+
+
+def default_scenario():
+    """
+    The paper's case with its largest patches, on level ground.
+
+    Returns
+    -------
+    scenario : fifesim.scenario.scenario.Scenario
+    """
+    return Scenario(ground={"arp": 0.24}, terrain={"dem": "flat"})
 
 
 def _with_own(name, own):
@@ -196,7 +207,7 @@ def _instruments(sweep):
             if name == own:
                 raise
             continue
-        if name == own or _FEWEST <= min(height, width) * cell / size + 1e-6 <= _MOST:
+        if name == own or _FEWEST <= round(min(height, width) * cell / size, 6) <= _MOST:
             found[name] = size
     return tuple(sorted(found, key=found.get))
 

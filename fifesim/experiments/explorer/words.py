@@ -41,13 +41,13 @@ def slider_words(sweep):
         number of the scenario's own.
     """
     own = sweep.scenario
-    haze = {"visibility": "Clear air", "aot": "Haze"}[sweep.haze]
+    haze = {"visibility": "Visibility", "aot": "Haze"}[sweep.haze]
     return [
         _slider("arp", "Patches of the ground", "how far leaf area resembles that beside it", sweep.arps,
                 own.ground.arp, lambda arp: _patches(arp, own.grid.cell)),
         _slider("haze", haze, "how far one can see, or how thick the haze is", sweep.hazes,
                 getattr(own.atmosphere, sweep.haze), lambda amount: _air(sweep.haze, amount)),
-        _slider("sza", "Sun from overhead", "the solar zenith angle", sweep.szas, own.sun_and_view().sza, _sun),
+        _slider("sza", "Solar zenith", "of the sun, from overhead", sweep.szas, own.sun_and_view().sza, _sun),
         _slider("instrument", "Instrument", "from small pixels to large", sweep.instruments, own.sensor.instrument,
                 lambda name: _instrument(sweep, name)),
         _slider("registration", "Registration error", "how far pixels lie beside the ground they are compared with",
@@ -66,7 +66,7 @@ def _patches(arp, cell):
     if arp is None:
         return "map", "as the map has them"
     length = correlation_length(arp, cell)
-    return f"{length:.0f} m", f"alike up to {length:.0f} m (arp {arp:g})"
+    return f"{length:.0f} m", f"leaf area is alike up to {length:.0f} m, arp {arp:g}"
 
 
 def _air(key, amount):
@@ -74,18 +74,18 @@ def _air(key, amount):
         return "none", "without haze"
     if key == "aot":
         return f"{amount:g}", f"aerosol optical thickness {amount:g}"
-    return f"{amount:g} km", f"visibility {amount:g} km"
+    return f"{amount:g} km", f"one sees {amount:g} km far"
 
 
 def _sun(sza):
-    return f"{sza:.3g}°", f"{sza:.1f} degrees from overhead"
+    return f"{sza:.3g}°", f"{sza:.1f}° from overhead"
 
 
 def _instrument(sweep, name):
     found = instrument(name)
     first = sweep.settings[0]
     size = sweep.at(type(first)(first.arp, first.haze, first.sza, name)).sensor.size
-    return f"{found.name} {size:g} m", f"{found.title}, pixels of {size:g} m"
+    return f"{found.name} {size:g} m", f"{found.title}, {size:g} m"
 
 
 def _displacement(offset):
