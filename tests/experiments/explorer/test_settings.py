@@ -37,7 +37,10 @@ def test_sliders_have_the_values_of_the_scenario():
 
 def test_a_setting_is_the_scenario_with_its_values(small):
     sweep = sweep_of(
-        parse_scenario(small.model_dump(exclude_unset=True) | {"sensor": {"instrument": "L4TM", "noise": ["thermal"], "min_valid": 0.9}})
+        parse_scenario(
+            small.model_dump(exclude_unset=True)
+            | {"sensor": {"instrument": "L4TM", "noise": ["thermal"], "min_valid": 0.9}}
+        )
     )
     own = sweep.at(Setting(0.249, 10.0, 60.0, "L4TM"), (0.0, 0.5))
     assert (own.ground.arp, own.atmosphere.visibility, own.sensor.offset) == (0.249, 10.0, [0.0, 0.5])
