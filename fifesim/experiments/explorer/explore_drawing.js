@@ -22,12 +22,11 @@ function ramp(name) {
 }
 const COLOURS = { green: ramp("green"), grey: ramp("grey") };
 
-// A canvas as sharp as the screen, and its size on the page.
+// A canvas as sharp as the screen, and its size on the page; its height there follows from its proportions.
 function fitted(canvas, aspect) {
   const width = Math.max(canvas.clientWidth, 1);
   const height = Math.round(width * aspect);
   const scale = Math.max(window.devicePixelRatio || 1, printing ? 2 : 1);
-  canvas.style.height = `${height}px`;
   canvas.width = Math.round(width * scale);
   canvas.height = Math.round(height * scale);
   const pen = canvas.getContext("2d");

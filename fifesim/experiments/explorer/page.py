@@ -50,7 +50,8 @@ def explorer_page(sweep, outcomes):
     }
     own = Path(__file__).parent
     return pages.html(
-        _TEMPLATE, title=title(scenario), sliders=data["sliders"], run=run, data=data, bytes=text,
+        _TEMPLATE, title=title(scenario), sliders=data["sliders"], story=_story(data["sliders"], outcomes), run=run,
+        data=data, bytes=text,
         style=Markup((own / "explore.css").read_text(encoding="utf-8")),
         script=Markup("\n".join((own / name).read_text(encoding="utf-8") for name in _SCRIPTS)),
     )  # fmt: skip
@@ -95,6 +96,18 @@ def page_data(sweep, outcomes):
         "keys": _keys(sweep),
     }
     return text, data
+
+
+def _story(sliders, outcomes):
+    """What becomes of R2 of LAI as a reader does what the page proposes first."""
+    r2 = outcomes.lines[..., VARIABLES.index("lai"), NUMBERS.index("r2")]
+    place = [slider["start"] for slider in sliders]
+    found = {"start": float(r2[tuple(place)]), "patches": None}
+    place[-1] = -1
+    found["displaced"] = float(r2[tuple(place)])
+    if place[0] < len(sliders[0]["texts"]) - 1:
+        found["patches"] = float(r2[(-1, *place[1:])])
+    return found
 
 
 def _arrays(outcomes):

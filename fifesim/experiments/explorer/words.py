@@ -43,7 +43,7 @@ def slider_words(sweep):
     own = sweep.scenario
     haze = {"visibility": "Visibility", "aot": "Haze"}[sweep.haze]
     return [
-        _slider("arp", "Patches of the ground", "how far leaf area resembles that beside it", sweep.arps,
+        _slider("arp", "Ground patches", "how far leaf area resembles that beside it", sweep.arps,
                 own.ground.arp, lambda arp: _patches(arp, own.grid.cell)),
         _slider("haze", haze, "how far one can see, or how thick the haze is", sweep.hazes,
                 getattr(own.atmosphere, sweep.haze), lambda amount: _air(sweep.haze, amount)),
@@ -66,7 +66,7 @@ def _patches(arp, cell):
     if arp is None:
         return "map", "as the map has them"
     length = correlation_length(arp, cell)
-    return f"{length:.0f} m", f"leaf area is alike up to {length:.0f} m, arp {arp:g}"
+    return f"{length:.0f} m", f"leaves are alike up to {length:.0f} m, arp {arp:g}"
 
 
 def _air(key, amount):

@@ -39,6 +39,13 @@ def test_page_is_whole_and_names_no_place_of_this_machine(page, sweep, outcomes,
     assert len(text) < 1_000_000
 
 
+def test_story_has_the_numbers_of_the_page(page, outcomes):
+    r2 = outcomes.lines[..., 0, 2]
+    text = page.read_text(encoding="utf-8").split("</header>")[0]
+    for place in ((0, 0, 0, 1, 0), (0, 0, 0, 1, 1), (1, 0, 0, 1, 1)):
+        assert f"{r2[place]:.2f}" in text
+
+
 def test_names_of_files_stand_without_their_folders(sweep, outcomes, tmp_path):
     dem = tmp_path / "hills.tif"
     fifesim.flint_hills(sweep.scenario.geobox(), seed=1).fifesim.to_geotiff(dem)
@@ -120,16 +127,18 @@ def test_page_fits_its_width_by_mouse_and_keyboard(page, width, dark, tmp_path):
     async def look(browser):
         await browser.size(width, 900, dark)
         await browser.evaluate("document.getElementById('registration').scrollIntoView({block: 'center'})")
-        place = "(() => { const box = document.getElementById('registration').getBoundingClientRect(); return [box.left, box.top, box.width, box.height]; })()"
+        box = "const { left, top, width, height } = document.getElementById('registration').getBoundingClientRect()"
+        place = f"(() => {{ {box}; return [left, top, width, height]; }})()"
         left, top, wide, high = await browser.evaluate(place)
         before = await browser.text("r2")
         await browser.click(left + wide - 6, top + high / 2)
         moved = before, await browser.text("r2")
-        focus = "(() => { document.getElementById('image').focus(); return document.getElementById('reading').textContent; })()"
-        pixel = await browser.evaluate(focus)
+        await browser.evaluate("document.getElementById('image').focus()")
+        pixel = await browser.text("reading")
         await browser.press("ArrowDown")
         marked = pixel, await browser.text("reading")
-        drawn = "['scene', 'image', 'scatter'].map((id) => { const it = document.getElementById(id); const pen = it.getContext('2d'); return new Set(pen.getImageData(0, 0, it.width, it.height).data).size; })"
+        values = "it.getContext('2d').getImageData(0, 0, it.width, it.height).data"
+        drawn = f"[...document.querySelectorAll('canvas')].map((it) => new Set({values}).size)"
         body = await browser.evaluate("getComputedStyle(document.body).backgroundColor")
         over = await browser.evaluate("document.documentElement.scrollWidth - window.innerWidth")
         said = await browser.evaluate("document.getElementById('registration').getAttribute('aria-valuetext')")

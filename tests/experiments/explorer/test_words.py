@@ -15,7 +15,7 @@ def test_every_stage_has_its_words():
 
 def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
     arp, haze, sza, instrument, registration = words.slider_words(sweep)
-    assert arp["start"] == 0 and "alike up to 8 m, arp 0.15" in arp["texts"][0]
+    assert arp["start"] == 0 and "leaves are alike up to 8 m, arp 0.15" in arp["texts"][0]
     assert haze["marks"] == ["45 km"] and haze["start"] == 0
     assert sza["texts"][0] == "28.5° from overhead"
     assert instrument["texts"] == ["SPOT-1 HRV 1, multispectral mode, 20 m", "Landsat-5 Thematic Mapper, 30 m"]
