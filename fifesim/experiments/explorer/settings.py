@@ -1,11 +1,12 @@
 """What the sliders of a page set, and the scenario that each setting is."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 from odc.geo.geobox import GeoBox
 
+from fifesim.experiments.scatter.stages import working_stages
 from fifesim.rasters import grid as grids
 from fifesim.scenario.scenario import Scenario, grid_keys, parse_scenario
 from fifesim.sensor.description.instruments import instrument
@@ -25,6 +26,8 @@ _DISPLACEMENTS = (0.0, 0.25, 0.5, 1.0)
 _SIDE = 900.0
 # Pixels along it: a line needs some, and a page holds only so many.
 _FEWEST, _WANTED, _MOST = 12, 30, 100
+# With more stages of the scatter, whose sets double with each, sliders have fewer values.
+_MANY = 8
 # Cells along it, where that leaves enough pixels.
 _MOST_CELLS = 400
 
@@ -132,6 +135,9 @@ def sweep_of(scenario=None):
     """
     Sliders of a scenario: its own values, and others around them.
 
+    Where more than eight stages share the scatter, as in a landscape of classes, sliders of haze, sun and instrument
+    have two values.
+
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario, optional
@@ -162,7 +168,32 @@ def sweep_of(scenario=None):
         instruments=(own.instrument,),
         offsets=_offsets(own.offset),
     )
-    return Sweep(**{**vars(sweep), "instruments": _instruments(sweep)})
+    sweep = replace(sweep, instruments=_instruments(sweep))
+    return _with_fewer_values(sweep) if len(_stages(sweep)) > _MANY else sweep
+
+
+def _stages(sweep):
+    """Stages that any setting has at work."""
+    own = sweep.scenario
+    displaced = own.sensor.model_copy(update={"offset": list(sweep.offsets[-1])})
+    return working_stages(own.model_copy(update={"sensor": displaced}))
+
+
+def _with_fewer_values(sweep):
+    """Sliders of haze, sun and instrument with the own value and that farthest from it."""
+    own, first = sweep.scenario, sweep.settings[0]
+    sizes = {name: math.log(sweep.at(replace(first, instrument=name)).sensor.size) for name in sweep.instruments}
+    name = own.sensor.instrument
+    far = max(sizes, key=lambda each: abs(sizes[each] - sizes[name]))
+    hazes = _farthest(sweep.hazes, getattr(own.atmosphere, sweep.haze)) if None not in sweep.hazes else sweep.hazes
+    szas = _farthest(sweep.szas, own.sun_and_view().sza)
+    instruments = tuple(each for each in sizes if each in (name, far))
+    return replace(sweep, hazes=hazes, szas=szas, instruments=instruments)
+
+
+def _farthest(values, own):
+    far = max(values, key=lambda value: abs(value - own))
+    return tuple(value for value in values if value in (own, far))
 
 
 def default_scenario():

@@ -90,3 +90,11 @@ def test_haze_given_by_optical_thickness_stays_so(small):
 def test_ground_of_few_pixels_is_refused():
     with pytest.raises(ValueError, match="fewer than 12 x 12 pixels of 30 m"):
         sweep_of(parse_scenario(FLAT | {"grid": SITE | {"width": 300.0}}))
+
+
+def test_a_landscape_of_many_stages_has_fewer_settings():
+    sweep = sweep_of(fifesim.default_scenario())
+    assert sweep.shape == (3, 2, 2, 2, 4)
+    assert sweep.hazes == (10.0, 45.0) and sweep.szas[1] == 60.0 and sweep.instruments == ("MSI", "TM")
+    hills = sweep_of(fifesim.Scenario())
+    assert hills.shape == (3, 3, 3, 4, 4)
