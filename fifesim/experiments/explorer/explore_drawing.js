@@ -5,7 +5,7 @@ const RAMPS = {
   green: ["#f4ecd8", "#dfdcae", "#b4c987", "#7fb06d", "#4b9160", "#236f55", "#0d4a45"],
   grey: ["#14181a", "#f7f5ef"],
 };
-const LIGHT = { ink: "#22302a", faint: "#8b968f", rule: "#dfe2da", point: "#2f6f4f", line: "#b4531f", mark: "#12211a", halo: "#ffffff" };
+const LIGHT = { ink: "#22302a", faint: "#66736c", rule: "#dfe2da", point: "#2f6f4f", line: "#b4531f", mark: "#12211a", halo: "#ffffff" };
 const DARK = { ink: "#e3e9e4", faint: "#8a978f", rule: "#2e3833", point: "#8fcfa5", line: "#f0a067", mark: "#ffffff", halo: "#101512" };
 
 let printing = false;

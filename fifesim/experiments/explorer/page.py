@@ -45,7 +45,7 @@ def explorer_page(sweep, outcomes):
         "cell": scenario.grid.cell,
         "height": shape.y * scenario.grid.cell,
         "width": shape.x * scenario.grid.cell,
-        "seed": scenario.ground.seed,
+        "seed": None if scenario.ground.lai_file else scenario.ground.seed,
         "level": scenario.terrain.dem == "flat",
     }
     own = Path(__file__).parent

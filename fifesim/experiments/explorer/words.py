@@ -85,7 +85,7 @@ def _instrument(sweep, name):
     found = instrument(name)
     first = sweep.settings[0]
     size = sweep.at(type(first)(first.arp, first.haze, first.sza, name)).sensor.size
-    return f"{found.name} {size:g} m", f"{found.title}, {size:g} m"
+    return found.name, f"{found.title}, {size:g} m"
 
 
 def _displacement(offset):

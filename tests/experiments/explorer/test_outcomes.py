@@ -62,6 +62,7 @@ def test_reflectance_of_the_numbers_is_that_of_the_image(sweep, outcomes):
     np.testing.assert_allclose(red, expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_red_and_near_infrared_are_found_among_more_bands_on_hills(small):
     values = small.model_dump(exclude_unset=True) | {"terrain": {"dem": "flint-hills", "horizon_reach": 300.0}}
     sweep = sweep_of(parse_scenario(values | {"sensor": {"bands": ["TM4", "TM2", "TM3"]}}))
@@ -80,7 +81,16 @@ def test_where_all_pixels_have_one_ndvi_there_is_no_line(small):
     values = small.model_dump(exclude_unset=True) | {"sensor": {"instrument": "MSS"}}
     values["grid"] |= {"width": 720.0, "height": 720.0}
     sweep = sweep_of(parse_scenario(values))
-    one = type(sweep)(**{**vars(sweep), "arps": (0.0,), "hazes": (5.0,), "szas": (60.0,), "instruments": ("MSS",)})
+    one = type(sweep)(
+        **{
+            **vars(sweep),
+            "arps": (0.0,),
+            "hazes": (5.0,),
+            "szas": (60.0,),
+            "instruments": ("MSS",),
+            "offsets": ((0.0, 0.0),),
+        }
+    )
     found = outcomes_of(one)
     flat = np.isnan(found.lines[..., 0])
     assert flat.any() and (found.lines[..., 2][flat] == 0).all()

@@ -18,6 +18,7 @@ def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
     assert arp["start"] == 0 and "leaves are alike up to 8 m, arp 0.15" in arp["texts"][0]
     assert haze["marks"] == ["45 km"] and haze["start"] == 0
     assert sza["texts"][0] == "28.5° from overhead"
+    assert instrument["marks"] == ["HRV", "TM"]
     assert instrument["texts"] == ["SPOT-1 HRV 1, multispectral mode, 20 m", "Landsat-5 Thematic Mapper, 30 m"]
     assert registration["marks"] == ["0", "½"] and registration["texts"] == ["none", "0.50 pixel"]
 
