@@ -116,6 +116,7 @@ from .output.styles import write_style as write_style
 from .scenario.simulation import simulate as simulate
 from .scenario.sweeps import sweep as sweep
 from .experiments.scatter.shares import budget as budget
+from .experiments.explorer.writing import explore as explore
 from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import default_scenario as default_scenario
 from .scenario.scenario import read_scenario as read_scenario

@@ -207,6 +207,27 @@ def budget(
 
 
 @app.command()
+def explore(
+    context: typer.Context,
+    scenario: Annotated[Path | None, typer.Argument(help="TOML file; the paper's case by default.")] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The page.")] = Path("explore.html"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier page.")] = False,
+    allow_remote: _AllowRemote = False,
+):
+    """Make a page to play with: sliders for ground, air, sun, instrument and registration; about a minute."""
+    _check_spelling(scenario)
+
+    with _importing():
+        from fifesim.experiments.explorer.writing import explore as write_page
+        from fifesim.scenario.scenario import read_scenario
+
+    if allow_remote:
+        _open_remote(context)
+    found = None if scenario is None else read_scenario(scenario)
+    _say(write_page(found, output, overwrite=overwrite))
+
+
+@app.command()
 def scenario(paper: _Paper = False):
     """Print the default scenario, every key with its unit, to edit."""
     from fifesim.scenario.toml import write_scenario

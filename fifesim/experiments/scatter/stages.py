@@ -14,6 +14,7 @@ from fifesim.base.footprints import regularize
 from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
 from fifesim.chain.setup import Setup, reflectance_of
+from fifesim.experiments.scatter.blocks import middle_cells, spread_out
 from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, operators
@@ -115,21 +116,49 @@ def pixels(scenario):
     ValueError
         If the bands have no red or no near infrared, or fewer than three pixels have data.
     """
-    scene, stages = _scene(scenario), working_stages(scenario)
+    return displaced_pixels(scenario, [scenario.sensor.offset])[0]
+
+
+def displaced_pixels(scenario, offsets):
+    """
+    `pixels` at several registration errors: the light that leaves the ground and the air is computed once.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    offsets : sequence of (float, float)
+        In the place of the scenario's, southward and eastward. [pixel]
+
+    Returns
+    -------
+    pixels : list of Pixels
+    """
+    sensors = [scenario.sensor.model_copy(update={"offset": list(offset)}) for offset in offsets]
+    stages = [working_stages(scenario.model_copy(update={"sensor": sensor})) for sensor in sensors]
+    scene = _scene(scenario)
+    scenes = [replace(scene, setup=replace(scene.setup, offset=tuple(offset))) for offset in offsets]
     # False is ideal, True at work.
-    switches = {name: (False, True) if name in stages else (False,) for name in STAGES}
-    lit = [name for name in STAGES if name not in _SENSED]
-    sensed = [switches[name] for name in _SENSED]
-    images = []
-    for states in _states(switches, lit):
+    switches = [{name: (False, True) if name in each else (False,) for name in STAGES} for each in stages]
+    lit, images = [name for name in STAGES if name not in _SENSED], [[] for _ in scenes]
+    for states in _states(switches[0], lit):
         at_work = {name for name, state in zip(lit, states, strict=True) if state}
-        images.append(_images(scene, _cells(scene, scene.ground(at_work), at_work), sensed))
+        cells = _cells(scene, scene.ground(at_work), at_work)
+        for found, one, each in zip(images, scenes, switches, strict=True):
+            found.append(_images(one, cells, [each[name] for name in _SENSED]))
+    truths, even = _truths(scene, switches[0]), _even(scene)
+    even_cells, even_truth = _cells(scene, even, set(stages[0])), _truth(scene, even, True)
+    found = []
+    for k, one in enumerate(scenes):
+        of_even = _images(one, even_cells, [switches[k][name][-1:] for name in _SENSED]).reshape(scene.shape)
+        found.append(_with_data(stages[k], _in_order(images[k], switches[k], lit), truths, of_even, even_truth))
+    return found
+
+
+def _in_order(images, switches, lit):
+    """Images of all states with the axes of `STAGES` first."""
     order = [*lit, *_SENSED]
-    images = np.reshape(images, (*(len(switches[name]) for name in order), *scene.shape))
-    images = np.moveaxis(images, [order.index(name) for name in STAGES], range(len(STAGES)))
-    even = _even(scene)
-    of_even = _images(scene, _cells(scene, even, set(stages)), [each[-1:] for each in sensed])
-    return _with_data(stages, images, _truths(scene, switches), of_even.reshape(scene.shape), _truth(scene, even, True))
+    images = np.reshape(images, (*(len(switches[name]) for name in order), *np.shape(images)[-2:]))
+    return np.moveaxis(images, [order.index(name) for name in STAGES], range(len(STAGES)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,8 +196,7 @@ class _Scene:
 
     def spread_out(self, cells):
         """Means over the pixels of the truth, on the cells."""
-        means = aggregate(cells, grids.cell_size(self.blocks)[0], min_valid=self.setup.min_valid)
-        return _spread_out(means, cells)
+        return spread_out(cells, self.blocks, self.setup.min_valid)
 
 
 def _scene(scenario):
@@ -186,7 +214,7 @@ def _even(scene):
     whole = scene.ground(PROPERTIES)
     land = {name: scene.spread_out(each) for name, each in whole.land.items() if name != "cover" and each.ndim == 2}
     if "cover" in whole.land:
-        land["cover"] = _middle_cells(whole.land["cover"], scene.blocks)
+        land["cover"] = middle_cells(whole.land["cover"], scene.blocks)
     return _Ground(whole.land.assign(land), whole.middle)
 
 
@@ -195,31 +223,6 @@ def _red_and_nir(bands):
     coords = {"wavelength": ("band", [band.wavelength for band in bands])}
     numbers = xr.DataArray(np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords=coords)
     return tuple(bands[number.item()] for number in red_and_nir(numbers))
-
-
-def _spread_out(means, cells):
-    """Means of blocks over their cells; a cell of no block keeps its own, and one without data has none."""
-    (rows, columns), inside = _places(cells, grids.geobox(means))
-    spread = means.values[rows][:, columns]
-    return cells.copy(data=np.where(inside & np.isfinite(spread) & np.isfinite(cells.values), spread, cells.values))
-
-
-def _middle_cells(cells, blocks):
-    """The cell in the middle of each block over its cells; one of no block keeps its own."""
-    (rows, columns), inside = _places(cells, blocks)
-    sizes = zip(grids.cell_size(blocks), grids.cell_size(grids.geobox(cells)), strict=True)
-    down, across = (block / cell for block, cell in sizes)
-    middle = cells.values[((rows + 0.5) * down).astype(int)][:, ((columns + 0.5) * across).astype(int)]
-    return cells.copy(data=np.where(inside & (cells.values >= 0), middle, cells.values))
-
-
-def _places(cells, blocks):
-    """Row and column of the block of each cell, at most the last, and whether the cell lies in it."""
-    sizes = zip(grids.cell_size(grids.geobox(cells)), grids.cell_size(blocks), cells.shape, strict=True)
-    places = [np.floor((np.arange(count) + 0.5) * cell / block + 1e-9).astype(int) for cell, block, count in sizes]
-    inside = [place < count for place, count in zip(places, blocks.shape, strict=True)]
-    last = [np.minimum(place, count - 1) for place, count in zip(places, blocks.shape, strict=True)]
-    return last, inside[0][:, None] & inside[1]
 
 
 def _tangent(function, lai, middle):

@@ -6,7 +6,7 @@ import pytest
 import fifesim
 from fifesim.experiments.scatter import shares as scatter
 from fifesim.experiments.scatter.grounds import PROPERTIES
-from fifesim.experiments.scatter.stages import STAGES, pixels
+from fifesim.experiments.scatter.stages import STAGES, displaced_pixels, pixels
 
 
 def of(seen, **at_work):
@@ -59,3 +59,20 @@ def test_over_uniform_pixels_the_cells_are_the_mean(scenario):
     lai = fifesim.lai_scene(scenario().geobox(), "burned-grazed", arp=0.15, seed=7).fifesim.aggregate(30)
     of_mean = fifesim.surface_reflectance(lai, bands=["TM3", "TM4"]).fifesim.to_toa()
     np.testing.assert_allclose(seen.homogeneous_ndvi, fifesim.ndvi(of_mean).values.ravel(), atol=0.01)
+
+
+def test_pixels_at_several_displacements_are_those_of_each(rough):
+    """The whole of it, to the bit: stages, images, truth, and the ground that is uniform within pixels."""
+    offsets = [(0.0, 0.0), (0.1, 0.0), (0.0, 0.5)]
+    for offset, seen in zip(offsets, displaced_pixels(rough, offsets), strict=True):
+        sensor = rough.sensor.model_copy(update={"offset": list(offset)})
+        alone = pixels(rough.model_copy(update={"sensor": sensor}))
+        assert seen.stages == alone.stages
+        np.testing.assert_array_equal(seen.ndvi, alone.ndvi)
+        np.testing.assert_array_equal(seen.homogeneous_ndvi, alone.homogeneous_ndvi)
+        np.testing.assert_array_equal(seen.truth["fpar"], alone.truth["fpar"])
+
+
+def test_without_displacement_registration_is_ideal(scenario):
+    still, moved = displaced_pixels(scenario(), [(0.0, 0.0), (0.0, 0.5)])
+    assert "registration" not in still.stages and "registration" in moved.stages

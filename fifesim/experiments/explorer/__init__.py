@@ -1,0 +1,1 @@
+"""A page with sliders over simulations of one scenario."""

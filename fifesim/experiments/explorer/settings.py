@@ -1,0 +1,269 @@
+"""What the sliders of a page set, and the scenario that each setting is."""
+
+import math
+from dataclasses import dataclass, replace
+from itertools import product
+
+from odc.geo.geobox import GeoBox
+
+from fifesim.experiments.scatter.stages import working_stages
+from fifesim.rasters import grid as grids
+from fifesim.scenario.scenario import Scenario, grid_keys, parse_scenario
+from fifesim.sensor.description.instruments import instrument
+
+# Where a scenario's own value is none of these, it takes the place of the nearest.
+_VALUES = {
+    "arp": (0.15, 0.24, 0.249),
+    "visibility": (10.0, 23.0, 45.0),
+    "aot": (0.05, 0.2, 0.5),
+    "sza": (20.0, 40.0, 60.0),
+}
+_INSTRUMENTS = ("MSI", "HRV", "TM", "MSS")
+# Eastward, so that pixels see the ground beside them. [pixel]
+_DISPLACEMENTS = (0.0, 0.25, 0.5, 1.0)
+
+# Edge of the ground that a page shows. [m]
+_SIDE = 900.0
+# Pixels along it: a line needs some, and a page holds only so many.
+_FEWEST, _WANTED, _MOST = 12, 30, 100
+# With more stages of the scatter, whose sets double with each, sliders have fewer values.
+_MANY = 8
+# Cells along it, where that leaves enough pixels.
+_MOST_CELLS = 400
+
+
+@dataclass(frozen=True)
+class Setting:
+    """
+    Values that every slider but registration has.
+
+    Attributes
+    ----------
+    arp : float or None
+        None for a map of leaf area. [1]
+    haze : float or None
+        Visibility [km] or optical thickness; None where the scenario has no aerosol.
+    sza : float
+        [degree]
+    instrument : str
+    """
+
+    arp: float | None
+    haze: float | None
+    sza: float
+    instrument: str
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """
+    Scenarios of all settings of a page.
+
+    Attributes
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+        On the ground that the page shows.
+    haze : str
+        The key that haze is given by: visibility, or aot.
+    arps, hazes, szas, instruments : tuple
+        Values of the sliders, one at least.
+    offsets : tuple of (float, float)
+        Registration errors southward and eastward. [pixel]
+    """
+
+    scenario: Scenario
+    haze: str
+    arps: tuple
+    hazes: tuple
+    szas: tuple
+    instruments: tuple
+    offsets: tuple
+
+    @property
+    def shape(self):
+        """Number of values of arp, haze, sza, instrument and offset."""
+        return tuple(map(len, (self.arps, self.hazes, self.szas, self.instruments, self.offsets)))
+
+    @property
+    def settings(self):
+        """Every `Setting`, the last of them changing fastest."""
+        return [Setting(*values) for values in product(self.arps, self.hazes, self.szas, self.instruments)]
+
+    def at(self, setting, offset=(0.0, 0.0)):
+        """
+        The scenario of a setting.
+
+        Parameters
+        ----------
+        setting : Setting
+        offset : (float, float), optional
+            [pixel]
+
+        Returns
+        -------
+        scenario : fifesim.scenario.scenario.Scenario
+            Complete.
+        """
+        return parse_scenario(self.values(setting, offset)).complete()
+
+    def values(self, setting, offset=(0.0, 0.0)):
+        """
+        The keys of the scenario of a setting that are not left to defaults, a dict of tables.
+
+        Parameters
+        ----------
+        setting, offset
+            As in `at`.
+
+        Returns
+        -------
+        values : dict
+        """
+        values = self.scenario.model_dump(exclude_unset=True)
+        sun = self.scenario.sun_and_view()
+        said = {
+            "ground": {} if setting.arp is None else {"arp": setting.arp},
+            "atmosphere": {} if setting.haze is None else {self.haze: setting.haze},
+            "geometry": {"sza": setting.sza, "saa": sun.saa},
+        }
+        values |= {name: values.get(name, {}) | keys for name, keys in said.items() if keys}
+        values["sensor"] = _sensor_keys(self.scenario, setting.instrument) | {"offset": list(offset)}
+        return values
+
+
+def sweep_of(scenario=None):
+    """
+    Sliders of a scenario: its own values, and others around them.
+
+    Where more than eight stages share the scatter, as in a landscape of classes, sliders of haze, sun and instrument
+    have two values.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario, optional
+        By default the paper's case with its largest patches, on level ground.
+
+    Returns
+    -------
+    sweep : Sweep
+
+    Raises
+    ------
+    ValueError
+        If the scenario asks for what cannot be, or its grid holds fewer than 12 pixels along an edge.
+    """
+    scenario = default_scenario() if scenario is None else scenario
+    scenario.complete()
+    scenario = scenario.model_copy(update={"grid": _window(scenario)})
+    scenario = parse_scenario(scenario.model_dump(exclude_unset=True))
+    land, air, own = scenario.ground, scenario.atmosphere, scenario.sensor
+    haze = "visibility" if air.aot is None else "aot"
+    fixed_air = air.aerosol == "none"
+    sweep = Sweep(
+        scenario=scenario,
+        haze=haze,
+        arps=(None,) if land.lai_file else _with_own("arp", land.arp),
+        hazes=(None,) if fixed_air else _with_own(haze, getattr(air, haze)),
+        szas=_with_own("sza", scenario.sun_and_view().sza),
+        instruments=(own.instrument,),
+        offsets=_offsets(own.offset),
+    )
+    sweep = replace(sweep, instruments=_instruments(sweep))
+    return _with_fewer_values(sweep) if len(_stages(sweep)) > _MANY else sweep
+
+
+def _stages(sweep):
+    """Stages that any setting has at work."""
+    own = sweep.scenario
+    displaced = own.sensor.model_copy(update={"offset": list(sweep.offsets[-1])})
+    return working_stages(own.model_copy(update={"sensor": displaced}))
+
+
+def _with_fewer_values(sweep):
+    """Sliders of haze, sun and instrument with the own value and that farthest from it."""
+    own, first = sweep.scenario, sweep.settings[0]
+    sizes = {name: math.log(sweep.at(replace(first, instrument=name)).sensor.size) for name in sweep.instruments}
+    name = own.sensor.instrument
+    far = max(sizes, key=lambda each: abs(sizes[each] - sizes[name]))
+    hazes = _farthest(sweep.hazes, getattr(own.atmosphere, sweep.haze)) if None not in sweep.hazes else sweep.hazes
+    szas = _farthest(sweep.szas, own.sun_and_view().sza)
+    instruments = tuple(each for each in sizes if each in (name, far))
+    return replace(sweep, hazes=hazes, szas=szas, instruments=instruments)
+
+
+def _farthest(values, own):
+    far = max(values, key=lambda value: abs(value - own))
+    return tuple(value for value in values if value in (own, far))
+
+
+def default_scenario():
+    """
+    The paper's case with its largest patches, on level ground.
+
+    Returns
+    -------
+    scenario : fifesim.scenario.scenario.Scenario
+    """
+    return Scenario(ground={"arp": 0.24}, terrain={"dem": "flat"})
+
+
+def _with_own(name, own):
+    """Values of a slider, in their order, with the own one in the place of the nearest."""
+    values = _VALUES[name]
+    nearest = min(values, key=lambda value: abs(value - own))
+    return tuple(sorted(own if value == nearest else value for value in values))
+
+
+def _offsets(own):
+    """Displacements, one of which is the own."""
+    size = math.hypot(*own)
+    nearest = min(_DISPLACEMENTS[1:], key=lambda value: abs(value - size)) if size else None
+    found = [tuple(own) if value == nearest else (0.0, value) for value in _DISPLACEMENTS]
+    return tuple(sorted(found, key=lambda offset: math.hypot(*offset)))
+
+
+def _instruments(sweep):
+    """Names of the instruments whose pixels fit the ground and its cells, from small pixels to large."""
+    own = sweep.instruments[0]
+    first = sweep.settings[0]
+    height, width = sweep.scenario.geobox().shape
+    cell = sweep.scenario.grid.cell
+    same = instrument(own).name
+    found = {}
+    for name in (own, *(name for name in _INSTRUMENTS if instrument(name).name != same)):
+        try:
+            size = sweep.at(Setting(first.arp, first.haze, first.sza, name)).sensor.size
+        except ValueError:
+            # Leaves that are known in the bands of another, or pixels below a cell.
+            if name == own:
+                raise
+            continue
+        if name == own or _FEWEST <= round(min(height, width) * cell / size, 6) <= _MOST:
+            found[name] = size
+    return tuple(sorted(found, key=found.get))
+
+
+def _sensor_keys(scenario, name):
+    """Keys of the sensor: all of its own, or of another what does not depend on its bands."""
+    own = scenario.sensor.model_dump(exclude_unset=True)
+    if name == scenario.sensor.instrument:
+        return own
+    kept = {key: own[key] for key in ("seed", "min_valid") if key in own}
+    if scenario.sensor.noise and all(band.noise for band in instrument(name).red_and_near_infrared()):
+        kept["noise"] = scenario.sensor.noise
+    return {"instrument": name} | kept
+
+
+def _window(scenario):
+    """Keys of the ground in the middle of a scenario's grid that a page shows."""
+    box, size, cell = scenario.geobox(), scenario.sensor.size, max(grids.cell_size(scenario.geobox()))
+    side = max(_FEWEST * size, min(max(_SIDE, _WANTED * size), _MOST_CELLS * cell))
+    if min(box.shape) * cell < _FEWEST * size * (1 - 1e-9):
+        raise ValueError(
+            f"grid: {grids.in_words(box)} holds fewer than {_FEWEST} x {_FEWEST} pixels of {size:g} m: "
+            "type a larger width and height"
+        )
+    step = max(round(size / cell), 1)
+    shape = tuple(min(int(side / cell + 1e-6), count) for count in box.shape)
+    first = [(count - held) // 2 // step * step for count, held in zip(box.shape, shape, strict=True)]
+    return grid_keys(GeoBox(shape, box[first[0] :, first[1] :].affine, box.crs))

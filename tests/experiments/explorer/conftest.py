@@ -1,0 +1,44 @@
+"""A small page: 12 x 12 pixels of 30 m, and few values a slider."""
+
+from dataclasses import replace
+
+import pytest
+
+from fifesim.experiments.explorer.outcomes import outcomes_of
+from fifesim.experiments.explorer.page import explorer_page
+from fifesim.experiments.explorer.settings import sweep_of
+from fifesim.scenario.scenario import parse_scenario
+
+SMALL = {
+    "grid": {"west": 707970.0, "north": 4331220.0, "width": 400.0, "height": 360.0, "cell": 10 / 3},
+    "terrain": {"dem": "flat"},
+    "ground": {"arp": 0.15, "seed": 3},
+    "atmosphere": {"visibility": 45.0},
+}
+
+
+@pytest.fixture(scope="session")
+def small():
+    return parse_scenario(SMALL)
+
+
+@pytest.fixture(scope="session")
+def sweep(small):
+    """Two values of each slider but haze, of instruments TM and HRV."""
+    found = sweep_of(small)
+    return replace(
+        found, arps=found.arps[:2], hazes=found.hazes[2:], szas=found.szas[:2], instruments=("HRV", "TM"),
+        offsets=(found.offsets[0], found.offsets[2]),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def outcomes(sweep):
+    return outcomes_of(sweep)
+
+
+@pytest.fixture(scope="session")
+def page(sweep, outcomes, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "explore.html"
+    path.write_text(explorer_page(sweep, outcomes), encoding="utf-8")
+    return path

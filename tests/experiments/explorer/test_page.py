@@ -1,0 +1,173 @@
+"""The page: what its text holds, and what a browser shows of it."""
+
+import asyncio
+import json
+import re
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, opened
+
+import fifesim
+from fifesim.experiments.explorer.page import explorer_page, page_data
+from fifesim.scenario.scenario import parse_scenario
+
+READY = "document.body?.classList.contains('ready')"
+in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+
+
+def looked_at(page, folder, look):
+    """What a coroutine finds on the page, which must have no error and ask for nothing."""
+
+    async def visit():
+        async with opened(page, folder) as browser:
+            await browser.until(READY)
+            found = await look(browser)
+            assert browser.errors == []
+            assert browser.addresses == [page.absolute().as_uri()]
+            return found
+
+    return asyncio.run(visit())
+
+
+def test_page_is_whole_and_names_no_place_of_this_machine(page, sweep, outcomes, tmp_path):
+    text = page.read_text(encoding="utf-8")
+    assert not re.search(r"(src|href)=\"(?!data:)", text) and "http:" not in text and "https:" not in text
+    assert "fifesim " + fifesim.__version__ in text and "seed 3" in text
+    assert str(tmp_path.parent) not in text
+    assert len(text) < 1_000_000
+
+
+def test_story_has_the_numbers_of_the_page(page, outcomes):
+    r2 = outcomes.lines[..., 0, 2]
+    text = page.read_text(encoding="utf-8").split("</header>")[0]
+    for place in ((0, 0, 0, 1, 0), (0, 0, 0, 1, 1), (1, 0, 0, 1, 1)):
+        assert f"{r2[place]:.2f}" in text
+
+
+def test_names_of_files_stand_without_their_folders(sweep, outcomes, tmp_path):
+    dem = tmp_path / "hills.tif"
+    fifesim.flint_hills(sweep.scenario.geobox(), seed=1).fifesim.to_geotiff(dem)
+    values = sweep.scenario.model_dump(exclude_unset=True) | {"terrain": {"dem": str(dem)}}
+    own = type(sweep)(**{**vars(sweep), "scenario": parse_scenario(values)})
+    _, data = page_data(own, outcomes)
+    assert data["keys"]["tables"]["terrain"]["dem"] == "hills.tif"
+    assert str(tmp_path) not in json.dumps(data)
+
+
+def test_ranges_hold_what_is_drawn(sweep, outcomes):
+    _, data = page_data(sweep, outcomes)
+    for name, (low, high) in data["ranges"].items():
+        assert low < high, name
+    assert data["ranges"]["lai"][0] >= 0 and data["ranges"]["fpar"][1] <= 1
+
+
+@in_a_browser
+def test_numbers_shown_are_those_of_the_public_functions(page, sweep, tmp_path):
+    """Sliders by keyboard; R2, slope, intercept, shares, and the scenario that the page says, run again."""
+
+    async def look(browser):
+        await browser.evaluate("document.getElementById('arp').focus()")
+        await browser.press("ArrowRight")
+        for slider, key in (("registration", "End"), ("instrument", "Home"), ("sza", "ArrowRight")):
+            await browser.evaluate(f"document.getElementById('{slider}').focus()")
+            await browser.press(key)
+        shown = {name: await browser.text(name) for name in ("r2", "slope", "intercept", "n", "toml", "headline")}
+        stages = await browser.evaluate(
+            "[...document.querySelectorAll('.budget li:not(.scale)')].map((row) => row.innerText)"
+        )
+        own = "(() => { const { ndvi, truth } = window.explorer.pixels(); return [[...ndvi], [...truth]]; })()"
+        return shown, stages, await browser.evaluate(own)
+
+    shown, stages, (ndvi, truth) = looked_at(page, tmp_path, look)
+    scenario = parse_scenario(tomllib.loads(shown["toml"]))
+    assert (scenario.ground.arp, scenario.sensor.offset) == (sweep.arps[1], list(sweep.offsets[1]))
+    assert scenario.geometry.sza == sweep.szas[1] and scenario.sensor.instrument == "HRV"
+    run = fifesim.simulate(scenario)
+    line = fifesim.regress(run["truth"]["lai"], run["image"]["ndvi"], pair="index")
+    expected = {"r2": f"{line.r2:.3f}", "slope": f"{line.slope:.3f}", "intercept": f"{line.intercept:.3f}"}
+    assert {name: shown[name].replace("−", "-") for name in expected} == expected and shown["n"] == str(line.n)
+    assert f"{100 * line.r2:.0f} %" in shown["headline"]
+    budget = fifesim.budget(scenario, realisations=1, cells=400).isel(realisation=0).sel(variable="lai")
+    said = {row.split("\n")[0]: row.split("\n")[-1].replace("−", "-") for row in stages}
+    assert said["curvature"] == f"{100 * float(budget['curvature']):.1f}"
+    for name in ("registration", "point spread", "non-linearity", "quantisation", "atmosphere"):
+        assert float(said[name]) == pytest.approx(100 * float(budget["share"].sel(stage=name)), abs=0.05 + 1e-9)
+    np.testing.assert_allclose(np.array(ndvi, float).ravel(), run["image"]["ndvi"].values.ravel(), rtol=1e-12)
+    rows, columns = run["image"]["ndvi"].shape
+    np.testing.assert_allclose(np.array(truth, float), run["truth"]["lai"].values[:rows, :columns].ravel(), atol=1e-4)
+
+
+@in_a_browser
+def test_scenario_of_a_landscape_is_written_whole(sweep, outcomes, tmp_path):
+    """Classes are tables of their own; deviations and the like stand in a line."""
+    window = sweep.scenario.grid.model_dump()
+    values = fifesim.default_scenario().model_dump(exclude_unset=True) | {"grid": window, "terrain": {"dem": "flat"}}
+    values["landscape"] = values["landscape"] | {"covary": {"soil": -0.3}}
+    own = replace(sweep, scenario=parse_scenario(values))
+    page = tmp_path / "land.html"
+    page.write_text(explorer_page(own, outcomes), encoding="utf-8")
+    folder = tmp_path / "browser"
+    folder.mkdir()
+    text = looked_at(page, folder, lambda browser: browser.text("toml"))
+    start = replace(own.settings[0], instrument="TM")
+    assert parse_scenario(tomllib.loads(text)).complete() == own.at(start)
+
+
+@in_a_browser
+def test_what_stays_is_said_to_stay(page, tmp_path):
+    """Registration moves the pixels beside the ground; the sun leaves the ground and its leaf area as they are."""
+
+    async def moves(browser):
+        names = ("ground", "truth", "image", "line", "moved")
+        found = []
+        for slider, key in (("registration", "End"), ("sza", "End"), ("arp", "End")):
+            await browser.evaluate(f"document.getElementById('{slider}').focus()")
+            await browser.press(key)
+            found.append(
+                {name: await browser.text(f"{name}-moved" if name != "moved" else "moved-what") for name in names}
+            )
+        return found
+
+    registration, sun, patches = looked_at(page, tmp_path, moves)
+    assert registration["ground"] == registration["truth"] == "the same" and "→" in registration["line"]
+    assert registration["moved"] == "Registration error: 0 → ½" and "other numbers" in registration["image"]
+    assert sun["ground"] == sun["truth"] == "the same" and "other numbers" in sun["image"]
+    assert patches["ground"] == "another" and patches["truth"] == "others"
+
+
+@in_a_browser
+def test_page_fits_its_width_by_mouse_and_keyboard(page, tmp_path):
+    async def at(browser, width, dark):
+        await browser.size(width, 900, dark)
+        await browser.evaluate("document.getElementById('reset').click()")
+        await browser.evaluate("document.getElementById('registration').scrollIntoView({block: 'center'})")
+        box = "const { left, top, width, height } = document.getElementById('registration').getBoundingClientRect()"
+        left, top, wide, high = await browser.evaluate(f"(() => {{ {box}; return [left, top, width, height]; }})()")
+        before = await browser.text("r2")
+        await browser.click(left + wide - 6, top + high / 2)
+        assert before != await browser.text("r2")
+        said = await browser.evaluate("document.getElementById('registration').getAttribute('aria-valuetext')")
+        assert said == "0.50 pixel, 15 m"
+        await browser.evaluate("document.getElementById('image').focus()")
+        await browser.press("ArrowDown")
+        assert "row 8" in await browser.text("reading")
+        pen = "const pen = new OffscreenCanvas(12, 12).getContext('2d'); pen.drawImage(it, 0, 0, 12, 12)"
+        levels = f"(it) => {{ {pen}; return new Set(pen.getImageData(0, 0, 12, 12).data).size; }}"
+        drawn = await browser.evaluate(f"[...document.querySelectorAll('canvas')].map({levels})")
+        assert len(drawn) == 3 and min(drawn) > 15
+        assert (
+            await browser.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") <= 0
+        )
+        paper = await browser.evaluate("getComputedStyle(document.body).backgroundColor")
+        brightness = sum(map(int, re.findall(r"\d+", paper)[:3]))
+        assert brightness < 150 if dark else brightness > 600
+
+    async def look(browser):
+        for width, dark in ((400, False), (400, True), (1600, False), (1600, True)):
+            await at(browser, width, dark)
+        return await browser.printed()
+
+    assert looked_at(page, tmp_path, look).startswith(b"%PDF")

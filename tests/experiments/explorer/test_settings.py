@@ -1,0 +1,100 @@
+"""What the sliders of a page set."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fifesim
+from fifesim.experiments.explorer.settings import Setting, sweep_of
+from fifesim.scenario.scenario import parse_scenario
+
+FLAT = {"terrain": {"dem": "flat"}}
+SITE = {"west": 704970.0, "north": 4334220.0, "width": 3000.0, "height": 3000.0}
+
+
+def test_default_is_the_paper_with_large_patches_on_level_ground():
+    sweep = sweep_of()
+    assert sweep.shape == (3, 3, 3, 4, 4)
+    assert sweep.instruments == ("MSI", "HRV", "TM", "MSS") and sweep.scenario.terrain.dem == "flat"
+    assert sweep.arps[1] == sweep.scenario.ground.arp == 0.24
+    box, whole = sweep.scenario.geobox(), fifesim.Scenario().geobox()
+    assert box.shape == (270, 270)
+    assert (box.affine.c - whole.affine.c) % 30 == pytest.approx(0, abs=1e-6)
+
+
+def test_sliders_have_the_values_of_the_scenario():
+    own = FLAT | {
+        "grid": SITE,
+        "ground": {"arp": 0.2},
+        "atmosphere": {"visibility": 30.0},
+        "geometry": {"sza": 33.0, "saa": 90.0},
+    }
+    sweep = sweep_of(parse_scenario(own | {"sensor": {"instrument": "OLI", "offset": [0.3, 0.4]}}))
+    assert sweep.arps == (0.15, 0.2, 0.249) and sweep.hazes == (10.0, 30.0, 45.0) and sweep.szas == (20.0, 33.0, 60.0)
+    assert "OLI" in sweep.instruments and (0.3, 0.4) in sweep.offsets and len(sweep.offsets) == 4
+
+
+def test_a_setting_is_the_scenario_with_its_values(small):
+    sweep = sweep_of(
+        parse_scenario(
+            small.model_dump(exclude_unset=True)
+            | {"sensor": {"instrument": "L4TM", "noise": ["thermal"], "min_valid": 0.9}}
+        )
+    )
+    own = sweep.at(Setting(0.249, 10.0, 60.0, "L4TM"), (0.0, 0.5))
+    assert (own.ground.arp, own.atmosphere.visibility, own.sensor.offset) == (0.249, 10.0, [0.0, 0.5])
+    assert own.sun_and_view().sza == 60.0 and own.sun_and_view().saa == sweep.scenario.sun_and_view().saa
+    assert own.ground.seed == 3 and own.geobox() == sweep.scenario.geobox()
+    assert sweep.at(Setting(0.24, 10.0, 60.0, "HRV")).sensor.noise == []
+    other = sweep.at(Setting(0.24, 10.0, 60.0, "MSI"))
+    assert (
+        other.sensor.bands == ["MSI4", "MSI8"] and other.sensor.noise == ["thermal"] and other.sensor.min_valid == 0.9
+    )
+
+
+def test_instruments_fit_the_ground_and_its_cells(small):
+    """In 360 m, MSS has 6 pixels; and a cell of 20 m is more than a pixel of MSI."""
+    assert sweep_of(small).instruments == ("MSI", "HRV", "TM")
+    coarse = parse_scenario(FLAT | {"grid": SITE | {"cell": 25.0}, "sensor": {"instrument": "MODIS"}})
+    found = sweep_of(coarse)
+    assert found.instruments == ("TM", "MSS", "MODIS") and found.scenario.geobox().shape == (120, 120)
+
+
+def test_optics_of_a_band_keep_other_instruments_out(small):
+    values = small.model_dump(exclude_unset=True)
+    values["ground"] |= {"leaf_reflectance": {"TM3": 0.1, "TM4": 0.5}, "leaf_transmittance": {"TM3": 0.05, "TM4": 0.4}}
+    assert sweep_of(parse_scenario(values)).instruments == ("TM",)
+
+
+def test_a_map_has_no_patches_to_vary_and_clear_air_no_haze(tmp_path):
+    lai = fifesim.lai_scene(
+        fifesim.grid_at("EPSG:26914", 707970.0, 4331220.0, 400.0, 400.0, 10.0), "burned-grazed", arp=0.24, seed=1
+    )
+    path = tmp_path / "lai.tif"
+    lai.fifesim.to_geotiff(path)
+    own = parse_scenario(
+        FLAT | {"ground": {"lai_file": str(path)}, "grid": {"cell": 10.0}, "atmosphere": {"aerosol": "none"}}
+    )
+    sweep = sweep_of(own)
+    assert sweep.arps == (None,) and sweep.hazes == (None,)
+    np.testing.assert_array_equal(sweep.at(sweep.settings[0]).ground.arp, own.ground.arp)
+
+
+def test_haze_given_by_optical_thickness_stays_so(small):
+    sweep = sweep_of(parse_scenario(small.model_dump(exclude_unset=True) | {"atmosphere": {"aot": 0.15}}))
+    assert sweep.haze == "aot" and sweep.hazes == (0.05, 0.15, 0.5)
+    assert sweep.at(replace(sweep.settings[0], haze=0.5)).atmosphere.aot == 0.5
+
+
+def test_ground_of_few_pixels_is_refused():
+    with pytest.raises(ValueError, match="fewer than 12 x 12 pixels of 30 m"):
+        sweep_of(parse_scenario(FLAT | {"grid": SITE | {"width": 300.0}}))
+
+
+def test_a_landscape_of_many_stages_has_fewer_settings():
+    sweep = sweep_of(fifesim.default_scenario())
+    assert sweep.shape == (3, 2, 2, 2, 4)
+    assert sweep.hazes == (10.0, 45.0) and sweep.szas[1] == 60.0 and sweep.instruments == ("MSI", "TM")
+    hills = sweep_of(fifesim.Scenario())
+    assert hills.shape == (3, 3, 3, 4, 4)
