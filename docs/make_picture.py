@@ -10,7 +10,6 @@ from PIL import Image
 
 import fifesim
 from fifesim.output.maps import image_map, stretch_of
-from fifesim.scenario.scenario import default_scenario
 
 # Of the ground of the default run: what is shown, and within it the part that is shown larger. [m]
 WEST, NORTH, WIDTH, HEIGHT = 706500.0, 4331220.0, 12000.0, 8100.0
@@ -21,7 +20,7 @@ _FILE = Path(__file__).parent / "_static" / "scene_and_image.png"
 
 def run():
     """Image, its NDVI and the truth of a part of the ground of the default run, and the cells of a part of that."""
-    whole = default_scenario()
+    whole = fifesim.default_scenario()
     grid = {"west": WEST, "north": NORTH, "width": WIDTH, "height": HEIGHT}
     tree = fifesim.simulate(whole.model_copy(update={"grid": whole.grid.model_copy(update=grid)}))
     image = tree["image"].to_dataset().compute()
@@ -79,7 +78,16 @@ def _titles(land, cells, pixels, cells_title, pixels_title):
 
 def _scatter(axis, ndvi, lai):
     fit = fifesim.regress(lai, ndvi)
-    axis.hexbin(ndvi.values.ravel(), lai.values.ravel(), gridsize=75, mincnt=1, bins="log", cmap="Greens", linewidths=0.1, vmin=0.4)
+    axis.hexbin(
+        ndvi.values.ravel(),
+        lai.values.ravel(),
+        gridsize=75,
+        mincnt=1,
+        bins="log",
+        cmap="Greens",
+        linewidths=0.1,
+        vmin=0.4,
+    )
     line = np.linspace(float(ndvi.min()), float(ndvi.max()), 50)
     axis.plot(line, fit.predict(line), color="#b2182b", linewidth=2.5)
     axis.set_title(f"What its NDVI tells: R² = {fit.r2:.2f}", loc="left", fontsize=15)

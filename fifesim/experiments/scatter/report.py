@@ -99,7 +99,7 @@ def mechanisms(budget):
     """
     rows = []
     for name, parts in MECHANISMS.items():
-        row = {"name": name, "parts": " and ".join(parts)}
+        row = {"name": name, "parts": " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))}
         shares = sum(budget["curvature"] if part == CURVATURE else budget["share"].sel(stage=part) for part in parts)
         for variable in VARIABLES:
             share = shares.sel(variable=variable)
