@@ -17,6 +17,7 @@ land = fifesim.landscape(site, arp=0.24, seed=7, chunks="auto")
 names = ["MSI", "TM", "OLI", "MODIS", "AVHRR"]
 images = fifesim.compare(land["lai"], names).compute()
 
+ground = site.boundingbox
 figure, axes = plt.subplots(1, 5, figsize=(13, 3.5), layout="constrained")
 for axis, name in zip(axes, names, strict=True):
     ndvi = images[name]["dn"].fifesim.ndvi()
@@ -24,7 +25,7 @@ for axis, name in zip(axes, names, strict=True):
     spacing = abs(float(ndvi.x[1] - ndvi.x[0]))
     shown = axis.imshow(ndvi, extent=(left, right, bottom, top), vmin=0.15, vmax=0.6, cmap="YlGn")
     axis.set_title(f"{name}, {spacing:.0f} m\nstandard deviation {float(ndvi.std()):.3f}", fontsize="medium")
-    axis.set(xlim=(705000, 711600), ylim=(4327400, 4334000), xticks=[], yticks=[], facecolor="0.85")
+    axis.set(xlim=(ground.left, ground.right), ylim=(ground.bottom, ground.top), xticks=[], yticks=[], facecolor="0.85")
 figure.colorbar(shown, ax=axes, label="NDVI", shrink=0.8, extend="both")
 figure.suptitle("NDVI of the same 6.6 km of ground")
 

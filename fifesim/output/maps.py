@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from fifesim.base.bands import GREEN, NEAR_INFRARED, RED, nearest
+from fifesim.output.composites import dark_and_bright
 from fifesim.rasters import grid as grids
 from fifesim.sensor.raster import to_reflectance
 
@@ -27,10 +28,6 @@ _QUALITY = 78
 # Percentiles between which colours run, and stops of a colour bar.
 _MOST = 0.5, 99.5
 _STOPS = 9
-
-# The dark end of a colour picture is this share of what its darkest percent has, and the bright end lies this much
-# beyond the brightest: bands that vary against each other, as red and near infrared do, would else leave pure colours.
-_DARK, _BEYOND = 0.7, 0.1
 
 
 class Bar(NamedTuple):
@@ -172,11 +169,8 @@ def stretch_of(dn):
     names = false_colour_names(dn) or [str(dn["band"].values[-1])] * 3
     reflectance, spans = to_reflectance(dn.sel(band=list(dict.fromkeys(names)))), []
     for name in names:
-        values = _finite(reflectance.sel(band=name))
-        low, high = np.percentile(values, (1, 99)) if values.size else (0.0, 1.0)
-        # A count above level ground may be below nothing at all.
-        dark = _DARK * max(low, 0.0) if low > 0 else low
-        spans.append((name, float(dark), float(max(high + _BEYOND * (high - dark), dark + 1e-6))))
+        dark, bright = dark_and_bright(_finite(reflectance.sel(band=name)))
+        spans.append((name, dark, max(bright, dark + 1e-6)))
     return spans
 
 
