@@ -101,7 +101,7 @@ def test_image_lies_where_the_scenario_says(first):
     with rasterio.open(first[0] / "image.tif") as image:
         assert image.crs.to_epsg() == 26914
         assert tuple(image.bounds) == (704970.0, 4333620.0, 705870.0, 4334220.0)
-        assert image.descriptions == ("TM3", "TM4")
+        assert image.descriptions == ("TM2", "TM3", "TM4")
         assert image.read().min() > 0
 
 

@@ -62,21 +62,21 @@ left.legend(frameon=False, title="visibility; lines 5S, dots successive orders",
 #
 # What an atmosphere does, wavelength by wavelength:
 
-figure, axis = plt.subplots(figsize=(11, 4.4), layout="constrained")
-spectrum = fifesim.atmosphere.spectrum(fifesim.Atmosphere("tropical", "maritime", 23), fifesim.Geometry(45, 0, 30, 90))
-for name, color in (
-    ("gas_transmittance", "0.6"),
-    ("transmittance_down", "#2166ac"),
-    ("direct_transmittance_down", "#92c5de"),
-    ("spherical_albedo", "#b2182b"),
-    ("path_reflectance", "#f4a582"),
-):
-    spectrum[name].plot(ax=axis, color=color, label=name.replace("_", " "), linewidth=1.2)
-axis.set(
-    xlim=(0.4, 2.5),
-    ylim=(0, 1),
-    xlabel="wavelength [µm]",
-    ylabel="[1]",
-    title="Tropical air, maritime aerosol, 23 km; sun at 45°, view at 30°",
+figure, (gases, scattering) = plt.subplots(
+    2, 1, figsize=(11, 5.6), sharex=True, layout="constrained", height_ratios=[2, 3]
 )
-axis.legend(frameon=False, loc="center right")
+spectrum = fifesim.atmosphere.spectrum(fifesim.Atmosphere("tropical", "maritime", 23), fifesim.Geometry(45, 0, 30, 90))
+micrometres = spectrum["wavelength"]
+gases.fill_between(micrometres, spectrum["gas_transmittance"], color="#bcd4e6", linewidth=0)
+gases.set(
+    ylabel="let pass by gases", ylim=(0, 1), title="Tropical air, maritime aerosol, 23 km; sun at 45°, view at 30°"
+)
+for name, label, color in (
+    ("transmittance_down", "reaches the ground, in all", "#2166ac"),
+    ("direct_transmittance_down", "reaches the ground, straight from the sun", "#67a9cf"),
+    ("spherical_albedo", "comes back from the ground to the ground", "#b2182b"),
+    ("path_reflectance", "reaches the sensor without the ground", "#ef8a62"),
+):
+    scattering.plot(micrometres, spectrum[name], color=color, linewidth=1.8, label=label)
+scattering.set(xlim=(0.4, 2.5), ylim=(0, 1), xlabel="wavelength [µm]", ylabel="share of the light")
+scattering.legend(loc="center right", framealpha=1, edgecolor="0.85")

@@ -2,8 +2,8 @@
 One scene through many sensors, and their noise
 ===============================================
 
-The same leaf area index, seen in red and near infrared by five instruments, each on its own pixels. Leaves and soil
-are the same for all: their spectra, averaged over the response of each band.
+The same pastures, seen in red and near infrared by five instruments, each on its own pixels. Leaves and soil are the
+same for all: their spectra, averaged over the response of each band.
 """
 
 import matplotlib.pyplot as plt
@@ -13,20 +13,21 @@ from odc.geo.xr import wrap_xr
 import fifesim
 
 site = fifesim.fife_site(30 / 9, window=((0, 1980), (0, 1980)))
-lai = fifesim.lai_scene(site, "burned-grazed", arp=0.24, seed=7, chunks="auto")
+land = fifesim.landscape(site, arp=0.24, seed=7, chunks="auto")
 names = ["MSI", "TM", "OLI", "MODIS", "AVHRR"]
-images = fifesim.compare(lai, names).compute()
+images = fifesim.compare(land["lai"], names).compute()
 
-figure, axes = plt.subplots(1, 5, figsize=(13, 3.2), layout="constrained")
+ground = site.boundingbox
+figure, axes = plt.subplots(1, 5, figsize=(13, 3.5), layout="constrained")
 for axis, name in zip(axes, names, strict=True):
     ndvi = images[name]["dn"].fifesim.ndvi()
-    inner = ndvi.sel(x=slice(705000, 706500), y=slice(4334000, 4332500)) if name in ("MSI", "TM", "OLI") else ndvi
-    shown = inner.plot.imshow(ax=axis, vmin=0.2, vmax=0.55, cmap="YlGn", add_colorbar=False, add_labels=False)
+    left, bottom, right, top = ndvi.odc.geobox.boundingbox
     spacing = abs(float(ndvi.x[1] - ndvi.x[0]))
-    title = f"{name}, {spacing:.0f} m\nstandard deviation {float(ndvi.std()):.3f}"
-    axis.set(title=title, xticks=[], yticks=[], aspect=1)
-figure.colorbar(shown, ax=axes, label="NDVI", shrink=0.8)
-figure.suptitle("NDVI of the same ground: 1.5 km (MSI, TM, OLI) and 6.6 km (MODIS, AVHRR)")
+    shown = axis.imshow(ndvi, extent=(left, right, bottom, top), vmin=0.15, vmax=0.6, cmap="YlGn")
+    axis.set_title(f"{name}, {spacing:.0f} m\nstandard deviation {float(ndvi.std()):.3f}", fontsize="medium")
+    axis.set(xlim=(ground.left, ground.right), ylim=(ground.bottom, ground.top), xticks=[], yticks=[], facecolor="0.85")
+figure.colorbar(shown, ax=axes, label="NDVI", shrink=0.8, extend="both")
+figure.suptitle("NDVI of the same 6.6 km of ground")
 
 # %%
 # What each lets pass in the red, across the track. Their own intervals decide the frequency beyond which detail folds

@@ -13,9 +13,9 @@ import fifesim
 
 site = fifesim.fife_site(30 / 9, window=((0, 1500), (0, 1800)))
 dem = fifesim.flint_hills(site, seed=7)
-lai = fifesim.lai_scene(site, "burned-grazed", arp=0.2, seed=7)
+land = fifesim.landscape(site, arp=0.2, seed=7)
 bands = ["MSI2", "MSI3", "MSI4", "MSI8"]
-image = lai.fifesim.surface_reflectance("MSI", bands=bands, dem=dem).fifesim.to_toa().fifesim.sense("MSI")
+image = land.fifesim.surface_reflectance("MSI", bands=bands, dem=dem).fifesim.to_toa().fifesim.sense("MSI")
 
 image.fifesim.plot()
 
@@ -32,13 +32,15 @@ image.fifesim.to_surface().fifesim.index("EVI2").fifesim.plot(axes=axes[1, 1])
 # %%
 # A regression draws its line and what new pixels are to be expected in; with the rasters, the pixels too.
 
+lai = land["lai"]
 truth, ndvi = lai.fifesim.aggregate(10), image.fifesim.ndvi()
 fit = fifesim.regress(truth, ndvi)
 print(fit)
 fit.plot(truth, ndvi)
 
 # %%
-# One scene through four instruments, as a table and side by side. MODIS sees the slopes, and nothing of the leaves.
+# One scene through four instruments, as a table and side by side. MODIS sees the pastures, and nothing
+# of what varies within them.
 
 setup = fifesim.Setup(dem=dem)
 images = fifesim.compare(lai, ["MSI", "OLI", "TM", "MODIS"], setup)

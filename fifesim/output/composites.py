@@ -9,11 +9,15 @@ from fifesim.rasters.reductions import computed
 
 COMPOSITES = {"false colour": (NEAR_INFRARED, RED, GREEN), "natural colour": (RED, GREEN, BLUE)}
 
+# The dark end of a colour picture is this share of what its darkest percent has, and the bright end lies this much
+# beyond the brightest: bands that vary against each other, as red and near infrared do, would else leave pure colours.
+_DARK, _BEYOND = 0.7, 0.1
+
 # Pixels along a side from which the limits of a stretch are taken.
 _SAMPLE = 1000
 
 
-def rgb(image, composite="false colour", *, stretch=(2, 98)):
+def rgb(image, composite="false colour", *, stretch=None):
     """
     Colours of an image, which ``.plot.imshow()`` shows.
 
@@ -25,7 +29,8 @@ def rgb(image, composite="false colour", *, stretch=(2, 98)):
         Near infrared, red and green as red, green and blue; red, green and blue; or three bands by name. An image
         without green shows its red twice.
     stretch : (float, float), optional
-        Percentiles of a band that become dark and bright; they are computed, from a million pixels at most. [%]
+        Percentiles of a band that become dark and bright; they are computed, from a million pixels at most. By default
+        somewhat beyond the first and the last, so that colours are those of a picture and not of a map. [%]
 
     Returns
     -------
@@ -38,13 +43,13 @@ def rgb(image, composite="false colour", *, stretch=(2, 98)):
         If a band is missing, or the percentiles are none.
     """
     names = composite_bands(image, composite)
-    low, high = _percentiles(stretch)
+    percentiles = None if stretch is None else _percentiles(stretch)
     have = [str(name) for name in image["band"].values]
     layers = [valid(image.isel(band=have.index(name))) for name in names]
     values = [
         np.asarray(each, float)[np.isfinite(each)] for each in computed(*(thinned(each, _SAMPLE) for each in layers))
     ]
-    limits = [np.percentile(each, (low, high)) if each.size else (0.0, 1.0) for each in values]
+    limits = [dark_and_bright(each, percentiles) for each in values]
     stretched = [
         chunks.pointwise(_stretched, layer, dtype=np.float32, low=float(start), high=float(stop))
         for layer, (start, stop) in zip(layers, limits, strict=True)
@@ -59,6 +64,35 @@ def rgb(image, composite="false colour", *, stretch=(2, 98)):
     out.attrs = {"long_name": f"{', '.join(names)} as red, green, blue", "units": "1"} | kept
     out.encoding = {"grid_mapping": "spatial_ref"}
     return out.rename("colours")
+
+
+def dark_and_bright(values, percentiles=None):
+    """
+    Values of a band that become dark and bright.
+
+    Parameters
+    ----------
+    values : array
+        Without NaN; there may be none.
+    percentiles : (float, float), optional
+        Of the values; by default from below the first to beyond the last. [%]
+
+    Returns
+    -------
+    dark, bright : float
+
+    Examples
+    --------
+    >>> dark_and_bright(np.linspace(0.1, 0.2, 101), (0, 100))
+    (0.1, 0.2)
+    """
+    if not values.size:
+        return 0.0, 1.0
+    low, high = (float(each) for each in np.percentile(values, percentiles or (1, 99)))
+    if percentiles is not None or low == high:
+        return low, high
+    dark = min(_DARK * low, low)
+    return dark, high + _BEYOND * (high - dark)
 
 
 def composite_bands(image, composite="false colour"):

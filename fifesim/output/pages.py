@@ -7,11 +7,15 @@ from pathlib import Path
 import jinja2
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
 
 from fifesim.output.provenance import versions
 
 # What all pages share, page.html.j2, lies here.
 _SHARED = Path(__file__).parent
+
+# Of a picture's palette.
+_SHADES = 256
 
 
 def html(template, **values):
@@ -58,11 +62,14 @@ def png(figure, dpi):
     Returns
     -------
     picture : bytes
+        With a palette: a third of the bytes, for lines, letters and colour maps.
     """
-    buffer = io.BytesIO()
     figure.set_dpi(dpi)
     # Unlike savefig, this lays the figure out and draws it once.
-    FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    drawn, buffer = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]), io.BytesIO()
+    drawn.quantize(_SHADES, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(buffer, "png")
     return buffer.getvalue()
 
 
@@ -120,5 +127,6 @@ def plus_minus(value, digits=1):
 
 
 def _embedded(picture):
-    """Address of a PNG picture that is the picture itself."""
-    return "data:image/png;base64," + base64.b64encode(picture).decode("ascii")
+    """Address of a PNG or WebP picture that is the picture itself."""
+    kind = "webp" if picture[8:12] == b"WEBP" else "png"
+    return f"data:image/{kind};base64," + base64.b64encode(picture).decode("ascii")

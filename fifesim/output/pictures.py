@@ -43,9 +43,7 @@ _SIZE = 1500
 _KILOMETRES = 3000.0
 
 
-def plot(
-    raster, *, band=None, composite="false colour", stretch=(2, 98), cmap=None, limits=None, axes=None, size=_SIZE
-):
+def plot(raster, *, band=None, composite="false colour", stretch=None, cmap=None, limits=None, axes=None, size=_SIZE):
     """
     Draw a raster as a map: an image in colours, one band or quantity by its colour map.
 
@@ -56,7 +54,7 @@ def plot(
     band : str, optional
         The band to draw; by default three of them as colours, or the only one.
     composite, stretch : optional
-        As in `fifesim.output.composites.rgb`; the percentiles are those of one band too.
+        As in `fifesim.output.composites.rgb`; of one band or quantity the percentiles are 2 and 98 by default.
     cmap : str or matplotlib.colors.Colormap, optional
         By default that of the quantity.
     limits : (float, float), optional
@@ -87,7 +85,7 @@ def plot(
         _draw(axes, picture, colours=np.dstack([np.nan_to_num(picture.values), picture.notnull().all("rgb").values]))
         what = picture.attrs["long_name"]
     else:
-        style = _style(shown, stretch, cmap, limits)
+        style = _style(shown, stretch or (2, 98), cmap, limits)
         drawn = _draw(axes, shown, **style)
         extend = _extend(shown, style["vmin"], style["vmax"])
         label = " ".join(filter(None, [short_name(shown), unit(shown)]))

@@ -2,17 +2,22 @@
 
 from pathlib import Path
 
+import numpy as np
+
+from fifesim.analysis.rasters.pairs import matched
 from fifesim.chain.engines import TYPICAL_LAI, engine_error
 from fifesim.output import pages
-from fifesim.output.figures import NAMES, detail_figure, fit_figure, histogram_figure, map_figure, terrain_figure
+from fifesim.output.figures import NAMES, fit_figure, histogram_figures, reflectance_change
+from fifesim.output.maps import encoded, false_colour_names, image_map, relief_map, stretch_of, value_map
 from fifesim.output.pairing import pairing_rows
 from fifesim.rasters import grid as grids
 from fifesim.scenario.simulation import setup_of
-from fifesim.sensor.description.listing import blur_in_words, noise_in_words
+from fifesim.sensor.description.listing import blur_in_words, noise_in_words, sensor_in_words
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
-_DPI = 130
-# Figures show every so many pixels of an image that has more rows or columns. [pixel]
+# Of figures, which are shown at half of it or less.
+_DPI = 200
+# Maps show every so many pixels of an image that has more rows or columns. [pixel]
 _MOST = 600
 # Difference of 5S from successive orders from which a reader is told to change. [1]
 _ENGINE_BOUND = 0.02
@@ -20,7 +25,7 @@ _ENGINE_BOUND = 0.02
 
 def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     """
-    One self-contained HTML page on a run, and its first picture.
+    One self-contained HTML page on a run, and a picture of its image.
 
     Parameters
     ----------
@@ -43,35 +48,140 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     Returns
     -------
     quicklook : bytes
-        The scene and its image, a PNG.
+        The image without a frame, a PNG: in false colours, else its NDVI, else one band in grey.
     html : str
     """
     # Pixels and their truth are paired by row and column.
     step = max(_step(image), _step(truth))
     shown, means = _thinned(image, step), _thinned(truth, step)
-    figures = {
-        "detail": detail_figure(shown, _below(image, detail), detail),
-        "maps": map_figure(shown, means),
-        "histograms": histogram_figure(shown, means, detail),
-    }
-    if terrain is not None:
-        figures["terrain"] = terrain_figure(image, terrain, level)
-    if fits:
-        figures["fits"] = fit_figure(shown, means, fits)
-    pictures = {name: pages.png(figure, _DPI) for name, figure in figures.items()}
+    whole, *close = _seen(shown, _below(image, detail), detail)
+    figures = {name: pages.png(fit_figure(shown, means, name, fit), _DPI) for name, fit in fits.items()}
     html = pages.html(
         _TEMPLATE,
         title=title(scenario),
+        finding=finding(truth, fits, reasons),
+        pairing=pairing(scenario, image, truth),
         summary=_summary(scenario, image, truth, fits, reasons)
         + pairing_rows(scenario, fits)
         + _ground(terrain)
         + engine_rows(scenario),
-        figures=pictures,
-        fits=[(NAMES[name], fit) for name, fit in fits.items()],
+        seen={"whole": whole, "close": close, "colours": false_colour_names(image["dn"])},
+        maps=_maps(shown, means, fits),
+        terrain=[] if terrain is None else _terrain_maps(image, terrain, level),
+        band=str(image["dn"]["band"].values[-1]),
+        histograms=[pages.png(figure, _DPI) for figure in histogram_figures(shown, means, detail)],
+        fits=[(NAMES[name], fit, figures[name]) for name, fit in fits.items()],
         parameters=_parameters(scenario),
         history=image["dn"].attrs.get("history", "").splitlines(),
     )
-    return pictures["detail"], html
+    return encoded(whole.pixels, lossless=True), html
+
+
+def finding(truth, fits, reasons):
+    """
+    What a run shows, in a sentence or two.
+
+    Parameters
+    ----------
+    truth : xarray.Dataset
+    fits : mapping of str to fifesim.analysis.regression.Regression
+    reasons : mapping of str to str
+        Why there is none of them, by name.
+
+    Returns
+    -------
+    text : str
+    """
+    if not fits:
+        why = "; ".join(dict.fromkeys(reasons.values()))
+        return f"No line was fitted: {why}" if why else "The bands make no NDVI, so that no line was fitted."
+    shares = [f"{100 * fit.r2:.1f} % of the variance of true {NAMES[name]}" for name, fit in fits.items()]
+    text = f"A straight line on the NDVI of this image explains {' and '.join(shares)}."
+    name, fit = next(iter(fits.items()))
+    mean = float(truth[name].mean())
+    share = f", {100 * fit.residual_deviation / mean:.0f} % of the mean" if mean > 0 else ""
+    return f"{text} What it misses of {NAMES[name]} has a standard deviation of {fit.residual_deviation:.3f}{share}."
+
+
+def pairing(scenario, image, truth):
+    """
+    Which pixel is compared with which ground, in words.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    image, truth : xarray.Dataset
+
+    Returns
+    -------
+    text : str
+    """
+    block, cell = grids.cell_size(grids.geobox(truth["lai"]))[1], grids.cell_size(scenario.geobox())[1]
+    pairs = ((image[axis].values, truth[axis].values) for axis in ("y", "x"))
+    apart = [np.abs(np.subtract(*(each[: min(map(len, pair))] for each in pair))).max() for pair in pairs]
+    text = (
+        "Each point pairs a pixel of the image with the block of ground in the same row and column of the truth: the "
+        f"mean of {block / cell:.3g} x {block / cell:.3g} cells of {cell:.3g} m, a square of {block:g} m. "
+    )
+    if max(apart) < 1e-3 * block:
+        text += "Pixels and blocks have the same centres"
+    else:
+        text += f"Centres lie up to {np.hypot(*apart):.1f} m apart"
+    if any(scenario.sensor.offset):
+        down, right = scenario.sensor.offset
+        text += f", and the pixels see ground {down:g} pixels further south and {right:g} further east than they say"
+    return text + "."
+
+
+def _seen(shown, part, detail):
+    """The whole image; the cells in its middle, and the pixels over them."""
+    box = grids.geobox(detail).boundingbox
+    cell, pixel = (grids.cell_size(grids.geobox(each))[1] for each in (detail, part["dn"]))
+    high = max(float(detail.quantile(0.995)) if detail.notnull().any() else 1.0, 1e-6)
+    cells = value_map(detail, f"Leaf area index in cells of {cell:.2f} m", limits=(0.0, high))
+    titles = "The image", f"The same ground in pixels of {pixel:g} m"
+    names = false_colour_names(shown["dn"])
+    if not names and "ndvi" in shown:
+        limits = tuple(np.nanpercentile(shown["ndvi"], (0.5, 99.5))) if shown["ndvi"].notnull().any() else (0.0, 1.0)
+        whole, pixels = (
+            value_map(each["ndvi"], f"{said}: NDVI", limits=limits, frame=frame)
+            for each, said, frame in zip((shown, part), titles, (box, None), strict=True)
+        )
+        return whole, cells, pixels
+    stretch = stretch_of(shown["dn"])
+    said = "" if names else f": {stretch[0][0]}"
+    return (
+        image_map(shown["dn"], titles[0] + said, stretch, box),
+        cells,
+        image_map(part["dn"], titles[1] + said, stretch),
+    )
+
+
+def _maps(shown, means, fits):
+    """True leaf area index, NDVI, and what a line on it makes of the ground."""
+    maps = [value_map(means["lai"], "True leaf area index")]
+    if "ndvi" not in shown:
+        return [*maps, value_map(means["fpar"], "True FPAR")]
+    maps.append(value_map(shown["ndvi"], "NDVI of the image"))
+    if "lai" in fits:
+        values, ndvi = matched(means["lai"], shown["ndvi"], "index")
+        error = means["lai"].isel(y=slice(values.sizes["y"]), x=slice(values.sizes["x"]))
+        error = error.copy(data=fits["lai"].predict(ndvi.values) - values.values)
+        maps.append(value_map(error, "Leaf area index by the line, less the true one", "RdBu", middle=0.0))
+    return maps
+
+
+def _terrain_maps(image, terrain, level):
+    """Elevation, slope, Kt, and the image less that of level ground."""
+    band = str(image["dn"]["band"].values[-1])
+    dn = image["dn"].sel(y=level["y"], x=level["x"]).compute()
+    change = reflectance_change(dn, level, band)
+    return [
+        relief_map(terrain["dem"], "Elevation [m], lit from the north-west"),
+        value_map(terrain["slope"], "Slope [degree], mean of the cells", "YlOrBr"),
+        value_map(terrain["kt"].sel(band=band), f"Kt in {band}, mean of the cells", "RdBu_r", middle=1.0),
+        value_map(change, f"What terrain did to the reflectance in {band}", "RdBu_r", middle=0.0),
+    ]
 
 
 def engine_rows(scenario):
@@ -137,6 +247,7 @@ def _summary(scenario, image, truth, fits, reasons):
     rows = [
         ("Scene", f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m, {grid.crs}"),
         ("Image", f"{size} pixels of {scenario.sensor.pixel:g} m, {100 * valid:.1f} % of them with data"),
+        ("Sensor", sensor_in_words(own.description, own.bands)),
         ("Blur", blur_in_words(own.description, own.bands)),
         ("Noise", noise_in_words(own.description, own.bands, own.noise)),
         ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
@@ -187,4 +298,4 @@ def _parameters(scenario):
 def _below(image, detail):
     """The pixels of some cells, in memory."""
     box = grids.geobox(detail).boundingbox
-    return image["dn"].sel(x=slice(box.left, box.right), y=slice(box.top, box.bottom)).compute()
+    return image.sel(x=slice(box.left, box.right), y=slice(box.top, box.bottom)).compute()

@@ -134,7 +134,7 @@ class SensorKeys(Section):
     """The instrument."""
 
     instrument: str = file("TM", "see: fifesim sensors", suffix=".toml")
-    bands: list[str] = text(["TM3", "TM4"], "names of bands; by default red and near infrared")
+    bands: list[str] = text(["TM3", "TM4"], "names of bands; by default red and near infrared, in a file green too")
     pixel: float | None = number(
         None,
         "m",

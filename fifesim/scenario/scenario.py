@@ -14,6 +14,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters import whereabouts
 from fifesim.rasters.covering import covering_grid
 from fifesim.rasters.sites import on_fife_site
+from fifesim.scenario.colours import with_false_colour
 from fifesim.scenario.ground import drawn_properties
 from fifesim.scenario.ground_keys import COVARIATES
 from fifesim.scenario.keys import EXTENT, GridKeys, Keys
@@ -302,7 +303,8 @@ def read_scenario(path):
     Parameters
     ----------
     path : str or path
-        Files that it names lie relative to it.
+        Files that it names lie relative to it. Where it names no bands, green is seen beside red and near infrared,
+        for a picture in false colours.
 
     Returns
     -------
@@ -314,4 +316,4 @@ def read_scenario(path):
         If it is missing or not TOML, or a key or value is wrong: one line a mistake, with the key, the value and what
         is allowed.
     """
-    return parse_scenario(load_values(path))
+    return parse_scenario(with_false_colour(load_values(path)))

@@ -5,7 +5,7 @@ import pytest
 
 import fifesim
 from fifesim.analysis.rasters.regression import regress
-from fifesim.output.figures import fit_figure, histogram_figure, map_figure, reflectance_change
+from fifesim.output.figures import fit_figure, histogram_figures, reflectance_change
 from fifesim.scenario.scenario import parse_scenario
 
 
@@ -17,29 +17,31 @@ def run():
     return image.assign(ndvi=image["dn"].fifesim.ndvi()), tree["truth"].to_dataset(), tree["scene"]["lai"]
 
 
-def test_maps_lie_on_their_ground_in_km(run):
-    image, truth, _ = run
-    *maps, ndvi = [axis for axis in map_figure(image, truth).axes if axis.get_title()]
-    assert len(maps) == 2 and ndvi.get_title() == "NDVI of the image"
-    drawn = maps[0].images[0]
-    np.testing.assert_array_equal(drawn.get_array(), truth["lai"])
-    west, east, south, north = drawn.get_extent()
-    np.testing.assert_allclose([east - west, north - south], [0.6, 0.3])
-    np.testing.assert_allclose((west + east) / 2, truth["x"].mean() / 1000)
-
-
 def test_regression_is_written_above_its_line(run):
     image, truth, _ = run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
-    axis = fit_figure(image, truth, {"lai": fit}).axes[0]
+    axis = fit_figure(image, truth, "lai", fit).axes[0]
     assert f"R² = {fit.r2:.3f},  n = {fit.n}" in axis.get_title()
     (line,) = axis.lines
     np.testing.assert_allclose(line.get_ydata(), fit.intercept + fit.slope * line.get_xdata())
 
 
+def test_every_pixel_is_counted_where_it_lies(run):
+    image, truth, _ = run
+    axis = fit_figure(image, truth, "lai", regress(truth["lai"], image["ndvi"], pair="index")).axes[0]
+    (density,) = axis.images
+    counts = 10.0 ** density.get_array()
+    assert counts.sum() == pytest.approx(image["ndvi"].size)
+    ndvi = image["ndvi"].values
+    assert density.get_extent()[:2] == pytest.approx([ndvi.min(), ndvi.max()])
+    centres = np.linspace(*density.get_extent()[:2], 2 * counts.shape[1] + 1)[1::2]
+    step = centres[1] - centres[0]
+    assert (counts.filled(0).sum(axis=0) @ centres) / ndvi.size == pytest.approx(float(ndvi.mean()), abs=step / 2)
+
+
 def test_frequencies_are_of_all_pixels(run):
     image, truth, detail = run
-    axis = histogram_figure(image, truth, detail).axes[2]
+    axis = histogram_figures(image, truth, detail)[2].axes[0]
     shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
     assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
 

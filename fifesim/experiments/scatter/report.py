@@ -45,9 +45,9 @@ def chart(table):
     -------
     figure : matplotlib.figure.Figure
     """
-    figure = Figure(figsize=(7.2, 4.4), layout="constrained")
-    axis = figure.subplots()
     names = (*_shown(table), CURVATURE)
+    figure = Figure(figsize=(7.2, 1.1 + 0.4 * len(names)), layout="constrained")
+    axis = figure.subplots()
     for k, variable in enumerate(VARIABLES):
         rows = table[table["variable"] == variable].set_index("stage")
         total = 100 * rows.loc[TOTAL]
@@ -60,7 +60,8 @@ def chart(table):
         for y, value, spread in zip(at, share, np.nan_to_num(error), strict=True):
             # Exactly nothing is a stage that is ideal already.
             text = "0" if value == 0 else fixed(value, 1)
-            end = max(value, 0) + spread, y
+            # Beyond whatever of bar and whisker reaches furthest.
+            end = max(value + spread, 0), y
             axis.annotate(text, end, (5, 0), textcoords="offset points", va="center", fontsize=7)
     axis.axvline(0, color="#222222", linewidth=0.8)
     axis.set_yticks(np.arange(len(names)), names)
@@ -70,7 +71,8 @@ def chart(table):
     axis.tick_params(labelsize=8.5)
     axis.tick_params(axis="y", length=0)
     axis.spines[["top", "right", "left"]].set_visible(False)
-    axis.legend(frameon=False, fontsize=8.5, loc="lower right")
+    # Above the bars, wherever the long ones are.
+    figure.legend(frameon=False, fontsize=8.5, loc="outside upper center", ncols=2)
     return figure
 
 
@@ -97,7 +99,7 @@ def mechanisms(budget):
     """
     rows = []
     for name, parts in MECHANISMS.items():
-        row = {"name": name, "parts": " and ".join(parts)}
+        row = {"name": name, "parts": " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))}
         shares = sum(budget["curvature"] if part == CURVATURE else budget["share"].sel(stage=part) for part in parts)
         for variable in VARIABLES:
             share = shares.sel(variable=variable)

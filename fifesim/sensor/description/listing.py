@@ -113,6 +113,32 @@ def _pair(values, form):
     return f"{along:{form}}" if along == across else f"{along:{form}} along x {across:{form}} across"
 
 
+def sensor_in_words(instrument, bands):
+    """
+    What an instrument is and how it sees in some bands, in a sentence or two.
+
+    Parameters
+    ----------
+    instrument : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of str
+
+    Returns
+    -------
+    text : str
+
+    Examples
+    --------
+    >>> from fifesim.sensor.description.instruments import instrument
+    >>> sensor_in_words(instrument("TM"), ["TM3", "TM4"])
+    'Landsat-5 Thematic Mapper, a whiskbroom scanner, 705 km up, in TM3 (0.66 µm) and TM4 (0.84 µm); 8 bits'
+    """
+    names = [f"{band.name} ({band.wavelength:.2f} µm)" for band in instrument.select(bands)]
+    text = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    kind = {"whiskbroom": ", a whiskbroom scanner", "pushbroom": ", a pushbroom scanner"}
+    scans = kind.get(instrument.scan.kind, "") if instrument.scan else ""
+    return f"{instrument.title}{scans}, {instrument.altitude / 1000:g} km up, in {text}; {instrument.bits} bits"
+
+
 def blur_in_words(instrument, bands):
     """
     What is known of the spatial response of some bands, in a line.

@@ -1,0 +1,258 @@
+"""Maps of a page: a picture of the pixels alone; its colour bar, its scale and a frame in it are drawn by the page."""
+
+import io
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import LightSource, ListedColormap, Normalize, to_hex
+from matplotlib.ticker import MaxNLocator
+from PIL import Image
+
+from fifesim.base.bands import GREEN, NEAR_INFRARED, RED, nearest
+from fifesim.output.composites import dark_and_bright
+from fifesim.rasters import grid as grids
+from fifesim.sensor.raster import to_reflectance
+
+# Without the blue of the map's seas.
+LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)))
+
+_NO_DATA = np.array([217, 217, 217], np.uint8)
+
+# Pictures with fewer pixels along the longer side keep their values and their edges. [pixel]
+_FEW = 200
+
+# Of lossy pictures: noise of pixels stays, at a third of the bytes.
+_QUALITY = 78
+
+# Percentiles between which colours run, and stops of a colour bar.
+_MOST = 0.5, 99.5
+_STOPS = 9
+
+
+class Bar(NamedTuple):
+    """A colour bar: stops of a gradient, and numbers with their places along it. [%]"""
+
+    stops: list[str]
+    ticks: list[tuple[float, str]]
+
+
+class Map(NamedTuple):
+    """
+    A map as a page shows it.
+
+    Parameters
+    ----------
+    pixels : array of uint8, shape (rows, columns, 3)
+    title : str
+    bar : Bar or None
+    scale : (float, str)
+        A round length along the lower edge, as a share of the width, and in words. [%]
+    frame : (float, float, float, float) or None
+        Left, top, width and height of a part that is marked. [%]
+    """
+
+    pixels: np.ndarray
+    title: str
+    bar: Bar | None
+    scale: tuple[float, str]
+    frame: tuple[float, float, float, float] | None = None
+
+    @property
+    def picture(self):
+        """As a file: WebP, or PNG where there are few pixels."""
+        return encoded(self.pixels)
+
+    @property
+    def size(self):
+        """Columns and rows."""
+        return self.pixels.shape[1::-1]
+
+    @property
+    def has_few_pixels(self):
+        """Whether its pixels are to be seen one by one."""
+        return max(self.size) < _FEW
+
+
+def value_map(array, title, cmap="YlGn", *, limits=None, middle=None, frame=None):
+    """
+    A quantity by a colour map.
+
+    Parameters
+    ----------
+    array : xarray.DataArray, dims (y, x)
+        In memory; NaN is no data.
+    title : str
+    cmap : str or matplotlib.colors.Colormap, optional
+    limits : (float, float), optional
+        Of the colours; by default the 0.5th and 99.5th percentile.
+    middle : float, optional
+        Value from which colours diverge to both sides.
+    frame : odc.geo.geom.BoundingBox, optional
+        A part to mark.
+
+    Returns
+    -------
+    found : Map
+    """
+    colours, (low, high) = colormaps[cmap] if isinstance(cmap, str) else cmap, limits or _limits(array)
+    if middle is not None:
+        half = max(abs(low - middle), abs(high - middle), 1e-6)
+        low, high = middle - half, middle + half
+    with np.errstate(invalid="ignore"):
+        shares = np.nan_to_num(Normalize(low, max(high, low + 1e-9), clip=True)(array.values).filled(np.nan))
+    pixels = colours(shares, bytes=True)[..., :3]
+    return _map(array, pixels, np.isfinite(array.values), title, _bar(colours, low, high), frame)
+
+
+def relief_map(dem, title):
+    """
+    Elevation in colours, lit from the north-west as maps are.
+
+    Parameters
+    ----------
+    dem : xarray.DataArray, dims (y, x)
+        [m]
+    title : str
+
+    Returns
+    -------
+    found : Map
+    """
+    low, high = _limits(dem)
+    down, across = grids.cell_size(grids.geobox(dem))
+    filled = np.nan_to_num(dem.values, nan=float(dem.mean()) if dem.notnull().any() else 0.0)
+    tint = LAND(Normalize(low, max(high, low + 1e-9))(filled))[..., :3]
+    source = LightSource(azdeg=315, altdeg=45)
+    lit = source.shade_rgb(tint, filled, blend_mode="soft", vert_exag=3, dx=across, dy=down)
+    return _map(dem, _bytes(lit), np.isfinite(dem.values), title, _bar(LAND, low, high))
+
+
+def image_map(dn, title, stretch, frame=None):
+    """
+    An image in false colours: near infrared, red and green as red, green and blue.
+
+    Parameters
+    ----------
+    dn : xarray.DataArray, dims (band, y, x)
+        Digital numbers, in memory; 0 is no data.
+    title : str
+    stretch : list of (str, float, float)
+        From `stretch_of`.
+    frame : odc.geo.geom.BoundingBox, optional
+        A part to mark.
+
+    Returns
+    -------
+    found : Map
+    """
+    reflectance = to_reflectance(dn)
+    layers = [(reflectance.sel(band=name).values - low) / (high - low) for name, low, high in stretch]
+    pixels = _bytes(np.nan_to_num(np.clip(np.dstack(layers), 0, 1)))
+    return _map(dn, pixels, (dn != 0).all("band").values, title, None, frame)
+
+
+def stretch_of(dn):
+    """
+    Bands for red, green and blue, with the reflectances that become dark and bright.
+
+    Parameters
+    ----------
+    dn : xarray.DataArray, dims (band, y, x)
+        Digital numbers, in memory.
+
+    Returns
+    -------
+    stretch : list of (str, float, float)
+        One band thrice, a grey picture, where one of near infrared, red and green is missing.
+    """
+    names = false_colour_names(dn) or [str(dn["band"].values[-1])] * 3
+    reflectance, spans = to_reflectance(dn.sel(band=list(dict.fromkeys(names)))), []
+    for name in names:
+        dark, bright = dark_and_bright(_finite(reflectance.sel(band=name)))
+        spans.append((name, dark, max(bright, dark + 1e-6)))
+    return spans
+
+
+def false_colour_names(image):
+    """
+    Names of the bands of a false-colour picture.
+
+    Parameters
+    ----------
+    image : xarray.DataArray with a ``wavelength`` along band
+
+    Returns
+    -------
+    names : list of str
+        Of near infrared, red and green; none where one is missing.
+    """
+    numbers = [nearest(image["wavelength"].values, window) for window in (NEAR_INFRARED, RED, GREEN)]
+    return [] if None in numbers else [str(image["band"].values[number]) for number in numbers]
+
+
+def encoded(pixels, lossless=False):
+    """
+    A colour picture as a file.
+
+    Parameters
+    ----------
+    pixels : array of uint8, shape (rows, columns, 3)
+    lossless : bool, optional
+
+    Returns
+    -------
+    picture : bytes
+        WebP; PNG where it is lossless, with 256 colours where it has few pixels.
+    """
+    buffer, picture = io.BytesIO(), Image.fromarray(np.ascontiguousarray(pixels))
+    if lossless:
+        picture.save(buffer, "png")
+    elif max(picture.size) < _FEW:
+        picture.quantize(256, dither=Image.Dither.NONE).save(buffer, "png")
+    else:
+        picture.save(buffer, "webp", quality=_QUALITY, method=2)
+    return buffer.getvalue()
+
+
+def _map(array, pixels, valid, title, bar, frame=None):
+    pixels = np.where(valid[..., None], pixels, _NO_DATA)
+    box = grids.geobox(array).boundingbox
+    marked = frame and (
+        100 * (frame.left - box.left) / box.span_x,
+        100 * (box.top - frame.top) / box.span_y,
+        100 * frame.span_x / box.span_x,
+        100 * frame.span_y / box.span_y,
+    )
+    return Map(pixels, title, bar, _scale(box.span_x), marked)
+
+
+def _scale(width):
+    """A round length of about a quarter of a width, its share of it [%], and in words."""
+    power = 10 ** np.floor(np.log10(width / 4))
+    length = max(step * power for step in (1, 2, 5) if step * power <= width / 4 * (1 + 1e-9))
+    return 100 * length / width, f"{length / 1000:g} km" if length >= 1000 else f"{length:g} m"
+
+
+def _bar(colours, low, high):
+    stops = [to_hex(colours(share)) for share in np.linspace(0, 1, _STOPS)]
+    ticks = [each for each in MaxNLocator(4).tick_values(low, high) if low <= each <= high and high > low]
+    step = min(np.diff(ticks), default=1.0)
+    digits = int(max(0, -np.floor(np.log10(step) + 1e-9)))
+    texts = (f"{each:.{digits}f}".replace("-", "−") for each in ticks)
+    return Bar(stops, [(100 * (each - low) / (high - low), text) for each, text in zip(ticks, texts, strict=True)])
+
+
+def _limits(array):
+    values = _finite(array)
+    low, high = np.percentile(values, _MOST) if values.size else (0.0, 1.0)
+    return float(low), float(high)
+
+
+def _finite(array):
+    values = np.asarray(array.values).ravel()
+    return values[np.isfinite(values)]
+
+
+def _bytes(shares):
+    return np.round(255 * shares).astype(np.uint8)
