@@ -47,7 +47,12 @@ axes[0].imshow(land.lai, cmap="YlGn", vmin=0, vmax=2.4, interpolation="nearest")
 drawn(axes[1], ground)
 drawn(axes[2], top)
 drawn(axes[3], image.fifesim.to_reflectance())
-titles = ["Ground: leaf area, 3.3 m", "Light: what leaves the slopes", "Air: through haze", "Image: Thematic Mapper, 30 m"]
+titles = [
+    "Ground: leaf area, 3.3 m",
+    "Light: what leaves the slopes",
+    "Air: through haze",
+    "Image: Thematic Mapper, 30 m",
+]
 titles += [f"Scatter: R² = {fit.r2:.2f}", "Budget: where it comes from"]
 for number, (axis, title) in enumerate(zip(axes, titles, strict=True), 1):
     figure.text(*corners[number - 1], f"{number}  {title}", fontsize=12, fontweight="bold")
@@ -55,17 +60,31 @@ for number, (axis, title) in enumerate(zip(axes, titles, strict=True), 1):
         axis.set_axis_off()
 
 line = np.linspace(float(ndvi.min()), float(ndvi.max()), 2)
-axes[4].plot(ndvi.values.ravel(), truth.values.ravel(), ".", color="#1a9850", markersize=2, alpha=0.5)
+axes[4].plot(
+    ndvi.values.ravel(), truth.values.ravel(), ".", color="#1a9850", markersize=2, alpha=0.5
+)
 axes[4].plot(line, fit.predict(line), color="#b2182b", linewidth=2)
 axes[4].set(xlabel="NDVI of the image", ylabel="true leaf area index")
 
 budget = pd.read_csv(DOCS / "landscape_budget.csv")
 budget = budget[(budget.instrument == "TM") & (budget.variable == "lai")].set_index("stage")
-stages = {"registration": "place", "dead leaves": "dead leaves", "soil": "soil", "cover": "cover", "point spread": "blur"}
+stages = {
+    "registration": "place",
+    "dead leaves": "dead leaves",
+    "soil": "soil",
+    "cover": "cover",
+    "point spread": "blur",
+}
 shares = 100 * budget.loc[list(stages), "share"]
 errors = 100 * budget.loc[list(stages), "share_error"]
 colours = ["#0072B2", "#8c6d31", "#8c6d31", "#8c6d31", "#0072B2"]
-axes[5].barh(list(stages.values()), shares, color=colours, xerr=errors, error_kw={"elinewidth": 1, "capsize": 2})
+axes[5].barh(
+    list(stages.values()),
+    shares,
+    color=colours,
+    xerr=errors,
+    error_kw={"elinewidth": 1, "capsize": 2},
+)
 axes[5].invert_yaxis()
 axes[5].set_xlabel("share of the variance of leaf area [%]")
 for axis in axes[4:]:

@@ -58,9 +58,23 @@ def test_every_reference_is_in_the_bibliography():
 
 def test_api_pages_follow_the_package(api):
     """Every public name, and every module of a stage that knows no labels."""
-    functions, physics = api.functions(), api.physics()
+    functions, physics = "".join(api.functions().values()), api.physics()
     assert [name for name in PUBLIC if f"\n   {name}\n" not in functions] == []
     assert "ground.canopy.sail_model" in physics and "sensor.raster" not in physics
+
+
+def test_every_public_name_has_an_example():
+    assert [name for name in PUBLIC if "Examples\n" not in (getattr(fifesim, name).__doc__ or "")] == []
+
+
+@pytest.mark.parametrize("page", [str(page.relative_to(ROOT)) for page in PAGES])
+def test_code_of_a_page_fits_its_width(page):
+    blocks = re.findall(
+        r"^```\S+(?: python\n:class: no-run)?\n(.*?)^```", (ROOT / page).read_text("utf-8"), re.S | re.M
+    )
+    # A shell's two commands of the README are one line each, which a reader copies.
+    lines = [line for block in blocks for line in block.splitlines() if "python3 -m venv" not in line]
+    assert [line for line in lines if len(line) > 96] == []
 
 
 def test_links_between_pages_lead_somewhere():
