@@ -17,25 +17,50 @@ _TITLE = "{title}\n{line}\n\n{text}\n\n.. currentmodule:: fifesim\n"
 _SUMMARY = "\n.. autosummary::\n   :toctree: names\n{options}   :nosignatures:\n\n{names}\n"
 
 
-def functions():
+def groups():
     """
-    Page of the public names.
+    Public names by group.
 
     Returns
     -------
-    page : str
+    groups : dict of str to list of str
+    """
+    return {
+        group: list(dict(members))
+        for group, members in groupby(PUBLIC.items(), key=lambda item: item[1].group)
+    }
+
+
+def functions():
+    """
+    Pages of the public names, one for each group and one that leads to them.
+
+    Returns
+    -------
+    pages : dict of str to str
+        By file name.
     """
     text = (
         "Functions of a raster are methods of the ``.fifesim`` accessor too: ``fifesim.ndvi(image)`` is "
         "``image.fifesim.ndvi()``. ``fifesim.__version__`` is the version."
     )
-    parts = [_heading("Functions and classes", text)]
-    for group, members in groupby(PUBLIC.items(), key=lambda item: item[1].group):
-        names = [name for name, _ in members]
-        parts.append(f"\n.. rubric:: {group}\n" + _summary(names + _BESIDE.get(group, [])))
-        for kind, called in (("DataArray", "a raster"), ("DataTree", "what ``compare`` returns")):
-            if methods := [f"``{name}``" for name in names if kind in PUBLIC[name].methods_of]:
-                parts.append(f"\nMethods of {called}: {', '.join(methods)}.\n")
+    pages = {_file(group): _group(group, names) for group, names in groups().items()}
+    listed = "".join(f"   {Path(name).stem}\n" for name in pages)
+    return {
+        "functions.rst": _heading("Functions and classes", text)
+        + f"\n.. toctree::\n   :maxdepth: 2\n\n{listed}"
+    } | pages
+
+
+def _file(group):
+    return f"{group.lower().replace(' ', '_')}.rst"
+
+
+def _group(group, names):
+    parts = [_heading(group, ""), _summary(names + _BESIDE.get(group, []))]
+    for kind, called in (("DataArray", "a raster"), ("DataTree", "what ``compare`` returns")):
+        if methods := [f"``{name}``" for name in names if kind in PUBLIC[name].methods_of]:
+            parts.append(f"\nMethods of {called}: {', '.join(methods)}.\n")
     return "".join(parts)
 
 
@@ -47,7 +72,9 @@ def modules():
     -------
     names : list of str
     """
-    paths = (path for folder in PHYSICS for path in sorted((PACKAGE / folder).rglob("[a-z]*.py")))
+    paths = (
+        path for folder in PHYSICS for path in sorted((PACKAGE / folder).rglob("[a-z]*.py"))
+    )
     dotted = [".".join(path.relative_to(PACKAGE).with_suffix("").parts) for path in paths]
     return [name for name in dotted if not name.endswith(".raster") and ".rasters." not in name]
 
@@ -64,14 +91,17 @@ def physics():
     options = "   :template: module.rst\n"
     parts = [_heading("Physics", text)]
     for folder, names in groupby(modules(), key=lambda name: name.rpartition(".")[0]):
-        parts.append(f"\n.. rubric:: {folder.replace('.', ', ')}\n" + _summary(list(names), options))
+        parts.append(
+            f"\n.. rubric:: {folder.replace('.', ', ')}\n" + _summary(list(names), options)
+        )
     return "".join(parts)
 
 
 def write():
     """Write the pages."""
     PAGES.mkdir(exist_ok=True)
-    (PAGES / "functions.rst").write_text(functions(), encoding="utf-8")
+    for name, page in functions().items():
+        (PAGES / name).write_text(page, encoding="utf-8")
     (PAGES / "physics.rst").write_text(physics(), encoding="utf-8")
 
 

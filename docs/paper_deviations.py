@@ -28,7 +28,9 @@ from fifesim.sensor.description.rasters.carried import attributes_of
 LENGTHS = {0.05: 5, 0.15: 15, 0.24: 30}
 
 
-def fits(case, seeds, change=None, method="periodic", reflectance=reflectance_of, land=(None, None)):
+def fits(
+    case, seeds, change=None, method="periodic", reflectance=reflectance_of, land=(None, None)
+):
     """
     Lines of LAI on NDVI of the nine scenes, where something is otherwise.
 
@@ -54,7 +56,9 @@ def fits(case, seeds, change=None, method="periodic", reflectance=reflectance_of
     for seed in seeds:
         for treatment, arp in friedl1995.scenes():
             setup = replace(case.setup, dem=land[0], horizon=land[1], **(change or {}))
-            lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method=method)
+            lai = lai_scene(
+                case.grid, case.densities[treatment], arp=arp, seed=seed, method=method
+            )
             image = image_of(setup, reflectance(setup, lai).compute())
             truth = aggregate(lai, case.pixel, min_valid=setup.min_valid)
             values = pixel_values(truth, ndvi(image))
@@ -66,7 +70,11 @@ def effect(lines, base):
     """What a change does to the nine rows of LAI: mean and largest change of R2, mean relative change of slopes."""
     now, was = lines.mean(axis=0), base.mean(axis=0)
     r2 = now[:, 2] - was[:, 2]
-    return {"r2": r2.mean(), "r2_largest": np.abs(r2).max(), "slope": np.mean(now[:, 1] / was[:, 1] - 1)}
+    return {
+        "r2": r2.mean(),
+        "r2_largest": np.abs(r2).max(),
+        "slope": np.mean(now[:, 1] / was[:, 1] - 1),
+    }
 
 
 def deviations(seeds):
@@ -90,9 +98,11 @@ def deviations(seeds):
     return {
         "lengths": lengths(),
         "sky": sky(case) | effect(fits(case, seeds, reflectance=_by_sunlight), base),
-        "facet": facet(land[0]) | effect(fits(hills, seeds, {"upwelling": False}, land=land), on_hills),
+        "facet": facet(land[0])
+        | effect(fits(hills, seeds, {"upwelling": False}, land=land), on_hills),
         "streaming": effect(fits(case, seeds, method="streaming"), base),
-        "eight": effect(fits(case, seeds, {"instrument": narrow}), base) | {"width": narrow.line_spread.width},
+        "eight": effect(fits(case, seeds, {"instrument": narrow}), base)
+        | {"width": narrow.line_spread.width},
         "orders": effect(fits(case, seeds, {"atmosphere": _polarized()}), base),
         "blur": blur(case, seeds),
         "sun": sun(),
@@ -115,8 +125,15 @@ def lengths():
     for arp, length in LENGTHS.items():
         correlation = autocorrelation(arp, cells)
         there = np.exp(np.interp(length / CELL, cells, np.log(correlation)))
-        row = {"arp": arp, "paper": length, "length": correlation_length(arp, CELL), "there": there}
-        found.append(row | {"neighbour": correlation[1], "left": correlation[4] / correlation[3]})
+        row = {
+            "arp": arp,
+            "paper": length,
+            "length": correlation_length(arp, CELL),
+            "there": there,
+        }
+        found.append(
+            row | {"neighbour": correlation[1], "left": correlation[4] / correlation[3]}
+        )
     return found
 
 
@@ -128,14 +145,20 @@ def blur(case, seeds):
     paper = friedl1995.paper_table().query("variable == 'lai'")["slope"].to_numpy()
     by_arp = slope.reshape(3, 3)
     factor = np.exp(np.log(slope / paper).mean())
-    return {"background": soil["TM3"], "factor": factor, "growth": np.mean(by_arp[:, 2] / by_arp[:, 0])}
+    return {
+        "background": soil["TM3"],
+        "factor": factor,
+        "growth": np.mean(by_arp[:, 2] / by_arp[:, 0]),
+    }
 
 
 def sky(case):
     """Share of skylight, and what it does to NDVI of the ground at the mean of the burned, grazed."""
     setup, density = case.setup, case.densities["burned-grazed"]
     lai = lai_scene(case.grid, density, arp=0.15, seed=0)
-    mixed, alone = (float(ndvi(make(setup, lai)).mean()) for make in (reflectance_of, _by_sunlight))
+    mixed, alone = (
+        float(ndvi(make(setup, lai)).mean()) for make in (reflectance_of, _by_sunlight)
+    )
     shares = dict(zip(("red", "nir"), map(float, _shares(setup)), strict=True))
     return shares | {"ndvi": mixed - alone}
 
@@ -143,15 +166,25 @@ def sky(case):
 def facet(dem):
     """Eq. 5's factor at nadir, which is the cosine of the slope: at 20 degrees, and over the synthetic hills."""
     cosine = np.cos(np.radians(fifesim.slope(dem).values))
-    return {"at_20": np.cos(np.radians(20)), "mean": np.nanmean(cosine), "least": np.nanquantile(cosine, 0.01)}
+    return {
+        "at_20": np.cos(np.radians(20)),
+        "mean": np.nanmean(cosine),
+        "least": np.nanquantile(cosine, 0.01),
+    }
 
 
 def sun():
     """Zenith angles and K at the assumed time of the overpass, and eight minutes to each side."""
     found = []
     for minute in (27, 35, 43):
-        sza = float(sun_position(f"1987-06-06T16:{minute}Z", fife.LATITUDE, fife.LONGITUDE, fife.ALTITUDE).sza)
-        found.append({"time": f"16:{minute}", "sza": sza, "k": float(extinction_coefficient(sza))})
+        sza = float(
+            sun_position(
+                f"1987-06-06T16:{minute}Z", fife.LATITUDE, fife.LONGITUDE, fife.ALTITUDE
+            ).sza
+        )
+        found.append(
+            {"time": f"16:{minute}", "sza": sza, "k": float(extinction_coefficient(sza))}
+        )
     return found
 
 
@@ -170,7 +203,9 @@ def _by_sunlight(setup, lai):
     """Reflectance of level ground by SAIL for the directions of sun and view, without skylight."""
     bands = setup.instrument.select(setup.bands)
     responses = tuple(band.response for band in bands)
-    leaf_reflectance, leaf_transmittance = leaves.leaf_optics(responses, setup.leaf_optics, lai, exact=False)
+    leaf_reflectance, leaf_transmittance = leaves.leaf_optics(
+        responses, setup.leaf_optics, lai, exact=False
+    )
     return canopy.level_reflectance(
         lai,
         bands=[band.name for band in bands],

@@ -27,6 +27,16 @@ class Regression:
         Standard deviation of y about the line, with n - 2 degrees of freedom.
     x_mean, x_sum_of_squares : float
         Mean of x, and the sum of its squared deviations.
+
+    Examples
+    --------
+    >>> line = {"slope": 4.0, "intercept": -0.7, "r2": 0.9, "n": 100, "residual_deviation": 0.1}
+    >>> fit = Regression(**line, x_mean=0.5, x_sum_of_squares=0.8)
+    >>> fit.predict(0.5)
+    1.3
+    >>> low, high = fit.prediction_interval(0.5)
+    >>> round(float(low), 2), round(float(high), 2)
+    (1.1, 1.5)
     """
 
     slope: float

@@ -109,6 +109,11 @@ class Band:
     ------
     ValueError
         If the wavelengths do not increase, or the response is negative or zero throughout.
+
+    Examples
+    --------
+    >>> round(Band("red", (0.62, 0.63, 0.68, 0.69), (0.0, 1.0, 1.0, 0.0)).center, 3)
+    0.655
     """
 
     name: str

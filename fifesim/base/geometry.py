@@ -38,6 +38,11 @@ class Geometry:
         If the sun or the sensor is not above the horizon.
     TypeError
         If an angle is no number.
+
+    Examples
+    --------
+    >>> Geometry(sza=30, saa=120, vza=10, vaa=290).raa
+    170.0
     """
 
     sza: float
@@ -272,6 +277,11 @@ def fife_geometry():
     -------
     geometry : Geometry
         sza 28.5, saa 117.0, vza 0, vaa 0. [degree]
+
+    Examples
+    --------
+    >>> round(fife_geometry().sza, 1)
+    28.5
     """
     return sun_position(fife.TIME, fife.LATITUDE, fife.LONGITUDE, fife.ALTITUDE)
 

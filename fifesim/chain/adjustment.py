@@ -72,6 +72,16 @@ def adjust_bands(reflectance, instrument, *, bands=None, source=None, uncertaint
     See Also
     --------
     fifesim.sensor.response.adjustment.best_linear, fifesim.ground.canopy.library.library_spectra
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> scene = lai.fifesim.surface_reflectance("MSI")
+    >>> red_and_nir = scene.fifesim.adjust_bands("TM", bands=["TM3", "TM4"])
+    >>> red_and_nir.mean(["y", "x"]).round(2).values
+    array([0.09, 0.23])
     """
     if {"y", "x"} <= set(reflectance.dims):  # and not spectra of the field
         reflectance = as_bands_of(reflectance, source, "surface_reflectance")
@@ -147,6 +157,16 @@ def as_seen_by(
     See Also
     --------
     adjust_bands, fifesim.chain.steps.to_toa, fifesim.sensor.raster.sense
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> scene = lai.fifesim.surface_reflectance("MSI")
+    >>> tm = scene.fifesim.as_seen_by("TM", bands=["TM3", "TM4"])
+    >>> tm.shape, tm.dtype
+    ((2, 10, 10), dtype('uint8'))
     """
     description = find_instrument(instrument)
     reflectance = as_bands_of(reflectance, source, "surface_reflectance")
@@ -197,6 +217,13 @@ def spectral_adjustment(source, target, *, bands=None):
     See Also
     --------
     fifesim.sensor.response.adjustment.line_between
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> lines = fifesim.spectral_adjustment("MSI", "OLI", bands=["OLI4"])
+    >>> lines.source_band.values, lines.slope.round(2).values
+    (array(['MSI4'], dtype='<U4'), array([0.96]))
     """
     source, target = find_instrument(source), find_instrument(target)
     to = target.select(bands) if bands is not None else [band for band in target.bands if _beside(source.bands, band)]

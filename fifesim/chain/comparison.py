@@ -47,6 +47,15 @@ def compare(lai, instruments, setup=None, *, bands=None):
     See Also
     --------
     fifesim.chain.setup.reflectance_of, fifesim.chain.setup.image_of
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> images = lai.fifesim.compare(["TM", "OLI"])
+    >>> list(images.children)
+    ['TM', 'OLI']
     """
     setup = Setup() if setup is None else setup
     if not isinstance(setup, Setup):
@@ -94,6 +103,15 @@ def comparison_table(images, truth=None):
     See Also
     --------
     fifesim.analysis.rasters.regression.regress
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> images = lai.fifesim.compare(["TM", "OLI"])
+    >>> images.fifesim.comparison_table().pixel.to_dict()
+    {'TM': 30.0, 'OLI': 30.0}
     """
     rows = {}
     for name, image in recorded_images(images).items():

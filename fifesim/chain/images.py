@@ -30,6 +30,17 @@ def ndvi(image):
     See Also
     --------
     fifesim.analysis.rasters.indices.ndvi
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> ndvi = image.fifesim.ndvi()
+    >>> round(float(ndvi.mean()), 2)
+    0.36
     """
     return indices.ndvi(planetary_reflectance(image))
 
@@ -65,6 +76,15 @@ def index(image, name):
     See Also
     --------
     fifesim.analysis.indices
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM1", "TM3", "TM4"])
+    >>> round(float(rho.fifesim.index("EVI").mean()), 2)
+    0.27
     """
     return indices.index(planetary_reflectance(image), name)
 

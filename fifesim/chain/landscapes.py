@@ -256,6 +256,14 @@ def fpar(
     See Also
     --------
     fifesim.ground.canopy.absorption.fpar, fifesim.ground.canopy.absorption.green_fpar
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> round(float(lai.fifesim.fpar().mean()), 2)
+    0.3
     """
     land = land_of(lai)
     said = {"geometry": geometry, "time": time, "fpar_inf": fpar_inf, "leaves": leaves}
@@ -304,6 +312,14 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     See Also
     --------
     fifesim.base.footprints.regularize
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> lai.fifesim.aggregate(30).shape
+    (10, 10)
     """
     mean = partial(means.aggregate, pixel=pixel, min_valid=min_valid, lsf=lsf)
     if not isinstance(array, xr.Dataset):

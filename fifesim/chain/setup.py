@@ -46,6 +46,16 @@ class Setup:
         As in `fifesim.sense`: where pixels lie, and what they need.
     noise, noise_models, seed, quantise : optional
         As in `fifesim.sense`.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> haze = fifesim.Atmosphere(visibility=10)
+    >>> setup = fifesim.Setup(instrument="OLI", bands=("OLI4", "OLI5"), atmosphere=haze)
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> list(lai.fifesim.compare(["OLI"], setup).children)
+    ['OLI']
     """
 
     instrument: str | Instrument = "TM"

@@ -121,6 +121,15 @@ def surface_reflectance(
     fifesim.ground.canopy.crowns.clumped, fifesim.ground.canopy.raster.level_reflectance,
     fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil_water.moistened,
     fifesim.ground.terrain.rasters.light.terrain_reflectance
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> rho.mean(["y", "x"]).round(3).values
+    array([0.089, 0.229])
     """
     if dem is None and horizon is not None:
         raise ValueError("a horizon stands around a dem: give dem= too")
@@ -187,6 +196,17 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, time=N
     See Also
     --------
     fifesim.ground.terrain.light.topographic_factor
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> dem = fifesim.flint_hills(grid, seed=7)
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM4"])
+    >>> kt = rho.fifesim.kt(dem)
+    >>> kt.dims, bool(abs(kt.mean() - 1) < 0.1)
+    (('band', 'y', 'x'), True)
     """
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     light = _sunlight(*air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time), "kt")
@@ -255,6 +275,17 @@ def to_toa(
     See Also
     --------
     fifesim.atmosphere.schemes.coupling.apparent_reflectance
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> haze = fifesim.Atmosphere(visibility=10)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], atmosphere=haze)
+    >>> toa = rho.fifesim.to_toa()
+    >>> (toa - rho).mean(["y", "x"]).round(3).values
+    array([ 0.01, -0.03])
     """
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
@@ -303,6 +334,16 @@ def to_surface(
     See Also
     --------
     fifesim.atmosphere.schemes.coupling.corrected_reflectance
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> toa = rho.fifesim.to_toa()
+    >>> bool(abs(toa.fifesim.to_surface() - rho).max() < 1e-6)
+    True
     """
     reflectance = as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance")
     light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time, assume=assume)

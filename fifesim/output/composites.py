@@ -41,6 +41,15 @@ def rgb(image, composite="false colour", *, stretch=None):
     ------
     ValueError
         If a band is missing, or the percentiles are none.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> image = lai.fifesim.surface_reflectance("TM", bands=["TM2", "TM3", "TM4"])
+    >>> image.fifesim.rgb().shape
+    (90, 90, 3)
     """
     names = composite_bands(image, composite)
     percentiles = None if stretch is None else _percentiles(stretch)

@@ -72,6 +72,15 @@ def plot(raster, *, band=None, composite="false colour", stretch=None, cmap=None
     ------
     ValueError
         If the raster has other dimensions, or a band is missing.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> axes = lai.fifesim.plot()
+    >>> axes.get_aspect()
+    1.0
     """
     raster = _checked(raster, band)
     names = composite_bands(raster, composite) if "band" in raster.dims else []
@@ -120,6 +129,18 @@ def plot_fit(fit, y=None, x=None, *, pair="coordinates", level=0.95, axes=None):
     ------
     ValueError
         If one raster is given without the other, or they do not match.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> truth, ndvi = lai.fifesim.aggregate(30), image.fifesim.ndvi()
+    >>> axes = fifesim.plot_fit(fifesim.regress(truth, ndvi), truth, ndvi)
+    >>> axes.get_xlabel()
+    'Normalized difference vegetation index'
     """
     if (y is None) != (x is None):
         raise ValueError("fit.plot() draws the line alone, fit.plot(y, x) the pixels too: give both rasters or none")
@@ -177,6 +198,16 @@ def plot_comparison(images, *, limits=None):
     Notes
     -----
     Large images are thinned; mean and deviation are of the pixels drawn.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> images = lai.fifesim.compare(["TM", "OLI"])
+    >>> figure = images.fifesim.plot_comparison()
+    >>> len(figure.axes) >= 2
+    True
     """
     recorded = {name: image for name, image in recorded_images(images).items() if shows_ndvi(image)}
     if not recorded:

@@ -74,6 +74,16 @@ def to_geotiff(raster, path, *, overwrite=False, tags=None):
     coordinate ``time`` is ``TIFFTAG_DATETIME`` and ``ACQUISITIONDATETIME``. Red, green, blue and near infrared are
     what the wavelengths say, not the order of the bands. Angles that vary over the cells are not written, which is a
     warning.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> path = lai.fifesim.to_geotiff(f"{mkdtemp()}/lai.tif")
+    >>> fifesim.open_image(path).shape
+    (90, 90)
     """
     path = Path(path)
     if path.exists() and not overwrite:
@@ -130,6 +140,18 @@ def open_image(path, chunks=None, *, allow_remote=False):
         takes more memory than there is.
     OSError
         If its cells cannot be read.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> path = image.fifesim.to_geotiff(f"{mkdtemp()}/tm.tif")
+    >>> fifesim.open_image(path).identical(image)
+    True
     """
     file = raster_file(path, allow_remote)
     with ErrorsOfGdal(f"cannot read {file.name}"):

@@ -38,6 +38,13 @@ def grid_at(crs, west, north, width, height, cell):
     ------
     ValueError
         If there is no such CRS, it is not one that `check_grid` passes, or the size holds no cell.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.grid_at("EPSG:32633", west=390000, north=5820000, width=300, height=200, cell=5)
+    >>> grid.shape, grid.resolution.x
+    (Shape2d(x=60, y=40), 5.0)
     """
     down, across = np.broadcast_to(np.asarray(cell, float), 2).tolist()
     size, of = f"a grid of width = {width:g}, height = {height:g} m holds", f"of {down:g} x {across:g} m"

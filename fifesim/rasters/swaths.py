@@ -80,6 +80,16 @@ def grid_swath(image, grid, method="nearest", *, min_valid=0.5):
     See Also
     --------
     fifesim.base.scan_pixels.nearest_pixels, fifesim.base.scan_pixels.covered_means
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(25, window=((0, 120), (0, 120)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> toa = lai.fifesim.surface_reflectance("MODIS", bands=["MODIS1"]).fifesim.to_toa()
+    >>> swath = toa.fifesim.sense_swath("MODIS")
+    >>> swath.fifesim.grid_swath(fifesim.fife_site(250, window=((0, 12), (0, 12)))).dims
+    ('band', 'y', 'x')
     """
     grids.check_grid(grid)
     _check(image, method, min_valid)

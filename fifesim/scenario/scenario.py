@@ -38,6 +38,13 @@ class Scenario(Keys):
     ------
     ValueError
         If a key is unknown or a value not allowed: one line a mistake.
+
+    Examples
+    --------
+    >>> from fifesim.scenario.scenario import Scenario
+    >>> scenario = Scenario(grid={"width": 900, "height": 900}, ground={"arp": 0.24})
+    >>> scenario.ground.arp, scenario.atmosphere.visibility
+    (0.24, 45.0)
     """
 
     ground: Ground = Ground()
@@ -248,6 +255,12 @@ def default_scenario():
     Returns
     -------
     scenario : Scenario
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> sorted(fifesim.default_scenario().classes)
+    ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """
     return read_scenario(datasets.path("fife.toml"))
 
@@ -315,5 +328,15 @@ def read_scenario(path):
     ValueError
         If it is missing or not TOML, or a key or value is wrong: one line a mistake, with the key, the value and what
         is allowed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import fifesim
+    >>> path = Path(mkdtemp()) / "mine.toml"
+    >>> _ = path.write_text("[ground]\\narp = 0.24\\n")
+    >>> fifesim.read_scenario(path).ground.arp
+    0.24
     """
     return parse_scenario(with_false_colour(load_values(path)))

@@ -39,6 +39,14 @@ def simulate(scenario, chunks="auto"):
     ------
     ValueError
         If the scenario asks for what cannot be.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> scenario = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
+    >>> run = fifesim.simulate(scenario)
+    >>> list(run.children), run["image"]["dn"].shape
+    (['scene', 'truth', 'image'], (2, 10, 10))
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")

@@ -101,6 +101,18 @@ def sense(
     --------
     fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise,
     fifesim.sensor.response.calibration.radiance_to_dn, fifesim.sensor.response.product_scaling
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> image.shape, image.dtype
+    ((2, 10, 10), dtype('uint8'))
+    >>> image.mean(["y", "x"]).round(1).values
+    array([51.8, 73.4])
     """
     toa, description, bands = by_bands(toa, instrument)
     digital_numbers.check_scaling(scaling, description, quantise)
@@ -266,6 +278,16 @@ def to_radiance(image):
     See Also
     --------
     fifesim.sensor.response.calibration.dn_to_radiance
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> image.fifesim.to_radiance().mean(["y", "x"]).round().values
+    array([41., 58.])
     """
     missing = {"gain", "offset"} - set(image.coords)
     if missing:
@@ -299,6 +321,16 @@ def to_reflectance(image):
     See Also
     --------
     fifesim.sensor.response.calibration.radiance_to_reflectance
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> image.fifesim.to_reflectance().mean(["y", "x"]).round(2).values
+    array([0.1 , 0.21])
     """
     radiance = to_radiance(image) if "gain" in image.coords else image
     cf.check_quantity(radiance, "toa_radiance")

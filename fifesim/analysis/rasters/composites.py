@@ -48,6 +48,22 @@ def composite(images, method="maximum-value", *, by=None):
     References
     ----------
     [Holben1986]_
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> clear = image.fifesim.to_reflectance()
+    >>> dates = np.array(["1987-06-06T16:35", "1987-06-22T16:35"], "datetime64[ns]")
+    >>> stack = xr.concat([0.5 * clear + 0.1, clear], xr.DataArray(dates, dims="time", name="time"))
+    >>> best = stack.fifesim.composite()
+    >>> bool((best.date == dates[1]).all())
+    True
     """
     if method not in _METHODS:
         raise ValueError(f"method must be one of {', '.join(_METHODS)}, got {method!r}")

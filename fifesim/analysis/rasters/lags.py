@@ -44,6 +44,15 @@ def autocovariance(array, reach):
     See Also
     --------
     fifesim.analysis.variogram.lag_sums
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> lags = lai.fifesim.autocovariance(10)
+    >>> dict(lags.sizes)
+    {'lag_y': 4, 'lag_x': 7}
     """
     check_no_counts(array)
     if set(array.dims) != {"y", "x"}:
@@ -94,6 +103,15 @@ def variogram(array, reach):
     ------
     ValueError
         As in `autocovariance`, and if the cells are not square or their values do not vary.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> along = lai.fifesim.variogram(30).semivariance.sel(direction="x")
+    >>> bool(along[1] < along[5])
+    True
     """
     down, across = grids.cell_size(grids.geobox(array))
     if abs(down - across) > 1e-6 * across:
@@ -146,6 +164,15 @@ def regularized_variance(array, pixel=30.0, lsf=None):
     See Also
     --------
     fifesim.analysis.variogram.footprint_variance
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> left = lai.fifesim.regularized_variance(30)
+    >>> bool(left.simulated < left.cells)
+    True
     """
     scene = grids.geobox(array)
     lsf = Boxcar(pixel) if lsf is None else lsf

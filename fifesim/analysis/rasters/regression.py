@@ -29,6 +29,17 @@ def regress(y, x, *, pair="coordinates"):
     See Also
     --------
     fifesim.analysis.regression.fit
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> fit = fifesim.regress(lai.fifesim.aggregate(30), image.fifesim.ndvi())
+    >>> fit.n, round(fit.r2, 2)
+    (100, 0.95)
     """
     y, x = matched(y, x, pair)
     y_origin, x_origin = origins(y, x)

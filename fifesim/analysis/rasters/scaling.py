@@ -48,6 +48,16 @@ def scale_bias(algorithm, array, pixel=30.0):
     References
     ----------
     [Friedl1995]_, Eq. 1; [Hall1992]_
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> bias = fifesim.scale_bias(fifesim.ndvi, rho)["bias"]
+    >>> bias.shape, bool((bias < 0.01).all())
+    ((10, 10), True)
     """
     of_cells = aggregate(algorithm(array), pixel)
     of_mean = algorithm(aggregate(array, pixel))
@@ -87,6 +97,17 @@ def ndvi_bias(reflectance, pixel=30.0):
     See Also
     --------
     fifesim.analysis.scaling.ndvi_hessian
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> simulated = fifesim.scale_bias(fifesim.ndvi, rho)["bias"]
+    >>> predicted = rho.fifesim.ndvi_bias()
+    >>> bool(abs(predicted - simulated).max() < 1e-3)
+    True
     """
     red, nir = red_and_nir(reflectance)
     # Moments of the same cells: a cell that lacks one band has no NDVI.
@@ -124,6 +145,14 @@ def fpar_bias(lai, extinction, fpar_inf=0.94, pixel=30.0):
     See Also
     --------
     fifesim.analysis.scaling.beer_bias
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> bool((lai.fifesim.fpar_bias(extinction=0.57) <= 0).all())
+    True
     """
     cf.check_quantity(lai, "lai")
     if not 0 < extinction < np.inf:
@@ -161,6 +190,15 @@ def ndvi_linearity(reflectance):
     See Also
     --------
     fifesim.analysis.scaling.ndvi_linearity
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> round(rho.fifesim.ndvi_linearity(), 2)
+    0.64
     """
     red, nir = red_and_nir(reflectance)
     fit = regress(nir - red, 1.0 / (nir + red), pair="index")
@@ -189,6 +227,15 @@ def share_kept(pixels, cells):
     See Also
     --------
     fifesim.analysis.scaling.share_kept
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> kept = lai.fifesim.aggregate(30).fifesim.share_kept(lai)
+    >>> bool(0 < kept["variance"] < 1)
+    True
     """
     for array in (pixels, cells):
         check_no_counts(array)
@@ -232,6 +279,15 @@ def density(array, points=256, bandwidth=None, *, reflect=None):
     See Also
     --------
     fifesim.analysis.density.gaussian_density
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> density = lai.fifesim.density()
+    >>> round(float(density.integrate("value")), 2)
+    1.0
     """
     check_no_counts(array)
     low, high = extremes(array)

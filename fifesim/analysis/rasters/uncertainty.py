@@ -49,6 +49,18 @@ def relative_equivalent_noise(variable, ndvi, increment=0.1, *, slope=None, min_
     See Also
     --------
     fifesim.analysis.uncertainty.equivalent_noise
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 270), (0, 270)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
+    >>> noise = truth.fifesim.relative_equivalent_noise(ndvi, increment=0.2)
+    >>> int(noise["count"].sum())
+    900
     """
     if not 0 < increment < np.inf:
         raise ValueError(f"increment must be positive, got {increment:g}: it is a width in units of the variable")

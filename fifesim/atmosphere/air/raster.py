@@ -70,6 +70,16 @@ def read_aerosol(source, *, scale_height=None, layer=None):
     See Also
     --------
     aerosol_tables : the package's own aerosols in this form.
+
+    Examples
+    --------
+    Tables as a Dataset, or the path of their file; an air of them is given its optical thickness:
+
+    >>> import fifesim
+    >>> tables = fifesim.aerosol_tables("continental")
+    >>> haze = fifesim.read_aerosol(tables)
+    >>> fifesim.Atmosphere(aerosol=haze, aot=0.2).aot
+    0.2
     """
     dataset, name = (source, source.attrs.get("title", "own")) if isinstance(source, xr.Dataset) else _opened(source)
     found = _named(dataset, name)
@@ -110,6 +120,13 @@ def aerosol_tables(aerosol):
     ------
     ValueError, TypeError
         If the aerosol is unknown.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> tables = fifesim.aerosol_tables("continental")
+    >>> tables.sizes["component"], sorted(tables.data_vars)
+    (3, ['asymmetry', 'extinction', 'phase', 'polarization', 'single_scattering_albedo'])
     """
     parts = aerosols.parts(aerosol)
     tables = [components.tabulated(component) for component in parts]

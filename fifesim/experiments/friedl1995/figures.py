@@ -50,6 +50,14 @@ def plot_reproduction(number, found, *, reading=None):
     See Also
     --------
     fifesim.reproduce
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> found = fifesim.reproduce(reading="aligned", realisations=1, cells=90)
+    >>> figure = fifesim.plot_reproduction(9, found)
+    >>> len(figure.axes)
+    6
     """
     if number not in NUMBERS:
         raise ValueError(f"number must be one of {', '.join(map(str, NUMBERS))}, the paper's figures, got {number}")

@@ -85,6 +85,13 @@ def reproduce(
     See Also
     --------
     fifesim.plot_reproduction
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> found = fifesim.reproduce(reading="aligned", realisations=1, cells=90)
+    >>> found["r2"].sel(reading="aligned", variable="lai").dims
+    ('realisation', 'distribution', 'arp')
     """
     given = {"dem": dem, "densities": densities, "optics": optics, "background": background}
     case = friedl1995.case_of(reading, sensor=sensor, cells=cells, west=west, north=north, **given)

@@ -69,6 +69,14 @@ def budget(scenario=None, *, realisations=20, cells=333, seed=None, each=None):
     See Also
     --------
     fifesim.analysis.attribution.shapley
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> scenario = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
+    >>> shares = fifesim.budget(scenario, realisations=1, cells=90)
+    >>> round(float(shares["total"].sel(variable="lai").mean()), 2)
+    0.05
     """
     scenario = default_scenario() if scenario is None else scenario
     if not isinstance(scenario, Scenario):

@@ -61,6 +61,12 @@ def lai_distribution(source):
     References
     ----------
     [Friedl1995]_, Fig. 3
+
+    Examples
+    --------
+    >>> from scipy import stats
+    >>> round(float(lai_distribution(stats.gamma(4, scale=0.4)).mean()), 2)
+    1.6
     """
     if hasattr(source, "ppf") and hasattr(source, "support"):
         if hasattr(getattr(source, "dist", source), "pmf"):

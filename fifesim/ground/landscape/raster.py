@@ -63,6 +63,17 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     See Also
     --------
     fifesim.ground.landscape.field.streaming_field, fifesim.ground.landscape.distribution.lai_distribution
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
+    >>> lai.dims, lai.shape
+    (('y', 'x'), (90, 90))
+    >>> lai.isel(y=slice(2), x=slice(3)).round(2).values
+    array([[1.31, 0.57, 0.5 ],
+           [0.58, 0.28, 1.76]])
     """
     grids.check_grid(grid)
     check_arp(arp)
@@ -105,6 +116,17 @@ def open_lai(path_or_raster, grid, chunks=None, *, allow_remote=False):
         If the file is missing or not of a format that is opened, has no CRS, does not overlap the grid, or needs a
         change of datum whose accuracy is unknown; if it has no data on the grid, known at once where the result is in
         memory; and, when computed, if LAI is negative or above what canopies have, where it lacks its scale.
+
+    Examples
+    --------
+    A map of 10 m on cells of 5 m:
+
+    >>> import fifesim
+    >>> site = fifesim.fife_site(10, window=((0, 30), (0, 30)))
+    >>> map_10m = fifesim.lai_scene(site, seed=7)
+    >>> lai = fifesim.open_lai(map_10m, fifesim.fife_site(5, window=((0, 60), (0, 60))))
+    >>> lai.shape, round(float(lai.mean() - map_10m.mean()), 3)
+    ((60, 60), -0.0)
     """
     lai = lai_window(path_or_raster, grid, chunks, allow_remote=allow_remote)
     if lai.chunks is None and not np.isfinite(lai.values).any():

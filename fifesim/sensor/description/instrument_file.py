@@ -59,6 +59,13 @@ class Instrument:
     pydantic.ValidationError
         If a value is wrong or has no source; `fifesim.sensor.description.instruments.read_instrument` names file and
         key.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> tm = fifesim.instrument("TM")
+    >>> tm.altitude, [band.name for band in tm.bands[:3]]
+    (705000.0, ['TM1', 'TM2', 'TM3'])
     """
 
     name: Name

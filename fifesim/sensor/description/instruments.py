@@ -123,6 +123,18 @@ def read_instrument(path):
         cannot be in the unit of its key; the message names file, key and remedy.
     FileNotFoundError
         If there is no such file.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import fifesim
+    >>> bands = '{ name = "red", center = 0.668, width = 0.010 }, { name = "nir", center = 0.840, width = 0.040 }'
+    >>> path = Path(mkdtemp()) / "camera.toml"
+    >>> text = f'name = "Camera"\\naltitude = 120.0\\ngsd = 0.1\\nbits = 12\\nbands = [{bands}]\\n'
+    >>> _ = path.write_text(text, encoding="utf-8")
+    >>> [band.name for band in fifesim.read_instrument(path).bands]
+    ['red', 'nir']
     """
     # Tables that it names lie beside it, wherever Python goes.
     path = Path(path).absolute()

@@ -47,6 +47,12 @@ class NoiseModel:
     ------
     ValueError
         If a number is negative or there is no detector.
+
+    Examples
+    --------
+    >>> from fifesim.sensor.response.noise import NoiseModel
+    >>> NoiseModel(thermal=0.1, shot=0.01).detectors
+    1
     """
 
     thermal: float

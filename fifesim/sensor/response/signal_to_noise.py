@@ -25,6 +25,12 @@ def noise_equivalent_radiance(instrument, band, radiance):
     ------
     ValueError
         If there is no such instrument or band, or its description has no noise.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> round(fifesim.noise_equivalent_radiance("OLI", "OLI4", 22.0).item(), 3)
+    0.096
     """
     return _noise_of(instrument, band).noise_equivalent_radiance(radiance)
 
@@ -50,6 +56,12 @@ def snr(instrument, band, radiance):
     ------
     ValueError
         If there is no such instrument or band, or its description has no noise.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> fifesim.snr("OLI", "OLI4", [22.0, 60.0]).round()
+    array([230., 627.])
     """
     return _noise_of(instrument, band).snr(radiance)
 

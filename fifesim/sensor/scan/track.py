@@ -35,6 +35,12 @@ class Track:
     ------
     ValueError
         If the latitude is out of range, or a number is not finite.
+
+    Examples
+    --------
+    >>> from fifesim.sensor.scan.track import Track
+    >>> Track(latitude=39.1, longitude=-96.6, heading=190.0).heading
+    190.0
     """
 
     latitude: float

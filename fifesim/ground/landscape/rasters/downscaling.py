@@ -88,6 +88,16 @@ def downscale(lai, grid, *, arp=0.15, distribution=None, cv=None, seed=0, chunks
     See Also
     --------
     fifesim.ground.landscape.downscaling.downscaled, fifesim.ground.landscape.block_kriging.kriging_filter
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> import numpy as np
+    >>> map_10m = fifesim.lai_scene(fifesim.fife_site(10, window=((0, 30), (0, 30))), seed=7)
+    >>> grid = fifesim.fife_site(10 / 3, window=((0, 90), (0, 90)))
+    >>> cells = map_10m.fifesim.downscale(grid, cv=0.4, seed=7)
+    >>> bool(np.allclose(cells.fifesim.aggregate(10), map_10m, atol=1e-6))
+    True
     """
     grid, seed = grids.check_grid(grid), check_seed(seed)
     check_arp(arp)

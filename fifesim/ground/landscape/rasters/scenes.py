@@ -117,6 +117,16 @@ def landscape(
     See Also
     --------
     fifesim.ground.landscape.cover.patch_classes, fifesim.ground.landscape.field.streaming_field
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> land = fifesim.landscape(grid, soil=fifesim.Field(sd=0.03, arp=0.24), seed=7)
+    >>> sorted(land.data_vars)
+    ['cover', 'lai', 'soil']
+    >>> land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).dims
+    ('band', 'y', 'x')
     """
     grids.check_grid(grid)
     check_arp(arp)

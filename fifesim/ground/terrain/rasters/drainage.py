@@ -47,6 +47,15 @@ def wetness(dem, *, resolution=None):
     See Also
     --------
     fifesim.ground.terrain.wetness.wetness_index
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> dem = fifesim.flint_hills(grid, seed=7)
+    >>> wetness = dem.fifesim.wetness()
+    >>> wetness.attrs["long_name"]
+    'topographic wetness index'
     """
     grid = elevation_grid(dem)
     places = places_of(grid, source_resolution(dem, resolution))

@@ -59,6 +59,15 @@ def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=Non
     See Also
     --------
     fifesim.ground.terrain.spline.spline_coefficients, fifesim.ground.terrain.spline.spline_grid
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> coarse = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 40), (0, 40))), seed=7)
+    >>> grid = fifesim.fife_site(10, window=((30, 90), (30, 90)))
+    >>> dem = fifesim.fine_dem(coarse, grid)
+    >>> dem.shape, dem.attrs["units"]
+    ((60, 60), 'm')
     """
     model = model_under(grid, path_or_raster, fill, vertical_units, allow_remote)
     if isinstance(model.source.cells, da.Array):
@@ -95,6 +104,15 @@ def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None, 
     ------
     ValueError
         As in `fine_dem`, but not for what the model lacks, unless that is all.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> coarse = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 40), (0, 40))), seed=7)
+    >>> grid = fifesim.fife_site(10, window=((30, 90), (30, 90)))
+    >>> around = fifesim.source_dem(coarse, grid, margin=300)
+    >>> around[0].shape
+    (40, 40)
     """
     model = model_under(grid, path_or_raster, fill, vertical_units, allow_remote)
     coarse, around = _coarse_grid(grid, model.resolution, margin)

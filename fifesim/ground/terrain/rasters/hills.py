@@ -44,6 +44,14 @@ def flint_hills(grid, seed=0, *, chunks=None):
     See Also
     --------
     fifesim.ground.terrain.flint_hills.elevation
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> dem = fifesim.flint_hills(grid, seed=7)
+    >>> dem.shape, dem.attrs["units"]
+    ((90, 90), 'm')
     """
     grids.check_grid(grid)
     seed = check_seed(seed)

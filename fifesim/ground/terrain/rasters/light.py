@@ -47,6 +47,13 @@ def sky_view(dem, horizon=None):
     See Also
     --------
     fifesim.ground.terrain.sky.sky_factor, fifesim.ground.terrain.sky.sky_vector
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> dem = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 60), (0, 60))), seed=7)
+    >>> bool((dem.fifesim.sky_view() <= 1).all())
+    True
     """
     return _light(dem, horizon, None, "sky_view", lambda light: light.sky_view)
 
@@ -73,6 +80,13 @@ def terrain_view(dem, horizon=None):
     See Also
     --------
     fifesim.ground.terrain.sky.terrain_view
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> dem = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 60), (0, 60))), seed=7)
+    >>> bool((dem.fifesim.terrain_view() >= 0).all())
+    True
     """
     return _light(dem, horizon, None, "terrain_view", lambda light: skies.terrain_view(light.sky_view, light.cosine))
 
@@ -105,6 +119,15 @@ def illumination(dem, geometry=None, horizon=None, *, time=None):
     See Also
     --------
     fifesim.ground.terrain.slope.along_normal, fifesim.ground.terrain.light.horizon_toward
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> import numpy as np
+    >>> dem = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 60), (0, 60))), seed=7)
+    >>> light = dem.fifesim.illumination()
+    >>> bool(abs(float(light.mean()) - np.cos(np.radians(28.5))) < 0.02)
+    True
     """
     return _light(dem, horizon, _sun(dem, geometry, time), "illumination", lambda light: light.mu_s_local)
 
@@ -129,6 +152,15 @@ def shadow(dem, geometry=None, horizon=None, *, time=None):
     ------
     ValueError
         As in `illumination`.
+
+    Examples
+    --------
+    The sun of FIFE stands too high for shadows on these hills:
+
+    >>> import fifesim
+    >>> dem = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 60), (0, 60))), seed=7)
+    >>> float(dem.fifesim.shadow().sum())
+    0.0
     """
     return _light(dem, horizon, _sun(dem, geometry, time), "shadow", _shadow)
 

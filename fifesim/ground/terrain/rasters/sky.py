@@ -51,6 +51,14 @@ def horizon(dem, *, directions=DIRECTIONS, reach=REACH, resolution=None, beside=
     See Also
     --------
     fifesim.ground.terrain.horizon.horizon_zenith
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> dem = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 60), (0, 60))), seed=7)
+    >>> horizon = dem.fifesim.horizon(directions=16, reach=1000)
+    >>> horizon.dims, horizon.sizes["direction"]
+    (('direction', 'y', 'x'), 16)
     """
     places = places_of(elevation_grid(dem), source_resolution(dem, resolution))
     azimuths = horizons.azimuths(directions)

@@ -29,6 +29,14 @@ def slope(dem):
     See Also
     --------
     fifesim.ground.terrain.slope.slope_aspect
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> dem = fifesim.flint_hills(grid, seed=7)
+    >>> bool((dem.fifesim.slope() < 30).all())
+    True
     """
     return _slope_or_aspect(dem, "slope", 0)
 
@@ -55,6 +63,15 @@ def aspect(dem):
     See Also
     --------
     fifesim.ground.terrain.slope.slope_aspect
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> dem = fifesim.flint_hills(grid, seed=7)
+    >>> aspect = dem.fifesim.aspect()
+    >>> bool(((aspect >= 0) & (aspect < 360)).all())
+    True
     """
     return _slope_or_aspect(dem, "aspect", 1)
 

@@ -54,6 +54,20 @@ def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=Non
     See Also
     --------
     fifesim.sensor.products.scaling.counts
+
+    Examples
+    --------
+    Counts of an image that has lost its calibration:
+
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> counts = image.drop_vars(["gain", "offset"]).drop_attrs().rio.write_crs(grid.crs.to_wkt())
+    >>> again = counts.fifesim.calibrate("TM", time="1987-06-06T16:35Z")
+    >>> bool(abs(again.fifesim.ndvi() - image.fifesim.ndvi()).max() < 1e-3)
+    True
     """
     if not isinstance(dn, xr.DataArray):
         raise TypeError(f"dn must be an xarray.DataArray of digital numbers, got {type(dn).__name__}")

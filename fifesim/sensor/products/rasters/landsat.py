@@ -79,6 +79,12 @@ def open_landsat(path, *, bands=None, angles="centre", quality=True, chunks="aut
     See Also
     --------
     fifesim.sensor.products.scaling.product_reflectance
+
+    Examples
+    --------
+    >>> product = "LT05_L1TP_028033_19870606_20201014_02_T1_MTL.txt"
+    >>> image = fifesim.open_landsat(product)  # doctest: +SKIP
+    >>> image.fifesim.to_surface().fifesim.ndvi()  # doctest: +SKIP
     """
     file = metadata_file(path)
     scene, folder, sizes = landsat_scene(read_groups(file)), file.parent, chunk_sizes(chunks)

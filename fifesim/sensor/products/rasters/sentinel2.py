@@ -94,6 +94,12 @@ def open_sentinel2(path, resolution=None, *, bands=None, angles="centre", qualit
     See Also
     --------
     fifesim.sensor.products.scaling.product_reflectance
+
+    Examples
+    --------
+    >>> product = "S2A_MSIL2A_20220603T171901_N0510_R012_T14SPJ_20240622T102300.SAFE"
+    >>> scene = fifesim.open_sentinel2(product, 10)  # doctest: +SKIP
+    >>> scene.fifesim.as_seen_by("TM", time="1987-06-06T16:35Z")  # doctest: +SKIP
     """
     file = metadata_file(path)
     product, folder, sizes = sentinel2_product(file), file.parent, chunk_sizes(chunks)

@@ -63,6 +63,16 @@ def to_bands(spectra, instrument, *, bands=None, min_coverage=MIN_COVERAGE):
     See Also
     --------
     fifesim.sensor.response.spectral.band_weights
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> wavelength = xr.Variable("wavelength", np.arange(0.4, 1.0, 0.005), {"units": "um"})
+    >>> spectra = xr.DataArray(np.full((120, 2, 2), 0.3), {"wavelength": wavelength}, ("wavelength", "y", "x"))
+    >>> spectra.fifesim.to_bands("OLI", bands=["OLI4", "OLI5"]).isel(y=0, x=0).round(6).values
+    array([0.3, 0.3])
     """
     cf.check_quantity(spectra, "surface_reflectance", "toa_reflectance", "toa_radiance")
     spectra = unpacked(spectra)

@@ -37,6 +37,13 @@ def psf(instrument="TM", band=None, *, spacing=None):
     See Also
     --------
     fifesim.sensor.response.spatial, fifesim.sensor.response.transfer
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> response = fifesim.psf("TM", "TM3", spacing=3.0)
+    >>> round(float(response.sum()) * 3.0**2, 6)
+    1.0
     """
     description = find_instrument(instrument)
     band = description.bands[0] if band is None else description.select(band)[0]
@@ -89,6 +96,13 @@ def mtf(instrument="TM", bands=None, *, frequency=None):
     See Also
     --------
     fifesim.sensor.response.spatial, fifesim.sensor.response.transfer
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> transfer = fifesim.mtf("TM", ["TM3"], frequency=[0.0, 1 / 60])
+    >>> transfer.sel(direction="across").round(2).values
+    array([[1.  , 0.69]])
     """
     description = find_instrument(instrument)
     selected = description.select(bands)

@@ -81,6 +81,15 @@ def sense_swath(
     See Also
     --------
     fifesim.sensor.scan.swath.footprint_operator, fifesim.sensor.scan.track
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(25, window=((0, 120), (0, 120)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> toa = lai.fifesim.surface_reflectance("MODIS", bands=["MODIS1"]).fifesim.to_toa()
+    >>> toa.fifesim.sense_swath("MODIS").dims
+    ('band', 'line', 'sample')
     """
     toa, description, bands = by_bands(toa, instrument)
     geometry = directions.given_geometry(geometry, toa, time)

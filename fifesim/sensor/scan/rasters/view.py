@@ -51,6 +51,13 @@ def scan_geometry(instrument, grid, track=None, *, nadir_offset=0.0, heading=180
     See Also
     --------
     fifesim.sensor.scan.track.view_components
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> view = fifesim.scan_geometry("MODIS", fifesim.fife_site(500), nadir_offset=300_000)
+    >>> view.vza.mean().round(0).item()
+    26.0
     """
     description = find_instrument(instrument)
     grids.check_grid(grid)
