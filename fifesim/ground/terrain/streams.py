@@ -45,20 +45,25 @@ def erode(start, erodibility, preference, law):
     [Braun2013]_
     """
     size, step = start.shape[0], 1.0 / law.steps
-    ground, new, area = start.copy().ravel(), np.empty(size * size), np.empty(size * size)
+    ground, new = start.copy().ravel(), np.empty(size * size)
     rock, distance = erodibility.ravel(), np.ones(size * size)
     receiver, order = np.empty(size * size, np.int32), np.empty(size * size, np.int32)
+    drained = np.empty(size * size, np.int32)
+    # Powers of areas, which are whole numbers of nodes; 0 where none has been asked for.
+    powers = np.zeros(size * size + 1)
     # The explicit scheme is stable below a quarter.
     parts = int(law.creep * step / law.node**2 / 0.2) + 1
     share = law.creep * step / law.node**2 / parts
     for _ in range(law.steps):
         _receivers(ground, preference, size, law.node, receiver, distance)
-        _downstream_first(receiver, order)
-        _drain(receiver, order, law.node**2, area)
-        for k in range(size * size):
+        _drain(receiver, order, drained)
+        for k in range(size * size - 1, -1, -1):
             i = order[k]
             if receiver[i] != i:
-                factor = step * rock[i] * area[i] ** law.area_exponent / distance[i]
+                nodes = drained[i]
+                if powers[nodes] == 0.0:
+                    powers[nodes] = (nodes * law.node**2) ** law.area_exponent
+                factor = step * rock[i] * powers[nodes] / distance[i]
                 ground[i] = (ground[i] + factor * ground[receiver[i]]) / (1.0 + factor)
         for _ in range(parts):
             _creep(ground, size, share, law.uplift * step / parts, new)
@@ -108,54 +113,51 @@ def _receivers(ground, preference, size, node, receiver, distance):
     """Where each node drains to: the neighbour down the steepest way, some being preferred; itself on the border."""
     for i in range(size * size):
         receiver[i] = i
+    steepest = np.empty(size - 2)
     for y in range(1, size - 1):
-        for x in range(1, size - 1):
-            i = y * size + x
-            steepest, k = 0.0, 0
-            for a in range(-1, 2):
-                for b in range(-1, 2):
-                    if a == 0 and b == 0:
-                        continue
-                    j = i + a * size + b
-                    length = node * (np.sqrt(2.0) if a * b != 0 else 1.0)
-                    slope = (ground[i] - ground[j]) / length * preference[k, i]
-                    k += 1
-                    if slope > steepest:
-                        steepest = slope
-                        receiver[i], distance[i] = j, length
+        first = y * size + 1
+        here, to = ground[first : first + size - 2], receiver[first : first + size - 2]
+        far = distance[first : first + size - 2]
+        steepest[:] = 0.0
+        k = 0
+        # Neighbour by neighbour and not node by node: each is a line of nodes without branches.
+        for a in range(-1, 2):
+            for b in range(-1, 2):
+                if a == 0 and b == 0:
+                    continue
+                j = first + a * size + b
+                there, liked = ground[j : j + size - 2], preference[k, first : first + size - 2]
+                length = node * (np.sqrt(2.0) if a * b != 0 else 1.0)
+                for x in range(size - 2):
+                    slope = (here[x] - there[x]) / length * liked[x]
+                    steeper = slope > steepest[x]
+                    steepest[x] = slope if steeper else steepest[x]
+                    to[x] = np.int32(j + x) if steeper else to[x]
+                    far[x] = length if steeper else far[x]
+                k += 1
 
 
 @njit(nogil=True, cache=True)
-def _downstream_first(receiver, order):
-    """Order of nodes in which each comes after the one that it drains to."""
-    child, sibling = np.full(receiver.size, -1), np.empty(receiver.size, np.int64)
+def _drain(receiver, order, drained):
+    """Order of nodes in which each comes before the one that it drains to, and the nodes that drain through each."""
+    above = np.zeros(receiver.size, np.int32)
     for i in range(receiver.size):
         if receiver[i] != i:
-            sibling[i] = child[receiver[i]]
-            child[receiver[i]] = i
+            above[receiver[i]] += 1
+    drained[:] = 1
     filled = 0
-    for i in range(receiver.size):
-        if receiver[i] == i:
-            done = filled
+    for source in range(receiver.size):
+        i = source
+        # From a source down to where other water, which has not come yet, flows in.
+        while above[i] == 0:
+            above[i] = -1
             order[filled] = i
             filled += 1
-            while done < filled:
-                other = child[order[done]]
-                while other >= 0:
-                    order[filled] = other
-                    filled += 1
-                    other = sibling[other]
-                done += 1
-
-
-@njit(nogil=True, cache=True)
-def _drain(receiver, order, own, area):
-    """Area that drains through each node, its own with it."""
-    area[:] = own
-    for k in range(order.size - 1, -1, -1):
-        i = order[k]
-        if receiver[i] != i:
-            area[receiver[i]] += area[i]
+            if receiver[i] == i:
+                break
+            drained[receiver[i]] += drained[i]
+            above[receiver[i]] -= 1
+            i = receiver[i]
 
 
 @njit(nogil=True, cache=True)
