@@ -142,22 +142,22 @@ def _drain(receiver, order, drained):
     """Order of nodes in which each comes before the one that it drains to, and the nodes that drain through each."""
     above = np.zeros(receiver.size, np.int32)
     for i in range(receiver.size):
-        if receiver[i] != i:
-            above[receiver[i]] += 1
+        above[receiver[i]] += receiver[i] != i
     drained[:] = 1
+    # Sources, then whatever all water has come to that flows into it. An entry stays if the count goes on past it:
+    # a branch would be guessed wrongly at every other node.
     filled = 0
-    for source in range(receiver.size):
-        i = source
-        # From a source down to where other water, which has not come yet, flows in.
-        while above[i] == 0:
-            above[i] = -1
-            order[filled] = i
-            filled += 1
-            if receiver[i] == i:
-                break
-            drained[receiver[i]] += drained[i]
-            above[receiver[i]] -= 1
-            i = receiver[i]
+    for i in range(receiver.size):
+        order[filled] = i
+        filled += above[i] == 0
+    for done in range(receiver.size):
+        i = order[done]
+        into = receiver[i]
+        drained[into] += drained[i] if into != i else 0
+        above[into] -= 1
+        if filled < receiver.size:
+            order[filled] = into
+            filled += above[into] == 0
 
 
 @njit(nogil=True, cache=True)
