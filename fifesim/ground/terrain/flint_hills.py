@@ -112,12 +112,14 @@ def _bent_uplands(seed, south, east):
     along = along - SHIFTS[line % SHIFTS.size]
     place = np.floor(along).astype(int)
     out = np.empty(along.shape)
-    for number in np.unique(line):
-        for column in np.unique(place[line == number]):
-            here = (line == number) & (place == column)
-            rows = (across[here] - number) * (NODES - 1) + REACH
-            columns = (along[here] - column) * (NODES - 1) + REACH
-            out[here] = spline_points(upland(seed, int(number), int(column)), rows[None], columns[None])[0]
+    for number in range(line.min(), line.max() + 1):
+        between = line == number
+        for column in range(place.min(), place.max() + 1):
+            here = np.nonzero(between & (place == column))
+            if here[0].size:
+                rows = (across[here] - number) * (NODES - 1) + REACH
+                columns = (along[here] - column) * (NODES - 1) + REACH
+                out[here] = spline_points(upland(seed, number, column), rows[None], columns[None])[0]
     return out + BASE_NOISE[0] * smooth_noise(seed, _LEVEL, BASE_NOISE[1], south, east)
 
 
