@@ -46,27 +46,21 @@ def erode(start, erodibility, preference, law):
     """
     size, step = start.shape[0], 1.0 / law.steps
     ground, new = start.copy().ravel(), np.empty(size * size)
-    rock, distance = erodibility.ravel(), np.ones(size * size)
     receiver, order = np.empty(size * size, np.int32), np.empty(size * size, np.int32)
-    drained = np.empty(size * size, np.int32)
+    drained, distance = np.empty(size * size, np.int32), np.ones(size * size)
     # Powers of areas, which are whole numbers of nodes; 0 where none has been asked for.
-    powers = np.zeros(size * size + 1)
+    powers, factor = np.zeros(size * size + 1), np.empty(size * size)
     # The explicit scheme is stable below a quarter.
     parts = int(law.creep * step / law.node**2 / 0.2) + 1
     share = law.creep * step / law.node**2 / parts
     for _ in range(law.steps):
         _receivers(ground, preference, size, law.node, receiver, distance)
         _drain(receiver, order, drained)
-        for k in range(size * size - 1, -1, -1):
-            i = order[k]
-            if receiver[i] != i:
-                nodes = drained[i]
-                if powers[nodes] == 0.0:
-                    powers[nodes] = (nodes * law.node**2) ** law.area_exponent
-                factor = step * rock[i] * powers[nodes] / distance[i]
-                ground[i] = (ground[i] + factor * ground[receiver[i]]) / (1.0 + factor)
+        _powers(drained, law.node**2, law.area_exponent, powers)
+        _factors(step, erodibility.ravel(), powers, drained, distance, receiver, factor)
+        _cut(order, receiver, factor, ground)
         for _ in range(parts):
-            _creep(ground, size, share, law.uplift * step / parts, new)
+            _creep(ground.reshape(size, size), share, law.uplift * step / parts, new.reshape(size, size))
             ground, new = new, ground
     return ground.reshape(size, size)
 
@@ -161,10 +155,34 @@ def _drain(receiver, order, drained):
 
 
 @njit(nogil=True, cache=True)
-def _creep(ground, size, share, uplift, new):
+def _powers(drained, own, exponent, powers):
+    """Powers of the areas of so many nodes, those that are not known yet."""
+    for i in range(drained.size):
+        if powers[drained[i]] == 0.0:
+            powers[drained[i]] = (drained[i] * own) ** exponent
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _factors(step, erodibility, powers, drained, distance, receiver, factor):
+    """What the implicit step weighs the receiver of a node with; 0 on the border, which stays."""
+    for i in range(factor.size):
+        cut = step * erodibility[i] * powers[drained[i]] / distance[i]
+        factor[i] = cut if receiver[i] != i else 0.0
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _cut(order, receiver, factor, ground):
+    """Ground after one implicit step of stream power, from the border upstream."""
+    for k in range(order.size - 1, -1, -1):
+        i = order[k]
+        ground[i] = (ground[i] + factor[i] * ground[receiver[i]]) / (1.0 + factor[i])
+
+
+@njit(nogil=True, cache=True)
+def _creep(ground, share, uplift, new):
     new[:] = ground
-    for y in range(1, size - 1):
-        for x in range(1, size - 1):
-            i = y * size + x
-            around = ground[i - 1] + ground[i + 1] + ground[i - size] + ground[i + size]
-            new[i] = ground[i] + share * (around - 4.0 * ground[i]) + uplift
+    for y in range(1, ground.shape[0] - 1):
+        north, row, south, out = ground[y - 1], ground[y], ground[y + 1], new[y]
+        for x in range(1, row.size - 1):
+            around = row[x - 1] + row[x + 1] + north[x] + south[x]
+            out[x] = row[x] + share * (around - 4.0 * row[x]) + uplift
