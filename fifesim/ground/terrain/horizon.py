@@ -1,5 +1,6 @@
 """Horizons: how far up from the horizontal the terrain around a cell reaches, in every direction."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -142,11 +143,9 @@ def horizon_tangent(dem, cell_y, cell_x, directions, reach):
     """
     dem = np.ascontiguousarray(dem, float)
     rows, columns = horizon_margin(cell_y, cell_x, reach)
-    rays = [_samples(azimuth, cell_y, cell_x, reach) for azimuth in np.radians(np.asarray(directions, float))]
-    first, second, share, per_metre = (np.concatenate(each) for each in zip(*rays, strict=True))
-    ends = np.cumsum([0, *(len(ray[0]) for ray in rays)])
-    out = np.zeros((len(rays), dem.shape[0] - 2 * rows, dem.shape[1] - 2 * columns))
-    _march(dem, _Rays(ends, first, second, share, per_metre), rows, columns, out)
+    rays = _rays(tuple(np.asarray(directions, float).tolist()), float(cell_y), float(cell_x), float(reach))
+    out = np.zeros((rays.ends.size - 1, dem.shape[0] - 2 * rows, dem.shape[1] - 2 * columns))
+    _march(dem, rays, rows, columns, out)
     return out
 
 
@@ -187,6 +186,14 @@ def tangent(zenith):
     [1.0, 0.0, 0.0]
     """
     return np.tan(np.radians(np.fmax(90 - np.asarray(zenith, float), 0.0)))
+
+
+# The chunks of a raster have the same.
+@lru_cache(maxsize=16)
+def _rays(directions, cell_y, cell_x, reach):
+    rays = [_samples(azimuth, cell_y, cell_x, reach) for azimuth in np.radians(directions)]
+    ends = np.cumsum([0, *(len(ray[0]) for ray in rays)])
+    return _Rays(ends, *(np.concatenate(each) for each in zip(*rays, strict=True)))
 
 
 def _samples(azimuth, cell_y, cell_x, reach):
