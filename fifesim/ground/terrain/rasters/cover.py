@@ -69,7 +69,8 @@ def known_cells(model, shape):
     for top in range(0, shape[0], _PART):
         for left in range(0, shape[1], _PART):
             part = known[top : top + _PART, left : left + _PART]
-            part[:] = _looked_at(model, *(first + np.arange(size) for first, size in zip((top, left), part.shape, strict=True)))
+            height, width = part.shape
+            part[:] = _looked_at(model, top + np.arange(height), left + np.arange(width))
     return known
 
 

@@ -87,8 +87,8 @@ def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None, 
     Returns
     -------
     dem : xarray.DataArray, dims (y, x)
-        In memory without chunks. Its cells are whole multiples of the grid's, from the grid's corner; it reaches up to the margin and
-        as far as the model does. NaN where unknown. [m]
+        In memory without chunks. Its cells are whole multiples of the grid's, from the grid's corner; it reaches up to
+        the margin and as far as the model does. NaN where unknown. [m]
     reach : dict of str to float
         How far the elevation is known without a gap beside all of the ``north``, ``east``, ``south`` and ``west`` side
         of the grid, up to the margin. [m]
