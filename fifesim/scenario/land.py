@@ -55,8 +55,8 @@ def elevation(scenario, grid, chunks=None):
     else:
         options = {"fill": terrain.fill, "vertical_units": terrain.vertical_units}
         dem = fine_dem(terrain.dem, grid, chunks=chunks, **options)
-        around, reach = source_dem(terrain.dem, grid, terrain.horizon_reach, **options)
-        middle, around = around[_middle(around.shape)], around.chunk(_AROUND_CHUNK)
+        around, reach = source_dem(terrain.dem, grid, terrain.horizon_reach, chunks="auto", **options)
+        middle = around[_middle(around.shape)].compute()
     horizon = sky_raster.horizon(around, reach=terrain.horizon_reach, beside=dem)
     _check_sun(middle, around, horizon, scenario.sun_and_view())
     return dem, horizon, reach

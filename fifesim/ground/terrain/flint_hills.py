@@ -11,6 +11,7 @@ the roughness of a real model.
 from functools import lru_cache, partial
 
 import numpy as np
+from numba import njit
 from scipy.interpolate import PchipInterpolator
 
 from fifesim.base.seeds import generator
@@ -112,12 +113,14 @@ def _bent_uplands(seed, south, east):
     along = along - SHIFTS[line % SHIFTS.size]
     place = np.floor(along).astype(int)
     out = np.empty(along.shape)
-    for number in np.unique(line):
-        for column in np.unique(place[line == number]):
-            here = (line == number) & (place == column)
-            rows = (across[here] - number) * (NODES - 1) + REACH
-            columns = (along[here] - column) * (NODES - 1) + REACH
-            out[here] = spline_points(upland(seed, int(number), int(column)), rows[None], columns[None])[0]
+    for number in range(line.min(), line.max() + 1):
+        between = line == number
+        for column in range(place.min(), place.max() + 1):
+            here = np.nonzero(between & (place == column))
+            if here[0].size:
+                rows = (across[here] - number) * (NODES - 1) + REACH
+                columns = (along[here] - column) * (NODES - 1) + REACH
+                out[here] = spline_points(upland(seed, number, column), rows[None], columns[None])[0]
     return out + BASE_NOISE[0] * smooth_noise(seed, _LEVEL, BASE_NOISE[1], south, east)
 
 
@@ -127,9 +130,24 @@ def _detail(seed, south, east, ground):
         ground = ground + size * smooth_noise(seed, _ROUGH + k, step, south, east)
     for k, (height, share) in enumerate(BENCHES):
         clear = np.clip(0.5 + 0.5 * smooth_noise(seed, _BENCH + k, BENCH_NOISE, south, east), 0, 1)
-        turn = 2 * np.pi / height
-        ground = ground + share / turn * clear * np.sin(turn * ground)
+        _add_bench(ground, clear, height, share)
     return ground
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _add_bench(ground, clear, height, share):
+    """Ground with a sine of itself that changes its slope by a share where it is clear."""
+    ground, clear = ground.ravel(), clear.ravel()
+    for i in range(ground.size):
+        turns = ground[i] / height
+        turns -= np.rint(turns)
+        # The same sine, nearer to 0.
+        turns = turns if abs(turns) <= 0.25 else np.copysign(0.5, turns) - turns
+        angle, series = 2 * np.pi * turns, 1.0
+        # Its series as a product, to the last digit at a right angle.
+        for k in range(20, 0, -2):
+            series = 1 - angle * angle * (1 / (k * (k + 1))) * series
+        ground[i] += share * (height / (2 * np.pi)) * clear[i] * angle * series
 
 
 def hypsometry(eroded):
@@ -147,4 +165,9 @@ def hypsometry(eroded):
         A rising function: valleys keep falling. Beyond the table it goes on in a line of a fifth of the slope there.
     """
     low, high = eroded.clip(max=_ERODED[0]) - _ERODED[0], eroded.clip(min=_ERODED[-1]) - _ERODED[-1]
-    return PchipInterpolator(_ERODED, _WATERSHED)(eroded.clip(_ERODED[0], _ERODED[-1])) + 0.2 * (low + high)
+    return _survey()(eroded.clip(_ERODED[0], _ERODED[-1])) + 0.2 * (low + high)
+
+
+@lru_cache(maxsize=1)
+def _survey():
+    return PchipInterpolator(_ERODED, _WATERSHED)

@@ -1,5 +1,6 @@
 """Horizons: how far up from the horizontal the terrain around a cell reaches, in every direction."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,8 @@ _FINENESS = 32
 class _Rays(NamedTuple):
     """Samples along rays, one ray after the other."""
 
-    ends: np.ndarray  # of each ray among all samples, beginning with 0
-    first: np.ndarray  # row and column of the cell before a sample of the first cell
+    ends: np.ndarray  # of each ray among all samples, an even number of which it has, beginning with 0
+    first: np.ndarray  # rows and columns from a cell to that before a sample
     second: np.ndarray  # and of that after it
     share: np.ndarray  # of the second [1]
     per_metre: np.ndarray  # inverse distance [m-1]
@@ -142,11 +143,9 @@ def horizon_tangent(dem, cell_y, cell_x, directions, reach):
     """
     dem = np.ascontiguousarray(dem, float)
     rows, columns = horizon_margin(cell_y, cell_x, reach)
-    rays = [_samples(azimuth, cell_y, cell_x, reach) for azimuth in np.radians(np.asarray(directions, float))]
-    first, second, share, per_metre = (np.concatenate(each) for each in zip(*rays, strict=True))
-    ends = np.cumsum([0, *(len(ray[0]) for ray in rays)])
-    out = np.zeros((len(rays), dem.shape[0] - 2 * rows, dem.shape[1] - 2 * columns))
-    _march(dem, _Rays(ends, first + (rows, columns), second + (rows, columns), share, per_metre), rows, columns, out)
+    rays = _rays(tuple(np.asarray(directions, float).tolist()), float(cell_y), float(cell_x), float(reach))
+    out = np.zeros((rays.ends.size - 1, dem.shape[0] - 2 * rows, dem.shape[1] - 2 * columns))
+    _march(dem, rays, rows, columns, out)
     return out
 
 
@@ -189,6 +188,14 @@ def tangent(zenith):
     return np.tan(np.radians(np.fmax(90 - np.asarray(zenith, float), 0.0)))
 
 
+# The chunks of a raster have the same.
+@lru_cache(maxsize=16)
+def _rays(directions, cell_y, cell_x, reach):
+    rays = [_samples(azimuth, cell_y, cell_x, reach) for azimuth in np.radians(directions)]
+    ends = np.cumsum([0, *(len(ray[0]) for ray in rays)])
+    return _Rays(ends, *(np.concatenate(each) for each in zip(*rays, strict=True)))
+
+
 def _samples(azimuth, cell_y, cell_x, reach):
     """Where a ray is sampled: two cells (rows, columns away), the share of the second, and 1 / distance [1/m]."""
     down, right = -np.cos(azimuth) / cell_y, np.sin(azimuth) / cell_x
@@ -197,6 +204,8 @@ def _samples(azimuth, cell_y, cell_x, reach):
     steps = [1]
     while steps[-1] + max(1, steps[-1] // _FINENESS) <= reach * major + 1e-9:
         steps.append(steps[-1] + max(1, steps[-1] // _FINENESS))
+    # They are taken by twos; the last one twice changes nothing.
+    steps += steps[-1:] * (len(steps) % 2)
     k = np.array(steps, float)
     # Rounded, so that a ray along an axis or a diagonal meets cells and not their neighbours by 1e-17.
     minor = np.round(k * ((down if along_columns else right) / major), 9)
@@ -210,14 +219,32 @@ def _samples(azimuth, cell_y, cell_x, reach):
 
 @njit(nogil=True, cache=True)
 def _march(dem, rays, top, left, out):
+    cells, columns, width = dem.ravel(), out.shape[2], dem.shape[1]
+    # How far the cells of a sample lie from that of the ray, row after row.
+    first = rays.first[:, 0] * width + rays.first[:, 1]
+    second = rays.second[:, 0] * width + rays.second[:, 1]
     for direction in range(out.shape[0]):
         for i in range(out.shape[1]):
-            line, here = out[direction, i], dem[top + i, left:]
-            for n in range(rays.ends[direction], rays.ends[direction + 1]):
-                first = dem[i + rays.first[n, 0], rays.first[n, 1] :]
-                second = dem[i + rays.second[n, 0], rays.second[n, 1] :]
-                share, per_metre = rays.share[n], rays.per_metre[n]
-                for j in range(line.size):
-                    rise = (first[j] + share * (second[j] - first[j]) - here[j]) * per_metre
-                    # False for NaN: what is not known is open.
-                    line[j] = rise if rise > line[j] else line[j]
+            start = (top + i) * width + left
+            here = cells[start : start + columns]
+            for n in range(rays.ends[direction], rays.ends[direction + 1], 2):
+                a, b = start + first[n], start + second[n]
+                c, d = start + first[n + 1], start + second[n + 1]
+                _raise_horizon(
+                    (cells[a : a + columns], cells[b : b + columns], rays.share[n], rays.per_metre[n]),
+                    (cells[c : c + columns], cells[d : d + columns], rays.share[n + 1], rays.per_metre[n + 1]),
+                    here, out[direction, i],
+                )  # fmt: skip
+
+
+@njit(nogil=True, cache=True)
+def _raise_horizon(near, far, here, line):
+    """Horizon of a row of cells with two more samples of their rays: elevations beside, share, 1 / distance."""
+    first, second, share, per_metre = near
+    far_first, far_second, far_share, far_per_metre = far
+    for j in range(line.size):
+        rise = (first[j] + share * (second[j] - first[j]) - here[j]) * per_metre
+        # False for NaN: what is not known is open.
+        horizon = rise if rise > line[j] else line[j]
+        rise = (far_first[j] + far_share * (far_second[j] - far_first[j]) - here[j]) * far_per_metre
+        line[j] = rise if rise > horizon else horizon

@@ -251,30 +251,31 @@ def _setting(cell, geometry):
     return _Setting(sun, sun_tangent, view, 0.5 / cell_y, 0.5 / cell_x)
 
 
-@njit(nogil=True, cache=True)
+# Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once.
+@njit(nogil=True, cache=True, error_model="numpy")
 def _slope_light(dem, sky, setting, light):
-    above = np.empty((4, sky.layers.shape[2]))
+    columns = light.cosine.shape[1]
+    above, below, gradient = np.empty((4, columns)), np.empty((4, columns)), np.empty((2, columns))
     for i in range(light.cosine.shape[0]):
-        _between_rows(sky, i, above)
+        _sky_beside(sky, i, above, below)
+        _gradient_of_row(dem[i], dem[i + 1], dem[i + 2], setting, gradient[0], gradient[1])
         line = SlopeLight(light.cosine[i], light.sky_view[i], light.mu_s_local[i], light.upwelling[i])
-        _light_of_row(dem, i, above, sky, setting, line)
+        _light_of_row(gradient[0], gradient[1], above, below, sky.row_share[i], setting, line)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _slope_reflectance(rho, dem, sky, setting, direct, total, upwelling, out):
-    above, columns = np.empty((4, sky.layers.shape[2])), out.shape[2]
+    columns = out.shape[2]
+    above, below, gradient = np.empty((4, columns)), np.empty((4, columns)), np.empty((2, columns))
     line = SlopeLight(np.empty(columns), np.empty(columns), np.empty(columns), np.empty(columns))
     for i in range(out.shape[1]):
-        _between_rows(sky, i, above)
-        _light_of_row(dem, i, above, sky, setting, line)
+        _sky_beside(sky, i, above, below)
+        _gradient_of_row(dem[i], dem[i + 1], dem[i + 2], setting, gradient[0], gradient[1])
+        _light_of_row(gradient[0], gradient[1], above, below, sky.row_share[i], setting, line)
+        if not upwelling:
+            line.upwelling[:] = 1.0
         for band in range(out.shape[0]):
-            for j in range(columns):
-                sky_view = line.sky_view[j]
-                factor = topographic_factor(
-                    sky_view, terrain_view(sky_view, line.cosine[j]), rho[band, i, j], line.mu_s_local[j],
-                    setting.sun.z, direct[band], total[band],
-                )  # fmt: skip
-                out[band, i, j] = rho[band, i, j] * factor * (line.upwelling[j] if upwelling else 1.0)
+            _reflectance_of_row(rho[band, i], line, setting.sun.z, direct[band], total[band], out[band, i])
 
 
 @register_jitable
@@ -282,36 +283,56 @@ def _between(before, after, share):
     return (1 - share) * before + share * after
 
 
-@njit(nogil=True, cache=True)
-def _between_rows(sky, i, out):
-    """The sky of one row of cells, at the columns of places."""
-    row, share = sky.row[i], sky.row_share[i]
-    after = min(row + 1, sky.layers.shape[1] - 1)
+@njit(nogil=True, cache=True, error_model="numpy")
+def _sky_beside(sky, i, above, below):
+    """The sky of the rows of places above and below a row of cells, at its columns; those of the row before stay."""
+    row, last = sky.row[i], sky.layers.shape[1] - 1
+    if i > 0 and row == sky.row[i - 1]:
+        return
+    if i > 0 and row == sky.row[i - 1] + 1:
+        above[:] = below
+    else:
+        _sky_of_places(sky, row, above)
+    _sky_of_places(sky, min(row + 1, last), below)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _sky_of_places(sky, row, out):
+    last = sky.layers.shape[2] - 1
     for layer in range(out.shape[0]):
+        places = sky.layers[layer, row]
         for j in range(out.shape[1]):
-            out[layer, j] = _between(sky.layers[layer, row, j], sky.layers[layer, after, j], share)
+            before = sky.column[j]
+            out[layer, j] = _between(places[before], places[min(before + 1, last)], sky.column_share[j])
 
 
-@njit(nogil=True, cache=True)
-def _light_of_row(dem, i, above, sky, setting, light):
-    last = above.shape[1] - 1
-    for j in range(light.cosine.size):
-        here = dem[i + 1, j + 1]
-        if np.isnan(here):
-            light.cosine[j] = light.sky_view[j] = light.mu_s_local[j] = light.upwelling[j] = np.nan
-            continue
-        east = rise(dem[i + 1, j], here, dem[i + 1, j + 2]) * setting.per_x
-        north = rise(dem[i + 2, j + 1], here, dem[i, j + 1]) * setting.per_y
-        before, share = sky.column[j], sky.column_share[j]
-        after = min(before + 1, last)
+@njit(nogil=True, cache=True, error_model="numpy")
+def _gradient_of_row(above, here, below, setting, east, north):
+    """Rise of one row of cells from its elevation and that of its neighbours, each with a margin of one cell."""
+    for j in range(east.size):
+        rising = rise(here[j], here[j + 1], here[j + 2]) * setting.per_x
+        east[j] = np.nan if np.isnan(here[j + 1]) else rising
+        north[j] = rise(below[j + 1], here[j + 1], above[j + 1]) * setting.per_y
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _light_of_row(east, north, above, below, share, setting, light):
+    for j in range(east.size):
         seen = Vector(
-            _between(above[0, before], above[0, after], share),
-            _between(above[1, before], above[1, after], share),
-            _between(above[2, before], above[2, after], share),
+            _between(above[0, j], below[0, j], share),
+            _between(above[1, j], below[1, j], share),
+            _between(above[2, j], below[2, j], share),
         )
-        horizon = _between(above[3, before], above[3, after], share)
-        mu_s = along_normal(setting.sun, east, north)
-        light.cosine[j] = slope_cosine(east, north)
-        light.sky_view[j] = sky_factor(seen, east, north)
-        light.mu_s_local[j] = mu_s if mu_s > 0 and horizon <= setting.sun_tangent else 0.0
-        light.upwelling[j] = upwelling_factor(along_normal(setting.sensor, east, north), setting.sensor.z)
+        lit = _between(above[3, j], below[3, j], share) <= setting.sun_tangent
+        light.cosine[j] = slope_cosine(east[j], north[j])
+        light.sky_view[j] = sky_factor(seen, east[j], north[j])
+        light.mu_s_local[j] = np.maximum(along_normal(setting.sun, east[j], north[j]), 0.0) * lit
+        light.upwelling[j] = upwelling_factor(along_normal(setting.sensor, east[j], north[j]), setting.sensor.z)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _reflectance_of_row(rho, light, mu_s, direct, total, out):
+    for j in range(out.size):
+        land = terrain_view(light.sky_view[j], light.cosine[j])
+        kt = topographic_factor(light.sky_view[j], land, rho[j], light.mu_s_local[j], mu_s, direct, total)
+        out[j] = rho[j] * kt * light.upwelling[j]

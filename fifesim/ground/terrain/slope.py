@@ -35,11 +35,9 @@ def rise(low, here, high):
     >>> rise(0.0, 1.0, 5.0), rise(np.nan, 1.0, 5.0), rise(np.nan, 1.0, np.nan)
     (5.0, 8.0, 0.0)
     """
-    if np.isnan(low):
-        low = 2 * here - high
-    elif np.isnan(high):
-        high = 2 * here - low
-    return 0.0 if np.isnan(high - low) else high - low
+    before = 2 * here - high if np.isnan(low) else low
+    after = 2 * here - low if np.isnan(high) else high
+    return 0.0 if np.isnan(after - before) else after - before
 
 
 def gradient(dem, cell_y, cell_x, rows=None, columns=None):

@@ -66,24 +66,25 @@ def spline_grid(coefficients, rows, columns):
     values : array, shape (rows, columns)
     """
     across = np.empty((coefficients.shape[0], columns.size))
-    weights = np.empty(6)
+    weights = np.empty((columns.size, 6))
+    first = np.empty(columns.size, np.int64)
     for j in range(columns.size):
-        first = int(np.floor(columns[j])) - 2
-        _weights(columns[j] - np.floor(columns[j]), weights)
-        for i in range(coefficients.shape[0]):
-            total = 0.0
-            for k in range(6):
-                total += weights[k] * coefficients[i, first + k]
-            across[i, j] = total
-    out = np.empty((rows.size, columns.size))
-    for i in range(rows.size):
-        first = int(np.floor(rows[i])) - 2
-        _weights(rows[i] - np.floor(rows[i]), weights)
+        first[j] = int(np.floor(columns[j])) - 2
+        _weights(columns[j] - np.floor(columns[j]), weights[j])
+    for i in range(coefficients.shape[0]):
         for j in range(columns.size):
-            total = 0.0
-            for k in range(6):
-                total += weights[k] * across[first + k, j]
-            out[i, j] = total
+            c, w = coefficients[i, first[j] : first[j] + 6], weights[j]
+            across[i, j] = w[0] * c[0] + w[1] * c[1] + w[2] * c[2] + w[3] * c[3] + w[4] * c[4] + w[5] * c[5]
+    out = np.empty((rows.size, columns.size))
+    w = np.empty(6)
+    for i in range(rows.size):
+        top = int(np.floor(rows[i])) - 2
+        _weights(rows[i] - np.floor(rows[i]), w)
+        a, b, c = across[top], across[top + 1], across[top + 2]
+        d, e, f = across[top + 3], across[top + 4], across[top + 5]
+        u, v, x, y, z, q = w[0], w[1], w[2], w[3], w[4], w[5]
+        for j in range(columns.size):
+            out[i, j] = u * a[j] + v * b[j] + x * c[j] + y * d[j] + z * e[j] + q * f[j]
     return out
 
 

@@ -45,23 +45,22 @@ def erode(start, erodibility, preference, law):
     [Braun2013]_
     """
     size, step = start.shape[0], 1.0 / law.steps
-    ground, new, area = start.copy().ravel(), np.empty(size * size), np.empty(size * size)
-    rock, distance = erodibility.ravel(), np.ones(size * size)
+    ground, new = start.copy().ravel(), np.empty(size * size)
     receiver, order = np.empty(size * size, np.int32), np.empty(size * size, np.int32)
+    drained, distance = np.empty(size * size, np.int32), np.ones(size * size)
+    # Powers of areas, which are whole numbers of nodes; 0 where none has been asked for.
+    powers, factor = np.zeros(size * size + 1), np.empty(size * size)
     # The explicit scheme is stable below a quarter.
     parts = int(law.creep * step / law.node**2 / 0.2) + 1
     share = law.creep * step / law.node**2 / parts
     for _ in range(law.steps):
         _receivers(ground, preference, size, law.node, receiver, distance)
-        _downstream_first(receiver, order)
-        _drain(receiver, order, law.node**2, area)
-        for k in range(size * size):
-            i = order[k]
-            if receiver[i] != i:
-                factor = step * rock[i] * area[i] ** law.area_exponent / distance[i]
-                ground[i] = (ground[i] + factor * ground[receiver[i]]) / (1.0 + factor)
+        _drain(receiver, order, drained)
+        _powers(drained, law.node**2, law.area_exponent, powers)
+        _factors(step, erodibility.ravel(), powers, drained, distance, receiver, factor)
+        _cut(order, receiver, factor, ground)
         for _ in range(parts):
-            _creep(ground, size, share, law.uplift * step / parts, new)
+            _creep(ground.reshape(size, size), share, law.uplift * step / parts, new.reshape(size, size))
             ground, new = new, ground
     return ground.reshape(size, size)
 
@@ -108,61 +107,82 @@ def _receivers(ground, preference, size, node, receiver, distance):
     """Where each node drains to: the neighbour down the steepest way, some being preferred; itself on the border."""
     for i in range(size * size):
         receiver[i] = i
+    steepest = np.empty(size - 2)
     for y in range(1, size - 1):
-        for x in range(1, size - 1):
-            i = y * size + x
-            steepest, k = 0.0, 0
-            for a in range(-1, 2):
-                for b in range(-1, 2):
-                    if a == 0 and b == 0:
-                        continue
-                    j = i + a * size + b
-                    length = node * (np.sqrt(2.0) if a * b != 0 else 1.0)
-                    slope = (ground[i] - ground[j]) / length * preference[k, i]
-                    k += 1
-                    if slope > steepest:
-                        steepest = slope
-                        receiver[i], distance[i] = j, length
+        first = y * size + 1
+        here, to = ground[first : first + size - 2], receiver[first : first + size - 2]
+        far = distance[first : first + size - 2]
+        steepest[:] = 0.0
+        k = 0
+        # Neighbour by neighbour and not node by node: each is a line of nodes without branches.
+        for a in range(-1, 2):
+            for b in range(-1, 2):
+                if a == 0 and b == 0:
+                    continue
+                j = first + a * size + b
+                there, liked = ground[j : j + size - 2], preference[k, first : first + size - 2]
+                length = node * (np.sqrt(2.0) if a * b != 0 else 1.0)
+                for x in range(size - 2):
+                    slope = (here[x] - there[x]) / length * liked[x]
+                    steeper = slope > steepest[x]
+                    steepest[x] = slope if steeper else steepest[x]
+                    to[x] = np.int32(j + x) if steeper else to[x]
+                    far[x] = length if steeper else far[x]
+                k += 1
 
 
 @njit(nogil=True, cache=True)
-def _downstream_first(receiver, order):
-    """Order of nodes in which each comes after the one that it drains to."""
-    child, sibling = np.full(receiver.size, -1), np.empty(receiver.size, np.int64)
+def _drain(receiver, order, drained):
+    """Order of nodes in which each comes before the one that it drains to, and the nodes that drain through each."""
+    above = np.zeros(receiver.size, np.int32)
     for i in range(receiver.size):
-        if receiver[i] != i:
-            sibling[i] = child[receiver[i]]
-            child[receiver[i]] = i
+        above[receiver[i]] += receiver[i] != i
+    drained[:] = 1
+    # Sources, then whatever all water has come to that flows into it. An entry stays if the count goes on past it:
+    # a branch would be guessed wrongly at every other node.
     filled = 0
     for i in range(receiver.size):
-        if receiver[i] == i:
-            done = filled
-            order[filled] = i
-            filled += 1
-            while done < filled:
-                other = child[order[done]]
-                while other >= 0:
-                    order[filled] = other
-                    filled += 1
-                    other = sibling[other]
-                done += 1
+        order[filled] = i
+        filled += above[i] == 0
+    for done in range(receiver.size):
+        i = order[done]
+        into = receiver[i]
+        drained[into] += drained[i] if into != i else 0
+        above[into] -= 1
+        if filled < receiver.size:
+            order[filled] = into
+            filled += above[into] == 0
 
 
 @njit(nogil=True, cache=True)
-def _drain(receiver, order, own, area):
-    """Area that drains through each node, its own with it."""
-    area[:] = own
+def _powers(drained, own, exponent, powers):
+    """Powers of the areas of so many nodes, those that are not known yet."""
+    for i in range(drained.size):
+        if powers[drained[i]] == 0.0:
+            powers[drained[i]] = (drained[i] * own) ** exponent
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _factors(step, erodibility, powers, drained, distance, receiver, factor):
+    """What the implicit step weighs the receiver of a node with; 0 on the border, which stays."""
+    for i in range(factor.size):
+        cut = step * erodibility[i] * powers[drained[i]] / distance[i]
+        factor[i] = cut if receiver[i] != i else 0.0
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _cut(order, receiver, factor, ground):
+    """Ground after one implicit step of stream power, from the border upstream."""
     for k in range(order.size - 1, -1, -1):
         i = order[k]
-        if receiver[i] != i:
-            area[receiver[i]] += area[i]
+        ground[i] = (ground[i] + factor[i] * ground[receiver[i]]) / (1.0 + factor[i])
 
 
 @njit(nogil=True, cache=True)
-def _creep(ground, size, share, uplift, new):
+def _creep(ground, share, uplift, new):
     new[:] = ground
-    for y in range(1, size - 1):
-        for x in range(1, size - 1):
-            i = y * size + x
-            around = ground[i - 1] + ground[i + 1] + ground[i - size] + ground[i + size]
-            new[i] = ground[i] + share * (around - 4.0 * ground[i]) + uplift
+    for y in range(1, ground.shape[0] - 1):
+        north, row, south, out = ground[y - 1], ground[y], ground[y + 1], new[y]
+        for x in range(1, row.size - 1):
+            around = row[x - 1] + row[x + 1] + north[x] + south[x]
+            out[x] = row[x] + share * (around - 4.0 * row[x]) + uplift

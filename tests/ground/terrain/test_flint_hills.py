@@ -158,3 +158,13 @@ def test_hypsometry_is_the_survey_at_its_quantiles_and_a_line_beyond():
     lowest, highest = flint_hills.hypsometry(np.array([322.1, 1108.3]))
     assert (lowest, highest) == (334.0, 443.5)
     np.testing.assert_allclose(flint_hills.hypsometry(np.array([302.1, 1158.3])), [330.0, 453.5], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("height", "share"), flint_hills.BENCHES)
+def test_benches_are_sines_of_the_ground(height, share):
+    ground = np.random.default_rng(2).uniform(300, 500, (40, 50))
+    ground[0, :4] = height * np.array([30, 30.25, 30.5, 30.75])
+    clear, found = np.random.default_rng(3).uniform(0, 1, ground.shape), ground.copy()
+    flint_hills._add_bench(found, clear, height, share)
+    turn = 2 * np.pi / height
+    np.testing.assert_allclose(found, ground + share / turn * clear * np.sin(turn * ground), rtol=0, atol=1e-12)

@@ -41,6 +41,24 @@ def test_sky_factor_is_doziers_integral(seed):
     np.testing.assert_allclose(sky_of(slope, aspect, horizon), expected, rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("steepest", [30.0, 75.0, 89.0])
+def test_arcs_of_every_length_are_lamberts(steepest):
+    """Horizons that leap, so that an arc is up to a right angle long, by their angles and normals one by one."""
+    rng, count = np.random.default_rng(3), 16
+    tangents = np.tan(np.radians(rng.uniform(0, steepest, (count, 50))))
+    tangents[:, 0] = np.where(np.arange(count) % 2, np.tan(np.radians(steepest)), 0.0)
+    directions = np.arange(count) * (360 / count)
+    expected = np.zeros((3, 50))
+    for cell in range(50):
+        edge = [(*np.sin(np.radians((a, 90 - a))), t) for a, t in zip(directions, tangents[:, cell], strict=True)]
+        for a, b in zip(edge, edge[1:] + edge[:1], strict=True):
+            normal = np.cross(b, a)
+            sine = np.linalg.norm(normal)
+            expected[:, cell] += np.arctan2(sine, np.dot(a, b)) * normal / sine / (2 * np.pi)
+    found = sky_vector(tangents, directions, np.zeros(50), np.zeros(50))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=3e-14)
+
+
 @pytest.mark.parametrize("wall", [5.0, 20.0, 45.0])
 def test_bottom_of_a_v_valley_sees_what_its_walls_leave(wall):
     """Across a long valley Vd is half the sum of the sines from the normal to the two limits of the sky."""

@@ -67,3 +67,37 @@ def test_preferred_neighbour_takes_the_water():
     factor = 0.02 * law.node / (law.node * np.sqrt(2))
     # The corner node drains to the border, and nothing through it.
     assert found[5, 1] == pytest.approx((plane[5, 1] + factor * found[4, 2]) / (1 + factor), rel=1e-12)
+
+
+def test_water_that_joins_cuts_with_the_area_of_all_that_comes():
+    """Two lines of unlike length meet in a third: areas of nodes that drain through it, not of the longest way."""
+    size, law, rock = 9, LAW._replace(steps=1, uplift=0.0), 0.02
+    ground = np.full((size, size), 100.0)
+    ground[:, 0] = 0.0
+    # Down along row 4; from the north three nodes of column 4 and from the south one flow into it.
+    ground[4, 1:5] = [10.0, 20.0, 30.0, 40.0]
+    ground[1:4, 4] = [70.0, 60.0, 50.0]
+    ground[5, 4] = 55.0
+    liked = without_preference(size)
+    found = erode(ground, np.full((size, size), rock), liked, law)
+    drained = _drained_by_hand(ground, law.node)
+    factor = rock * np.sqrt(drained[4, 1] * law.node**2) / law.node
+    assert drained[4, 1] > 8
+    assert found[4, 1] == pytest.approx((10.0 + factor * 0.0) / (1 + factor), rel=1e-12)
+
+
+def _drained_by_hand(ground, node):
+    """Nodes that drain through each, by following every one of them down."""
+    size, drained = ground.shape[0], np.zeros(ground.shape, int)
+    around = [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1) if a or b]
+    for i in range(1, size - 1):
+        for j in range(1, size - 1):
+            y, x = i, j
+            while 0 < y < size - 1 and 0 < x < size - 1:
+                drained[y, x] += 1
+                falls = [(ground[y, x] - ground[y + a, x + b]) / (node * np.hypot(a, b)) for a, b in around]
+                if max(falls) <= 0:
+                    break
+                a, b = around[int(np.argmax(falls))]
+                y, x = y + a, x + b
+    return drained

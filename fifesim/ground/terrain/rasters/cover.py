@@ -15,6 +15,9 @@ from fifesim.rasters.whereabouts import lies_in_words
 _LOOKS = 2000
 _STRIP = 256
 
+# Of what is looked at cell by cell, so many rows and columns at a time.
+_PART = 512
+
 # A model that ends this far inside the grid is better exchanged than carried on. [m]
 _NEAR = 150
 
@@ -48,6 +51,36 @@ def known_elevation(model, make_tile, first_row, first_column, shape):
     return values
 
 
+def known_cells(model, shape):
+    """
+    Whether elevations of a model's grid are known, from a look at its source by parts.
+
+    Parameters
+    ----------
+    model : fifesim.ground.terrain.rasters.model.Model
+    shape : (int, int)
+        Of the grid.
+
+    Returns
+    -------
+    known : array of bool, shape (rows, columns)
+    """
+    known = np.empty(shape, bool)
+    for top in range(0, shape[0], _PART):
+        for left in range(0, shape[1], _PART):
+            part = known[top : top + _PART, left : left + _PART]
+            height, width = part.shape
+            part[:] = _looked_at(model, top + np.arange(height), left + np.arange(width))
+    return known
+
+
+def _looked_at(model, rows, columns):
+    """Whether some rows and columns of a model's grid are known."""
+    rows, columns = model.place.positions(rows, columns)
+    top, left, height, width = model.window(rows, columns)
+    return looked_up(np.isfinite(model.read(top, left, height, width)), rows - top, columns - left)
+
+
 def check_cover(model, grid):
     """
     Refuse a model that lacks what a grid needs, before anything is made of it.
@@ -69,9 +102,7 @@ def check_cover(model, grid):
     ]
     unknown = []
     for first in range(0, looks[0].size, _STRIP):
-        rows, columns = model.place.positions(looks[0][first : first + _STRIP], looks[1])
-        top, left, height, width = model.window(rows, columns)
-        unknown.append(~looked_up(np.isfinite(model.read(top, left, height, width)), rows - top, columns - left))
+        unknown.append(~_looked_at(model, looks[0][first : first + _STRIP], looks[1]))
     unknown = np.concatenate(unknown)
     if unknown.any():
         _raise_for_gaps(model, grid, unknown, *looks)

@@ -10,7 +10,7 @@ import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
-from fifesim.ground.terrain.rasters.cover import check_cover, known_elevation, warn_of_terraces
+from fifesim.ground.terrain.rasters.cover import check_cover, known_cells, known_elevation, warn_of_terraces
 from fifesim.ground.terrain.rasters.model import TILE, Model, model_under
 from fifesim.ground.terrain.rasters.source import placement
 from fifesim.rasters import cf, places
@@ -80,7 +80,7 @@ def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=Non
     return cf.label(out, "dem", history=history, source_resolution=model.resolution)
 
 
-def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None, allow_remote=False):
+def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None, chunks=None, allow_remote=False):
     """
     Elevation model around a grid, at about its own resolution; for horizons.
 
@@ -90,12 +90,14 @@ def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None, 
         As in `fine_dem`.
     margin : float
         Distance from the grid that is wanted on each side. [m]
+    chunks : mapping or int or "auto", optional
+        Makes the result lazy; where the model ends is looked up at once.
 
     Returns
     -------
     dem : xarray.DataArray, dims (y, x)
-        In memory. Its cells are whole multiples of the grid's, from the grid's corner; it reaches up to the margin and
-        as far as the model does. NaN where unknown. [m]
+        In memory without chunks. Its cells are whole multiples of the grid's, from the grid's corner; it reaches up to
+        the margin and as far as the model does. NaN where unknown. [m]
     reach : dict of str to float
         How far the elevation is known without a gap beside all of the ``north``, ``east``, ``south`` and ``west`` side
         of the grid, up to the margin. [m]
@@ -119,18 +121,31 @@ def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None, 
     if isinstance(model.source.cells, da.Array):
         model = model.reading(model.source.cells.compute())
     model = replace(model, place=placement(model.source, coarse))
-    values = model.elevation(model.tiles(), 0, 0, tuple(coarse.shape))
-    if not np.isfinite(values).any():
+    values = model.elevation(model.tiles(), 0, 0, tuple(coarse.shape)) if chunks is None else None
+    known = known_cells(model, coarse.shape) if values is None else np.isfinite(values)
+    if not known.any():
         source = model.source
         raise ValueError(
             f"{source.name} does not reach the grid, which spans {grids.extent(grid)}: it spans "
             f"{lies_in_words(source.affine, source.shape, source.crs)}"
         )
-    reach = _reach(np.isfinite(values), around, grids.cell_size(coarse))
-    kept = _with_data(np.isfinite(values), around)
-    dem = grids.place(xr.DataArray(values[kept], dims=("y", "x")), coarse[kept])
+    reach = _reach(known, around, grids.cell_size(coarse))
+    kept = _with_data(known, around)
+    data = _in_chunks(model, coarse[kept], kept, chunks) if values is None else values[kept]
+    dem = grids.place(xr.DataArray(data, dims=("y", "x")), coarse[kept])
     history = f"source_dem: {model.source.name}, cells of {model.resolution:.4g} m, {margin:g} m around the grid"
     return cf.label(dem, "dem", history=history, source_resolution=model.resolution), reach
+
+
+def _in_chunks(model, grid, kept, chunks):
+    """Lazy elevation of a part of a model's grid. Horizons read chunks many times, which are made once for all."""
+    make_tile, (first_row, first_column) = model.tiles(), (part.start for part in kept)
+
+    def kernel(rows, columns):
+        shape = rows.stop - rows.start, columns.stop - columns.start
+        return model.elevation(make_tile, first_row + rows.start, first_column + columns.start, shape)
+
+    return chunking.windows(kernel, [], tuple(grid.shape), places.chunk_sizes(grid, chunks, tile=TILE))
 
 
 class _TileReads(NamedTuple):

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from uuid import uuid4
 
 import dask.array as da
 import numpy as np
@@ -29,12 +30,33 @@ LAND = (-500, 9000)
 _MOST_CELLS = 2**27
 
 
+class ByWindow:
+    """
+    Cells of a raster in memory, or opened and not read: then windows are read alone, and none is kept.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray, dims (y, x)
+    """
+
+    def __init__(self, raster):
+        self._cells, self._token = raster.variable, uuid4().hex
+        self.shape = raster.shape
+
+    def __getitem__(self, window):
+        return np.asarray(self._cells[window])
+
+    def __dask_tokenize__(self):
+        # A token of its cells would read them all.
+        return self._token
+
+
 @dataclass(frozen=True, eq=False)
 class Source:
     """An elevation model: what holds its cells, their size and place, and metres in one unit of theirs."""
 
     name: str
-    cells: RasterFile | np.ndarray | da.Array
+    cells: RasterFile | ByWindow | np.ndarray | da.Array
     shape: tuple[int, int]
     affine: Affine
     crs: pyproj.CRS
@@ -139,7 +161,8 @@ def _array_source(raster, vertical_units):
         raise ValueError(
             f"{name} holds packed values, scale {scale:g}, offset {offset:g}: open it with mask_and_scale=True"
         )
-    cells = raster.transpose(*raster.odc.spatial_dims).data
+    raster = raster.transpose(*raster.odc.spatial_dims)
+    cells = ByWindow(raster) if raster.chunks is None else raster.data
     nodata = raster.rio.nodata
     nodata = None if nodata is None or np.isnan(nodata) else float(nodata)
     source = Source(name, cells, cells.shape, found.affine, None, 1.0, nodata)

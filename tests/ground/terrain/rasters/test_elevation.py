@@ -78,6 +78,20 @@ def test_source_around_the_grid(path):
     assert dem.attrs["source_resolution"] == pytest.approx(30)
 
 
+@pytest.mark.parametrize("chunks", ["auto", {"y": 31, "x": 27}])
+def test_lazy_source_is_the_same_with_and_without_holes(tmp_path, chunks):
+    values, affine = model()
+    values[:, :15], values[3, 40] = np.nan, np.nan
+    for crs in (CRS, "EPSG:32614"):
+        where = write(tmp_path / "cut.tif", values, affine, crs)
+        for fill in (None, 60.0):
+            whole, reach = fifesim.source_dem(where, grid(), 6000.0, fill=fill)
+            with no_compute():
+                lazy, same_reach = fifesim.source_dem(where, grid(), 6000.0, fill=fill, chunks=chunks)
+            assert lazy.chunks is not None and reach == same_reach
+            xr.testing.assert_identical(lazy.compute(), whole)
+
+
 def test_source_reaches_as_far_as_its_data(tmp_path):
     values, affine = model()
     values[:, :15], values[3, 40] = np.nan, np.nan

@@ -1,5 +1,6 @@
 """Elevation models of any unit, orientation and coordinate reference system."""
 
+import tracemalloc
 import warnings
 
 import numpy as np
@@ -12,6 +13,8 @@ from elevations import AMPLITUDE, CRS, NORTH, WEST, grid, model, surface, truth,
 from lazy import no_compute
 
 import fifesim
+from fifesim.ground.terrain.rasters import source as sources
+from fifesim.ground.terrain.rasters.elevation import source_dem
 from fifesim.ground.terrain.rasters.source import open_source
 from fifesim.rasters import projection
 
@@ -115,3 +118,53 @@ def test_window_of_a_source_may_reach_beyond_it(path):
     np.testing.assert_array_equal(window[3:, :2], values[:5, -2:])
     assert np.isnan(window[:3]).all() and np.isnan(window[:, 2:]).all()
     assert np.isnan(source.read(rows + 5, 0, 3, 3)).all()
+
+
+@pytest.fixture(scope="module")
+def continent(tmp_path_factory):
+    """A file of 20,000 x 20,000 cells (1.6 GB) of which it holds those around the grid, and the first of these."""
+    where = tmp_path_factory.mktemp("continent") / "continent.tif"
+    values, affine = model(margin=1500.0)
+    first, count = 9984, 20_000
+    affine = affine @ Affine.translation(-first, -first)
+    profile = {"driver": "GTiff", "width": count, "height": count, "count": 1, "dtype": "float32", "nodata": -9999.0}
+    with rasterio.open(where, "w", crs=CRS, transform=affine, tiled=True, sparse_ok=True, **profile) as file:
+        file.write(values.astype("f4"), 1, window=rasterio.windows.Window(first, first, *values.shape[::-1]))
+    return where, first + 1500 // 30
+
+
+@pytest.mark.parametrize("margin", [None, 900.0])
+def test_no_more_of_a_file_is_read_than_lies_near_the_grid(continent, monkeypatch, margin):
+    """
+    Tiles of 504 fine cells are 56 of the model's, a spline looks 37 around, the look for terraces 237; with a margin
+    of 30, tiles are 504 of the model's.
+    """
+    (where, first), read = continent, []
+    windows = sources._file_window
+
+    def noted(file, rows, columns):
+        read.append((rows, columns))
+        return windows(file, rows, columns)
+
+    monkeypatch.setattr(sources, "_file_window", noted)
+    if margin is None:
+        dem = fifesim.fine_dem(where, grid(), chunks="auto").compute()
+        np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
+    else:
+        source_dem(where, grid(), margin)
+    around = max(56 + 37, 237) if margin is None else 30 + 504 + 37
+    outline = [(min(part.start for part in axis), max(part.stop for part in axis)) for axis in zip(*read, strict=True)]
+    assert all(first - around < start < first and first + 30 < stop < first + 30 + around for start, stop in outline)
+
+
+@pytest.mark.parametrize("opened", [str, rioxarray.open_rasterio], ids=["path", "opened, not read"])
+def test_large_model_is_never_held_whole(continent, opened):
+    raster = opened(continent[0])
+    tracemalloc.start()
+    try:
+        dem = fifesim.fine_dem(raster, grid(), chunks="auto").compute()
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    np.testing.assert_allclose(dem, truth(dem), rtol=0, atol=1e-3 * AMPLITUDE)
+    assert peak < 60e6
