@@ -1,7 +1,7 @@
 """Lazy arrays whose every block is one task, which gathers windows of others and hands them to a kernel."""
 
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import dask.array as da
@@ -21,7 +21,7 @@ class _Plan(NamedTuple):
     taken: tuple[tuple[slice, slice], ...]
 
 
-def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=float):
+def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=float, seams=((), ())):
     """
     Lazy array whose blocks are made by a kernel from windows of other lazy arrays.
 
@@ -44,6 +44,9 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
         Lengths of the axes of the result before y and x.
     dtype : dtype, optional
         Of the result.
+    seams : (sequence of int, sequence of int), optional
+        Rows and columns of the result at which windows come to lie within one chunk. Blocks are made in parts there,
+        so that only the windows of rims are put together, and others are views.
 
     Returns
     -------
@@ -55,13 +58,14 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
     starts = [[_starts(sizes) for sizes in array.chunks[-2:]] for array in arrays]
     for i, rows in enumerate(slices(chunks[0])):
         for j, columns in enumerate(slices(chunks[1])):
-            place, windows = ask(rows, columns)
-            plans, keys = [], []
-            for array, edges, window in zip(arrays, starts, windows, strict=True):
-                plan, parts = _plan(array, edges, window, graph)
-                plans.append(plan)
-                keys.append(parts)
-            graph[(name, *(0 for _ in leading), i, j)] = (partial(_make, place, plans), shared, keys)
+            made, keys = [], []
+            for part in product(_cut_at(rows, seams[0]), _cut_at(columns, seams[1])):
+                place, windows = ask(*part)
+                found = [_plan(*each, graph) for each in zip(arrays, starts, windows, strict=True)]
+                made.append((place, [plan for plan, _ in found]))
+                keys.append([parts for _, parts in found])
+            across = len(_cut_at(columns, seams[1]))
+            graph[(name, *(0 for _ in leading), i, j)] = (partial(_make_parts, made, across), shared, keys)
     sizes = (*((length,) for length in leading), *chunks)
     layers = HighLevelGraph.from_collections(name, graph, dependencies=arrays)
     return da.Array(layers, name, sizes, dtype=dtype, meta=np.empty((0,) * len(sizes), dtype))
@@ -229,6 +233,21 @@ def _part(array, start, part, key):
 
 def _cut(part, chunk):
     return chunk[(..., *part)].copy()
+
+
+def _cut_at(part, seams):
+    """A slice in parts that begin at seams."""
+    edges = [part.start, *(at for at in seams if part.start < at < part.stop), part.stop]
+    return [slice(start, stop) for start, stop in pairwise(edges)]
+
+
+def _make_parts(made, across, kernel, keys):
+    """A block of parts, so many of them in a row."""
+    blocks = [_make(place, plans, kernel, parts) for (place, plans), parts in zip(made, keys, strict=True)]
+    if len(blocks) == 1:
+        return blocks[0]
+    rows = [blocks[first : first + across] for first in range(0, len(blocks), across)]
+    return np.concatenate([np.concatenate(row, axis=-1) for row in rows], axis=-2)
 
 
 def _make(place, plans, kernel, parts):
