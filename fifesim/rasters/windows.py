@@ -58,14 +58,15 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
     starts = [[_starts(sizes) for sizes in array.chunks[-2:]] for array in arrays]
     for i, rows in enumerate(slices(chunks[0])):
         for j, columns in enumerate(slices(chunks[1])):
-            made, keys = [], []
-            for part in product(_cut_at(rows, seams[0]), _cut_at(columns, seams[1])):
+            made, keys, held = [], [], set()
+            across = _cut_at(columns, seams[1])
+            # The last part is that within a chunk, of which rims need no copies then.
+            for part in reversed(list(product(_cut_at(rows, seams[0]), across))):
                 place, windows = ask(*part)
-                found = [_plan(*each, graph) for each in zip(arrays, starts, windows, strict=True)]
-                made.append((place, [plan for plan, _ in found]))
-                keys.append([parts for _, parts in found])
-            across = len(_cut_at(columns, seams[1]))
-            graph[(name, *(0 for _ in leading), i, j)] = (partial(_make_parts, made, across), shared, keys)
+                found = [_plan(*each, graph, held) for each in zip(arrays, starts, windows, strict=True)]
+                made.insert(0, (place, [plan for plan, _ in found]))
+                keys.insert(0, [parts for _, parts in found])
+            graph[(name, *(0 for _ in leading), i, j)] = (partial(_make_parts, made, len(across)), shared, keys)
     sizes = (*((length,) for length in leading), *chunks)
     layers = HighLevelGraph.from_collections(name, graph, dependencies=arrays)
     return da.Array(layers, name, sizes, dtype=dtype, meta=np.empty((0,) * len(sizes), dtype))
@@ -188,8 +189,12 @@ def _starts(sizes):
     return np.concatenate([[0], np.cumsum(sizes)]).astype(int)
 
 
-def _plan(array, edges, window, graph):
-    """Where the parts of a window come from; those that are little of a chunk are cut out by tasks of their own."""
+def _plan(array, edges, window, graph, held):
+    """
+    Where the parts of a window come from.
+
+    Those that are little of a chunk are cut out by tasks of their own, unless the chunk is held for another part.
+    """
     shape = tuple(part.stop - part.start for part in window)
     beyond = any(part.start < 0 or part.stop > size for part, size in zip(window, array.shape[-2:], strict=True))
     into, taken, keys = [], [], []
@@ -198,10 +203,13 @@ def _plan(array, edges, window, graph):
             whole = (edges[0][i + 1] - edges[0][i]) * (edges[1][j + 1] - edges[1][j])
             key = (array.name, *(0,) * (array.ndim - 2), i, j)
             part = (row_taken, column_taken)
-            if 2 * (row_taken.stop - row_taken.start) * (column_taken.stop - column_taken.start) < whole:
+            size = (row_taken.stop - row_taken.start) * (column_taken.stop - column_taken.start)
+            if key not in held and 2 * size < whole:
                 cut = (f"cut-{array.name}", i, j, *(edge for each in part for edge in (each.start, each.stop)))
                 graph[cut] = _part(array, (edges[0][i], edges[1][j]), part, key)
                 key, part = cut, (slice(None), slice(None))
+            else:
+                held.add(key)
             into.append((row_into, column_into))
             taken.append(part)
             keys.append(key)
