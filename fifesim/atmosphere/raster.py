@@ -11,9 +11,7 @@ from fifesim.rasters import cf, chunks, directions, swaths
 _REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
 
 
-def to_toa(
-    reflectance, atmosphere, bands, geometry, *, elevation=None, adjacency=False, surroundings=None, made=None
-):
+def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacency=False, surroundings=None, made=None):
     """
     Apparent reflectance at the top of the atmosphere.
 

@@ -242,9 +242,7 @@ def _regularize(values, apart, length, rows, columns, min_valid, out):
             share = rows.share[i] * columns.share[j]
             if np.isnan(total):
                 first = top * apart + left
-                total, share = _sum_valid(
-                    values[first:], apart, rows.weights[i, :height], columns.weights[j, :width]
-                )
+                total, share = _sum_valid(values[first:], apart, rows.weights[i, :height], columns.weights[j, :width])
             # The slack is rounding: a whole footprint sums to 1 within 1e-15 and must pass min_valid = 1.
             out[i, j] = total / share if share > 0 and share >= min_valid - 1e-9 else np.nan
 

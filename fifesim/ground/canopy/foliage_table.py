@@ -289,8 +289,8 @@ def _foliage(lai, brown, background, table, values):
 
 @register_jitable
 def _places(table, lai, brown, starts, leaves, dead):
-    """First coefficients of cells, counted in rows of columns, and their shares of intervals; -1 is beyond the table."""
-    rows, browns, _ = table.coefficients.shape
+    """First coefficients of cells in rows of columns, -1 beyond the table, and shares of intervals."""
+    browns = table.coefficients.shape[1]
     for i in range(lai.size):
         known = (lai[i] >= 0) & (lai[i] <= LIMIT) & (brown[i] >= 0) & (brown[i] <= 1)
         row, leaves[i] = _place_leaves(table, lai[i] if known else 0.0)
