@@ -91,6 +91,28 @@ def lazy_together(*arrays):
     return tuple(None if array is None else _lazy(array) for array in arrays)
 
 
+def held(array):
+    """
+    A lazy array whose blocks dask makes by themselves, not as a part of what follows on them.
+
+    Parameters
+    ----------
+    array : numpy.ndarray or dask.array.Array
+
+    Returns
+    -------
+    array : numpy.ndarray or dask.array.Array
+        The same values. ``dask.compute`` of a Dataset takes an array and another made of it, block by block, for one,
+        and then misses the first.
+    """
+    if not isinstance(array, da.Array):
+        return array
+    name = f"held-{array.name}"
+    graph = {(name, *index): (_same, (array.name, *index)) for index in np.ndindex(array.numblocks)}
+    layers = HighLevelGraph.from_collections(name, graph, dependencies=[array])
+    return da.Array(layers, name, array.chunks, dtype=array.dtype, meta=array._meta)
+
+
 def slices(sizes):
     """
     Slices of chunks.
@@ -183,6 +205,10 @@ def _lazy(array):
     if isinstance(array, da.Array):
         return array.rechunk(leading)
     return da.from_array(array, chunks=(*leading.values(), _CHUNK, _CHUNK), name=False)
+
+
+def _same(block):
+    return block
 
 
 def _starts(sizes):
