@@ -11,7 +11,7 @@ from fifesim.rasters import cf, chunks, directions, swaths
 _REFERENCE = "Tanre et al. (1990), doi:10.1080/01431169008955048"
 
 
-def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacency=False, surroundings=None):
+def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacency=False, surroundings=None, made=None):
     """
     Apparent reflectance at the top of the atmosphere.
 
@@ -29,6 +29,9 @@ def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacenc
         Whether light that the surroundings reflect is scattered into the view of a cell.
     surroundings : number, sequence or xarray.DataArray, optional
         Reflectance around the scene, for adjacency; by default the scene's mean. [1]
+    made : callable, optional
+        ``made(terms)`` gives the result, dims (band, y, x), of the terms of the equation over a uniform surface, where
+        the cells are made together with it.
 
     Returns
     -------
@@ -48,7 +51,7 @@ def to_toa(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacenc
     """
     cf.check_quantity(reflectance, "surface_reflectance")
     said = ("toa_reflectance", "to_toa")
-    return _carry(*said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings)
+    return _carry(*said, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings, made)
 
 
 def to_surface(reflectance, atmosphere, bands, geometry, *, elevation=None, adjacency=False, surroundings=None):
@@ -109,7 +112,7 @@ def diffuse_fraction(atmosphere, bands, geometry):
     return chunks.pointwise(kernel, geometry.sza, bands=len(bands))
 
 
-def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings):
+def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adjacency, surroundings, made=None):
     reflectance = adjacency_raster.banded(reflectance)
     if surroundings is not None and not adjacency:
         raise ValueError("surroundings matter with adjacency=True only: give both, or leave surroundings out")
@@ -118,7 +121,7 @@ def _carry(name, verb, reflectance, atmosphere, bands, geometry, elevation, adja
     if adjacency:
         out = _with_adjacency(verb, plain, atmosphere, bands, geometry, elevation, surroundings)
     elif elevation is None and not directions.varying(geometry):
-        out = _uniform(verb, plain, atmosphere, bands, geometry)
+        out = _uniform(verb, plain, atmosphere, bands, geometry, made)
     else:
         out = _varying(verb, plain, atmosphere, bands, geometry, elevation)
     if reflectance.dtype == np.float32:
@@ -143,8 +146,10 @@ def _check_cells(reflectance, geometry, elevation, adjacency):
         )
 
 
-def _uniform(verb, reflectance, atmosphere, bands, geometry):
+def _uniform(verb, reflectance, atmosphere, bands, geometry, made):
     terms = engines.band_terms(atmosphere, tuple(bands), geometry.sza, geometry.vza, geometry.raa)
+    if made is not None:
+        return reflectance.copy(data=made(terms).data)
     kernel = coupling.apparent_reflectance if verb == "to_toa" else coupling.corrected_reflectance
     per_band = (xr.DataArray(values, dims="band") for values in terms.uniform.values())
     return chunks.pointwise(kernel, reflectance, *per_band)

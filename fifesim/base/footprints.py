@@ -194,8 +194,7 @@ def regularize(values, rows, columns, *, min_valid=0.98):
     means = np.empty((*values.shape[:-2], len(rows), len(columns)), dtype)
     down, across = _axis(rows), _axis(columns)
     for layer in np.ndindex(values.shape[:-2]):
-        cells = np.ascontiguousarray(values[layer], dtype)
-        _regularize(cells, down, across, min_valid, means[layer])
+        _regularize(*_rows_of(values[layer], dtype), down, across, min_valid, means[layer])
     return means
 
 
@@ -212,17 +211,29 @@ def _axis(operator):
     return _Axis(operator.start - operator.window.start, operator.count, operator.weights, operator.share)
 
 
+def _rows_of(cells, dtype):
+    """Cells as one row after another, how far these lie apart, and their length; a part of an array is not copied."""
+    inside = cells.dtype == dtype and cells.size and cells.strides[1] == cells.itemsize
+    if not inside or cells.strides[0] < cells.shape[1] * cells.itemsize or cells.strides[0] % cells.itemsize:
+        cells = np.ascontiguousarray(cells, dtype)
+        return cells.reshape(-1), cells.shape[1], cells.shape[1]
+    apart = cells.strides[0] // cells.itemsize
+    size = (cells.shape[0] - 1) * apart + cells.shape[1]
+    return np.lib.stride_tricks.as_strided(cells, (size,), cells.strides[1:]), apart, cells.shape[1]
+
+
 @njit(nogil=True, cache=True)
-def _regularize(values, rows, columns, min_valid, out):
-    line = np.empty(values.shape[1])
+def _regularize(values, apart, length, rows, columns, min_valid, out):
+    line = np.empty(length)
     for i in range(out.shape[0]):
         top, height = rows.start[i], rows.count[i]
         # Rows first: this sum runs along contiguous memory, and leaves one line for the sum over columns.
         line[:] = 0.0
         for k in range(height):
-            weight = rows.weights[i, k]
-            for x in range(line.size):
-                line[x] += weight * values[top + k, x]
+            weight, first = rows.weights[i, k], (top + k) * apart
+            cells = values[first : first + length]
+            for x in range(length):
+                line[x] += weight * cells[x]
         for j in range(out.shape[1]):
             left, width = columns.start[j], columns.count[j]
             total = 0.0
@@ -230,19 +241,20 @@ def _regularize(values, rows, columns, min_valid, out):
                 total += columns.weights[j, k] * line[left + k]
             share = rows.share[i] * columns.share[j]
             if np.isnan(total):
-                cells = values[top : top + height, left : left + width]
-                total, share = _sum_valid(cells, rows.weights[i], columns.weights[j])
+                first = top * apart + left
+                total, share = _sum_valid(values[first:], apart, rows.weights[i, :height], columns.weights[j, :width])
             # The slack is rounding: a whole footprint sums to 1 within 1e-15 and must pass min_valid = 1.
             out[i, j] = total / share if share > 0 and share >= min_valid - 1e-9 else np.nan
 
 
 @njit(nogil=True, cache=True)
-def _sum_valid(cells, y_weights, x_weights):
+def _sum_valid(values, apart, y_weights, x_weights):
     total, share = 0.0, 0.0
-    for y in range(cells.shape[0]):
-        for x in range(cells.shape[1]):
-            if not np.isnan(cells[y, x]):
+    for y in range(y_weights.size):
+        for x in range(x_weights.size):
+            value = values[y * apart + x]
+            if not np.isnan(value):
                 weight = y_weights[y] * x_weights[x]
-                total += weight * cells[y, x]
+                total += weight * value
                 share += weight
     return total, share

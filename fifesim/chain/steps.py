@@ -5,6 +5,7 @@ from fifesim.atmosphere.schemes import engines
 from fifesim.chain import landscapes
 from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
+from fifesim.chain.seen_canopy import seen_through_air
 from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.rasters import soils
 from fifesim.ground.terrain.rasters import light as terrain
@@ -290,6 +291,7 @@ def to_toa(
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
+    scene["made"] = seen_through_air(reflectance)
     return _of(instrument, atmosphere_raster.to_toa(directions.dated(reflectance, time), *light, **scene))
 
 

@@ -122,7 +122,7 @@ def margin_reads(array, rows, columns=None, offset=(0, 0), shape=None):
     return Reads(array, *((at - depth, at + depth + 1) for at, depth in zip(cells, (rows, columns), strict=True)))
 
 
-def windows(kernel, reads, shape, chunks=None, dtype=float):
+def windows(kernel, reads, shape, chunks=None, dtype=float, seams=((), ())):
     """
     Array whose every block is made from windows of others.
 
@@ -138,6 +138,8 @@ def windows(kernel, reads, shape, chunks=None, dtype=float):
         Of a lazy result over y and x. Without them all is made at once.
     dtype : dtype, optional
         Of a lazy result.
+    seams : (sequence of int, sequence of int), optional
+        As in `array_from_windows`, of a kernel that makes the same of a block in parts.
 
     Returns
     -------
@@ -152,7 +154,8 @@ def windows(kernel, reads, shape, chunks=None, dtype=float):
 
     token = tokenize(kernel, reads, shape, chunks)
     arrays, leading = [each.array for each in reads], shape[:-2]
-    return array_from_windows(kernel, arrays, chunks, ask, token=token, leading=leading, dtype=dtype)
+    how = {"token": token, "leading": leading, "dtype": dtype, "seams": seams}
+    return array_from_windows(kernel, arrays, chunks, ask, **how)
 
 
 def in_blocks(kernel, reads, shape, size, dtype=float):

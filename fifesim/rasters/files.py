@@ -32,6 +32,9 @@ from fifesim.rasters.tags import TAG, read_tag, tag_of
 # GDAL's own block size for cloud-optimised files.
 _BLOCK = 512
 
+# Blocks of single bands are written together where they are no more than that. [byte]
+_AT_ONCE = 16 * 2**20
+
 _TILED = {"driver": "GTiff", "tiled": True, "blockxsize": _BLOCK, "blockysize": _BLOCK, "bigtiff": "if_safer"}
 _COG = {"driver": "COG", "compress": "deflate", "predictor": "yes", "overview_resampling": "average"}
 # Without it GDAL leaves behind what the whole file has in IMAGERY.
@@ -252,7 +255,15 @@ def _stream(array, grid, path, described, further):
         if not isinstance(array.data, da.Array):
             sink.write(array.values)
     if isinstance(array.data, da.Array):
-        da.store(array.data, _Sink(str(path)), lock=_lock(str(path)), compute=True)
+        # The file is opened for each block, which takes longer than to write a small one.
+        together = array.sizes["band"] * _largest_block(array) <= _AT_ONCE
+        data = array.data.rechunk({0: -1}) if together else array.data
+        da.store(data, _Sink(str(path)), lock=_lock(str(path)), compute=True)
+
+
+def _largest_block(array):
+    """Of one band. [byte]"""
+    return array.dtype.itemsize * max(array.chunks[-2]) * max(array.chunks[-1])
 
 
 class _Sink:

@@ -115,11 +115,17 @@ def resample(rows, columns, array, grid, *, min_valid=0.98):
         Float, lazy where the input is.
     """
     array = array.transpose(..., "y", "x")
-    sizes = None
+    sizes, seams = None, ((), ())
     if array.chunks is not None:
         # A pixel is made with the chunk of its last cell: what it needs of earlier ones is cut off when these are made.
         lasts = [axis.start + np.maximum(axis.count, 1) - 1 for axis in (rows, columns)]
         sizes = tuple(chunks.runs(last, each) for last, each in zip(lasts, array.chunks[-2:], strict=True))
+        # From the first pixel on that begins in a chunk, all up to the next chunk lie in it.
+        edges = [np.cumsum((0, *each[:-1])) for each in array.chunks[-2:]]
+        seams = tuple(
+            np.unique(np.searchsorted(axis.start, each)).tolist()
+            for axis, each in zip((rows, columns), edges, strict=True)
+        )
 
     def means(these, those, cells):
         return regularize(cells, rows[these], columns[those], min_valid=min_valid)
@@ -127,7 +133,7 @@ def resample(rows, columns, array, grid, *, min_valid=0.98):
     shape = (*array.shape[:-2], len(rows), len(columns))
     # What regularize makes of it.
     dtype = np.dtype(np.float32 if array.dtype == np.float32 else np.float64)
-    out = chunks.windows(means, [_Covered(array.data, rows, columns)], shape, sizes, dtype)
+    out = chunks.windows(means, [_Covered(array.data, rows, columns)], shape, sizes, dtype, seams)
     # xarray would take over dask's name.
     out = xr.DataArray(out, dims=array.dims, coords=chunks.other_coordinates(array), attrs=array.attrs)
     return grids.place(out.rename(array.name), grid)

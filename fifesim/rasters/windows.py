@@ -1,7 +1,7 @@
 """Lazy arrays whose every block is one task, which gathers windows of others and hands them to a kernel."""
 
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import dask.array as da
@@ -21,7 +21,7 @@ class _Plan(NamedTuple):
     taken: tuple[tuple[slice, slice], ...]
 
 
-def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=float):
+def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=float, seams=((), ())):
     """
     Lazy array whose blocks are made by a kernel from windows of other lazy arrays.
 
@@ -44,6 +44,9 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
         Lengths of the axes of the result before y and x.
     dtype : dtype, optional
         Of the result.
+    seams : (sequence of int, sequence of int), optional
+        Rows and columns of the result at which windows come to lie within one chunk. Blocks are made in parts there,
+        so that only the windows of rims are put together, and others are views.
 
     Returns
     -------
@@ -55,13 +58,15 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
     starts = [[_starts(sizes) for sizes in array.chunks[-2:]] for array in arrays]
     for i, rows in enumerate(slices(chunks[0])):
         for j, columns in enumerate(slices(chunks[1])):
-            place, windows = ask(rows, columns)
-            plans, keys = [], []
-            for array, edges, window in zip(arrays, starts, windows, strict=True):
-                plan, parts = _plan(array, edges, window, graph)
-                plans.append(plan)
-                keys.append(parts)
-            graph[(name, *(0 for _ in leading), i, j)] = (partial(_make, place, plans), shared, keys)
+            made, keys, held = [], [], set()
+            across = _cut_at(columns, seams[1])
+            # The last part is that within a chunk, of which rims need no copies then.
+            for part in reversed(list(product(_cut_at(rows, seams[0]), across))):
+                place, windows = ask(*part)
+                found = [_plan(*each, graph, held) for each in zip(arrays, starts, windows, strict=True)]
+                made.insert(0, (place, [plan for plan, _ in found]))
+                keys.insert(0, [parts for _, parts in found])
+            graph[(name, *(0 for _ in leading), i, j)] = (partial(_make_parts, made, len(across)), shared, keys)
     sizes = (*((length,) for length in leading), *chunks)
     layers = HighLevelGraph.from_collections(name, graph, dependencies=arrays)
     return da.Array(layers, name, sizes, dtype=dtype, meta=np.empty((0,) * len(sizes), dtype))
@@ -84,6 +89,28 @@ def lazy_together(*arrays):
     if not any(isinstance(array, da.Array) for array in arrays):
         return arrays
     return tuple(None if array is None else _lazy(array) for array in arrays)
+
+
+def held(array):
+    """
+    A lazy array whose blocks dask makes by themselves, not as a part of what follows on them.
+
+    Parameters
+    ----------
+    array : numpy.ndarray or dask.array.Array
+
+    Returns
+    -------
+    array : numpy.ndarray or dask.array.Array
+        The same values. ``dask.compute`` of a Dataset takes an array and another made of it, block by block, for one,
+        and then misses the first.
+    """
+    if not isinstance(array, da.Array):
+        return array
+    name = f"held-{array.name}"
+    graph = {(name, *index): (_same, (array.name, *index)) for index in np.ndindex(array.numblocks)}
+    layers = HighLevelGraph.from_collections(name, graph, dependencies=[array])
+    return da.Array(layers, name, array.chunks, dtype=array.dtype, meta=array._meta)
 
 
 def slices(sizes):
@@ -180,12 +207,20 @@ def _lazy(array):
     return da.from_array(array, chunks=(*leading.values(), _CHUNK, _CHUNK), name=False)
 
 
+def _same(block):
+    return block
+
+
 def _starts(sizes):
     return np.concatenate([[0], np.cumsum(sizes)]).astype(int)
 
 
-def _plan(array, edges, window, graph):
-    """Where the parts of a window come from; those that are little of a chunk are cut out by tasks of their own."""
+def _plan(array, edges, window, graph, held):
+    """
+    Where the parts of a window come from.
+
+    Those that are little of a chunk are cut out by tasks of their own, unless the chunk is held for another part.
+    """
     shape = tuple(part.stop - part.start for part in window)
     beyond = any(part.start < 0 or part.stop > size for part, size in zip(window, array.shape[-2:], strict=True))
     into, taken, keys = [], [], []
@@ -194,10 +229,13 @@ def _plan(array, edges, window, graph):
             whole = (edges[0][i + 1] - edges[0][i]) * (edges[1][j + 1] - edges[1][j])
             key = (array.name, *(0,) * (array.ndim - 2), i, j)
             part = (row_taken, column_taken)
-            if 2 * (row_taken.stop - row_taken.start) * (column_taken.stop - column_taken.start) < whole:
+            size = (row_taken.stop - row_taken.start) * (column_taken.stop - column_taken.start)
+            if key not in held and 2 * size < whole:
                 cut = (f"cut-{array.name}", i, j, *(edge for each in part for edge in (each.start, each.stop)))
                 graph[cut] = _part(array, (edges[0][i], edges[1][j]), part, key)
                 key, part = cut, (slice(None), slice(None))
+            else:
+                held.add(key)
             into.append((row_into, column_into))
             taken.append(part)
             keys.append(key)
@@ -229,6 +267,21 @@ def _part(array, start, part, key):
 
 def _cut(part, chunk):
     return chunk[(..., *part)].copy()
+
+
+def _cut_at(part, seams):
+    """A slice in parts that begin at seams."""
+    edges = [part.start, *(at for at in seams if part.start < at < part.stop), part.stop]
+    return [slice(start, stop) for start, stop in pairwise(edges)]
+
+
+def _make_parts(made, across, kernel, keys):
+    """A block of parts, so many of them in a row."""
+    blocks = [_make(place, plans, kernel, parts) for (place, plans), parts in zip(made, keys, strict=True)]
+    if len(blocks) == 1:
+        return blocks[0]
+    rows = [blocks[first : first + across] for first in range(0, len(blocks), across)]
+    return np.concatenate([np.concatenate(row, axis=-1) for row in rows], axis=-2)
 
 
 def _make(place, plans, kernel, parts):

@@ -8,6 +8,7 @@ from fifesim.rasters import cf, chunks, directions, swaths
 from fifesim.rasters import grid as grids
 from fifesim.rasters.dates import by_date
 from fifesim.rasters.own_rasters import incoming
+from fifesim.rasters.windows import held
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import check_kinds
@@ -134,7 +135,7 @@ def sense(
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
     image = recorded(radiance, description, bands, quantise, geometry if scaling == "product" else None)
-    image = directions.with_geometry(grids.place(image, pixels), geometry)
+    image = directions.with_geometry(grids.place(image.copy(data=held(image.data)), pixels), geometry)
     return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise, scaling))
 
 

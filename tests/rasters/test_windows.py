@@ -1,10 +1,12 @@
 """Blocks made from windows of lazy arrays are those that numpy would make of the whole."""
 
+import dask
 import dask.array as da
 import numpy as np
 import pytest
+import xarray as xr
 
-from fifesim.rasters.windows import array_by_place, array_from_windows, gather, slices
+from fifesim.rasters.windows import array_by_place, array_from_windows, gather, held, slices
 
 CELLS = np.arange(11.0 * 13).reshape(11, 13)
 
@@ -69,3 +71,30 @@ def test_a_gathered_window_is_missing_beyond_the_array():
     found = gather(CELLS, (slice(-1, 2), slice(11, 15)))
     np.testing.assert_array_equal(found[1:, :2], CELLS[:2, 11:])
     assert np.isnan(found[0]).all() and np.isnan(found[:, 2:]).all()
+
+
+def test_parts_of_a_block_are_to_the_bit_the_block():
+    """Made at seams, a block reads its rim from other chunks and the rest where it is."""
+    cells = np.random.default_rng(3).random((2, 30, 40))
+    array = da.from_array(cells, chunks=(2, 10, 10))
+
+    def kernel(window):
+        return window[:, :-2, :-2] + window[:, 2:, 2:]
+
+    def ask(rows, columns):
+        return (), [tuple(slice(each.start, each.stop + 2) for each in (rows, columns))]
+
+    made = ((8, 10, 10), (8, 10, 20))
+    options = {"token": "parts", "leading": (2,), "seams": ([10, 20], [10, 20, 30])}
+    found = array_from_windows(kernel, [array], made, ask, **options)
+    np.testing.assert_array_equal(found.compute(scheduler="synchronous"), cells[:, :-2, :-2] + cells[:, 2:, 2:])
+
+
+def test_a_dataset_of_an_array_and_what_is_made_of_it_is_computed():
+    """dask fuses the two, and misses the first, where it is not held."""
+    image = held(da.from_array(CELLS, chunks=5) + 1.0)
+    dataset = xr.Dataset({"image": (("y", "x"), image), "index": (("y", "x"), image * 2)})
+    found = dask.compute(dataset)[0]
+    np.testing.assert_array_equal(found["image"], CELLS + 1)
+    np.testing.assert_array_equal(found["index"], 2 * CELLS + 2)
+    assert held(CELLS) is CELLS

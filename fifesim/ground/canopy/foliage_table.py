@@ -19,6 +19,9 @@ TOLERANCE = 4e-7
 _COARSEST = 33, 33
 _FINEST = 2**20  # nodes in all
 
+# Cells whose places in a table are found together: they stay in the nearest cache.
+_RUN = 256
+
 TERMS = 8
 """Columns of `FoliageTable` for each band where crowns differ from cell to cell."""
 
@@ -261,26 +264,41 @@ def _blend(flat, start, length, leaves, browns, wide, out):
         out[c] = b0 * wide[c] + b1 * wide[c + columns] + b2 * wide[c + 2 * columns] + b3 * wide[c + 3 * columns]
 
 
-@njit(nogil=True, cache=True)
+# No divisor is 0: without that being asked, cells are done several at once.
+@njit(nogil=True, cache=True, error_model="numpy")
 def _foliage(lai, brown, background, table, values):
     _, browns, columns = table.coefficients.shape
-    flat, wide, terms = table.coefficients.reshape(-1), np.zeros(4 * columns), np.zeros(columns)
-    of_ground = int(background.shape[1] > 1)
-    for i in range(lai.size):
-        if not (0 <= lai[i] <= LIMIT and 0 <= brown[i] <= 1):
-            for band in range(values.shape[0]):
-                values[band, i] = np.inf if lai[i] > LIMIT else np.nan
-            continue
-        row, share = _place_leaves(table, lai[i])
-        at, dead = _place_brown(table, brown[i])
-        _blend(flat, (row * browns + at) * columns, browns * columns, _weights(share), _weights(dead), wide, terms)
+    flat, wide, terms = table.coefficients.reshape(-1), np.zeros(4 * columns), np.zeros((_RUN, columns))
+    starts, leaves, dead = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN)
+    of_ground = background.shape[1] > 1
+    for first in range(0, lai.size, _RUN):
+        cells, shares = lai[first : first + _RUN], brown[first : first + _RUN]
+        _places(table, cells, shares, starts, leaves, dead)
+        for i in range(cells.size):
+            if starts[i] >= 0:
+                of_leaves, of_dead = _weights(leaves[i]), _weights(dead[i])
+                _blend(flat, starts[i] * columns, browns * columns, of_leaves, of_dead, wide, terms[i])
         for band in range(values.shape[0]):
-            alone, hot, through, rdd = terms[4 * band], terms[4 * band + 1], terms[4 * band + 2], terms[4 * band + 3]
-            ground = background[band, i * of_ground]
-            values[band, i] = over_background(alone, hot, through, rdd, ground)
+            out = values[band, first : first + _RUN]
+            below = background[band, first : first + _RUN] if of_ground else background[band]
+            for i in range(cells.size):
+                t, ground = terms[i], below[i if of_ground else 0]
+                seen = over_background(t[4 * band], t[4 * band + 1], t[4 * band + 2], t[4 * band + 3], ground)
+                out[i] = seen if starts[i] >= 0 else np.inf if cells[i] > LIMIT else np.nan
 
 
-@njit(nogil=True, cache=True)
+@register_jitable
+def _places(table, lai, brown, starts, leaves, dead):
+    """First coefficients of cells in rows of columns, -1 beyond the table, and shares of intervals."""
+    browns = table.coefficients.shape[1]
+    for i in range(lai.size):
+        known = (lai[i] >= 0) & (lai[i] <= LIMIT) & (brown[i] >= 0) & (brown[i] <= 1)
+        row, leaves[i] = _place_leaves(table, lai[i] if known else 0.0)
+        at, dead[i] = _place_brown(table, brown[i] if known else 0.0)
+        starts[i] = row * browns + at if known else -1
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def _crowned(lai, brown, cover, background, table, crowns, values):
     _, browns, columns = table.coefficients.shape
     flat, rooms = table.coefficients.reshape(-1), crowns.reshape(-1)

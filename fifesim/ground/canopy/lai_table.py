@@ -13,6 +13,9 @@ from fifesim.ground.canopy.optics import LARGEST_LAI
 LIMIT = LARGEST_LAI
 """Largest leaf area index in a table."""
 
+RUN = 1024
+"""Cells whose places in a table are found together: they stay in the nearest cache."""
+
 _COARSEST = 32
 _FINEST = 2**16
 
@@ -129,34 +132,75 @@ def interpolate_over(table, lai, background):
 
 
 @register_jitable
-def _place(lai, table):
-    """Interval of a leaf area index in a table, and its place in that, which is NaN where there is none."""
-    if not 0 <= lai <= LIMIT:
-        return 0, np.nan
-    position = table.rate * lai / (1 + table.rate * lai) * table.step
-    interval = min(int(position), table.coefficients.shape[0] - 1)
-    return interval, position - interval
+def places_of(lai, table, interval, share):
+    """
+    Intervals of leaf area indices in a table, and their places in these.
+
+    Parameters
+    ----------
+    lai : array, shape (n,)
+        [m2 m-2]
+    table : LaiTable
+    interval : array of int, shape (n,)
+        Filled in.
+    share : array, shape (n,)
+        Filled in: from 0 to 1, NaN where the table has no such leaf area. [1]
+    """
+    last = table.coefficients.shape[0] - 1
+    # Without branches, so that the loop is done for several cells at once.
+    for k in range(lai.size):
+        inside = (lai[k] >= 0) & (lai[k] <= LIMIT)
+        x = lai[k] if inside else 0.0
+        position = table.rate * x / (1 + table.rate * x) * table.step
+        at = min(int(position), last)
+        interval[k] = at
+        share[k] = position - at if inside else np.nan
 
 
 @register_jitable
-def _cubic(table, interval, column, share):
+def value_at(table, interval, column, share):
+    """
+    Value of a table.
+
+    Parameters
+    ----------
+    table : LaiTable
+    interval : int
+    column : int
+    share : float
+        Place in the interval, from `places_of`. [1]
+
+    Returns
+    -------
+    value : float
+    """
     c = table.coefficients[interval, column]
     return c[0] + share * (c[1] + share * (c[2] + share * c[3]))
 
 
-@njit(nogil=True, cache=True)
+# No divisor is 0: without that being asked, cells are done several at once.
+@njit(nogil=True, cache=True, error_model="numpy")
 def _interpolate(lai, table, values):
-    for i in range(lai.size):
-        interval, share = _place(lai[i], table)
+    interval, share = np.empty(RUN, np.int64), np.empty(RUN)
+    for first in range(0, lai.size, RUN):
+        cells = lai[first : first + RUN]
+        places_of(cells, table, interval, share)
         for column in range(values.shape[0]):
-            values[column, i] = _cubic(table, interval, column, share)
+            out = values[column, first : first + RUN]
+            for k in range(cells.size):
+                out[k] = value_at(table, interval[k], column, share[k])
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _interpolate_over(lai, background, table, values):
-    for i in range(lai.size):
-        interval, share = _place(lai[i], table)
+    interval, share = np.empty(RUN, np.int64), np.empty(RUN)
+    for first in range(0, lai.size, RUN):
+        cells = lai[first : first + RUN]
+        places_of(cells, table, interval, share)
         for band in range(values.shape[0]):
-            alone, hot = _cubic(table, interval, 4 * band, share), _cubic(table, interval, 4 * band + 1, share)
-            through, rdd = _cubic(table, interval, 4 * band + 2, share), _cubic(table, interval, 4 * band + 3, share)
-            values[band, i] = over_background(alone, hot, through, rdd, background[band, i])
+            out, below = values[band, first : first + RUN], background[band, first : first + RUN]
+            for k in range(cells.size):
+                at, s, c = interval[k], share[k], 4 * band
+                alone, hot = value_at(table, at, c, s), value_at(table, at, c + 1, s)
+                through, rdd = value_at(table, at, c + 2, s), value_at(table, at, c + 3, s)
+                out[k] = over_background(alone, hot, through, rdd, below[k])

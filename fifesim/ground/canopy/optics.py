@@ -297,9 +297,10 @@ def check_map(lai):
     >>> check_map(2.5)
     2.5
     """
-    cells = np.asarray(check_lai(lai), float)
+    cells = np.asarray(lai, float)
     largest = np.fmax.reduce(cells, axis=None, initial=0.0)
-    if largest > LARGEST_OF_MAPS:
+    if largest > LARGEST_OF_MAPS or np.fmin.reduce(cells, axis=None, initial=0.0) < 0:
+        check_lai(lai)
         raise ValueError(
             f"leaf area index up to {largest:g}, canopies have at most {LARGEST_OF_MAPS:g}: where the numbers are "
             "scaled, as MODIS by 0.1, type lai * 0.1, or gdal_edit.py -a_scale 0.1 for a file; set cells without data "

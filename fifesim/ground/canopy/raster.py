@@ -8,10 +8,11 @@ from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.canopy.rasters import canopy_shares
-from fifesim.ground.canopy.rasters.evaluation import canopy_kernel
+from fifesim.ground.canopy.rasters.evaluation import canopy_kernel, even_canopy
 from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.origins import made_of
 from fifesim.rasters.packed import unpacked
 
 
@@ -99,7 +100,8 @@ def level_reflectance(
     out = chunking.pointwise(kernel, lai.drop_vars(varies, errors="ignore"), *rasters, bands=len(bands))
     described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
     said = {"leaf_angles": str(leaf_angle_classes(leaf_angles)), "background": described}
-    return labelled(out, lai, bands, wavelengths, geometry, told=canopy_shares.in_words(shares), **said, **provenance)
+    out = labelled(out, lai, bands, wavelengths, geometry, told=canopy_shares.in_words(shares), **said, **provenance)
+    return made_of(out, even_canopy(lai, **optics, **shares, **how, **light))
 
 
 def labelled(reflectance, lai, bands, wavelengths, geometry, *, leaf_angles, told="", **provenance):

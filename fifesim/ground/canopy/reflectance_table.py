@@ -116,6 +116,46 @@ def canopy_reflectance(
     return interpolate_over(_layer_table(scene), lai, background)
 
 
+def even_table(
+    leaf_reflectance,
+    leaf_transmittance,
+    background,
+    *,
+    sza,
+    vza,
+    raa,
+    leaf_angles,
+    hotspot,
+    diffuse_fraction,
+):
+    """
+    Table by which `canopy_reflectance` interpolates where cells differ in their green leaf area alone.
+
+    Parameters
+    ----------
+    leaf_reflectance, leaf_transmittance, background, diffuse_fraction : array, shape (band,)
+        [1]
+    sza, vza, raa, leaf_angles, hotspot
+        As in `canopy_reflectance`.
+
+    Returns
+    -------
+    table : fifesim.ground.canopy.lai_table.LaiTable
+        A column for each band.
+
+    Raises
+    ------
+    ValueError
+        As in `canopy_reflectance`.
+    """
+    check_leaf_optics(leaf_reflectance, leaf_transmittance)
+    check_background(background)
+    bands = np.shape(leaf_reflectance)
+    optics = tuple(_per_band(v, bands) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction))
+    scene = Scene(*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
+    return _surface_table(_per_band(background, bands), scene)
+
+
 def directional_reflectance(
     lai,
     leaf_reflectance,

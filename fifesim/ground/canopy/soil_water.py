@@ -26,6 +26,9 @@ _CONE = 40.0
 # Deeper than so many films is less than 2 % of the wettest soil, which counts as so many.
 _FILMS = 6
 
+# Cells that are done together, so that they stay in the nearest cache.
+_RUN = 512
+
 
 class WaterFilms(NamedTuple):
     """What films of water on a soil do to the light of bands."""
@@ -183,23 +186,36 @@ def moistened(dry, moisture, films):
     return in_cells(_moisten, dry, moisture, *films)
 
 
-@njit(nogil=True, cache=True)
+# No divisor is 0: without that being asked, cells are done several at once.
+@njit(nogil=True, cache=True, error_model="numpy")
 def _moisten(dry, moisture, surface, inside, entrance, passed, out):
-    covered = np.empty(_FILMS + 1)
-    for i in range(out.shape[1]):
+    covered, below, total = np.empty((_FILMS + 1, _RUN)), np.empty(_RUN), np.empty(_RUN)
+    for first in range(0, out.shape[1], _RUN):
+        water = moisture[first : first + _RUN]
+        _covered(water, covered)
+        for band in range(out.shape[0]):
+            soil = dry[first : first + _RUN, band]
+            for i in range(water.size):
+                below[i] = grains_in_water(soil[i], entrance[band])
+                total[i] = covered[0, i] * soil[i]
+            for k in range(_FILMS):
+                film, share = passed[band, k], covered[k + 1]
+                for i in range(water.size):
+                    total[i] += share[i] * wet_soil(below[i], film, surface[band], inside[band])
+            out[band, first : first + _RUN] = total[: water.size]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _covered(moisture, covered):
+    """Shares of a soil below no film, one, two and more."""
+    for i in range(moisture.size):
         mean = moisture[i] * ((WETTEST - DRIEST) / CAPACITY)
         share, rest = np.exp(-mean), 1.0
         for k in range(_FILMS):
-            covered[k] = share
+            covered[k, i] = share
             rest -= share
             share *= mean / (k + 1)
-        covered[_FILMS] = rest
-        for band in range(out.shape[0]):
-            below = grains_in_water(dry[i, band], entrance[band])
-            total = covered[0] * dry[i, band]
-            for k in range(_FILMS):
-                total += covered[k + 1] * wet_soil(below, passed[band, k], surface[band], inside[band])
-            out[band, i] = total
+        covered[_FILMS, i] = rest
 
 
 def check_moisture(moisture):

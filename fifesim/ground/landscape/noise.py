@@ -112,7 +112,8 @@ def _fill(seed, row, first, out):
                 out[i, 4 * g + k] = normals[k, g]
 
 
-@njit(nogil=True, cache=True)
+# No divisor is 0: without that being asked, cells are done several at once.
+@njit(nogil=True, cache=True, error_model="numpy")
 def _box_muller(one, other, cosines, sines):
     """Two normals from two words of 32 bits."""
     n = one.size

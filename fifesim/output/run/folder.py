@@ -29,6 +29,7 @@ from fifesim.output.styles import write_style
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
 from fifesim.rasters.files import to_geotiff
+from fifesim.rasters.reductions import computed
 from fifesim.scenario.simulation import simulate
 from fifesim.scenario.sweeps import VARIABLES
 from fifesim.scenario.toml import write_scenario
@@ -43,6 +44,9 @@ _GDAL_CACHE = 32 * 2**20
 
 # Of pixels that are read back for statistics; dask's own choice is a whole image.
 _CHUNK_SIZE = "4MiB"
+
+# Pixels and their truth are read back once where they are no more than that. [byte]
+_IN_MEMORY = 64 * 2**20
 
 
 def simulate_to_folder(
@@ -184,6 +188,8 @@ def _write_files(scenario, tree, found, folder, home):
         name: raster.copy(data=saved_array(folder / "blocks", name, found.arrays[name]))
         for name, raster in found.rasters.items()
     }
+    if sum(raster.nbytes for raster in saved.values()) <= _IN_MEMORY:
+        saved = dict(zip(saved, computed(*saved.values()), strict=True))
     _check_some_data(scenario, saved["image"])
     image = xr.Dataset({"dn": saved["image"]})
     if "ndvi" in tree["image"]:

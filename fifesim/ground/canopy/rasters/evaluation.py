@@ -1,6 +1,7 @@
 """What gives the reflectance of cells of one canopy, and which rasters it takes."""
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -12,6 +13,42 @@ from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.canopy.rasters import canopy_shares
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
 from fifesim.rasters import cf, directions
+
+
+class EvenCanopy(NamedTuple):
+    """A canopy whose cells differ in their green leaf area alone."""
+
+    lai: xr.DataArray
+    parameters: dict
+    """Of `ground.canopy.reflectance_table.even_table`, numbers and tuples."""
+
+
+def even_canopy(
+    lai, *, leaf_angles, hotspot, brown, crown_cover, soil_changes, exact, geometry, dissociation, brown_optics,
+    crown_shape, **by_band,
+):  # fmt: skip
+    """
+    A canopy whose reflectance is a function of leaf area alone, by its table.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x)
+    leaf_angles, hotspot, brown, crown_cover, soil_changes, exact, geometry, dissociation, brown_optics, crown_shape
+        As in `canopy_kernel`.
+    **by_band
+        Leaf reflectance, leaf transmittance, background and diffuse fraction.
+
+    Returns
+    -------
+    canopy : EvenCanopy or None
+        None where the cells differ otherwise, or the table is not used.
+    """
+    rasters = any(isinstance(each, xr.DataArray) for each in (brown, crown_cover, *by_band.values()))
+    if rasters or brown != 0 or crown_cover != 1 or soil_changes is not None or exact or directions.varying(geometry):
+        return None
+    parameters = {name: tuple(map(float, values)) for name, values in by_band.items()}
+    parameters |= {name: float(getattr(geometry, name)) for name in ("sza", "vza", "raa")}
+    return EvenCanopy(lai, parameters | {"leaf_angles": leaf_angle_classes(leaf_angles), "hotspot": float(hotspot)})
 
 
 def canopy_kernel(

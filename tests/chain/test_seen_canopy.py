@@ -1,0 +1,93 @@
+"""Canopy and air in one pass are to the bit those of two, and are taken where cells differ in leaf area alone."""
+
+import dask
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import no_compute
+
+import fifesim
+from fifesim.chain.seen_canopy import seen_reflectance, seen_through_air
+from fifesim.rasters.origins import origin_of
+
+GRID = fifesim.fife_site(30 / 9, window=((0, 90), (0, 72)))
+BANDS = ["TM2", "TM3", "TM4"]
+
+
+def scene(chunks=None):
+    lai = fifesim.lai_scene(GRID, arp=0.15, seed=7, chunks=chunks)
+    return lai.copy(data=xr.where(lai.data < 1.9, lai.data, np.nan) if chunks is None else lai.data)
+
+
+def chains(lai, **canopy):
+    reflectance = lai.fifesim.surface_reflectance("TM", bands=BANDS, **canopy)
+    return reflectance, reflectance.fifesim.to_toa()
+
+
+@pytest.mark.parametrize("canopy", [{}, {"hotspot": 0.1, "soil": 0.05}], ids=["plain", "hot spot, bright soil"])
+def test_one_pass_is_to_the_bit_two(canopy):
+    with no_compute():
+        reflectance, lazy = chains(scene({"y": 31, "x": 29}), **canopy)
+        assert seen_through_air(reflectance) is not None
+    assert not any(name in lazy.data.dask.layers for name in reflectance.data.dask.layers if "call" in name)
+    xr.testing.assert_identical(lazy.compute(), chains(scene({"y": 31, "x": 29}).compute(), **canopy)[1])
+
+
+@pytest.mark.parametrize("canopy", [{"brown": 0.2}, {"crown_cover": 0.7}, {"exact": True}], ids=lambda each: str(each))
+def test_other_canopies_go_step_by_step(canopy):
+    reflectance, lazy = chains(scene({"y": 90, "x": 40}), **canopy)
+    assert seen_through_air(reflectance) is None
+    xr.testing.assert_identical(lazy.compute(), chains(scene({"y": 90, "x": 40}).compute(), **canopy)[1])
+
+
+def test_changed_values_are_not_made_again():
+    reflectance, _ = chains(scene({"y": 90, "x": 40}))
+    halved = (0.5 * reflectance).assign_attrs(reflectance.attrs)
+    assert seen_through_air(halved) is None and seen_through_air(reflectance.compute()) is None
+    half = halved.fifesim.to_toa().compute()
+    assert float(half.mean()) < 0.9 * float(reflectance.fifesim.to_toa().mean())
+
+
+def test_missing_cells_are_missing():
+    lai = np.array([[0.0, np.nan, 2.5]])
+    canopy = origin_of(chains(scene({"y": 90, "x": 40}))[0]).parameters
+    names = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
+    clear = dict(zip(names, np.repeat([[0.0], [1.0], [1.0], [0.0], [1.0]], 3, axis=1), strict=True))
+    found = seen_reflectance(lai, canopy=canopy, terms=clear)
+    assert np.isnan(found[:, 0, 1]).all()
+    # Through no air, bare ground is seen as it is.
+    np.testing.assert_allclose(found[:, 0, 0], canopy["background"], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("lai", "message"), [(-1.0, "negative"), (35.0, "at most 20")])
+def test_leaf_area_that_cannot_be_is_refused_as_elsewhere(lai, message):
+    cells = scene({"y": 90, "x": 40})
+    toa = chains(cells.copy(data=cells.data * 0 + lai))[1]
+    with pytest.raises(ValueError, match=message):
+        toa.compute()
+
+
+def test_image_and_index_together_are_those_alone():
+    """Asked for together, and with the truth, they are to the bit those asked for alone."""
+    lai = scene({"y": 45, "x": 36})
+    toa = chains(lai)[1]
+    image = toa.fifesim.sense("TM")
+    ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
+    whole = xr.Dataset({"dn": image, "ndvi": ndvi})
+    *together, dataset = dask.compute(image, ndvi, truth, whole)
+    for one, alone in zip([*together, dataset["dn"], dataset["ndvi"]], (image, ndvi, truth, image, ndvi), strict=True):
+        np.testing.assert_array_equal(one, alone.compute())
+
+
+def test_image_and_index_together_cost_one_scene():
+    made = []
+
+    def counted(block):
+        made.append(block.shape)
+        return block
+
+    lai = scene({"y": 45, "x": 36})
+    lai = lai.copy(data=lai.data.map_blocks(counted, dtype=float, meta=np.empty((0, 0))))
+    image = chains(lai)[1].fifesim.sense("TM")
+    dask.compute(image, image.fifesim.ndvi(), lai.fifesim.aggregate(30), scheduler="synchronous")
+    assert len(made) == lai.data.npartitions
