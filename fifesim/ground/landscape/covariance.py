@@ -24,6 +24,9 @@ _STREAM = 2**50
 _ROUNDS = 30
 _CLOSE = 1e-4
 
+# Cells at once, of which all that is between stays in a processor's cache.
+_AT_ONCE = 2**16
+
 # What is left of a correlation may be so far from what is asked.
 _APART = 0.01
 
@@ -314,9 +317,14 @@ def correlated(ground, noise, scores, covariates):
     field : array, shape (y, x)
         Standard normal over the places that the ground was sampled at; NaN where the ground is. [1]
     """
-    signal = np.zeros(noise.size)
-    for weight, each in zip(ground.weights, ground.covariates, strict=True):
-        add_scores(covariates[each], scores[each], weight, signal)
-    field = np.sqrt(1 - ground.share**2) * np.ravel(noise)
-    add_scores(signal, ground.scores, ground.share, field)
-    return field.reshape(noise.shape)
+    shape = np.shape(noise)
+    noise, field = np.ravel(noise), np.empty(np.size(noise))
+    known = [np.ravel(covariates[each]) for each in ground.covariates]
+    for start in range(0, noise.size, _AT_ONCE):
+        cells = slice(start, start + _AT_ONCE)
+        signal = np.zeros(noise[cells].size)
+        for weight, name, values in zip(ground.weights, ground.covariates, known, strict=True):
+            add_scores(values[cells], scores[name], weight, signal)
+        np.multiply(noise[cells], np.sqrt(1 - ground.share**2), out=field[cells])
+        add_scores(signal, ground.scores, ground.share, field[cells])
+    return field.reshape(shape)
