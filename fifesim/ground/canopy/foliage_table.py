@@ -261,7 +261,7 @@ def _blend(flat, start, length, leaves, browns, wide, out):
         out[c] = b0 * wide[c] + b1 * wide[c + columns] + b2 * wide[c + 2 * columns] + b3 * wide[c + 3 * columns]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _foliage(lai, brown, background, table, values):
     _, browns, columns = table.coefficients.shape
     flat, wide, terms = table.coefficients.reshape(-1), np.zeros(4 * columns), np.zeros(columns)
@@ -280,7 +280,7 @@ def _foliage(lai, brown, background, table, values):
             values[band, i] = over_background(alone, hot, through, rdd, ground)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _crowned(lai, brown, cover, background, table, crowns, values):
     _, browns, columns = table.coefficients.shape
     flat, rooms = table.coefficients.reshape(-1), crowns.reshape(-1)

@@ -183,7 +183,7 @@ def moistened(dry, moisture, films):
     return in_cells(_moisten, dry, moisture, *films)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _moisten(dry, moisture, surface, inside, entrance, passed, out):
     covered = np.empty(_FILMS + 1)
     for i in range(out.shape[1]):
