@@ -98,7 +98,12 @@ class LandscapeKeys(Section):
     )
     arps: ByName = text({}, "autoregressive parameters [1] of these fields; by default that of [ground]")
     coarser: int = number(
-        1, "1", "ground cells along a side of a cell of these fields' lattice, which arps count in", ge=1, le=100, strict=True
+        1,
+        "1",
+        "ground cells along a side of a cell of these fields' lattice, which arps count in",
+        ge=1,
+        le=100,
+        strict=True,
     )
     covary: ByName = text({}, f"correlations [1] of leaf area with {', '.join(COVARIATES + VARYING)}")
 

@@ -48,7 +48,7 @@ class Copula(NamedTuple):
     ground: dict[str, Ground]
     noise: dict[str, dict[str, float]]
     """For each field the weights of the noises, by the fields that they belong to."""
-    coarse: dict[str, dict[str, float]] = {}
+    coarse: dict[str, dict[str, float]]
     """For each field that has part in them, the weights of independent fields on coarser lattices, by their names."""
 
 
@@ -202,7 +202,8 @@ def _left(one, other, r, arps, coarser, ground, signals):
     if abs(r - shared) > most * (1 + 1e-9):
         reasons = [f"by their arps {arps[one]:g} and {arps[other]:g}"] if alike < 1 else []
         reasons += ["what follows the ground"] if min(rests) < 1 else []
-        raise Impossible(f"{one} and {other} can have {shared - most:.2f} to {shared + most:.2f}, {' and '.join(reasons)}")
+        span = f"{shared - most:.2f} to {shared + most:.2f}"
+        raise Impossible(f"{one} and {other} can have {span}, {' and '.join(reasons)}")
     return r - shared, most
 
 

@@ -28,8 +28,8 @@ class Field:
     arp : float, optional
         Autoregressive parameter of the field, in [0, 0.2498]. [1]
     coarser : int, optional
-        Ground cells along a side of a cell of the field's own lattice, which `arp` counts in: with 4 a field varies over
-        13 m and more on ground cells of 3.3 m, and takes a tenth of the time. By default it has the ground's.
+        Ground cells along a side of a cell of the field's own lattice, which `arp` counts in: with 4 a field varies
+        over 27 m and more on ground cells of 3.3 m, and takes a tenth of the time. By default it has the ground's.
 
     Raises
     ------

@@ -205,7 +205,7 @@ def test_fields_of_coarser_lattices_are_given_to_the_others(places):
 def test_fields_of_another_lattice_may_correlate_by_any_number():
     """Where arps bind noises of one lattice to 0.63."""
     arps, asked = {"soil": 0.24, "lai": 0.05}, {("lai", "soil"): -0.9}
-    with pytest.raises(ValueError, match="can have -0.63 to 0.63, by their arps 0.24 and 0.05|by their arps"):
+    with pytest.raises(ValueError, match=r"can have -0\.63 to 0\.63, by their arps"):
         copula(arps, asked)
     parts = copula(arps, asked, coarser=("soil",))
     assert parts.coarse["lai"] == {"soil": pytest.approx(-0.9)} and parts.noise["lai"] == {"lai": 1.0}
@@ -215,7 +215,7 @@ def test_fields_of_another_lattice_may_correlate_by_any_number():
 @pytest.mark.parametrize("coarse", [("soil",), ("soil", "moisture"), ("lai", "soil", "moisture")])
 def test_what_no_matrix_allows_is_refused_of_coarser_lattices_too(coarse):
     asked = {("lai", "soil"): 0.9, ("lai", "moisture"): 0.9, ("soil", "moisture"): -0.9}
-    with pytest.raises(ValueError, match="cannot be: .* nearest allowed") as caught:
+    with pytest.raises(ValueError, match=r"cannot be: .* nearest allowed") as caught:
         copula(dict.fromkeys(ARPS, 0.1), asked, coarser=coarse)
     assert abs(float(str(caught.value).split()[-1])) == pytest.approx(0.5, abs=0.011)
 

@@ -72,12 +72,12 @@ def downscale(lai, grid, *, arp=0.15, distribution=None, cv=None, seed=0, chunks
     -----
     Exact: the mean of the cells of each pixel, within rounding (1e-12), and that none is negative. Approximate: where
     the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 1 %,
-    inside of pixels and across their borders alike. The model is a field whose logarithm is normal for `cv`, quantiles
-    of a normal field for `distribution`; cells may pass the end of a distribution by 0.1 %. What a map has beside that
-    is a trend, as strong as second differences of its pixels say in the surroundings of each tile, which is
-    interpolated. A map that is smoother than the model leaves cells less room: of a uniform map, in pixels of 3 x 3
-    cells, neighbours across a border have 0.89, 0.81 and 0.55 times the model's semivariance at arp 0, 0.15 and 0.24,
-    those in a pixel 1, 0.98 and 0.75 times.
+    of a skewed distribution at an arp of 0.24 within 2 %, inside of pixels and across their borders alike. The model is
+    a field whose logarithm is normal for `cv`, quantiles of a normal field for `distribution`; cells may pass the end
+    of a distribution by 0.1 %. What a map has beside that is a trend, as strong as second differences of its pixels say
+    in the surroundings of each tile, which is interpolated. A map that is smoother than the model leaves cells less
+    room: of a uniform map, in pixels of 3 x 3 cells, neighbours across a border have 0.89, 0.81 and 0.55 times the
+    model's semivariance at arp 0, 0.15 and 0.24, those in a pixel 1, 0.98 and 0.75 times.
 
     The field of cells is that of `fifesim.lai_scene`, whose seed gives the same ups and downs. A tile of cells holds at
     least 8 pixels along an axis and reads 12 around: pixels of 150 x 150 cells take 1.6 GB, and many times the time

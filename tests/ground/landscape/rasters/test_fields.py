@@ -209,7 +209,9 @@ def test_fields_of_coarser_lattices_correlate_as_asked(ground, mixed):
         if other is None:
             other = normal_scores(ground[name].values.ravel(), score_table(ground[name].values.ravel()))
         assert np.corrcoef(mixed["lai"].values.ravel(), other)[0, 1] == pytest.approx(asked, abs=0.04), name
-    assert np.corrcoef(mixed["soil"].values.ravel(), mixed["moisture"].values.ravel())[0, 1] == pytest.approx(0, abs=0.06)
+    assert np.corrcoef(mixed["soil"].values.ravel(), mixed["moisture"].values.ravel())[0, 1] == pytest.approx(
+        0, abs=0.06
+    )
     assert "4 x 4 cells" in mixed["soil"].attrs["history"] and "cells" not in mixed["lai"].attrs["history"]
 
 
@@ -220,7 +222,9 @@ def test_coarser_lattices_give_the_same_bits_in_chunks_and_windows(grid, ground,
         grid[window], reference=ground, covariates={n: each[window] for n, each in ground.items()}, **options
     )
     with no_compute():
-        lazy = landscape_fields(grid, covariates={n: in_chunks(r, {"y": 250, "x": 333}) for n, r in ground.items()}, **options)
+        lazy = landscape_fields(
+            grid, covariates={n: in_chunks(r, {"y": 250, "x": 333}) for n, r in ground.items()}, **options
+        )
     for name, whole in mixed.items():
         np.testing.assert_array_equal(part[name], whole[window])
         xr.testing.assert_identical(lazy[name].compute(), whole)
