@@ -8,7 +8,7 @@ from scipy import stats
 
 from fifesim.base.kinds import described
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
-from fifesim.ground.landscape.coarse_field import check_coarser
+from fifesim.ground.landscape.coarse_lattice import check_coarser
 
 SHARES = ("moisture", "brown", "crown_cover")
 """Properties between 0 and 1."""

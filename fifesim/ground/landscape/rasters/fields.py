@@ -11,7 +11,7 @@ import xarray as xr
 from fifesim.base.arguments import check
 from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
-from fifesim.ground.landscape.coarse_field import check_coarser, coarse_field
+from fifesim.ground.landscape.coarse_lattice import check_coarser, coarse_field
 from fifesim.ground.landscape.correlations import flat, pairs_of
 from fifesim.ground.landscape.covariance import Copula, copula, correlated, field_seed
 from fifesim.ground.landscape.field import TILE, mixed_field

@@ -5,7 +5,7 @@ import pytest
 from oracles_field import covariances
 from scipy import interpolate, stats
 
-from fifesim.ground.landscape.coarse_field import TILE, coarse_field, spline_weights
+from fifesim.ground.landscape.coarse_lattice import TILE, coarse_field, spline_weights
 from fifesim.ground.landscape.field import mixed_field, streaming_field
 
 
