@@ -29,10 +29,10 @@ def chain(seed):
 
 
 FIELDS = {
-    "soil": fifesim.Field(sd=0.03, arp=0.24),
-    "brown": fifesim.Field(mean=0.15, sd=0.06, arp=0.24),
-    "crown_cover": fifesim.Field(mean=0.8, sd=0.1, arp=0.24),
-    "moisture": fifesim.Field(mean=0.25, sd=0.08, arp=0.24),
+    "soil": fifesim.Field(sd=0.03, arp=0.05, coarser=4),
+    "brown": fifesim.Field(mean=0.15, sd=0.06, arp=0.05, coarser=4),
+    "crown_cover": fifesim.Field(mean=0.8, sd=0.1, arp=0.05, coarser=4),
+    "moisture": fifesim.Field(mean=0.25, sd=0.08, arp=0.05, coarser=4),
 }
 
 

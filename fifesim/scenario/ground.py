@@ -88,7 +88,7 @@ def drawn_properties(scenario):
     land, own = scenario.ground, scenario.landscape
     means = {"soil": 0.0, "moisture": own.moisture, "brown": land.brown, "crown_cover": land.crown_cover}
     return {
-        name: Field(mean=means[name], sd=deviation, arp=own.arps.get(name, land.arp))
+        name: Field(mean=means[name], sd=deviation, arp=own.arps.get(name, land.arp), coarser=own.coarser)
         for name, deviation in own.deviations.items()
         if deviation
     }

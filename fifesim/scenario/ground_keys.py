@@ -97,6 +97,14 @@ class LandscapeKeys(Section):
         {}, f"standard deviations [1] of what varies in fields that are drawn: {', '.join(VARYING)}"
     )
     arps: ByName = text({}, "autoregressive parameters [1] of these fields; by default that of [ground]")
+    coarser: int = number(
+        1,
+        "1",
+        "ground cells along a side of a cell of these fields' lattice, which arps count in",
+        ge=1,
+        le=100,
+        strict=True,
+    )
     covary: ByName = text({}, f"correlations [1] of leaf area with {', '.join(COVARIATES + VARYING)}")
 
     def is_one(self):

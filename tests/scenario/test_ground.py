@@ -35,6 +35,7 @@ OWN = {
         "moisture": 0.2,
         "deviations": {"soil": 0.03, "brown": 0.06, "crown_cover": 0.0},
         "arps": {"soil": 0.24},
+        "coarser": 2,
         "covary": {"soil": -0.3, "brown": 0.0},
     },
     "classes": {
@@ -61,8 +62,8 @@ def by_hand(scenario):
         },
         arp=0.1,
         moisture=0.2,
-        brown=fifesim.Field(mean=0.2, sd=0.06, arp=0.1),
-        soil=fifesim.Field(sd=0.03, arp=0.24),
+        brown=fifesim.Field(mean=0.2, sd=0.06, arp=0.1, coarser=2),
+        soil=fifesim.Field(sd=0.03, arp=0.24, coarser=2),
         covary={"soil": -0.3},
         seed=11,
     )

@@ -11,11 +11,6 @@ from scipy import fft
 
 from fifesim.ground.landscape.autoregression import field_variance, response
 
-# Spectral density of the trend of log LAI between pixels at one radian a pixel: second differences of pixels deviate by
-# 0.61 times this, 0.18, as measured of 10 m pixels of Sentinel-2 on Konza Prairie in June 2022. In standard deviations
-# of a field that is mapped to a distribution the same number is small beside the field itself.
-TREND = 0.3
-
 # Of the squared frequency, so that the trend has a spectral density at zero. [radian2 per pixel2]
 _SLOWEST = 1e-5
 
@@ -67,26 +62,26 @@ def by_pixel(pixels, ratio):
     return np.repeat(np.repeat(pixels, ratio[0], axis=0), ratio[1], axis=1)
 
 
-def kriging_filter(arp, deviation, ratio, shape):
+def kriging_filter(arp, trend, ratio, shape):
     r"""
     Frequency response of block kriging, from pixels to cells.
 
     .. math::
 
         K(f) = \frac{S(f) \, \overline{b(f)}}{\frac{1}{n} \sum_{f'} S(f') |b(f')|^2}, \quad
-        S(f) = s^2 \frac{H^2(f)}{\sigma^2} + n \frac{\tau^2}{|\omega|^4}
+        S(f) = \frac{H^2(f)}{\sigma^2} + n \frac{\tau^2}{|\omega|^4}
 
-    with H the response of the process, :math:`\sigma^2` its variance, s the deviation of the cells, b the response of
-    the mean over the n cells of a pixel, and the sum over the frequencies of cells that are one of pixels. The trend's
-    density, where :math:`\omega` is the frequency per pixel and :math:`\tau` is 0.3, makes K reproduce what changes
-    linearly.
+    with H the response of the process, :math:`\sigma^2` its variance, b the response of the mean over the n cells of a
+    pixel, and the sum over the frequencies of cells that are one of pixels. The trend's density, where :math:`\omega`
+    is the frequency per pixel, makes K reproduce what changes linearly.
 
     Parameters
     ----------
     arp : float
         Of the cells. [1]
-    deviation : float
-        Standard deviation of the process, in the unit of the pixels; with 0 the trend alone is interpolated.
+    trend : float
+        Root of the trend's density at one radian a pixel, over the deviation of the process, :math:`\tau`: from
+        `fifesim.ground.landscape.map_trends.map_trend`. Infinite where the trend alone is interpolated. [1]
     ratio : (int, int)
         Cells in a pixel, down and across.
     shape : (int, int)
@@ -101,17 +96,56 @@ def kriging_filter(arp, deviation, ratio, shape):
     ----------
     [Kyriakidis2004]_ for estimates of points from areas; [KyriakidisYoo2005]_ for the simulation
     """
-    u, v = (2.0 * np.pi * fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
-    number = ratio[0] * ratio[1]
-    squared = 2.0 * (1.0 - np.cos(u[:, None])) * ratio[0] ** 2 + 2.0 * (1.0 - np.cos(v)) * ratio[1] ** 2
-    density = number * (TREND / (squared + _SLOWEST)) ** 2
-    density += deviation**2 * response(arp, u[:, None], v) ** 2 / field_variance(arp)
-    mean = _mean_response(u, ratio[0])[:, None] * _mean_response(v, ratio[1])
-    seen = (density * np.abs(mean) ** 2).reshape(ratio[0], shape[0], ratio[1], shape[1]).sum((0, 2)) / number
-    half = v.size // 2 + 1
+    process, slow, mean = densities(arp, ratio, shape)
+    density = slow if np.isinf(trend) else process + trend**2 * slow
+    seen = of_means(density, mean, ratio)
+    half = mean.shape[1] // 2 + 1
     columns = np.arange(half) % shape[1]
     estimated = density[:, :half] * np.conj(mean[:, :half]) / np.tile(seen, (ratio[0], 1))[:, columns]
     return estimated.astype(np.complex64)
+
+
+def densities(arp, ratio, shape):
+    """
+    Spectral densities of the process and of a trend, and the response of means over pixels.
+
+    Parameters
+    ----------
+    arp, ratio, shape
+        As in `kriging_filter`.
+
+    Returns
+    -------
+    process, trend : array, shape (rows * ratio[0], columns * ratio[1])
+        Of unit variance, and of unit density at one radian a pixel. [1]
+    mean : array of complex, of this shape
+        [1]
+    """
+    u, v = (2.0 * np.pi * fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
+    squared = 2.0 * (1.0 - np.cos(u[:, None])) * ratio[0] ** 2 + 2.0 * (1.0 - np.cos(v)) * ratio[1] ** 2
+    trend = ratio[0] * ratio[1] / (squared + _SLOWEST) ** 2
+    process = response(arp, u[:, None], v) ** 2 / field_variance(arp)
+    return process, trend, _mean_response(u, ratio[0])[:, None] * _mean_response(v, ratio[1])
+
+
+def of_means(density, mean, ratio):
+    """
+    Spectral density of means over pixels.
+
+    Parameters
+    ----------
+    density, mean : array, shape (rows * ratio[0], columns * ratio[1])
+        From `densities`.
+    ratio : (int, int)
+
+    Returns
+    -------
+    density : array, shape (rows, columns)
+        Its mean is the variance of the means. [1]
+    """
+    rows, columns = (size // number for size, number in zip(density.shape, ratio, strict=True))
+    seen = (density * np.abs(mean) ** 2).reshape(ratio[0], rows, ratio[1], columns).sum((0, 2))
+    return seen / (ratio[0] * ratio[1])
 
 
 def _mean_response(frequency, number):
@@ -140,7 +174,7 @@ def kriged(pixels, response, ratio):
     --------
     What is the same everywhere stays so:
 
-    >>> cells = kriged(np.full((4, 4), 2.0), kriging_filter(0.2, 1.0, (3, 3), (4, 4)), (3, 3))
+    >>> cells = kriged(np.full((4, 4), 2.0), kriging_filter(0.2, 0.1, (3, 3), (4, 4)), (3, 3))
     >>> bool(np.allclose(cells, 2.0, atol=1e-5))
     True
     """

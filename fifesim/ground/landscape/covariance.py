@@ -24,6 +24,9 @@ _STREAM = 2**50
 _ROUNDS = 30
 _CLOSE = 1e-4
 
+# Cells at once, of which all that is between stays in a processor's cache.
+_AT_ONCE = 2**16
+
 # What is left of a correlation may be so far from what is asked.
 _APART = 0.01
 
@@ -45,6 +48,8 @@ class Copula(NamedTuple):
     ground: dict[str, Ground]
     noise: dict[str, dict[str, float]]
     """For each field the weights of the noises, by the fields that they belong to."""
+    coarse: dict[str, dict[str, float]]
+    """For each field that has part in them, the weights of independent fields on coarser lattices, by their names."""
 
 
 def field_seed(seed, name):
@@ -107,7 +112,7 @@ def cross_correlation(arp, other):
     return float((one - two) / (arp - other) / np.sqrt(field_variance(arp) * field_variance(other)))
 
 
-def copula(arps, correlations, samples=None):
+def copula(arps, correlations, samples=None, coarser=()):
     """
     How fields are put together so that they correlate as asked.
 
@@ -120,6 +125,8 @@ def copula(arps, correlations, samples=None):
         `fifesim.ground.landscape.correlations.pairs_of` gives them. [1]
     samples : dict of str to array, shape (n,), optional
         The ground at some places.
+    coarser : collection of str, optional
+        Names of the fields that vary on a coarser lattice.
 
     Returns
     -------
@@ -136,7 +143,8 @@ def copula(arps, correlations, samples=None):
     that they name. Fields whose pair is not named share nothing but the ground.
 
     Where fields have different arps, their noises correlate more than the fields: by the inverse of
-    `cross_correlation`.
+    `cross_correlation`. Fields on coarser lattices share no noise with others. They come first, and are given to those
+    as what is known: these have a part of their texture then, and may correlate by any number.
     """
     samples = {} if samples is None else _complete(samples)
     tables = {}
@@ -147,12 +155,14 @@ def copula(arps, correlations, samples=None):
             raise ValueError(f"{name} {error}") from None
     scores = {name: normal_scores(values, tables[name]) for name, values in samples.items()}
     try:
-        ground, noise = _parts(arps, correlations, scores)
+        ground, noise, coarse = _parts(arps, correlations, scores, coarser)
     except Impossible as reason:
         few = {name: each[:: max(1, each.size // 4096)] for name, each in scores.items()}
-        share = largest_share(lambda part: _parts(arps, {pair: part * r for pair, r in correlations.items()}, few))
+        share = largest_share(
+            lambda part: _parts(arps, {pair: part * r for pair, r in correlations.items()}, few, coarser)
+        )
         raise ValueError(refused(correlations, share, str(reason))) from None
-    return Copula(tables, ground, noise)
+    return Copula(tables, ground, noise, coarse)
 
 
 def _complete(samples):
@@ -163,26 +173,85 @@ def _complete(samples):
     return {name: np.asarray(each, float)[known] for name, each in samples.items()}
 
 
-def _parts(arps, correlations, scores):
-    """What of each field follows the ground, and weights of the noises."""
+def _parts(arps, correlations, scores, coarser):
+    """What of each field follows the ground; weights of the noises, and of the fields on coarser lattices."""
     ground, signals = {}, {}
     for name in arps:
         asked = {other: r for (one, other), r in correlations.items() if one == name and other in scores}
         if asked:
             ground[name], signals[name] = _follow(name, asked, scores)
-    names = list(arps)
+    names, coarse = [name for name in arps if name not in coarser], [name for name in arps if name in coarser]
+    pairs = {pair: r for pair, r in correlations.items() if set(pair) <= set(arps)}
+    shares = {pair: _left(*pair, r, arps, coarser, ground, signals) for pair, r in pairs.items()}
+    known = _known(coarse, names, shares)
     needed = np.eye(len(names))
-    for (one, other), r in correlations.items():
-        if one in arps and other in arps:
+    for (one, other), (left, most) in shares.items():
+        if one in names and other in names:
             i, j = names.index(one), names.index(other)
-            needed[i, j] = needed[j, i] = _noise_correlation(one, other, r, arps, ground, signals)
-    if np.linalg.eigvalsh(needed)[0] < -1e-9:
+            needed[i, j] = needed[j, i] = _noise_correlation(one, other, left, most, known, arps)
+    noise = _weights(names, needed) | {name: {name: 1.0} for name in coarse}
+    return ground, noise, {name: each for name, each in known.items() if each}
+
+
+def _left(one, other, r, arps, coarser, ground, signals):
+    """What of the covariance of two fields does not come of the ground, and the most that it can be."""
+    shared = float(np.mean(signals[one] * signals[other])) if one in signals and other in signals else 0.0
+    rests = [1 - ground[name].share ** 2 if name in ground else 1.0 for name in (one, other)]
+    alike = 1.0 if {one, other} & set(coarser) else cross_correlation(arps[one], arps[other])
+    most = alike * np.sqrt(rests[0] * rests[1])
+    if abs(r - shared) > most * (1 + 1e-9):
+        reasons = [f"by their arps {arps[one]:g} and {arps[other]:g}"] if alike < 1 else []
+        reasons += ["what follows the ground"] if min(rests) < 1 else []
+        span = f"{shared - most:.2f} to {shared + most:.2f}"
+        raise Impossible(f"{one} and {other} can have {span}, {' and '.join(reasons)}")
+    return r - shared, most
+
+
+def _known(coarse, names, shares):
+    """Weights of independent fields on coarser lattices, in those themselves and in the others."""
+    every = [*coarse, *names]
+    matrix = np.eye(len(every))
+    for (one, other), (left, most) in shares.items():
+        if {one, other} & set(coarse):
+            i, j = every.index(one), every.index(other)
+            matrix[i, j] = matrix[j, i] = left / most if most > 0 else 0.0
+    within = matrix[: len(coarse), : len(coarse)]
+    _check_matrix(within)
+    for i in range(len(coarse), len(every)):
+        # Each of the others by itself: what they share beside this is a matter of their noises.
+        _check_matrix(matrix[np.ix_([*range(len(coarse)), i], [*range(len(coarse)), i])])
+    weights = _lower(matrix)
+    return {
+        name: {coarse[j]: float(weights[i, j]) for j in range(min(i + 1, len(coarse))) if weights[i, j]}
+        for i, name in enumerate(every)
+    }
+
+
+def _noise_correlation(one, other, left, most, known, arps):
+    """Correlation of the noises of two fields on the ground's own lattice."""
+    through = sum(weight * known[other].get(name, 0.0) for name, weight in known[one].items())
+    if not known[one] and not known[other]:
+        return left / most if most > 0 else 0.0
+    alike = cross_correlation(arps[one], arps[other])
+    rests = [np.sqrt(max(1 - sum(w**2 for w in known[name].values()), 0.0)) for name in (one, other)]
+    wanted, room = left * alike / most - through if most > 0 else 0.0, alike * rests[0] * rests[1]
+    if abs(wanted) > room + 1e-9:
+        raise Impossible(f"{one} and {other} go too closely with the same fields of coarser lattices")
+    return wanted / room if room > 0 else 0.0
+
+
+def _check_matrix(matrix):
+    if np.linalg.eigvalsh(matrix)[0] < -1e-9 if len(matrix) else False:
         raise Impossible("no correlation matrix has them together; pairs of fields that are not named count as 0")
+
+
+def _weights(names, needed):
+    """Weights of the noises of fields."""
+    _check_matrix(needed)
     weights = _lower(needed)
-    noise = {
+    return {
         name: {names[j]: float(weights[i, j]) for j in range(i + 1) if weights[i, j]} for i, name in enumerate(names)
     }
-    return ground, noise
 
 
 def _follow(name, asked, scores):
@@ -212,20 +281,6 @@ def _follow(name, asked, scores):
     if np.abs(missed).max() > _APART and len(asked) > 1:
         raise Impossible(f"no sum of {', '.join(asked)} has such ranks that {name} follows each of them")
     return ground, signal
-
-
-def _noise_correlation(one, other, r, arps, ground, signals):
-    """Correlation of the noises of two fields for one of the fields."""
-    shared = float(np.mean(signals[one] * signals[other])) if one in signals and other in signals else 0.0
-    rests = [1 - ground[name].share ** 2 if name in ground else 1.0 for name in (one, other)]
-    most = cross_correlation(arps[one], arps[other]) * np.sqrt(rests[0] * rests[1])
-    if abs(r - shared) > most * (1 + 1e-9):
-        also = " and what follows the ground" if min(rests) < 1 else ""
-        raise Impossible(
-            f"{one} and {other} can have {shared - most:.2f} to {shared + most:.2f}, by their arps {arps[one]:g} and "
-            f"{arps[other]:g}{also}"
-        )
-    return (r - shared) / most if most > 0 else 0.0
 
 
 def _lower(matrix):
@@ -263,9 +318,14 @@ def correlated(ground, noise, scores, covariates):
     field : array, shape (y, x)
         Standard normal over the places that the ground was sampled at; NaN where the ground is. [1]
     """
-    signal = np.zeros(noise.size)
-    for weight, each in zip(ground.weights, ground.covariates, strict=True):
-        add_scores(covariates[each], scores[each], weight, signal)
-    field = np.sqrt(1 - ground.share**2) * np.ravel(noise)
-    add_scores(signal, ground.scores, ground.share, field)
-    return field.reshape(noise.shape)
+    shape = np.shape(noise)
+    noise, field = np.ravel(noise), np.empty(np.size(noise))
+    known = [np.ravel(covariates[each]) for each in ground.covariates]
+    for start in range(0, noise.size, _AT_ONCE):
+        cells = slice(start, start + _AT_ONCE)
+        signal = np.zeros(noise[cells].size)
+        for weight, name, values in zip(ground.weights, ground.covariates, known, strict=True):
+            add_scores(values[cells], scores[name], weight, signal)
+        np.multiply(noise[cells], np.sqrt(1 - ground.share**2), out=field[cells])
+        add_scores(signal, ground.scores, ground.share, field[cells])
+    return field.reshape(shape)

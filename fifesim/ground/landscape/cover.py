@@ -130,8 +130,7 @@ def patch_classes(patches, shares, seed, northing, easting):
         limits = norm.ppf(np.minimum(np.cumsum(shares)[:-1], 1.0))
         return np.searchsorted(limits, smooth_field(seed, *place), side="right").astype(np.int16)
     limits = np.cumsum(shares)[:-1]
-    drawn = voronoi(seed, *place) if patches.pattern == "voronoi" else pastures(seed, *place)
-    return np.searchsorted(limits, drawn, side="right").astype(np.int16)
+    return voronoi(seed, *place, limits) if patches.pattern == "voronoi" else pastures(seed, *place, limits)
 
 
 def _check_shares(values):

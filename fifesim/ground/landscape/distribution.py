@@ -245,6 +245,8 @@ def truncated_normal(mean, standard_deviation, lower, upper):
     return frozen(solution.x)
 
 
+# Some hundredths of a second each; treatments and the distributions of drawn shares are the same objects each time.
+@lru_cache(maxsize=32)
 def quantile_table(distribution):
     """
     Quantiles of a distribution at evenly spaced standard normal deviates.
@@ -252,6 +254,7 @@ def quantile_table(distribution):
     Parameters
     ----------
     distribution : frozen scipy distribution
+        Whose table is kept.
 
     Returns
     -------

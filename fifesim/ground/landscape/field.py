@@ -66,7 +66,7 @@ def streaming_field(seed, arp, row, column, shape):
     return mixed_field({check_seed(seed): 1.0}, arp, row, column, shape)
 
 
-def mixed_field(weights, arp, row, column, shape):
+def mixed_field(weights, arp, row, column, shape, *, tile=TILE):
     """
     Field of a mixture of noises, as a function of place.
 
@@ -76,6 +76,8 @@ def mixed_field(weights, arp, row, column, shape):
         Of the noise of each seed; their squares add up to 1. [1]
     arp, row, column, shape
         As in `streaming_field`.
+    tile : int, optional
+        Edge of the tiles that it is made in, which rounding depends on. [cell]
 
     Returns
     -------
@@ -104,7 +106,8 @@ def mixed_field(weights, arp, row, column, shape):
         raise ValueError(
             f'arp must be at most {LARGEST_STREAMING_ARP} for the streaming field, got {arp:g}: use method="periodic"'
         )
-    return assemble(partial(_tile, tuple(weights.items()), arp), TILE, row, column, shape)
+    made = _tile if tile == TILE else partial(_small_tile, tile)
+    return assemble(partial(made, tuple(weights.items()), arp), tile, row, column, shape)
 
 
 def periodic_field(seed, arp, shape):
@@ -148,9 +151,17 @@ def periodic_field(seed, arp, shape):
 @lru_cache(maxsize=12)
 def _tile(weights, arp, tile_row, tile_column):
     """One tile of a field, in single precision."""
-    tile = _window(weights, arp, tile_row * TILE, tile_column * TILE, (TILE, TILE)).copy()
+    return _filtered_tile(TILE, weights, arp, tile_row, tile_column)
+
+
+def _filtered_tile(size, weights, arp, tile_row, tile_column):
+    tile = _window(weights, arp, tile_row * size, tile_column * size, (size, size)).copy()
     tile.flags.writeable = False
     return tile
+
+
+# So many of 252 cells are 16 MB.
+_small_tile = lru_cache(maxsize=64)(_filtered_tile)
 
 
 def window_field(seed, arp, row, column, shape):

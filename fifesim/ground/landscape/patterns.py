@@ -30,7 +30,7 @@ _LEAST = 2.0**-54
 _ALONG = 3
 
 
-def voronoi(seed, down, across):
+def voronoi(seed, down, across, limits=None):
     """
     Number of the Voronoi cell that each place lies in.
 
@@ -41,18 +41,21 @@ def voronoi(seed, down, across):
     seed : int
     down, across : array, shape (y,), (x,)
         Places, in units of a patch.
+    limits : array, shape (n,), optional
+        Rising; classes begin where a number reaches them.
 
     Returns
     -------
     number : array, shape (y, x)
-        Uniform in [0, 1), of each cell its own. [1]
+        Uniform in [0, 1), of each cell its own; with limits its class, an int16 from 0 to n. [1]
     """
     # The nearest point lies within sqrt(2), so at most two squares away.
     (top, rows), (left, columns) = (_blocks(each, 2) for each in (down, across))
     points = _drawn(seed, _VORONOI, top, left, (rows, columns), 3)
     points[0] += np.arange(top, top + rows)[:, None]
     points[1] += np.arange(left, left + columns)
-    out = np.empty((down.size, across.size))
+    out = np.empty((down.size, across.size), float if limits is None else np.int16)
+    points[2] = _of_class(points[2], limits)
     _nearest(down, across, top, left, points, out)
     return out
 
@@ -91,7 +94,12 @@ def smooth_field(seed, down, across):
     return out
 
 
-def pastures(seed, down, across):
+def _of_class(numbers, limits):
+    """Classes of numbers; without limits these themselves. Patches are fewer than places."""
+    return numbers if limits is None else np.searchsorted(limits, numbers, side="right")
+
+
+def pastures(seed, down, across, limits=None):
     """
     Number of the pasture that each place lies in.
 
@@ -103,14 +111,16 @@ def pastures(seed, down, across):
     seed : int
     down, across : array, shape (y,), (x,)
         Places, in units of a pasture.
+    limits : array, shape (n,), optional
+        As in `voronoi`.
 
     Returns
     -------
     number : array, shape (y, x)
-        Uniform in [0, 1), of each pasture its own. [1]
+        Uniform in [0, 1), of each pasture its own; with limits its class, an int16 from 0 to n. [1]
     """
     down, across = np.asarray(down, float) / _ALONG, np.asarray(across, float) / _ALONG
-    out = np.empty((down.size, across.size))
+    out = np.empty((down.size, across.size), float if limits is None else np.int16)
     for row in np.unique(np.floor(down)).astype(int).tolist():
         rows = np.flatnonzero(np.floor(down) == row)
         for column in np.unique(np.floor(across)).astype(int).tolist():
@@ -118,7 +128,7 @@ def pastures(seed, down, across):
             for (top, left, bottom, right), number in _fenced(seed, row, column):
                 within = (down[rows] - row >= top) & (down[rows] - row < bottom)
                 beside = (across[columns] - column >= left) & (across[columns] - column < right)
-                out[np.ix_(rows[within], columns[beside])] = number
+                out[np.ix_(rows[within], columns[beside])] = _of_class(number, limits)
     return out
 
 

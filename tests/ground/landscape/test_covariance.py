@@ -172,6 +172,74 @@ def test_places_where_something_is_missing_are_left_out(places):
         copula({"lai": 0.1}, {("lai", "elevation"): 0.5}, {"elevation": np.full(9, np.nan)})
 
 
+def put_together(parts, names, noises):
+    """Fields without ground, of noises of one cell each."""
+    found = {}
+    for name in names:
+        known = parts.coarse.get(name, {})
+        own = sum(weight * noises[other] for other, weight in parts.noise[name].items())
+        part = sum(weight * noises[other] for other, weight in known.items())
+        rest = np.sqrt(1 - sum(weight**2 for weight in known.values()))
+        found[name] = part + rest * own
+    return found
+
+
+def test_fields_of_coarser_lattices_are_given_to_the_others(places):
+    """Five fields, two of them coarse: every pair as asked, and variances 1."""
+    names = ["wet", "soil", "lai", "brown", "crowns"]
+    asked = {
+        ("wet", "soil"): -0.5, ("lai", "wet"): 0.6, ("lai", "soil"): -0.4, ("brown", "wet"): -0.3,
+        ("lai", "brown"): -0.4, ("lai", "crowns"): 0.5,
+    }  # fmt: skip
+    parts = copula(dict.fromkeys(names, 0.1), asked, coarser=("wet", "soil"))
+    noises = dict(zip(names, np.random.default_rng(3).standard_normal((5, 200_000)), strict=True))
+    found = put_together(parts, names, noises)
+    wanted = np.eye(5)
+    for (one, other), r in asked.items():
+        i, j = names.index(one), names.index(other)
+        wanted[i, j] = wanted[j, i] = r
+    np.testing.assert_allclose(np.cov([found[name] for name in names]), wanted, atol=0.012)
+    assert parts.noise["wet"] == {"wet": 1.0} and set(parts.noise["lai"]) <= {"lai", "brown", "crowns"}
+
+
+def test_fields_of_another_lattice_may_correlate_by_any_number():
+    """Where arps bind noises of one lattice to 0.63."""
+    arps, asked = {"soil": 0.24, "lai": 0.05}, {("lai", "soil"): -0.9}
+    with pytest.raises(ValueError, match=r"can have -0\.63 to 0\.63, by their arps"):
+        copula(arps, asked)
+    parts = copula(arps, asked, coarser=("soil",))
+    assert parts.coarse["lai"] == {"soil": pytest.approx(-0.9)} and parts.noise["lai"] == {"lai": 1.0}
+    assert copula(arps, {("lai", "soil"): 1.0}, coarser=("soil",)).coarse["lai"] == {"soil": 1.0}
+
+
+@pytest.mark.parametrize("coarse", [("soil",), ("soil", "moisture"), ("lai", "soil", "moisture")])
+def test_what_no_matrix_allows_is_refused_of_coarser_lattices_too(coarse):
+    asked = {("lai", "soil"): 0.9, ("lai", "moisture"): 0.9, ("soil", "moisture"): -0.9}
+    with pytest.raises(ValueError, match=r"cannot be: .* nearest allowed") as caught:
+        copula(dict.fromkeys(ARPS, 0.1), asked, coarser=coarse)
+    assert abs(float(str(caught.value).split()[-1])) == pytest.approx(0.5, abs=0.011)
+
+
+def test_coarse_field_may_follow_the_ground(places):
+    asked = {("soil", "elevation"): -0.6, ("lai", "elevation"): 0.3, ("lai", "soil"): -0.4}
+    parts = copula({"soil": 0.1, "lai": 0.1}, asked, places, coarser=("soil",))
+    noises = dict(zip(("soil", "lai"), np.random.default_rng(5).standard_normal((2, 20_000)), strict=True))
+    mixed = put_together(parts, ["soil", "lai"], noises)
+    found = {name: correlated(parts.ground[name], mixed[name], parts.covariates, places) for name in mixed}
+    assert np.corrcoef(found["lai"], found["soil"])[0, 1] == pytest.approx(-0.4, abs=0.03)
+    elevation = normal_scores(places["elevation"], parts.covariates["elevation"])
+    assert np.corrcoef(found["soil"], elevation)[0, 1] == pytest.approx(-0.6, abs=0.03)
+
+
+def test_cells_in_pieces_are_those_of_one_piece(places):
+    parts = copula({"lai": 0.1}, {("lai", "elevation"): 0.5}, places)
+    many = {"elevation": np.tile(places["elevation"], 8)}
+    noise = np.random.default_rng(2).standard_normal(many["elevation"].size)
+    found = correlated(parts.ground["lai"], noise, parts.covariates, many)
+    last = {"elevation": many["elevation"][-70:]}
+    np.testing.assert_array_equal(found[-70:], correlated(parts.ground["lai"], noise[-70:], parts.covariates, last))
+
+
 def test_each_name_has_noise_of_its_own():
     seeds = {field_seed(seed, name) for seed in (0, 1) for name in ("lai", "soil", "moisture", "brown")}
     assert len(seeds) == 8

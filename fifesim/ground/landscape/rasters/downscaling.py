@@ -16,6 +16,7 @@ from fifesim.ground.landscape.dispersion import deviation_table, kept_variance, 
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.downscaling import LogNormal, Marginal, downscaled, fife_variation
 from fifesim.ground.landscape.field import window_field
+from fifesim.ground.landscape.map_trends import map_trend
 from fifesim.ground.landscape.raster import distribution_name, one_layer
 from fifesim.ground.landscape.rasters.pixels import MARGIN, PixelReads, pixel_lattice
 from fifesim.rasters import cf, places
@@ -71,11 +72,12 @@ def downscale(lai, grid, *, arp=0.15, distribution=None, cv=None, seed=0, chunks
     -----
     Exact: the mean of the cells of each pixel, within rounding (1e-12), and that none is negative. Approximate: where
     the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 1 %,
-    inside of pixels and across their borders alike; within 4 % at arp 0.24, and 1.5, 3 and 6 % at a cv of 0.2, 0.1 and
-    0.05, where a trend of the map counts for more. The model is a field whose logarithm is normal for `cv`, quantiles
-    of a normal field for `distribution`; cells may pass the end of a distribution by 0.1 %. A map that is smoother than
-    that leaves cells less room: of a uniform map, in pixels of 3 x 3 cells, neighbours across a border have 0.89, 0.81
-    and 0.55 times the model's semivariance at arp 0, 0.15 and 0.24, those in a pixel 1, 0.98 and 0.75 times.
+    of a skewed distribution at an arp of 0.24 within 2 %, inside of pixels and across their borders alike. The model is
+    a field whose logarithm is normal for `cv`, quantiles of a normal field for `distribution`; cells may pass the end
+    of a distribution by 0.1 %. What a map has beside that is a trend, as strong as second differences of its pixels say
+    in the surroundings of each tile, which is interpolated. A map that is smoother than the model leaves cells less
+    room: of a uniform map, in pixels of 3 x 3 cells, neighbours across a border have 0.89, 0.81 and 0.55 times the
+    model's semivariance at arp 0, 0.15 and 0.24, those in a pixel 1, 0.98 and 0.75 times.
 
     The field of cells is that of `fifesim.lai_scene`, whose seed gives the same ups and downs. A tile of cells holds at
     least 8 pixels along an axis and reads 12 around: pixels of 150 x 150 cells take 1.6 GB, and many times the time
@@ -87,7 +89,8 @@ def downscale(lai, grid, *, arp=0.15, distribution=None, cv=None, seed=0, chunks
 
     See Also
     --------
-    fifesim.ground.landscape.downscaling.downscaled, fifesim.ground.landscape.block_kriging.kriging_filter
+    fifesim.ground.landscape.downscaling.downscaled, fifesim.ground.landscape.block_kriging.kriging_filter,
+    fifesim.ground.landscape.map_trends.map_trend
 
     Examples
     --------
@@ -131,7 +134,7 @@ class _Model:
     transform: LogNormal | Marginal
     variation: object  # a function of the means of pixels, or None where the deviation is one
     table: tuple | None  # deviations of the field by cv
-    deviation: float  # of the field where the interpolation needs one
+    deviation: float | None  # of the field where it is the same in all pixels
     words: str
 
     def deviations(self, pixels):
@@ -154,10 +157,9 @@ def _model(arp, distribution, cv, ratio):
     table = _deviations(arp, ratio)
     variation = fife_variation if cv is None else cv
     if callable(variation):
-        typical = _checked_variation(np.asarray(variation(np.ones((1, 1))), float), table)
-        deviation = float(np.interp(np.ravel(typical)[0], *table))
+        _checked_variation(np.asarray(variation(np.ones((1, 1))), float), table)
         words = "log-normal, cv of FIFE's grass" if cv is None else "log-normal, cv by the mean"
-        return _Model(arp, LogNormal(), variation, table, deviation, words)
+        return _Model(arp, LogNormal(), variation, table, None, words)
     _checked_variation(np.asarray(cv, float), table)
     return _Model(arp, LogNormal(), None, None, float(np.interp(cv, *table)), f"log-normal, cv {cv:g}")
 
@@ -205,12 +207,15 @@ def _tile(model, seed, lattice, row, column, pixels):
     ]
     size = tuple(count * number for count, number in zip(shape, lattice.ratio, strict=True))
     field = window_field(seed, model.arp, *first, size)
-    response = _filter(model.arp, model.deviation, lattice.ratio, shape)
-    cells = downscaled(pixels, field, response, model.transform, model.deviations(pixels))
+    known, deviations = pixels > 0, model.deviations(pixels)
+    # Of pixels without leaves no level is asked.
+    levels = model.transform.level(np.where(known, pixels, pixels[known].max()))
+    trend = map_trend(levels, known, deviations, model.arp, lattice.ratio)
+    cells = downscaled(pixels, field, _filter(model.arp, trend, lattice.ratio, shape), model.transform, deviations)
     cut = tuple(slice(MARGIN * number, -MARGIN * number) for number in lattice.ratio)
     tile = cells[cut].copy()
     tile.flags.writeable = False
     return tile
 
 
-_filter = lru_cache(maxsize=4)(kriging_filter)
+_filter = lru_cache(maxsize=8)(kriging_filter)

@@ -44,6 +44,7 @@ def drawn_fields(grid, drawn, covary, arps, **options):
     for name in set(drawn) & set(SHARES):
         drawn[name].distribution(name)
     others = {name: each.arp for name, each in drawn.items()}
+    options["coarser"] = {name: each.coarser for name, each in drawn.items()}
     if not covary:
         made = [landscape_fields(grid, others, **options)] if others else [{}]
     else:

@@ -8,6 +8,9 @@ from fifesim.base.geometry import ANGLES
 from fifesim.ground.landscape.compression import NO_CLASS, cells_by_class, check_codes
 from fifesim.rasters import chunks as chunking
 
+# Cells that are put together at once: 1 MB of each raster.
+_AT_ONCE = 2**17
+
 
 def by_class(kernels, cover, *scene, bands=None):
     """
@@ -68,9 +71,10 @@ def _of_classes(codes, parts, banded, bands, first, cover, *blocks):
         found = kernel(*(block for block, _ in (*scene, *(rasters[index] for index in taken))))
         return np.reshape(found, ((bands,) if bands else ()) + shape)
     out = np.full((bands or 1, cover.size), np.nan)
-    for cells, (kernel, taken) in zip(cells_by_class(codes_of_cells, codes), parts, strict=True):
-        if cells.size:
-            read = (*scene, *(rasters[index] for index in taken))
+    for of_class, (kernel, taken) in zip(cells_by_class(codes_of_cells, codes), parts, strict=True):
+        read = (*scene, *(rasters[index] for index in taken))
+        for start in range(0, of_class.size, _AT_ONCE):
+            cells = of_class[start : start + _AT_ONCE]
             found = kernel(*(block[cells] if varies else block for block, varies in read))
             # Band by band: numpy puts cells of several rows at once back at half the speed.
             for band, values in zip(out, found if bands else [found], strict=True):

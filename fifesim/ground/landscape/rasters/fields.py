@@ -11,6 +11,7 @@ import xarray as xr
 from fifesim.base.arguments import check
 from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
+from fifesim.ground.landscape.coarse_lattice import check_coarser, coarse_field
 from fifesim.ground.landscape.correlations import flat, pairs_of
 from fifesim.ground.landscape.covariance import Copula, copula, correlated, field_seed
 from fifesim.ground.landscape.field import TILE, mixed_field
@@ -36,7 +37,9 @@ OF_ELEVATION = ("elevation", "wetness", "illumination", "slope")
 """What correlations may name of a landscape's elevation."""
 
 
-def correlated_fields(grid, arps, correlations=None, *, seed=0, covariates=None, reference=None, chunks=None):
+def correlated_fields(
+    grid, arps, correlations=None, *, coarser=None, seed=0, covariates=None, reference=None, chunks=None
+):
     """
     Standard normal fields that correlate with each other and with the ground.
 
@@ -48,6 +51,8 @@ def correlated_fields(grid, arps, correlations=None, *, seed=0, covariates=None,
         Autoregressive parameter of each field, by its name, in [0, 0.2498]. [1]
     correlations : mapping, optional
         ``{("lai", "soil"): -0.4, ("lai", "elevation"): 0.3}``, or by name, ``{"lai": {"soil": -0.4}}``. [1]
+    coarser : dict of str to int, optional
+        Ground cells along a side of a cell of a field's own lattice, where it varies on a coarser one. [1]
     seed : int, optional
         In [0, 2**63). The field "lai" is that of `fifesim.lai_scene`; each other name has noise of its own.
     covariates : dict of str to xarray.DataArray, dims (y, x), optional
@@ -95,17 +100,20 @@ def correlated_fields(grid, arps, correlations=None, *, seed=0, covariates=None,
     seed = check_seed(seed)
     for name, arp in arps.items():
         check("arps", {name: arp}, _ARPS)
+    coarser = _lattices(arps, coarser)
     pairs = pairs_of(correlations, list(arps), list(covariates or {}))
     covariates = {name: each for name, each in (covariates or {}).items() if any(name in pair for pair in pairs)}
     covariates = {name: _on_grid(name, each, grid) for name, each in covariates.items()}
     like = next((each.data for each in covariates.values() if each.chunks is not None), None)
     chunks = dict(zip("yx", like.chunks, strict=True)) if chunks is None and like is not None else chunks
-    parts = _copula(arps, pairs, covariates, reference)
+    parts = _copula(arps, pairs, covariates, reference, tuple(name for name in arps if coarser[name] > 1))
+    streams = {each: (field_seed(seed, each), arps[each], coarser[each]) for each in arps}
     fields = {}
     for name in arps:
         ground = {other: covariates[other] for other in covariates if (name, other) in pairs}
-        field = _field(grid, arps[name], name, {each: field_seed(seed, each) for each in arps}, parts, ground, chunks)
+        field = _field(grid, name, streams, parts, ground, chunks)
         said = f"correlated_fields: {name}, arp {arps[name]:g}, seed {seed}"
+        said += f", {coarser[name]} x {coarser[name]} cells" if coarser[name] > 1 else ""
         said += "".join(f", {one}-{other} {r:g}" for (one, other), r in pairs.items() if name in (one, other))
         made = {"arp": float(arps[name]), "rng_seed": str(seed), **made_on_site(grid)}
         fields[name] = cf.label(grids.place(field, grid), "normal_score", history=said, **made).rename(name)
@@ -113,14 +121,25 @@ def correlated_fields(grid, arps, correlations=None, *, seed=0, covariates=None,
 
 
 def landscape_fields(
-    grid, arps, covary=None, *, seed=0, dem=None, covariates=None, reference=None, geometry=None, time=None, chunks=None
+    grid,
+    arps,
+    covary=None,
+    *,
+    coarser=None,
+    seed=0,
+    dem=None,
+    covariates=None,
+    reference=None,
+    geometry=None,
+    time=None,
+    chunks=None,
 ):
     """
     Fields of a landscape, some of which follow its elevation.
 
     Parameters
     ----------
-    grid, arps, seed, reference, chunks
+    grid, arps, coarser, seed, reference, chunks
         As in `correlated_fields`.
     covary : mapping, optional
         Of the field "lai", ``{"elevation": 0.3, "soil": -0.4}``, or correlations as in `correlated_fields`. [1]
@@ -155,7 +174,7 @@ def landscape_fields(
         raise ValueError(f"covary names {', '.join(of_dem)}, which the elevation tells: give dem=")
     if of_dem:
         covariates |= of_elevation(dem, of_dem, geometry=geometry, time=time)
-    options = {"seed": seed, "covariates": covariates, "reference": reference, "chunks": chunks}
+    options = {"coarser": coarser, "seed": seed, "covariates": covariates, "reference": reference, "chunks": chunks}
     return correlated_fields(grid, arps, correlations, **options)
 
 
@@ -206,13 +225,20 @@ def _on_grid(name, raster, grid):
     return grids.place(xr.DataArray(raster.data, dims=("y", "x"), name=name), grid)
 
 
-def _field(grid, arp, name, seeds, parts, ground, chunks):
-    """One field, of the noises that are in it and of the ground that it follows."""
-    row, column = grids.lattice_position(grid)
+def _lattices(arps, coarser):
+    """Ground cells along a side of a cell of each field's lattice."""
+    unknown = set(coarser or {}) - set(arps)
+    if unknown:
+        raise ValueError(f"coarser names {', '.join(sorted(unknown))}, there are {', '.join(map(repr, arps))}")
+    return {name: check_coarser((coarser or {}).get(name, 1)) for name in arps}
+
+
+def _field(grid, name, streams, parts, ground, chunks):
+    """One field, of the noises that are in it and of the ground that it follows; streams are seeds, arps and sizes."""
+    lattice = grids.lattice_position(grid)
 
     def noise(made, first_row, first_column, shape):
-        weights = {seeds[other]: weight for other, weight in made.noise[name].items()}
-        return mixed_field(weights, arp, row + first_row, column + first_column, shape)
+        return _noise(name, streams, made, (lattice[0] + first_row, lattice[1] + first_column), shape)
 
     if isinstance(parts, Copula) and not ground:
         # A first window raises what is refused before anything lazy is built.
@@ -237,7 +263,33 @@ def _field(grid, arp, name, seeds, parts, ground, chunks):
     return chunking.pointwise(kernel, *at, *ground.values(), parts)
 
 
-def _copula(arps, pairs, covariates, reference):
+def _noise(name, streams, made, start, shape):
+    """What of a field does not follow the ground: standard normal."""
+    _, arp, size = streams[name]
+    known = made.coarse.get(name, {})
+    if size > 1:
+        return _of_coarse(known, streams, start, shape)
+    weights = {streams[other][0]: weight for other, weight in made.noise[name].items()}
+    own = mixed_field(weights, arp, *start, shape)
+    if known:
+        own *= np.sqrt(max(1.0 - sum(weight**2 for weight in known.values()), 0.0))
+        own += _of_coarse(known, streams, start, shape)
+    return own
+
+
+def _of_coarse(weights, streams, start, shape):
+    """Sum of independent fields on coarser lattices."""
+    total = None
+    for other, weight in weights.items():
+        seed, arp, size = streams[other]
+        field = coarse_field(seed, arp, size, *start, shape)
+        if weight != 1.0:
+            field *= weight
+        total = field if total is None else np.add(total, field, out=total)
+    return total
+
+
+def _copula(arps, pairs, covariates, reference, coarser):
     """How the fields are put together; where the ground is lazy, as a lazy array without dimensions."""
     known = covariates if reference is None else {name: _referred(reference, name) for name in covariates}
     sizes = {each.shape for each in known.values()}
@@ -245,7 +297,8 @@ def _copula(arps, pairs, covariates, reference):
         raise ValueError(f"the rasters of reference have different sizes, {sizes}: take all on one grid")
 
     def found(*samples):
-        return copula(arps, pairs, {name: each.ravel() for name, each in zip(known, samples, strict=True)})
+        sampled = {name: each.ravel() for name, each in zip(known, samples, strict=True)}
+        return copula(arps, pairs, sampled, coarser)
 
     def boxed(*samples):
         out = np.empty((), object)

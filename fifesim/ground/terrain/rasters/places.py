@@ -6,6 +6,7 @@ import numpy as np
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
+from fifesim.ground.terrain.between_places import bilinear
 from fifesim.ground.terrain.light import Sky
 from fifesim.rasters import cf, projection
 from fifesim.rasters import chunks as chunking
@@ -100,11 +101,7 @@ class Between(NamedTuple):
         """
         (row, down), (column, across) = self
         row, column = row[rows] - row[rows.start], column[columns] - column[columns.start]
-        down, across = down[rows, None], across[columns]
-        after = np.minimum(row + 1, layer.shape[0] - 1)
-        lines = layer[row] * (1 - down) + layer[after] * down
-        after = np.minimum(column + 1, layer.shape[1] - 1)
-        return lines[:, column] * (1 - across) + lines[:, after] * across
+        return bilinear(layer, (row, down[rows]), (column, across[columns]))
 
     def sky(self, layers, rows, columns):
         """

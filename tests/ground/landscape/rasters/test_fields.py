@@ -190,3 +190,53 @@ def test_ground_elsewhere_is_refused_and_lazy_impossible_correlations_when_they_
     )
     with pytest.raises(ValueError, match="nearest allowed in their proportion"):
         lazy["lai"].compute()
+
+
+COARSE = {"soil": 4, "moisture": 3}
+
+
+@pytest.fixture(scope="module")
+def mixed(grid, ground):
+    return landscape_fields(
+        grid, {"soil": 0.05, "moisture": 0.05, "lai": 0.15}, COVARY, seed=7, coarser=COARSE, covariates=ground
+    )
+
+
+def test_fields_of_coarser_lattices_correlate_as_asked(ground, mixed):
+    """600 x 600 cells hold some 60 x 60 independent ones of the soil."""
+    for name, asked in COVARY.items():
+        other = mixed[name].values.ravel() if name == "soil" else None
+        if other is None:
+            other = normal_scores(ground[name].values.ravel(), score_table(ground[name].values.ravel()))
+        assert np.corrcoef(mixed["lai"].values.ravel(), other)[0, 1] == pytest.approx(asked, abs=0.04), name
+    assert np.corrcoef(mixed["soil"].values.ravel(), mixed["moisture"].values.ravel())[0, 1] == pytest.approx(
+        0, abs=0.06
+    )
+    assert "4 x 4 cells" in mixed["soil"].attrs["history"] and "cells" not in mixed["lai"].attrs["history"]
+
+
+def test_coarser_lattices_give_the_same_bits_in_chunks_and_windows(grid, ground, mixed):
+    window = (slice(201, 300), slice(50, 222))
+    options = {"arps": {"soil": 0.05, "moisture": 0.05, "lai": 0.15}, "covary": COVARY, "seed": 7, "coarser": COARSE}
+    part = landscape_fields(
+        grid[window], reference=ground, covariates={n: each[window] for n, each in ground.items()}, **options
+    )
+    with no_compute():
+        lazy = landscape_fields(
+            grid, covariates={n: in_chunks(r, {"y": 250, "x": 333}) for n, r in ground.items()}, **options
+        )
+    for name, whole in mixed.items():
+        np.testing.assert_array_equal(part[name], whole[window])
+        xr.testing.assert_identical(lazy[name].compute(), whole)
+
+
+def test_leaf_area_alone_stays_that_of_the_scene(grid):
+    """What varies beside it, and how coarsely, is nothing to it."""
+    beside = correlated_fields(grid[:80, :80], {"soil": 0.05, "lai": 0.15}, seed=7, coarser={"soil": 4})
+    alone = correlated_fields(grid[:80, :80], {"lai": 0.15}, seed=7)
+    np.testing.assert_array_equal(beside["lai"], alone["lai"])
+
+
+def test_unknown_names_of_coarser_lattices_are_refused(grid):
+    with pytest.raises(ValueError, match="coarser names sand, there are 'lai'"):
+        correlated_fields(grid, {"lai": 0.15}, coarser={"sand": 4})

@@ -1,0 +1,84 @@
+"""Fields on a coarser lattice: normal in every cell, one of place, and as far correlated as their splines make them."""
+
+import numpy as np
+import pytest
+from oracles_field import covariances
+from scipy import interpolate, stats
+
+from fifesim.ground.landscape.coarse_lattice import TILE, coarse_field, spline_weights
+from fifesim.ground.landscape.field import mixed_field, streaming_field
+
+
+@pytest.mark.parametrize("coarser", [2, 3, 4])
+def test_cells_are_splines_of_the_lattice(coarser):
+    """scipy's B-splines over the centres of the lattice's cells, scaled."""
+    lattice = mixed_field({7: 1.0}, 0.1, -5, -5, (16, 16), tile=TILE)
+    place = (np.arange(4 * coarser) + 0.5) / coarser - 0.5
+    # Knots lie so that spline k is centred on the cell k - 5.
+    basis = interpolate.BSpline(np.arange(-7.0, 13.0), np.eye(16), 3)(place)
+    along, factor = spline_weights(0.1, coarser)
+    expected = basis @ lattice @ basis.T * np.tile(factor, (4, 4))
+    np.testing.assert_allclose(coarse_field(7, 0.1, coarser, 0, 0, expected.shape), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(along.sum(axis=1), 1.0, rtol=1e-14)
+
+
+@pytest.mark.parametrize(("arp", "coarser"), [(0.0, 2), (0.05, 4), (0.24, 3)])
+def test_variance_is_one_wherever_a_cell_lies(arp, coarser):
+    """By the covariance of the process, from another transform than production's."""
+    along, factor = spline_weights(arp, coarser)
+    covariance = covariances(arp) / covariances(arp)[0, 0]
+    lag = np.subtract.outer(np.arange(4), np.arange(4))
+    for p in range(coarser):
+        for q in range(coarser):
+            weights = np.multiply.outer(along[p], along[q]) * factor[p, q]
+            variance = sum(
+                weights[a, b] * np.sum(weights * covariance[lag[a]][:, lag[b]]) for a in range(4) for b in range(4)
+            )
+            assert variance == pytest.approx(1.0, abs=1e-9)
+
+
+def test_cells_are_normal_at_each_place_within_a_cell_of_the_lattice():
+    field = coarse_field(11, 0.05, 4, 0, 0, (2400, 2400))
+    for down in range(4):
+        for across in range(4):
+            # Every fourth cell of the lattice: the others are not independent.
+            cells = field[down::16, across::16].ravel()
+            assert stats.kstest(cells, "norm").pvalue > 1e-3
+            assert cells.std() == pytest.approx(1.0, abs=4 * np.sqrt(0.5 / cells.size))
+
+
+def test_lattice_of_the_ground_is_the_streaming_field():
+    np.testing.assert_array_equal(coarse_field(7, 0.2, 1, -3, 5, (9, 8)), streaming_field(7, 0.2, -3, 5, (9, 8)))
+
+
+@pytest.mark.parametrize("coarser", [2, 3, 5])
+def test_windows_are_slices_of_the_whole_across_tiles(coarser):
+    first = TILE * coarser - 31
+    whole = coarse_field(7, 0.15, coarser, -23, first, (60, 70))
+    for row, column, shape in ((0, 0, (1, 1)), (17, 5, (20, 63)), (59, 69, (1, 1)), (22, 28, (8, 9))):
+        part = coarse_field(7, 0.15, coarser, row - 23, column + first, shape)
+        np.testing.assert_array_equal(part, whole[row : row + shape[0], column : column + shape[1]])
+    assert coarse_field(7, 0.15, coarser, 0, 0, (0, 3)).shape == (0, 3)
+
+
+def test_tiles_meet_without_a_seam():
+    """Second differences across the border of two tiles are as small as beside it."""
+    edge = TILE * 4 - 2
+    field = coarse_field(3, 0.1, 4, 0, edge - 40, (3000, 84))
+    bends = np.abs(np.diff(field, 2, axis=1)).mean(axis=0)
+    assert bends[36:44].max() < 1.1 * bends.max()
+    assert np.abs(np.diff(field, axis=1)).max() < 1.5
+
+
+@pytest.mark.parametrize(
+    ("coarser", "error", "message"),
+    [
+        (0, ValueError, "coarser must be in 1 to 100, got 0"),
+        (101, ValueError, "coarser must be in 1 to 100, got 101"),
+        (2.0, TypeError, "whole number of ground cells, got .*: type coarser=4"),
+        (True, TypeError, "whole number"),
+    ],
+)
+def test_what_is_no_size_is_refused(coarser, error, message):
+    with pytest.raises(error, match=message):
+        coarse_field(7, 0.1, coarser, 0, 0, (2, 2))
