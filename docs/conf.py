@@ -4,7 +4,9 @@ import os
 import sys
 from pathlib import Path
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is loaded: its matrices here are small
+os.environ.setdefault(
+    "OMP_NUM_THREADS", "1"
+)  # before numpy is loaded: its matrices here are small
 
 from docutils import nodes
 from sphinx.addnodes import pending_xref
@@ -33,13 +35,22 @@ extensions = [
     "sphinx-mathjax-offline",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "bounds.md", "gallery_src", "paper/*", "gallery/**/*.ipynb", "gallery/*.ipynb"]
+exclude_patterns = [
+    "_build",
+    "bounds.md",
+    "gallery_src",
+    "paper/*",
+    "gallery/**/*.ipynb",
+    "gallery/*.ipynb",
+]
 templates_path = ["_templates"]
 default_role = "py:obj"
 
 html_theme = "furo"
 html_title = f"fifesim {version}"
-html_theme_options = {name: {"code-font-size": "75%"} for name in ("light_css_variables", "dark_css_variables")}
+html_theme_options = {
+    name: {"code-font-size": "75%"} for name in ("light_css_variables", "dark_css_variables")
+}
 html_static_path = ["_static"]
 html_css_files = ["gallery.css"]
 html_copy_source = False
@@ -71,13 +82,17 @@ autosummary.WELL_KNOWN_ABBREVIATIONS += ("Fig.", "Eq.", "Sect.")
 def _cite(name, rawtext, text, lineno, inliner, options=None, content=None):
     """A citation from Markdown: {cite}`Tanre1990` does what [Tanre1990]_ does in a docstring."""
     shown = nodes.inline(rawtext, f"[{text}]")
-    reference = pending_xref(rawtext, shown, refdomain="citation", reftype="ref", reftarget=text, refwarn=True)
+    reference = pending_xref(
+        rawtext, shown, refdomain="citation", reftype="ref", reftarget=text, refwarn=True
+    )
     return [reference], []
 
 
 def _skip(app, what, name, obj, skip, options):
     """Leave out what a class has by its making: unexplained tuple fields, a model's configuration."""
-    made = name == "model_config" or str(getattr(obj, "__doc__", "")).startswith("Alias for field number")
+    made = name == "model_config" or str(getattr(obj, "__doc__", "")).startswith(
+        "Alias for field number"
+    )
     return True if made else None
 
 

@@ -14,6 +14,12 @@ def write():
     for each in deviations():
         if STAGES[each.area] != stage:
             stage = STAGES[each.area]
-            lines += [f"\n### {stage}\n", "| compared | largest | bound | unit | with |", "|---|---|---|---|---|"]
-        lines.append(f"| {each.what} | {each.deviation:.3g} | {each.bound:.3g} | {each.unit} | {each.source} |")
+            lines += [
+                f"\n### {stage}\n",
+                "| compared | largest | bound | unit | with |",
+                "|---|---|---|---|---|",
+            ]
+        lines.append(
+            f"| {each.what} | {each.deviation:.3g} | {each.bound:.3g} | {each.unit} | {each.source} |"
+        )
     PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")

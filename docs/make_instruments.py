@@ -12,8 +12,21 @@ NAMES = (
 
 def main():
     table = compare_instruments(NAMES)
-    kept = ["instrument", "pixel", "blur", "noise", "place", "arp", "variable", "stage", "share", "share_error"]
-    table[kept].to_csv(Path(__file__).with_name("instruments.csv"), index=False, float_format="%.4g")
+    kept = [
+        "instrument",
+        "pixel",
+        "blur",
+        "noise",
+        "place",
+        "arp",
+        "variable",
+        "stage",
+        "share",
+        "share_error",
+    ]
+    table[kept].to_csv(
+        Path(__file__).with_name("instruments.csv"), index=False, float_format="%.4g"
+    )
 
 
 if __name__ == "__main__":

@@ -38,7 +38,9 @@ def main():
     kept = pd.read_csv(TABLE) if TABLE.exists() else pd.DataFrame()
     for name in sys.argv[1:] or WINDOWS:
         rows = rows_of(name)
-        kept = pd.concat([kept[kept["instrument"] != name], rows] if len(kept) else [rows], ignore_index=True)
+        kept = pd.concat(
+            [kept[kept["instrument"] != name], rows] if len(kept) else [rows], ignore_index=True
+        )
         columns = ["instrument", "cells", "realisations", "variable", "stage"]
         columns += ["share", "share_error", "alone", "alone_error", "first", "first_error"]
         kept[columns].to_csv(TABLE, index=False, float_format="%.4g")

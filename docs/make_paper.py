@@ -48,7 +48,10 @@ def numbers(realisations=REALISATIONS, few=FEW):
     """
     case, seeds = Case(), range(SEED, SEED + few)
     found = reproduce_case(case, realisations, SEED)
-    tables = {reading.name: table.table2(found.sel(reading=reading.name)) for reading in (NATIVE, ALIGNED)}
+    tables = {
+        reading.name: table.table2(found.sel(reading=reading.name))
+        for reading in (NATIVE, ALIGNED)
+    }
     return {
         "run": {"realisations": realisations, "few": few, "seed": SEED, "cells": case.cells, "drift": case.drift,
                 "interval": case.interval, "pixels": int(found["pixel_lai"][0, 0].count())},
@@ -128,17 +131,24 @@ def text(values):
     page : str
         Markdown.
     """
-    environment = jinja2.Environment(trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+    environment = jinja2.Environment(
+        trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
     environment.filters["fixed"] = fixed
     environment.globals |= {"between": between, "highest": highest}
     environment.globals["slope_of"] = lambda cosine: np.degrees(np.arccos(cosine))
     ren = noise(values["text"], values["table2"]["native"])
-    return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(**values, ren=ren) + "\n"
+    return (
+        environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(**values, ren=ren)
+        + "\n"
+    )
 
 
 def nine(reading, name):
     """The nine values of LAI of a row of readings: ``r2``, ``slope``, or these of the paper, an array."""
-    return np.array([reading[f"{name} {treatment} {arp:g}"] for treatment, arp in friedl1995.scenes()])
+    return np.array(
+        [reading[f"{name} {treatment} {arp:g}"] for treatment, arp in friedl1995.scenes()]
+    )
 
 
 def highest(reading):
@@ -165,7 +175,11 @@ def noise(rows, lines):
     """
     rows = [row for row in rows if row["quantity"] == "ren"]
     lai = [row for row in rows if row["variable"] == "lai"]
-    r2 = {row["arp"]: row["r2"] for row in lines if (row["variable"], row["distribution"]) == ("lai", "burned-grazed")}
+    r2 = {
+        row["arp"]: row["r2"]
+        for row in lines
+        if (row["variable"], row["distribution"]) == ("lai", "burned-grazed")
+    }
     return {
         "largest": max(abs(row["value"] / row["paper"] - 1) for row in rows),
         "growth": lai[-1]["value"] / lai[0]["value"],
@@ -177,11 +191,18 @@ def noise(rows, lines):
 def between(reading, other):
     """What tells one row of readings from another: mean change of R2 and mean relative change of slopes of LAI."""
     r2 = nine(reading, "r2") - nine(other, "r2")
-    return {"r2": r2.mean(), "slope": np.mean(nine(reading, "slope") / nine(other, "slope") - 1)}
+    return {
+        "r2": r2.mean(),
+        "slope": np.mean(nine(reading, "slope") / nine(other, "slope") - 1),
+    }
 
 
 def main():
-    known = json.loads(NUMBERS.read_text(encoding="utf-8")) | words(Case()) if "--text" in sys.argv else numbers()
+    known = (
+        json.loads(NUMBERS.read_text(encoding="utf-8")) | words(Case())
+        if "--text" in sys.argv
+        else numbers()
+    )
     NUMBERS.write_text(json.dumps(_plain(known), indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(text(_plain(known)), encoding="utf-8")
 

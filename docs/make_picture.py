@@ -22,16 +22,28 @@ def run():
     """Image, its NDVI and the truth of a part of the ground of the default run, and the cells of a part of that."""
     whole = fifesim.default_scenario()
     grid = {"west": WEST, "north": NORTH, "width": WIDTH, "height": HEIGHT}
-    tree = fifesim.simulate(whole.model_copy(update={"grid": whole.grid.model_copy(update=grid)}))
+    tree = fifesim.simulate(
+        whole.model_copy(update={"grid": whole.grid.model_copy(update=grid)})
+    )
     image = tree["image"].to_dataset().compute()
-    return image["dn"], image["ndvi"], tree["truth"]["lai"].compute(), _part(tree["scene"]["lai"]).compute()
+    return (
+        image["dn"],
+        image["ndvi"],
+        tree["truth"]["lai"].compute(),
+        _part(tree["scene"]["lai"]).compute(),
+    )
 
 
 def _part(raster):
     """What is shown larger."""
     size = abs(float(raster["x"][1] - raster["x"][0]))
     starts = {"y": TOP, "x": LEFT}
-    return raster.isel({axis: slice(round(at / size), round((at + SIDE) / size)) for axis, at in starts.items()})
+    return raster.isel(
+        {
+            axis: slice(round(at / size), round((at + SIDE) / size))
+            for axis, at in starts.items()
+        }
+    )
 
 
 def draw(dn, ndvi, truth, cells_shown):
@@ -49,26 +61,45 @@ def draw(dn, ndvi, truth, cells_shown):
         )
     )
     extent = (0, WIDTH / 1000, 0, HEIGHT / 1000)
-    land.imshow(image_map(dn, "", stretch).pixels, extent=extent, interpolation="nearest", aspect="auto")
+    land.imshow(
+        image_map(dn, "", stretch).pixels, extent=extent, interpolation="nearest", aspect="auto"
+    )
     corner = LEFT / 1000, (HEIGHT - TOP - SIDE) / 1000
-    land.add_patch(Rectangle(corner, SIDE / 1000, SIDE / 1000, fill=False, edgecolor="white", linewidth=2.2))
+    land.add_patch(
+        Rectangle(
+            corner, SIDE / 1000, SIDE / 1000, fill=False, edgecolor="white", linewidth=2.2
+        )
+    )
     land.plot([0.5, 2.5], [0.42, 0.42], color="white", linewidth=3)
     land.text(1.5, 0.55, "2 km", color="white", ha="center", fontsize=13, weight="bold")
     drawn = cells.imshow(cells_shown, cmap="YlGn", vmin=0, vmax=2.4, interpolation="nearest")
     pixels.imshow(image_map(_part(dn), "", stretch).pixels, interpolation="nearest")
-    _titles(land, cells, pixels, f"Cells of {cell:.2f} m: leaf area", f"Landsat pixels of {pixel:g} m")
+    _titles(
+        land,
+        cells,
+        pixels,
+        f"Cells of {cell:.2f} m: leaf area",
+        f"Landsat pixels of {pixel:g} m",
+    )
     beside = figure.add_axes((0.65, 0.545, 0.006, 0.38))
     figure.colorbar(drawn, cax=beside, ticks=[0, 1, 2]).ax.tick_params(labelsize=11, length=0)
     for side, (axis, height) in zip((1, 0), ((cells, 1), (pixels, 0)), strict=True):
         start = corner[0] + SIDE / 1000, corner[1] + side * SIDE / 1000
-        line = {"coordsA": land.transData, "coordsB": axis.transAxes, "color": "#555555", "linewidth": 1}
+        line = {
+            "coordsA": land.transData,
+            "coordsB": axis.transAxes,
+            "color": "#555555",
+            "linewidth": 1,
+        }
         figure.add_artist(ConnectionPatch(start, (0, height), **line))
     _scatter(plot, ndvi, truth)
     return figure
 
 
 def _titles(land, cells, pixels, cells_title, pixels_title):
-    land.set_title("What Landsat 5 would have seen: near infrared, red, green", loc="left", fontsize=15)
+    land.set_title(
+        "What Landsat 5 would have seen: near infrared, red, green", loc="left", fontsize=15
+    )
     cells.set_title(cells_title, loc="left", fontsize=13)
     pixels.set_title(pixels_title, loc="left", fontsize=13)
     for axis in (land, cells, pixels):
@@ -100,4 +131,6 @@ def _scatter(axis, ndvi, lai):
 if __name__ == "__main__":
     buffer = io.BytesIO()
     draw(*run()).savefig(buffer, dpi=100, metadata={"Software": None})
-    Image.open(buffer).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE).save(_FILE, optimize=True)
+    Image.open(buffer).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE).save(
+        _FILE, optimize=True
+    )

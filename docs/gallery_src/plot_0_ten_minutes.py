@@ -16,7 +16,9 @@ import fifesim
 
 grid = fifesim.fife_site(cell=30 / 9, window=((1800, 2700), (900, 1800)))
 dem = fifesim.flint_hills(grid, seed=7)
-land = fifesim.landscape(grid, soil=fifesim.Field(sd=0.03, arp=0.24), covary={"wetness": 0.5}, dem=dem, seed=7)
+land = fifesim.landscape(
+    grid, soil=fifesim.Field(sd=0.03, arp=0.24), covary={"wetness": 0.5}, dem=dem, seed=7
+)
 land.lai.fifesim.plot()
 print(land)
 
@@ -48,7 +50,9 @@ print(image.dtype, image.shape)
 ndvi, truth = image.fifesim.ndvi(), land.fifesim.aggregate(30).lai
 fit = fifesim.regress(truth, ndvi)
 fit.plot(truth, ndvi)
-print(f"R² = {fit.r2:.2f}: {100 * (1 - fit.r2):.0f} % of the variance of leaf area is not in a line on NDVI")
+print(
+    f"R² = {fit.r2:.2f}: {100 * (1 - fit.r2):.0f} % of the variance of leaf area is not in a line on NDVI"
+)
 
 # %%
 # **6. The same ground through other eyes.**

@@ -21,7 +21,9 @@ ground = (hills * grass).transpose("y", "x").rename("lai").assign_attrs(grass.at
 
 lai_10m = ground.fifesim.aggregate(10)
 fine = lai_10m.fifesim.downscale(grid, arp=0.15, cv=0.44, seed=2)
-print(f"largest difference of means over pixels: {float(abs(fine.fifesim.aggregate(10) - lai_10m).max()):.0e}")
+print(
+    f"largest difference of means over pixels: {float(abs(fine.fifesim.aggregate(10) - lai_10m).max()):.0e}"
+)
 
 # %%
 # **Three looks**, below each the square in it. The cells are not those of the ground, which nobody can know from its
@@ -34,7 +36,12 @@ for column, (title, lai) in zip(axes.T, views.items(), strict=True):
         part = lai[(lai["y"][0] - lai["y"] < last) & (lai["y"][0] - lai["y"] >= first)]
         part = part[:, (lai["x"] - lai["x"][0] < last) & (lai["x"] - lai["x"][0] >= first)]
         drawn = axis.imshow(
-            part, cmap="YlGn", vmin=0, vmax=3.5, extent=(first, last, last, first), interpolation="nearest"
+            part,
+            cmap="YlGn",
+            vmin=0,
+            vmax=3.5,
+            extent=(first, last, last, first),
+            interpolation="nearest",
         )
         axis.set(xticks=(first, last), yticks=(first, last))
     column[0].set_title(title)
@@ -48,7 +55,11 @@ figure.colorbar(drawn, ax=axes, shrink=0.6, label="leaf area index [m² m⁻²]"
 # So is the semivariance of the ground, within pixels and beyond.
 
 laid = ground.copy(data=np.kron(lai_10m, np.ones((3, 3))))
-scenes = {"ground": (ground, "black"), "map as it is": (laid, "tab:orange"), "map downscaled": (fine, "tab:green")}
+scenes = {
+    "ground": (ground, "black"),
+    "map as it is": (laid, "tab:orange"),
+    "map downscaled": (fine, "tab:green"),
+}
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
 seen = {}
@@ -58,7 +69,14 @@ for name, (lai, color) in scenes.items():
     if name != "ground":
         bias = float((seen[name] - seen["ground"]).mean())
         label = f"{name}: {bias:+.4f} on average"
-        left.plot(seen["ground"].values.ravel(), seen[name].values.ravel(), ".", color=color, markersize=1, label=label)
+        left.plot(
+            seen["ground"].values.ravel(),
+            seen[name].values.ravel(),
+            ".",
+            color=color,
+            markersize=1,
+            label=label,
+        )
     along = lai.fifesim.variogram(reach=60)["semivariance"].mean("direction")
     right.plot(along["lag"], along, color=color, marker="o", markersize=3, label=name)
 left.axline((0.4, 0.4), slope=1, color="black", linewidth=1)

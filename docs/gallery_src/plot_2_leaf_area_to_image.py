@@ -17,7 +17,10 @@ surface = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
 toa = surface.fifesim.to_toa()
 image = toa.fifesim.sense("TM")
 ndvi = image.fifesim.ndvi()
-truth = {"leaf area index [m² m⁻²]": lai.fifesim.aggregate(30), "FPAR": lai.fifesim.fpar().fifesim.aggregate(30)}
+truth = {
+    "leaf area index [m² m⁻²]": lai.fifesim.aggregate(30),
+    "FPAR": lai.fifesim.fpar().fifesim.aggregate(30),
+}
 
 # %%
 # Each step on the same 480 m x 480 m. The atmosphere brightens the red and lowers the contrast; the sensor averages
@@ -32,11 +35,18 @@ steps = [
     ("TM4, as recorded", "digital number", image.sel(band="TM4")[pixels, pixels], "gray"),
     ("NDVI of the image", "NDVI", ndvi[pixels, pixels], "YlGn"),
 ]
-figure, axes = plt.subplots(2, 3, figsize=(11, 6.6), layout="constrained", sharex=True, sharey=True)
+figure, axes = plt.subplots(
+    2, 3, figsize=(11, 6.6), layout="constrained", sharex=True, sharey=True
+)
 for axis, (title, label, raster, cmap) in zip(axes.flat, steps, strict=True):
     limits = (0.03, 0.16) if label == "reflectance" else (None, None)
     drawn = axis.imshow(
-        raster, cmap=cmap, vmin=limits[0], vmax=limits[1], extent=(0, 480, 0, 480), interpolation="nearest"
+        raster,
+        cmap=cmap,
+        vmin=limits[0],
+        vmax=limits[1],
+        extent=(0, 480, 0, 480),
+        interpolation="nearest",
     )
     axis.set(title=title, xticks=range(0, 481, 120), yticks=range(0, 481, 120))
     figure.colorbar(drawn, ax=axis, fraction=0.046, pad=0.03, label=label)
@@ -55,10 +65,23 @@ for axis, (name, true) in zip(axes, truth.items(), strict=True):
     line = np.linspace(float(ndvi.min()), float(ndvi.max()), 50)
     axis.scatter(ndvi, true, s=2, color="0.45", linewidths=0)
     axis.fill_between(
-        line, *fit.prediction_interval(line), color="#f4a582", alpha=0.4, label="95 % prediction interval"
+        line,
+        *fit.prediction_interval(line),
+        color="#f4a582",
+        alpha=0.4,
+        label="95 % prediction interval",
     )
-    axis.plot(line, fit.predict(line), color="#b2182b", label=f"{fit.slope:.2f} NDVI − {-fit.intercept:.2f}")
-    axis.set(xlabel="NDVI at the top of the atmosphere", ylabel=f"true {name}", title=f"R² = {fit.r2:.2f}, n = {fit.n}")
+    axis.plot(
+        line,
+        fit.predict(line),
+        color="#b2182b",
+        label=f"{fit.slope:.2f} NDVI − {-fit.intercept:.2f}",
+    )
+    axis.set(
+        xlabel="NDVI at the top of the atmosphere",
+        ylabel=f"true {name}",
+        title=f"R² = {fit.r2:.2f}, n = {fit.n}",
+    )
     axis.legend(frameon=False, loc="upper left")
 
 # %%

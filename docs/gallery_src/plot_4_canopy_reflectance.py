@@ -11,7 +11,9 @@ from odc.geo.xr import wrap_xr
 
 import fifesim
 
-grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=121 * 10, height=10, cell=10)
+grid = fifesim.grid_at(
+    "EPSG:26914", west=705000, north=4334000, width=121 * 10, height=10, cell=10
+)
 leaf_area = np.linspace(0, 6, 121)
 lai = wrap_xr(leaf_area[None], grid)
 sun, air = fifesim.fife_geometry(), fifesim.Atmosphere()  # the paper's case
@@ -22,16 +24,35 @@ sun, air = fifesim.fife_geometry(), fifesim.Atmosphere()  # the paper's case
 
 figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
 for leaves, style in (("planophile", "--"), ("spherical", "-"), ("erectophile", ":")):
-    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], geometry=sun, atmosphere=air, leaf_angles=leaves)
+    rho = lai.fifesim.surface_reflectance(
+        "TM", bands=["TM3", "TM4"], geometry=sun, atmosphere=air, leaf_angles=leaves
+    )
     for band, color in (("TM3", "#b2182b"), ("TM4", "#542788")):
-        axes[0].plot(leaf_area, rho.sel(band=band).squeeze(), style, color=color, label=f"{band}, {leaves}")
-    axes[1].plot(leaf_area, rho.fifesim.ndvi().squeeze(), style, color="#1b7837", label=f"NDVI, {leaves}")
-axes[1].plot(leaf_area, lai.fifesim.fpar(geometry=sun).squeeze(), color="0.4", label="FPAR, spherical")
-axes[0].set(ylabel="reflectance factor", title="Surface reflectance, sun at 28.5°, nadir", ylim=(0, 0.6))
+        axes[0].plot(
+            leaf_area,
+            rho.sel(band=band).squeeze(),
+            style,
+            color=color,
+            label=f"{band}, {leaves}",
+        )
+    axes[1].plot(
+        leaf_area, rho.fifesim.ndvi().squeeze(), style, color="#1b7837", label=f"NDVI, {leaves}"
+    )
+axes[1].plot(
+    leaf_area, lai.fifesim.fpar(geometry=sun).squeeze(), color="0.4", label="FPAR, spherical"
+)
+axes[0].set(
+    ylabel="reflectance factor", title="Surface reflectance, sun at 28.5°, nadir", ylim=(0, 0.6)
+)
 axes[1].set(ylabel="NDVI at the surface, FPAR", title="NDVI and FPAR", ylim=(0, 1))
 for axis in axes:
     axis.set(xlabel="leaf area index [m² m⁻²]", xlim=(0, 6))
-    axis.legend(frameon=False, ncols=2, fontsize=8, loc="upper right" if axis is axes[0] else "lower right")
+    axis.legend(
+        frameon=False,
+        ncols=2,
+        fontsize=8,
+        loc="upper right" if axis is axes[0] else "lower right",
+    )
 
 # %%
 # Across the principal plane, toward the sun (left) and away from it. The paper's SAIL has no hot spot (section Surface
@@ -52,5 +73,9 @@ for hotspot, style in ((0.0, "-"), (0.05, "--"), (0.2, ":")):
         axis.plot(views, band, style, color="black", label=f"hotspot {hotspot:g}")
 for axis, band in zip(axes, ("TM3, red, LAI 2", "TM4, near infrared, LAI 2"), strict=True):
     axis.axvline(-sun.sza, color="#e08214", linewidth=1, label="the sun")
-    axis.set(xlabel="view zenith [degree], negative toward the sun", ylabel="reflectance factor", title=band)
+    axis.set(
+        xlabel="view zenith [degree], negative toward the sun",
+        ylabel="reflectance factor",
+        title=band,
+    )
     axis.legend(frameon=False)

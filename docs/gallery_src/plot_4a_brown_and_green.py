@@ -11,10 +11,15 @@ from odc.geo.xr import wrap_xr
 
 import fifesim
 
-grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=101 * 10, height=10, cell=10)
+grid = fifesim.grid_at(
+    "EPSG:26914", west=705000, north=4334000, width=101 * 10, height=10, cell=10
+)
 share = wrap_xr(np.linspace(0, 1, 101)[None], grid)
 lai = wrap_xr(np.full((1, 101), 2.0), grid)
-case = {"geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere()}  # the paper's case
+case = {
+    "geometry": fifesim.fife_geometry(),
+    "atmosphere": fifesim.Atmosphere(),
+}  # the paper's case
 bands = ["TM3", "TM4"]
 
 # %%
@@ -27,10 +32,24 @@ for dissociation, (style, where) in places.items():
     dead = {"brown": share, "dissociation": dissociation}
     rho = lai.fifesim.surface_reflectance("TM", bands=bands, **dead, **case)
     for band, color in zip(bands, ("#b2182b", "#542788"), strict=True):
-        axes[0].plot(share.squeeze(), rho.sel(band=band).squeeze(), style, color=color, label=f"{band}, {where}")
-    axes[1].plot(share.squeeze(), rho.fifesim.ndvi().squeeze(), style, color="#1b7837", label=f"NDVI, {where}")
+        axes[0].plot(
+            share.squeeze(),
+            rho.sel(band=band).squeeze(),
+            style,
+            color=color,
+            label=f"{band}, {where}",
+        )
+    axes[1].plot(
+        share.squeeze(),
+        rho.fifesim.ndvi().squeeze(),
+        style,
+        color="#1b7837",
+        label=f"NDVI, {where}",
+    )
     green = lai.fifesim.fpar(leaves="green", geometry=case["geometry"], **dead)
-    axes[2].plot(share.squeeze(), green.squeeze(), style, color="#8c510a", label=f"green leaves, {where}")
+    axes[2].plot(
+        share.squeeze(), green.squeeze(), style, color="#8c510a", label=f"green leaves, {where}"
+    )
 total = lai.fifesim.fpar(geometry=case["geometry"])
 axes[2].plot(share.squeeze(), total.squeeze(), color="0.5", linewidth=1, label="all leaves")
 axes[0].set(ylabel="reflectance factor", ylim=(0, 0.52), title="Surface reflectance, LAI 2")
@@ -50,13 +69,27 @@ for axis in axes:
 figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
 cover = share.where(share >= 0.1)
 for leaf_area, style in ((1.0, ":"), (2.0, "--"), (4.0, "-")):
-    rho = (lai / 2 * leaf_area).fifesim.surface_reflectance("TM", bands=bands, crown_cover=cover, **case)
+    rho = (lai / 2 * leaf_area).fifesim.surface_reflectance(
+        "TM", bands=bands, crown_cover=cover, **case
+    )
     for band, color in zip(bands, ("#b2182b", "#542788"), strict=True):
         axes[0].plot(
-            share.squeeze(), rho.sel(band=band).squeeze(), style, color=color, label=f"{band}, LAI {leaf_area:g}"
+            share.squeeze(),
+            rho.sel(band=band).squeeze(),
+            style,
+            color=color,
+            label=f"{band}, LAI {leaf_area:g}",
         )
-    axes[1].plot(share.squeeze(), rho.fifesim.ndvi().squeeze(), style, color="#1b7837", label=f"LAI {leaf_area:g}")
-axes[0].set(ylabel="reflectance factor", ylim=(0, 0.6), title="Round crowns, sun at 28.5°, nadir")
+    axes[1].plot(
+        share.squeeze(),
+        rho.fifesim.ndvi().squeeze(),
+        style,
+        color="#1b7837",
+        label=f"LAI {leaf_area:g}",
+    )
+axes[0].set(
+    ylabel="reflectance factor", ylim=(0, 0.6), title="Round crowns, sun at 28.5°, nadir"
+)
 axes[1].set(ylabel="NDVI at the surface", ylim=(0, 1), title="NDVI")
 for axis in axes:
     axis.set(xlabel="share of the ground below crowns", xlim=(0, 1))

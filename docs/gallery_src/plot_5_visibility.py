@@ -17,7 +17,9 @@ grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=30, heigh
 wavelength = np.linspace(0.4025, 2.4975, 839)
 cell = wrap_xr(np.ones((1, 1)), grid)
 sun = fifesim.fife_geometry()  # of the paper's day
-spectrum = cell * xr.DataArray(np.ones(839), dims="band", coords={"wavelength": ("band", wavelength)})
+spectrum = cell * xr.DataArray(
+    np.ones(839), dims="band", coords={"wavelength": ("band", wavelength)}
+)
 
 figure, axis = plt.subplots(figsize=(11, 4.4), layout="constrained")
 for visibility, color in ((5, "#8c510a"), (23, "#35978f"), (100, "#01665e")):
@@ -53,14 +55,29 @@ lai = wrap_xr(
 ndvi = []
 for visibility in visibilities:
     air = fifesim.Atmosphere(visibility=visibility)
-    rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], geometry=sun, atmosphere=air)
+    rho = lai.fifesim.surface_reflectance(
+        "TM", bands=["TM3", "TM4"], geometry=sun, atmosphere=air
+    )
     ndvi.append(rho.fifesim.to_toa().fifesim.ndvi().values[0])
 clear = {"geometry": sun, "atmosphere": fifesim.Atmosphere()}
-below = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **clear).fifesim.ndvi().values[0]
+below = (
+    lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **clear)
+    .fifesim.ndvi()
+    .values[0]
+)
 
 figure, axis = plt.subplots(figsize=(7, 4.4), layout="constrained")
-for index, (area, color) in enumerate(zip(areas, plt.get_cmap("YlGn")([0.35, 0.55, 0.75, 0.95]), strict=True)):
-    axis.plot(visibilities, np.array(ndvi)[:, index], "o-", color=color, markersize=4, label=f"LAI {area:g}")
+for index, (area, color) in enumerate(
+    zip(areas, plt.get_cmap("YlGn")([0.35, 0.55, 0.75, 0.95]), strict=True)
+):
+    axis.plot(
+        visibilities,
+        np.array(ndvi)[:, index],
+        "o-",
+        color=color,
+        markersize=4,
+        label=f"LAI {area:g}",
+    )
     axis.plot([100, 112], [below[index]] * 2, color=color, linewidth=3)
 axis.axvline(45, color="0.6", linewidth=1, linestyle=":")
 axis.text(46, 0.07, "the paper's 45 km", color="0.4", fontsize=9)

@@ -17,8 +17,15 @@ spread = tm.line_spread
 figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
 x = np.linspace(-25, 25, 1001)
 axes[0].plot(x, np.gradient(spread.cumulative(x), x), color="#2166ac", label="line spread")
-axes[0].step(np.arange(-45, 46, 30), [0, 1 / 30, 0, 0], where="post", color="0.6", label="mean over 30 m")
-axes[0].set(xlabel="distance from the pixel centre [m]", ylabel="response [m⁻¹]", title="Line spread", xlim=(-25, 25))
+axes[0].step(
+    np.arange(-45, 46, 30), [0, 1 / 30, 0, 0], where="post", color="0.6", label="mean over 30 m"
+)
+axes[0].set(
+    xlabel="distance from the pixel centre [m]",
+    ylabel="response [m⁻¹]",
+    title="Line spread",
+    xlim=(-25, 25),
+)
 frequency = np.linspace(0, 0.06, 400)
 axes[1].plot(1000 * frequency, spread.mtf(frequency), color="#2166ac", label="line spread")
 axes[1].plot(1000 * frequency, np.sinc(30 * frequency), color="0.6", label="mean over 30 m")
@@ -47,11 +54,22 @@ grids = {
     "30.315 m": fifesim.grid_at("EPSG:26914", west, north, size, size, cell=tm.ground_interval),
     "10 m east": fifesim.grid_at("EPSG:26914", west + 10, north, size - 30, size, cell=30),
 }
-figure, axes = plt.subplots(3, 1, figsize=(11, 6), layout="constrained", sharex=True, sharey=True)
+figure, axes = plt.subplots(
+    3, 1, figsize=(11, 6), layout="constrained", sharex=True, sharey=True
+)
 for axis, (name, grid) in zip(axes, grids.items(), strict=True):
-    reflectance = toa.fifesim.sense("TM", onto=grid, geometry=fifesim.fife_geometry()).fifesim.to_reflectance()[0, 20]
+    reflectance = toa.fifesim.sense(
+        "TM", onto=grid, geometry=fifesim.fife_geometry()
+    ).fifesim.to_reflectance()[0, 20]
     axis.plot((np.arange(540) + 0.5) * 30 / 9, stripes, color="0.7", label="scene")
-    axis.plot(reflectance.x - west, reflectance, "o", color="#2166ac", markersize=4, label=f"pixels, {name}")
+    axis.plot(
+        reflectance.x - west,
+        reflectance,
+        "o",
+        color="#2166ac",
+        markersize=4,
+        label=f"pixels, {name}",
+    )
     axis.set(ylabel="reflectance", ylim=(0.03, 0.35))
     axis.legend(loc="upper right", ncols=2, fontsize=9)
 axes[-1].set(xlabel="easting [m]", xlim=(0, 900))
@@ -75,7 +93,9 @@ for arp, published in paper.items():
         lai = fifesim.lai_scene(grid, "burned-grazed", arp=arp, seed=seed)
         toa = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa()
         truth, corner = lai.fifesim.aggregate(30), grid.boundingbox
-        own = fifesim.grid_at("EPSG:26914", corner.left, corner.top, 1110, 1110, cell=tm.ground_interval)
+        own = fifesim.grid_at(
+            "EPSG:26914", corner.left, corner.top, 1110, 1110, cell=tm.ground_interval
+        )
         aligned.append(fifesim.regress(truth, toa.fifesim.sense("TM").fifesim.ndvi()).r2)
         ndvi = toa.fifesim.sense("TM", onto=own).fifesim.ndvi()
         drifting.append(fifesim.regress(truth, ndvi, pair="index").r2)

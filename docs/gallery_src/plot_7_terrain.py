@@ -42,7 +42,9 @@ drawn = axes[0].imshow(kt, cmap="RdBu_r", vmin=0.8, vmax=1.2, extent=extent)
 figure.colorbar(drawn, ax=axes[0], shrink=0.8)
 axes[0].set_title("Kt in TM4")
 images = [reflectance.fifesim.to_toa().fifesim.sense("TM") for reflectance in (level, hilly)]
-for axis, image, title in zip(axes[1:], images, ("TM4 on level ground", "TM4 on slopes"), strict=True):
+for axis, image, title in zip(
+    axes[1:], images, ("TM4 on level ground", "TM4 on slopes"), strict=True
+):
     axis.imshow(image.sel(band="TM4"), cmap="gray", vmin=60, vmax=85, extent=extent)
     axis.set_title(title)
 for axis in axes:

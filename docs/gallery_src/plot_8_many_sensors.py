@@ -23,9 +23,20 @@ for axis, name in zip(axes, names, strict=True):
     ndvi = images[name]["dn"].fifesim.ndvi()
     left, bottom, right, top = ndvi.odc.geobox.boundingbox
     spacing = abs(float(ndvi.x[1] - ndvi.x[0]))
-    shown = axis.imshow(ndvi, extent=(left, right, bottom, top), vmin=0.15, vmax=0.6, cmap="YlGn")
-    axis.set_title(f"{name}, {spacing:.0f} m\nstandard deviation {float(ndvi.std()):.3f}", fontsize="medium")
-    axis.set(xlim=(ground.left, ground.right), ylim=(ground.bottom, ground.top), xticks=[], yticks=[], facecolor="0.85")
+    shown = axis.imshow(
+        ndvi, extent=(left, right, bottom, top), vmin=0.15, vmax=0.6, cmap="YlGn"
+    )
+    axis.set_title(
+        f"{name}, {spacing:.0f} m\nstandard deviation {float(ndvi.std()):.3f}",
+        fontsize="medium",
+    )
+    axis.set(
+        xlim=(ground.left, ground.right),
+        ylim=(ground.bottom, ground.top),
+        xticks=[],
+        yticks=[],
+        facecolor="0.85",
+    )
 figure.colorbar(shown, ax=axes, label="NDVI", shrink=0.8, extend="both")
 figure.suptitle("NDVI of the same 6.6 km of ground")
 
@@ -39,8 +50,14 @@ for name in names:
     red = str(images[name]["band"].values[0])
     transfer = fifesim.mtf(name, red, frequency=frequency).sel(band=red, direction="across")
     (line,) = axis.semilogx(1000 * frequency, transfer, label=name)
-    axis.axvline(1000 * float(transfer["nyquist"]), color=line.get_color(), linestyle=":", linewidth=1)
-axis.set(xlabel="spatial frequency [cycles km⁻¹]", ylabel="modulation transfer", title="Dotted: Nyquist frequency")
+    axis.axvline(
+        1000 * float(transfer["nyquist"]), color=line.get_color(), linestyle=":", linewidth=1
+    )
+axis.set(
+    xlabel="spatial frequency [cycles km⁻¹]",
+    ylabel="modulation transfer",
+    title="Dotted: Nyquist frequency",
+)
 axis.legend(frameon=False)
 
 # %%
@@ -49,10 +66,18 @@ axis.legend(frameon=False)
 # of the detectors, 0.8 %, are assumed here: no source was found for them.
 
 model = fifesim.NoiseModel(thermal=0.5, shot=0.0, detectors=16, gain_spread=0.008)
-target = wrap_xr(np.full((900, 900), 40.0), fifesim.fife_site(30 / 9, window=((0, 900), (0, 900))))
+target = wrap_xr(
+    np.full((900, 900), 40.0), fifesim.fife_site(30 / 9, window=((0, 900), (0, 900)))
+)
 target = target.expand_dims(band=["TM3"]).assign_attrs(units="W m-2 sr-1 um-1")
 figure, axes = plt.subplots(1, 3, figsize=(12, 4.6), layout="constrained")
-for axis, kinds in zip(axes, (["thermal"], ["fixed-pattern"], ["thermal", "fixed-pattern"]), strict=True):
+for axis, kinds in zip(
+    axes, (["thermal"], ["fixed-pattern"], ["thermal", "fixed-pattern"]), strict=True
+):
     counts = target.fifesim.sense("TM", noise=kinds, seed=2, noise_models=model)[0]
     axis.imshow(counts, cmap="gray", vmin=48, vmax=54, interpolation="nearest")
-    axis.set(title=f"{' and '.join(kinds)}: {float(counts.std()):.2f} counts", xlabel="column", ylabel="line")
+    axis.set(
+        title=f"{' and '.join(kinds)}: {float(counts.std()):.2f} counts",
+        xlabel="column",
+        ylabel="line",
+    )

@@ -14,7 +14,10 @@ import fifesim
 arps = (0.05, 0.15, 0.24)
 sensor = {"instrument": "L4TM", "interval": "native", "noise": ["shot", "thermal"]}
 budgets = {
-    arp: fifesim.budget(fifesim.Scenario(ground={"arp": arp}, sensor=sensor), realisations=3, cells=333) for arp in arps
+    arp: fifesim.budget(
+        fifesim.Scenario(ground={"arp": arp}, sensor=sensor), realisations=3, cells=333
+    )
+    for arp in arps
 }
 
 # %%
@@ -26,10 +29,21 @@ stages = budgets[arps[0]]["stage"].values
 colors, hatches = ("#0072B2", "#E69F00", "#009E73"), ("", "////", "....")
 for k, (arp, color, hatch) in enumerate(zip(arps, colors, hatches, strict=True)):
     one = budgets[arp].sel(variable="lai")
-    share, error = (100 * one["share"].mean("realisation"), 100 * one["share"].std("realisation", ddof=1) / np.sqrt(3))
+    share, error = (
+        100 * one["share"].mean("realisation"),
+        100 * one["share"].std("realisation", ddof=1) / np.sqrt(3),
+    )
     label = f"arp {arp:g}: {100 * float(one['total'].mean()):.0f} % in all"
     style = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0}
-    axis.barh(np.arange(len(stages)) + 0.26 * (k - 1), share, 0.25, xerr=error, capsize=2, label=label, **style)
+    axis.barh(
+        np.arange(len(stages)) + 0.26 * (k - 1),
+        share,
+        0.25,
+        xerr=error,
+        capsize=2,
+        label=label,
+        **style,
+    )
 axis.set_yticks(np.arange(len(stages)), stages)
 axis.invert_yaxis()
 axis.axvline(0, color="0.2", linewidth=0.8)
@@ -40,10 +54,14 @@ axis.legend(frameon=False, loc="lower right")
 # The paper's discussion names three mechanisms: the non-linearity of NDVI against LAI, the scaling of NDVI itself, and
 # regularization by the sensor. It does not name the place of the pixels, which drift from their blocks here.
 
-print("arp    non-linearity and curvature    NDVI scaling    point spread    registration    total [% of variance]")
+print(
+    "arp    non-linearity and curvature    NDVI scaling    point spread    registration    total [% of variance]"
+)
 for arp, found in budgets.items():
     mean = 100 * found.sel(variable="lai").mean("realisation")
     share = mean["share"].to_series()
     first = share["non-linearity"] + float(mean["curvature"])
     scaling, spread, place = share["NDVI scaling"], share["point spread"], share["registration"]
-    print(f"{arp:.2f} {first:20.1f} {scaling:22.1f} {spread:15.1f} {place:15.1f} {float(mean['total']):17.1f}")
+    print(
+        f"{arp:.2f} {first:20.1f} {scaling:22.1f} {spread:15.1f} {place:15.1f} {float(mean['total']):17.1f}"
+    )

@@ -24,7 +24,9 @@ def band(axis, noise, label):
 # standard deviation of MYSTIC, which is a Monte Carlo program.
 
 cases = ("A1a", "A1b", "A1c", "A2", "A3", "B1")
-figure, axes = plt.subplots(2, 3, figsize=(11, 5.4), layout="constrained", sharex=True, sharey=True)
+figure, axes = plt.subplots(
+    2, 3, figsize=(11, 5.4), layout="constrained", sharex=True, sharey=True
+)
 for axis, case in zip(axes.flat, cases, strict=True):
     table, found = benchmarks.iprt(case)
     band(axis, 3, "three times the noise")
@@ -39,7 +41,13 @@ for axis, case in zip(axes.flat, cases, strict=True):
 axes[1, 1].set_xlabel("zenith angle of the view [degree]")
 for axis in axes[:, 0]:
     axis.set_ylabel("(fifesim − MYSTIC) / noise")
-figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=7, frameon=False, fontsize=8)
+figure.legend(
+    *axes[0, 0].get_legend_handles_labels(),
+    loc="outside lower center",
+    ncols=7,
+    frameon=False,
+    fontsize=8,
+)
 
 # %%
 # One of them as it is: Q and U of the sky above molecules of depth .5, the sun at 30 degrees.
@@ -51,8 +59,14 @@ figure, axis = plt.subplots(figsize=(6.5, 3.9), layout="constrained")
 for name, values in zip("IQU", found, strict=True):
     azimuth, seen = -table["raa"].to_numpy()[rows][order], table[name].to_numpy()[rows][order]
     axis.plot(azimuth, values[rows][order], "-", color=COLORS[name], label=f"{name}, fifesim")
-    axis.plot(azimuth, seen, "o", color=COLORS[name], markerfacecolor="none", label=f"{name}, MYSTIC")
-axis.set(xlabel="azimuth from the sun [degree]", ylabel="π L / (E₀ cos sza)", xticks=[0, 45, 90, 135, 180])
+    axis.plot(
+        azimuth, seen, "o", color=COLORS[name], markerfacecolor="none", label=f"{name}, MYSTIC"
+    )
+axis.set(
+    xlabel="azimuth from the sun [degree]",
+    ylabel="π L / (E₀ cos sza)",
+    xticks=[0, 45, 90, 135, 180],
+)
 axis.set_title("Sky at 60° from the zenith, IPRT A1b (noise: 3 × 10⁻⁵)")
 axis.legend(frameon=False, ncols=3, fontsize=8, loc="center right", bbox_to_anchor=(1, 0.62))
 
@@ -78,56 +92,109 @@ for axis, values, scale in ((axes[0], found, 1e2), (axes[1], converged, 1e7)):
 band(axes[0], 0.01, "bound")
 axes[0].set(title="As it comes: 60 layers, 16 directions", ylabel="(fifesim − Natraj) / I [%]")
 band(axes[1], 1, "last digit of the table")
-axes[1].set(title="Many layers and directions", ylabel="fifesim − Natraj [10⁻⁷]", ylim=(-1.5, 1.5))
+axes[1].set(
+    title="Many layers and directions", ylabel="fifesim − Natraj [10⁻⁷]", ylim=(-1.5, 1.5)
+)
 for axis in axes:
     axis.legend(frameon=False, ncols=4, fontsize=8, loc="upper left")
 
 # %%
 # White ground below molecules, and dark ground below aerosol and gases, seen across the principal plane.
 
-figure, axes = plt.subplots(2, 2, figsize=(11, 5.6), layout="constrained", sharex=True, height_ratios=(3, 2))
-titles = {"white": "White ground, molecules", "lambert": "Ground of .028, continental aerosol, gases"}
+figure, axes = plt.subplots(
+    2, 2, figsize=(11, 5.6), layout="constrained", sharex=True, height_ratios=(3, 2)
+)
+titles = {
+    "white": "White ground, molecules",
+    "lambert": "Ground of .028, continental aerosol, gases",
+}
 for (upper, lower), case in zip(axes.T, titles, strict=True):
     table, found = benchmarks.rami(case)
     vza, expected = table["vza"], table["reflectance"]
     noise = 300 * 1.2 * table["sd"] / expected
     order = np.argsort(vza.to_numpy())
-    upper.plot(vza, expected, "o", color="#b2182b", markersize=3, markerfacecolor="none", label="Eradiate")
-    upper.plot(vza.to_numpy()[order], found[order], "-", color="black", linewidth=1, label="fifesim")
+    upper.plot(
+        vza,
+        expected,
+        "o",
+        color="#b2182b",
+        markersize=3,
+        markerfacecolor="none",
+        label="Eradiate",
+    )
+    upper.plot(
+        vza.to_numpy()[order], found[order], "-", color="black", linewidth=1, label="fifesim"
+    )
     upper.set(title=titles[case], ylabel="reflectance at the top")
     upper.legend(frameon=False)
-    shade = {"color": "#fdae61", "alpha": 0.35, "linewidth": 0, "label": "three times the noise"}
-    lower.fill_between(vza.to_numpy()[order], -noise.to_numpy()[order], noise.to_numpy()[order], **shade)
+    shade = {
+        "color": "#fdae61",
+        "alpha": 0.35,
+        "linewidth": 0,
+        "label": "three times the noise",
+    }
+    lower.fill_between(
+        vza.to_numpy()[order], -noise.to_numpy()[order], noise.to_numpy()[order], **shade
+    )
     lower.plot(vza, 100 * (found / expected - 1), ".", color="black", markersize=3)
     lower.axhline(0, color="0.5", linewidth=0.8)
-    lower.set(xlabel="view zenith [degree], positive toward the sun", ylabel="fifesim − Eradiate [%]")
+    lower.set(
+        xlabel="view zenith [degree], positive toward the sun", ylabel="fifesim − Eradiate [%]"
+    )
     lower.legend(frameon=False, fontsize=8, loc="lower right")
 
 # %%
 # A canopy of discs of a leaf area index of 3, and SAIL with three sizes of the hot spot. On the right flat discs, whose
 # hot spot is known without any Monte Carlo.
 
-figure, axes = plt.subplots(2, 2, figsize=(11, 6), layout="constrained", sharex=True, height_ratios=(3, 2))
+figure, axes = plt.subplots(
+    2, 2, figsize=(11, 6), layout="constrained", sharex=True, height_ratios=(3, 2)
+)
 sizes = {0.0: ":", 0.025: "--", 0.03: "-"}
 for hotspot, style in sizes.items():
     table, found = benchmarks.hom45(hotspot)
     order = np.argsort(table["vza"].to_numpy())
     vza, expected = table["vza"].to_numpy()[order], table["reflectance"].to_numpy()[order]
-    axes[0, 0].plot(vza, found[order], style, color="black", linewidth=1, label=f"SAIL, hotspot {hotspot:g}")
+    axes[0, 0].plot(
+        vza, found[order], style, color="black", linewidth=1, label=f"SAIL, hotspot {hotspot:g}"
+    )
     axes[1, 0].plot(vza, 100 * (found[order] / expected - 1), style, color="black", linewidth=1)
-axes[0, 0].plot(vza, expected, "o", color="#b2182b", markersize=3.5, markerfacecolor="none", label="Eradiate, discs")
-axes[0, 0].set(title="HOM45: radius .025 of the height, any inclination", ylabel="reflectance, red")
+axes[0, 0].plot(
+    vza,
+    expected,
+    "o",
+    color="#b2182b",
+    markersize=3.5,
+    markerfacecolor="none",
+    label="Eradiate, discs",
+)
+axes[0, 0].set(
+    title="HOM45: radius .025 of the height, any inclination", ylabel="reflectance, red"
+)
 vza = np.concatenate([np.arange(-75, 25), np.linspace(25, 35, 81), np.arange(36, 76)])
 angles = {"sza": 30.0, "vza": np.abs(vza), "raa": np.where(vza < 0, 180.0, 0.0)}
 expected = benchmarks.flat_discs(0.025, 3.0, vza)
 for hotspot, style in {0.0: ":", 0.021: "--", 0.025: "-"}.items():
-    found = benchmarks.sail(3.0, 1e-6, 0.0, **angles, leaf_angles="0: 1", hotspot=hotspot).rso / 1e-6
-    axes[0, 1].plot(vza, found, style, color="black", linewidth=1, label=f"SAIL, hotspot {hotspot:g}")
+    found = (
+        benchmarks.sail(3.0, 1e-6, 0.0, **angles, leaf_angles="0: 1", hotspot=hotspot).rso
+        / 1e-6
+    )
+    axes[0, 1].plot(
+        vza, found, style, color="black", linewidth=1, label=f"SAIL, hotspot {hotspot:g}"
+    )
     axes[1, 1].plot(vza, 100 * (found / expected - 1), style, color="black", linewidth=1)
-axes[0, 1].plot(vza, expected, color="#b2182b", linewidth=3, alpha=0.4, zorder=0, label="circles, exact")
-axes[0, 1].set(title="Flat discs of the same size", ylabel="scattered once, of what a leaf reflects")
+axes[0, 1].plot(
+    vza, expected, color="#b2182b", linewidth=3, alpha=0.4, zorder=0, label="circles, exact"
+)
+axes[0, 1].set(
+    title="Flat discs of the same size", ylabel="scattered once, of what a leaf reflects"
+)
 for axis in axes[1]:
     axis.axhline(0, color="0.5", linewidth=0.8)
-    axis.set(ylim=(-10, 10), xlabel="view zenith [degree], positive toward the sun", ylabel="difference [%]")
+    axis.set(
+        ylim=(-10, 10),
+        xlabel="view zenith [degree], positive toward the sun",
+        ylabel="difference [%]",
+    )
 for axis in axes[0]:
     axis.legend(frameon=False, fontsize=8, loc="upper left")

@@ -14,7 +14,9 @@ import fifesim
 site = fifesim.fife_site(10 / 3, window=((0, 540), (0, 540)))
 lai = 1.5 * fifesim.lai_scene(site, "burned-ungrazed", arp=0.24, seed=7)
 ground = {
-    "leaf_optics": fifesim.Leaf(structure=1.4, chlorophyll=42, brown=0.1, water=0.009, dry_matter=0.006),
+    "leaf_optics": fifesim.Leaf(
+        structure=1.4, chlorophyll=42, brown=0.1, water=0.009, dry_matter=0.006
+    ),
     "background": fifesim.Background({"soil_wet": 0.6, "golden_grass": 0.4}),
     "leaf_angles": "campbell(63)",
 }
@@ -37,14 +39,27 @@ images = {
 }
 for axis, (title, image) in zip(axes, images.items(), strict=True):
     part = image.fifesim.ndvi().sel(x=slice(705000, 705900), y=slice(4334100, 4333200))
-    part.plot.imshow(ax=axis, cmap="YlGn", add_labels=False, vmin=part.quantile(0.02), vmax=part.quantile(0.98))
+    part.plot.imshow(
+        ax=axis,
+        cmap="YlGn",
+        add_labels=False,
+        vmin=part.quantile(0.02),
+        vmax=part.quantile(0.98),
+    )
     axis.set(title=f"NDVI, {title}", xticks=[], yticks=[], aspect=1)
 
 # %%
 # **By band.** The best linear estimate from all bands, beside the nearest band taken as it is. Leaves, leaf angles and
 # the mixture of soils are none of those in the library of spectra that the estimate is made with.
 
-nearest = {"TM1": "MSI2", "TM2": "MSI3", "TM3": "MSI4", "TM4": "MSI8", "TM5": "MSI11", "TM7": "MSI12"}
+nearest = {
+    "TM1": "MSI2",
+    "TM2": "MSI3",
+    "TM3": "MSI4",
+    "TM4": "MSI8",
+    "TM5": "MSI11",
+    "TM7": "MSI12",
+}
 estimate = fine["MSI"].fifesim.adjust_bands("TM")
 as_it_is = fine["MSI"].sel(band=list(nearest.values())).assign_coords(band=list(nearest))
 
@@ -55,9 +70,21 @@ def rms(errors):
 
 figure, axis = plt.subplots(figsize=(7, 3.8), layout="constrained")
 place = np.arange(len(nearest))
-axis.bar(place - 0.2, rms(as_it_is.drop_vars("wavelength") - fine["TM"]), 0.4, label="nearest band", color="0.75")
+axis.bar(
+    place - 0.2,
+    rms(as_it_is.drop_vars("wavelength") - fine["TM"]),
+    0.4,
+    label="nearest band",
+    color="0.75",
+)
 axis.bar(place + 0.2, rms(estimate - fine["TM"]), 0.4, label="adjust_bands", color="tab:green")
-axis.plot(place + 0.2, 1000 * estimate["adjustment_error"], "k_", markersize=14, label="its stated error")
+axis.plot(
+    place + 0.2,
+    1000 * estimate["adjustment_error"],
+    "k_",
+    markersize=14,
+    label="its stated error",
+)
 axis.set(ylabel="error of reflectance [0.001]", title="MSI bands as TM bands")
 axis.set_xticks(place, [f"{band}\nfrom {near}" for band, near in nearest.items()])
 axis.legend(frameon=False)
@@ -65,17 +92,33 @@ axis.legend(frameon=False)
 # %%
 # **One line for all land**, as tables of spectral adjustment give it, beside the published one.
 
-lines = fifesim.spectral_adjustment("MSI", "OLI", bands=[f"OLI{number}" for number in range(1, 8)])
+lines = fifesim.spectral_adjustment(
+    "MSI", "OLI", bands=[f"OLI{number}" for number in range(1, 8)]
+)
 reflectance = 0.15
 ours = lines["slope"] * reflectance + lines["offset"] - reflectance
 theirs = lines["published_slope"] * reflectance + lines["published_offset"] - reflectance
 figure, axis = plt.subplots(figsize=(7, 3.8), layout="constrained")
 place = np.arange(lines.sizes["band"])
-axis.errorbar(place - 0.1, 1000 * ours, 1000 * lines["error"], fmt="o", color="tab:green", label="fifesim's library")
+axis.errorbar(
+    place - 0.1,
+    1000 * ours,
+    1000 * lines["error"],
+    fmt="o",
+    color="tab:green",
+    label="fifesim's library",
+)
 axis.plot(place + 0.1, 1000 * theirs, "s", color="tab:orange", label="NASA's HLS")
 axis.axhline(0, color="0.7", linewidth=1)
-axis.set(ylabel="OLI less MSI at a reflectance of 0.15 [0.001]", title="MSI to OLI, one line for each band")
+axis.set(
+    ylabel="OLI less MSI at a reflectance of 0.15 [0.001]",
+    title="MSI to OLI, one line for each band",
+)
 axis.set_xticks(
-    place, [f"{near}\nto {band}" for near, band in zip(lines["source_band"].values, lines["band"].values, strict=True)]
+    place,
+    [
+        f"{near}\nto {band}"
+        for near, band in zip(lines["source_band"].values, lines["band"].values, strict=True)
+    ],
 )
 axis.legend(frameon=False, loc="lower right")

@@ -15,7 +15,11 @@ site = fifesim.fife_site(30 / 9, window=((0, 1500), (0, 1800)))
 dem = fifesim.flint_hills(site, seed=7)
 land = fifesim.landscape(site, arp=0.2, seed=7)
 bands = ["MSI2", "MSI3", "MSI4", "MSI8"]
-image = land.fifesim.surface_reflectance("MSI", bands=bands, dem=dem).fifesim.to_toa().fifesim.sense("MSI")
+image = (
+    land.fifesim.surface_reflectance("MSI", bands=bands, dem=dem)
+    .fifesim.to_toa()
+    .fifesim.sense("MSI")
+)
 
 image.fifesim.plot()
 
@@ -44,5 +48,10 @@ fit.plot(truth, ndvi)
 
 setup = fifesim.Setup(dem=dem)
 images = fifesim.compare(lai, ["MSI", "OLI", "TM", "MODIS"], setup)
-print(images.fifesim.comparison_table(truth=lai).drop(columns=["rows", "columns", "bands"]).round(3).to_string())
+print(
+    images.fifesim.comparison_table(truth=lai)
+    .drop(columns=["rows", "columns", "bands"])
+    .round(3)
+    .to_string()
+)
 images.fifesim.plot_comparison()

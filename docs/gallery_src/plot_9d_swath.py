@@ -15,7 +15,9 @@ grid = fifesim.grid_at("EPSG:26914", 100e3, 4440e3, 1000e3, 60e3, 500.0)
 away = {"nadir_offset": 500e3, "heading": 0.0}
 lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.248, seed=7)
 view = fifesim.scan_geometry("AVHRR", grid, **away).assign(sza=40.0, saa=150.0)
-rho = lai.fifesim.surface_reflectance("AVHRR", geometry=view, atmosphere=fifesim.Atmosphere(visibility=30))
+rho = lai.fifesim.surface_reflectance(
+    "AVHRR", geometry=view, atmosphere=fifesim.Atmosphere(visibility=30)
+)
 image = rho.fifesim.to_toa().fifesim.sense_swath("AVHRR", **away)
 ndvi = image.fifesim.ndvi()
 
@@ -29,7 +31,9 @@ for axis, west in zip(axes, ends, strict=True):
     ndvi.fifesim.plot(axes=axis, limits=(0.1, 0.6))
     axis.set(xlim=(west, west + 60), ylim=(4385, 4435))
     near = ndvi["vza"].where(abs(ndvi["x"] / 1000 - west - 30) < 30)
-    axis.set_title(f"NDVI by lines and samples, seen at {float(near.mean()):.0f}°", fontsize="medium")
+    axis.set_title(
+        f"NDVI by lines and samples, seen at {float(near.mean()):.0f}°", fontsize="medium"
+    )
 
 # %%
 # **On a map of 2 km**: the nearest pixel to each cell, or the mean of the pixels that lie on it, by area. Near the

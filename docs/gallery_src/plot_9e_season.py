@@ -23,7 +23,12 @@ wheat = 4 * np.exp(-(((share - 0.3) / 0.2) ** 2))
 grass = 1.3 * np.exp(-(((share - 0.5) / 0.3) ** 2))
 leaves = (lai * grass).where(~field, wheat).transpose("time", "y", "x").assign_attrs(lai.attrs)
 toa = leaves.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa()
-clouds = xr.concat([fifesim.lai_scene(grid, arp=0.2497, seed=day) for day in range(10)], dim=toa.time) > 1.1
+clouds = (
+    xr.concat(
+        [fifesim.lai_scene(grid, arp=0.2497, seed=day) for day in range(10)], dim=toa.time
+    )
+    > 1.1
+)
 image = toa.where(~clouds, 0.6).fifesim.sense()
 ndvi = image.fifesim.ndvi()
 clear = image.fifesim.to_reflectance().fifesim.composite()
@@ -31,8 +36,12 @@ clear = image.fifesim.to_reflectance().fifesim.composite()
 # %%
 # Four of the dates, and the composite with the date that each pixel shows.
 
-figure, axes = plt.subplots(2, 3, figsize=(10.5, 7), layout="constrained", sharex=True, sharey=True)
-maps = {f"{date:%d %B}": ndvi.sel(time=date) for date in dates[[1, 3, 5, 8]]} | {"Composite": clear.fifesim.ndvi()}
+figure, axes = plt.subplots(
+    2, 3, figsize=(10.5, 7), layout="constrained", sharex=True, sharey=True
+)
+maps = {f"{date:%d %B}": ndvi.sel(time=date) for date in dates[[1, 3, 5, 8]]} | {
+    "Composite": clear.fifesim.ndvi()
+}
 for axis, (title, values) in zip(axes.flat, maps.items(), strict=False):
     shown = axis.imshow(values, cmap="YlGn", vmin=0, vmax=0.8)
     axis.set(title=title, xticks=[], yticks=[])
@@ -48,7 +57,13 @@ figure.colorbar(shown, ax=axes[:, 2], label="day of the year", shrink=0.6)
 in_field = field.coarsen(y=9, x=9).mean().values > 0.5
 figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
 for name, of_cover, color in (("wheat", in_field, "#b8860b"), ("grass", ~in_field, "#2e7d32")):
-    axis.plot(dates, [float(each.where(of_cover).mean()) for each in ndvi], "o-", color=color, label=name)
+    axis.plot(
+        dates,
+        [float(each.where(of_cover).mean()) for each in ndvi],
+        "o-",
+        color=color,
+        label=name,
+    )
     level = float(clear.fifesim.ndvi().where(of_cover).mean())
     axis.axhline(level, color=color, linestyle=":", linewidth=1.5, label=f"{name}, composite")
 axis.set(ylabel="NDVI, clouds in the mean", xlabel="1987", ylim=(0, 0.95))

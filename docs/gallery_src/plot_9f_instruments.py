@@ -19,7 +19,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-table = pd.read_csv(next(path for path in map(Path, ("../instruments.csv", "docs/instruments.csv")) if path.exists()))
+table = pd.read_csv(
+    next(
+        path
+        for path in map(Path, ("../instruments.csv", "docs/instruments.csv"))
+        if path.exists()
+    )
+)
 table = table[table["variable"] == "lai"]
 
 STAGES = {
@@ -32,7 +38,9 @@ STAGES = {
 
 names = list(dict.fromkeys(table.sort_values("pixel", kind="stable")["instrument"]))
 arps = sorted(table["arp"].unique())
-figure, axes = plt.subplots(1, 3, figsize=(11.5, 0.42 * len(names) + 1.6), sharey=True, layout="constrained")
+figure, axes = plt.subplots(
+    1, 3, figsize=(11.5, 0.42 * len(names) + 1.6), sharey=True, layout="constrained"
+)
 for axis, arp in zip(axes, arps, strict=True):
     of_ground = table[table["arp"] == arp].set_index(["instrument", "stage"])
     left = np.zeros(len(names))
@@ -43,9 +51,23 @@ for axis, arp in zip(axes, arps, strict=True):
         left += share
     totals = [of_ground.loc[(name, "total")] for name in names]
     rest = np.array([row["share"] for row in totals]) - left
-    axis.barh(names, np.maximum(rest, 0), left=left, color="#dddddd", height=0.72, label="the relation itself")
+    axis.barh(
+        names,
+        np.maximum(rest, 0),
+        left=left,
+        color="#dddddd",
+        height=0.72,
+        label="the relation itself",
+    )
     error = [row["share_error"] for row in totals]
-    axis.errorbar([row["share"] for row in totals], names, xerr=error, fmt="none", ecolor="#222222", elinewidth=1)
+    axis.errorbar(
+        [row["share"] for row in totals],
+        names,
+        xerr=error,
+        fmt="none",
+        ecolor="#222222",
+        elinewidth=1,
+    )
     axis.set(title=f"arp {arp:g}", xlim=(0, 1.05), xlabel="share of the variance of LAI left")
     axis.spines[["top", "right"]].set_visible(False)
 axes[0].set_ylim(len(names) - 0.4, -0.6)
@@ -53,9 +75,18 @@ known = table.drop_duplicates("instrument").set_index("instrument")
 labels = []
 for name in names:
     unknown = [what for what in ("blur", "noise", "place") if not known.loc[name, what]]
-    labels.append(f"{name}, {known.loc[name, 'pixel']:g} m" + (f"\n(no {', '.join(unknown)})" if unknown else ""))
+    labels.append(
+        f"{name}, {known.loc[name, 'pixel']:g} m"
+        + (f"\n(no {', '.join(unknown)})" if unknown else "")
+    )
 axes[0].set_yticks(range(len(names)), labels, fontsize=7.5)
-figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False, fontsize=9)
+figure.legend(
+    *axes[0].get_legend_handles_labels(),
+    loc="outside lower center",
+    ncols=6,
+    frameon=False,
+    fontsize=9,
+)
 
 # %%
 # The same as numbers: R² of leaf area on NDVI.
@@ -76,7 +107,12 @@ print(text.to_string())
 
 shares = table.pivot(index=["arp", "instrument"], columns="stage", values="share")
 known["all"] = True
-for stage, quantity in (("registration", "place"), ("point spread", "blur"), ("noise", "noise"), ("atmosphere", "all")):
+for stage, quantity in (
+    ("registration", "place"),
+    ("point spread", "blur"),
+    ("noise", "noise"),
+    ("atmosphere", "all"),
+):
     print(stage)
     for arp in arps:
         found = shares.loc[arp, stage][known[quantity]]

@@ -23,16 +23,30 @@ found = fifesim.reproduce(realisations=3)
 # **Table 2 beside the paper's.** Means over three realisations; *native* pixels drift, *aligned* ones lie on the
 # blocks.
 
-MARKERS = {"native": ("o", "#0072B2"), "aligned": ("x", "#D55E00"), "blur-48.6": ("^", "#009E73")}
-PAPER = {"marker": "s", "color": "#222222", "markerfacecolor": "none", "linestyle": "none", "markersize": 7}
-rows = [(name, float(arp)) for name in found["distribution"].values for arp in found["arp"].values]
+MARKERS = {
+    "native": ("o", "#0072B2"),
+    "aligned": ("x", "#D55E00"),
+    "blur-48.6": ("^", "#009E73"),
+}
+PAPER = {
+    "marker": "s",
+    "color": "#222222",
+    "markerfacecolor": "none",
+    "linestyle": "none",
+    "markersize": 7,
+}
+rows = [
+    (name, float(arp)) for name in found["distribution"].values for arp in found["arp"].values
+]
 labels = [f"{name.replace('-', ', ')}, {arp:g}" for name, arp in rows]
 
 figure, axes = plt.subplots(2, 3, figsize=(11, 7), layout="constrained", sharey=True)
 for line, variable in zip(axes, ("lai", "fpar"), strict=True):
     for axis, name in zip(line, ("intercept", "slope", "r2"), strict=True):
         one = found.sel(variable=variable)
-        published = [float(one[f"paper_{name}"].sel(distribution=where, arp=arp)) for where, arp in rows]
+        published = [
+            float(one[f"paper_{name}"].sel(distribution=where, arp=arp)) for where, arp in rows
+        ]
         axis.plot(published, range(9), label="the paper", **PAPER)
         for reading in found["reading"].values:
             marker, color = MARKERS[str(reading)]
@@ -45,17 +59,25 @@ for line, variable in zip(axes, ("lai", "fpar"), strict=True):
 for axis in axes[:, 0]:
     axis.set_yticks(range(9), labels, fontsize=8)
 axes[0, 0].invert_yaxis()
-figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+figure.legend(
+    *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False
+)
 
 # %%
 # **Other readings, and relief.** Lines of LAI on NDVI. Pixels on the blocks leave R² high; blur brings it down, too,
 # but raises the slopes. Relief is that of synthetic hills. From here on the numbers are those of :doc:`/paper`.
 
 folders = (Path(".."), Path("docs"))
-numbers = json.loads(next(at / "paper.json" for at in folders if (at / "paper.json").exists()).read_text("utf-8"))
+numbers = json.loads(
+    next(at / "paper.json" for at in folders if (at / "paper.json").exists()).read_text("utf-8")
+)
 
-figure, axes = plt.subplots(2, 2, figsize=(11, 7), layout="constrained", sharex="col", sharey=True)
-for line, dem, words in zip(axes, ("flat", "flint-hills"), ("level ground", "synthetic hills"), strict=True):
+figure, axes = plt.subplots(
+    2, 2, figsize=(11, 7), layout="constrained", sharex="col", sharey=True
+)
+for line, dem, words in zip(
+    axes, ("flat", "flint-hills"), ("level ground", "synthetic hills"), strict=True
+):
     shown = [one for one in numbers["readings"] if one["dem"] == dem and one["name"] in MARKERS]
     for axis, name in zip(line, ("r2", "slope"), strict=True):
         published = [shown[0][f"paper_{name} {where} {arp:g}"] for where, arp in rows]
@@ -70,7 +92,9 @@ for line, dem, words in zip(axes, ("flat", "flint-hills"), ("level ground", "syn
 for axis in axes[:, 0]:
     axis.set_yticks(range(9), labels, fontsize=8)
 axes[0, 0].invert_yaxis()
-figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+figure.legend(
+    *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False
+)
 
 # %%
 # **What each input does** to the nine rows of LAI, changed by a little: slopes and intercepts follow soil and leaf
@@ -78,7 +102,11 @@ figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center
 
 changes = numbers["sensitivity"]
 names = [f"{one['name']}: {one['before']} → {one['after']}" for one in changes]
-panels = {"lai_r2": ("R²", 1), "lai_slope": ("slope [%]", 100), "lai_intercept": ("intercept", 1)}
+panels = {
+    "lai_r2": ("R²", 1),
+    "lai_slope": ("slope [%]", 100),
+    "lai_intercept": ("intercept", 1),
+}
 figure, axes = plt.subplots(1, 3, figsize=(11, 3.8), layout="constrained", sharey=True)
 for axis, (key, (title, scale)) in zip(axes, panels.items(), strict=True):
     axis.barh(names, [scale * one[key] for one in changes], color="#0072B2")
@@ -97,7 +125,9 @@ def show(number, reading="native"):
     canvas = FigureCanvasAgg(fifesim.plot_reproduction(number, found, reading=reading))
     canvas.figure.set_dpi(100)
     canvas.draw()
-    plt.figure(figsize=canvas.figure.get_size_inches(), dpi=100).figimage(np.asarray(canvas.buffer_rgba()))
+    plt.figure(figsize=canvas.figure.get_size_inches(), dpi=100).figimage(
+        np.asarray(canvas.buffer_rgba())
+    )
 
 
 show(3)

@@ -21,7 +21,9 @@ colors = plt.get_cmap("YlGn")(np.linspace(0.3, 1, 6))
 
 grid = fifesim.fife_site(cell=30, window=((0, 6), (0, 41)))
 lai = fifesim.lai_scene(grid, seed=7).drop_attrs(deep=False)
-lai = xr.zeros_like(lai) + xr.DataArray([0.0, 0.5, 1.0, 2.0, 3.0, 5.0], dims="y", coords={"y": lai.y})
+lai = xr.zeros_like(lai) + xr.DataArray(
+    [0.0, 0.5, 1.0, 2.0, 3.0, 5.0], dims="y", coords={"y": lai.y}
+)
 across = xr.zeros_like(lai) + xr.DataArray(np.linspace(0, 1, 41), dims="x", coords={"x": lai.x})
 case = {"bands": bands, "geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere()}
 changes = {
@@ -29,7 +31,9 @@ changes = {
     "Moisture 0 to 1, of a brighter soil": {"soil": 0.15, "moisture": across},
 }
 
-figure, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained", sharex=True, sharey=True)
+figure, axes = plt.subplots(
+    1, 2, figsize=(11, 4.6), layout="constrained", sharex=True, sharey=True
+)
 for axis, (title, soil) in zip(axes, changes.items(), strict=True):
     rho = fifesim.surface_reflectance(lai, "TM", **case, **soil)
     for ndvi in (0.2, 0.4, 0.6, 0.8):
@@ -73,7 +77,12 @@ soil = (0.04 * score).fifesim.aggregate(30)
 for axis, raster, title, style in (
     (axes[0], truth, "Leaf area index", {"cmap": "YlGn"}),
     (axes[1], soil, "Brightness of the soil", {"cmap": "cividis"}),
-    (axes[2], images[0.04] - images[0.0], "Change of NDVI by the soil", {"cmap": "RdBu", "vmin": -0.06, "vmax": 0.06}),
+    (
+        axes[2],
+        images[0.04] - images[0.0],
+        "Change of NDVI by the soil",
+        {"cmap": "RdBu", "vmin": -0.06, "vmax": 0.06},
+    ),
 ):
     drawn = axis.imshow(raster.isel(corner), extent=(0, 1.2, 0, 1.2), **style)
     figure.colorbar(drawn, ax=axis, shrink=0.8)
@@ -83,10 +92,14 @@ axes[0].set_ylabel("northing [km]")
 # %%
 # More variance of the soil, more scatter. A bright soil looks like fewer leaves, where there are few leaves to hide it.
 
-figure, axes = plt.subplots(1, 4, figsize=(13, 3.6), layout="constrained", sharex=True, sharey=True)
+figure, axes = plt.subplots(
+    1, 4, figsize=(13, 3.6), layout="constrained", sharex=True, sharey=True
+)
 for axis, (deviation, ndvi) in zip(axes, images.items(), strict=True):
     fit = fifesim.regress(truth, ndvi)
-    points = axis.scatter(ndvi, truth, c=soil * deviation / 0.04, s=2, cmap="cividis", vmin=-0.08, vmax=0.08)
+    points = axis.scatter(
+        ndvi, truth, c=soil * deviation / 0.04, s=2, cmap="cividis", vmin=-0.08, vmax=0.08
+    )
     line = np.array([float(ndvi.min()), float(ndvi.max())])
     axis.plot(line, fit.intercept + fit.slope * line, color="black", linewidth=1)
     axis.set(title=f"sd {deviation:g}: R² {fit.r2:.3f}", xlabel="NDVI")

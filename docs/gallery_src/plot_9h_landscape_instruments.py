@@ -18,7 +18,9 @@ grid = {"width": 6600.0, "height": 6600.0}
 
 def seen_by(instrument):
     """True leaf area, and NDVI of what an instrument records."""
-    scenario = fifesim.Scenario(**default | {"grid": grid, "sensor": {"instrument": instrument}})
+    scenario = fifesim.Scenario(
+        **default | {"grid": grid, "sensor": {"instrument": instrument}}
+    )
     run = fifesim.simulate(scenario)
     return run["truth"]["lai"].compute(), run["image"]["ndvi"].compute()
 
@@ -34,7 +36,9 @@ for axis, (name, (_, ndvi)) in zip(axes.flat[1:], runs.items(), strict=True):
     pixel = float(abs(ndvi["x"][1] - ndvi["x"][0]))
     axis.set(title=f"{name}, {pixel:g} m", facecolor="#eeeeee", xlim=(0, 6.6), ylim=(0, 6.6))
     width, height = (ndvi.sizes[side] * pixel / 1000 for side in ("x", "y"))
-    shown = axis.imshow(ndvi, cmap="YlGn", vmin=0.15, vmax=0.65, extent=(0, width, 6.6 - height, 6.6))
+    shown = axis.imshow(
+        ndvi, cmap="YlGn", vmin=0.15, vmax=0.65, extent=(0, width, 6.6 - height, 6.6)
+    )
 figure.colorbar(shown, ax=axes[:, 2], label="NDVI of planetary reflectance", shrink=0.7)
 for axis in axes.flat:
     axis.set(xticks=[0, 2, 4, 6], yticks=[0, 2, 4, 6])

@@ -18,7 +18,9 @@ import numpy as np
 import pandas as pd
 
 name = "landscape_budget.csv"
-table = pd.read_csv(next(path for path in (Path("..") / name, Path("docs") / name) if path.exists()))
+table = pd.read_csv(
+    next(path for path in (Path("..") / name, Path("docs") / name) if path.exists())
+)
 table = table[table["variable"] == "lai"].set_index(["instrument", "stage"])
 instruments = list(dict.fromkeys(table.index.get_level_values("instrument")))
 GROUND = ["soil", "dead leaves", "cover", "covariance"]
@@ -32,10 +34,20 @@ for number, instrument in enumerate(instruments):
     rows = table.loc[instrument].loc[stages]
     total = table.loc[(instrument, "total")]
     at = np.arange(len(stages)) + 0.26 * (number - 1)
-    label = f"{instrument}, in all {100 * total['share']:.0f} ± {100 * total['share_error']:.0f} %"
+    label = (
+        f"{instrument}, in all {100 * total['share']:.0f} ± {100 * total['share_error']:.0f} %"
+    )
     error = 100 * rows["share_error"]
     axis.barh(at, 100 * rows["share"], 0.24, color=colors[instrument], label=label)
-    axis.errorbar(100 * rows["share"], at, xerr=error, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2)
+    axis.errorbar(
+        100 * rows["share"],
+        at,
+        xerr=error,
+        fmt="none",
+        ecolor="#222222",
+        elinewidth=0.9,
+        capsize=2,
+    )
 for group, color in ((GROUND, "#f3ede2"), (SENSOR, "#e8eef4")):
     first, last = stages.index(group[0]), stages.index(group[-1])
     axis.axhspan(first - 0.5, last + 0.5, color=color, zorder=0)
@@ -56,7 +68,9 @@ for instrument in instruments:
     ground, sensor = shares[GROUND[:3]].sum(), shares[SENSOR].sum()
     said = ", ".join(f"{stage} {shares[stage]:.1f} ± {errors[stage]:.1f}" for stage in GROUND)
     print(f"{instrument}: {said} % of the variance.")
-    print(f"    Soil, dead leaves and cover add {ground:.1f} % together, place, blur, noise and counts {sensor:.1f} %.")
+    print(
+        f"    Soil, dead leaves and cover add {ground:.1f} % together, place, blur, noise and counts {sensor:.1f} %."
+    )
 
 # %%
 # To cite:
