@@ -1,5 +1,7 @@
 """Grids as odc GeoBoxes: what a DataArray's grid is, and where cells and pixels lie."""
 
+from functools import lru_cache
+
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
 import rioxarray  # noqa: F401  registers .rio
@@ -147,8 +149,14 @@ def coordinates(grid):
         attrs = {"standard_name": f"projection_{axis}_coordinate", "long_name": f"{axis} coordinate of projection"}
         attrs |= {"units": "m", "axis": axis.upper()}
         out[axis] = xr.DataArray(values, dims=axis, attrs=attrs)
-    out["spatial_ref"] = xr_coords(_snapped(grid))["spatial_ref"]
+    out["spatial_ref"] = _reference(_snapped(grid)).copy()
     return out
+
+
+# Every step of a chain asks for that of its grid, and it takes a millisecond to make.
+@lru_cache(maxsize=64)
+def _reference(grid):
+    return xr_coords(grid)["spatial_ref"]
 
 
 def place(array, grid):
