@@ -1,6 +1,7 @@
 """Images of a scene with any of its stages at their ideal."""
 
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -15,7 +16,7 @@ from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
 from fifesim.chain.arrays import shared_operators
 from fifesim.chain.setup import Setup, reflectance_of
-from fifesim.experiments.scatter.cells import Stand, stand_of, tangent
+from fifesim.experiments.scatter.cells import Stand, arrays_of, tangent
 from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas
@@ -23,7 +24,6 @@ from fifesim.scenario.ground import absorbed_light
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
-from fifesim.sensor import raster as sensor
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import pixel_grid
@@ -165,10 +165,18 @@ class _Scene:
             self.grounds[kind] = self.made(land, self.spread_out(land["lai"]))
         return self.grounds[kind]
 
+    @cached_property
+    def arrays(self):
+        """The chain and the slopes of one stand, where plain arrays do."""
+        return arrays_of(self.setup, self.bands, self.grid)
+
     def made(self, land, middle):
         """A ground, as arrays too where they do."""
+        chain, slopes = self.arrays
+        if chain is None or set(land.data_vars) != {"lai"}:
+            return _Ground(land, middle)
         fpar_inf = self.scenario.ground.fpar_inf
-        return _Ground(land, middle, stand_of(self.setup, self.bands, self.grid, land, middle, fpar_inf))
+        return _Ground(land, middle, Stand(chain, slopes, land["lai"].values, middle.values, fpar_inf))
 
     def spread_out(self, cells):
         """Means over the pixels of the truth, on the cells."""
@@ -322,17 +330,17 @@ def _recorded(scene, means, counts, grains):
     setup, geometry, bands = scene.setup, scene.setup.geometry, scene.bands
     known = [(band.full_scale_radiance, band.min_radiance, band.solar_irradiance) for band in bands]
     full_scale, lowest, irradiance = np.array(known).T[..., None, None]
-    radiance = sensor.as_radiance(xr.DataArray(means, dims=("band", "y", "x")), bands, geometry)
+    distance = geometry.earth_sun_distance
+    radiance = calibration.reflectance_to_radiance(means, irradiance, geometry.mu_s, distance)
     if grains:
-        first = grids.lattice_position(scene.image)
-        radiance = noisy(radiance, setup.instrument, bands, setup.noise, setup.seed, first, setup.noise_models)
-    radiance = radiance.values
+        plain, first = xr.DataArray(radiance, dims=("band", "y", "x")), grids.lattice_position(scene.image)
+        said = setup.noise, setup.seed, first, setup.noise_models
+        radiance = noisy(plain, setup.instrument, bands, *said).values
     if counts:
         gain, offset = calibration.gain_offset(full_scale, lowest, setup.instrument.bits)
         compression = np.array([band.compressed_count(setup.instrument.bits) for band in bands])[:, None, None]
         dn = calibration.radiance_to_dn(radiance, gain, offset, setup.instrument.bits, compression)
         radiance = calibration.dn_to_radiance(dn, gain, offset, compression)
-    distance = geometry.earth_sun_distance
     red, nir = calibration.radiance_to_reflectance(radiance, irradiance, geometry.mu_s, distance)
     return indices.normalized_difference(nir, red)
 
