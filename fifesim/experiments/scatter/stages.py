@@ -21,7 +21,7 @@ from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas
 from fifesim.scenario.ground import absorbed_light
-from fifesim.scenario.land import elevation
+from fifesim.scenario.land import elevation, in_memory
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.response import calibration
@@ -190,7 +190,7 @@ def _scene(scenario):
     blocks = grids.aligned(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     # In memory: every set of stages with topography asks for them.
-    dem, horizon = (each if each is None else each.compute() for each in elevation(scenario, grid)[:2])
+    dem, horizon = in_memory(*elevation(scenario, grid)[:2])
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, grid, blocks, image)
 
 
