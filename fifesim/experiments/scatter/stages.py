@@ -16,6 +16,7 @@ from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
 from fifesim.chain.arrays import shared_operators
 from fifesim.chain.setup import Setup, reflectance_of
+from fifesim.experiments.scatter.blocks import middle_cells, spread_out_means
 from fifesim.experiments.scatter.cells import Stand, arrays_of, tangent
 from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
 from fifesim.rasters import grid as grids
@@ -181,7 +182,7 @@ class _Scene:
     def spread_out(self, cells):
         """Means over the pixels of the truth, on the cells."""
         means = aggregate(cells, grids.cell_size(self.blocks)[0], min_valid=self.setup.min_valid)
-        return _spread_out(means, cells)
+        return spread_out_means(means, cells)
 
 
 def _scene(scenario):
@@ -199,7 +200,7 @@ def _even(scene):
     whole = scene.ground(PROPERTIES)
     land = {name: scene.spread_out(each) for name, each in whole.land.items() if name != "cover" and each.ndim == 2}
     if "cover" in whole.land:
-        land["cover"] = _middle_cells(whole.land["cover"], scene.blocks)
+        land["cover"] = middle_cells(whole.land["cover"], scene.blocks)
     return scene.made(whole.land.assign(land), whole.middle)
 
 
@@ -208,31 +209,6 @@ def _red_and_nir(bands):
     coords = {"wavelength": ("band", [band.wavelength for band in bands])}
     numbers = xr.DataArray(np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords=coords)
     return tuple(bands[number.item()] for number in red_and_nir(numbers))
-
-
-def _spread_out(means, cells):
-    """Means of blocks over their cells; a cell of no block keeps its own, and one without data has none."""
-    (rows, columns), inside = _places(cells, grids.geobox(means))
-    spread = means.values[rows][:, columns]
-    return cells.copy(data=np.where(inside & np.isfinite(spread) & np.isfinite(cells.values), spread, cells.values))
-
-
-def _middle_cells(cells, blocks):
-    """The cell in the middle of each block over its cells; one of no block keeps its own."""
-    (rows, columns), inside = _places(cells, blocks)
-    sizes = zip(grids.cell_size(blocks), grids.cell_size(grids.geobox(cells)), strict=True)
-    down, across = (block / cell for block, cell in sizes)
-    middle = cells.values[((rows + 0.5) * down).astype(int)][:, ((columns + 0.5) * across).astype(int)]
-    return cells.copy(data=np.where(inside & (cells.values >= 0), middle, cells.values))
-
-
-def _places(cells, blocks):
-    """Row and column of the block of each cell, at most the last, and whether the cell lies in it."""
-    sizes = zip(grids.cell_size(grids.geobox(cells)), grids.cell_size(blocks), cells.shape, strict=True)
-    places = [np.floor((np.arange(count) + 0.5) * cell / block + 1e-9).astype(int) for cell, block, count in sizes]
-    inside = [place < count for place, count in zip(places, blocks.shape, strict=True)]
-    last = [np.minimum(place, count - 1) for place, count in zip(places, blocks.shape, strict=True)]
-    return last, inside[0][:, None] & inside[1]
 
 
 def _truths(scene, switches):
