@@ -5,7 +5,7 @@ import time
 import numpy as np
 from chain import floor
 
-from fifesim.ground.landscape.field import keep_tiles
+from fifesim.ground.landscape.field import TILE, keep_tiles
 from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import Scenario
 
@@ -14,13 +14,14 @@ SIZES = (111, 333, 999)
 CHIP = 333
 PAIRS = 50  # of seed and arp, whose tiles chips share
 TREATMENTS = ("burned-grazed", "burned-ungrazed", "unburned-ungrazed")
-_WEST, _NORTH = 704970.0, 4334220.0
+# Where a tile of the random field begins on the site of FIFE. [m]
+_WEST, _NORTH = 210 * TILE * CELL, 1289 * TILE * CELL
 
 
 def place(number, side):
-    """Corner and size of a window; nine chips lie in a tile of the random field."""
-    step = max(side, CHIP) + 3
-    west, north = _WEST + CELL * step * (number % 3 + 3), _NORTH - CELL * step * (number // 3 % 3 + 3)
+    """Corner and size of a window within a tile of the random field, which holds nine chips."""
+    step, fitting = side + 3, TILE // (side + 3)
+    west, north = _WEST + CELL * step * (number % fitting), _NORTH - CELL * step * (number // fitting % fitting)
     return {"west": west, "north": north, "width": side * CELL + 1e-6, "height": side * CELL + 1e-6}
 
 
