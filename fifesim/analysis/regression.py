@@ -188,7 +188,8 @@ def totals(sums):
     >>> totals([[1e16, 1.0], [1.0, 2.0], [-1e16, 3.0]])
     [1.0, 6.0]
     """
-    return [math.fsum(column) for column in np.asarray(sums).T]
+    sums = np.asarray(sums)
+    return sums[0].tolist() if len(sums) == 1 else [math.fsum(column) for column in sums.T]
 
 
 def fit(sums, y_origin=0.0, x_origin=0.0):

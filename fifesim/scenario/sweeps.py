@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
+from fifesim.scenario.ensemble import realise
 from fifesim.scenario.keys import Keys
 from fifesim.scenario.scenario import Scenario, parse_scenario
 from fifesim.scenario.simulation import simulate
@@ -80,11 +81,13 @@ def sweep(scenario, axes, measures=None, *, pair="coordinates"):
 
 def _point(scenario, measures, pair):
     """Results of one scenario, computed in this thread: the points are what runs in parallel."""
-    run = simulate(scenario)
-    kept = xr.DataTree.from_dict({name: run[name].to_dataset() for name in ("image", "truth")})
-    kept = kept.map_over_datasets(lambda each: each.compute(scheduler="synchronous"))
     if measures is not None:
+        run = simulate(scenario)
+        kept = xr.DataTree.from_dict({name: run[name].to_dataset() for name in ("image", "truth")})
+        # What measures a run may look at all that it says.
+        kept = kept.map_over_datasets(lambda each: each.compute(scheduler="synchronous"))
         return np.array([float(measure(kept)) for measure in measures.values()])
+    kept = realise(scenario)
     fits = [regress(kept["truth"][name], kept["image"]["ndvi"], pair=pair) for name in VARIABLES]
     return np.array([[getattr(fit, name) for fit in fits] for name in STATISTICS], float)
 

@@ -12,7 +12,7 @@ from fifesim.base.kinds import is_path
 from fifesim.experiments.friedl1995 import inputs
 from fifesim.experiments.friedl1995.readings import CELL, NATIVE, TABLE_1, Reading, reading_of
 from fifesim.ground.landscape.distribution import treatments
-from fifesim.scenario.land import elevation
+from fifesim.scenario.land import elevation, in_memory
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
 
@@ -168,10 +168,9 @@ class Case:
         Returns
         -------
         dem, horizon : xarray.DataArray or None
-            As `fifesim.scenario.land.elevation` gives them, in memory.
+            As `fifesim.scenario.land.in_memory` gives them.
         """
-        dem, horizon, _ = elevation(self.common, self.grid)
-        return dem, None if horizon is None else horizon.compute()
+        return in_memory(*elevation(self.common, self.grid)[:2])
 
     def _leaves(self):
         keys = {}

@@ -1,16 +1,18 @@
 """Table 2 of Friedl et al. (1995) over realisations, and how far it agrees with the paper's."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from fifesim.analysis import uncertainty
-from fifesim.chain.images import ndvi
+from fifesim.chain.arrays import ArrayChain
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
-from fifesim.experiments.friedl1995.pixels import block_means, cell_limits, ground_of, pixel_values, scene_image
+from fifesim.experiments.friedl1995.cells import cells_of
+from fifesim.experiments.friedl1995.pixels import paired
 from fifesim.ground.landscape.distribution import treatments
 
 SAMPLE = 200
@@ -62,7 +64,8 @@ def realise(case, seeds, readings=None, distributions=None, arps=ARPS, each=iter
     distributions = treatments() if distributions is None else list(distributions)
     land = case.land()
     scenes = [(seed, treatment, arp) for seed in seeds for treatment in distributions for arp in arps]
-    found = [_scene(cases, land, *scene) for scene in each(scenes)]
+    chains = [ArrayChain(one.setup, one.grid) for one in cases]
+    found = [_scene(cases, chains, land, *scene) for scene in each(scenes)]
     shape = (len(seeds), len(distributions), len(arps), len(cases))
     outer = ("realisation", "distribution", "arp", "reading")
     variables = {}
@@ -196,7 +199,7 @@ def line(x, y):
     return np.stack([y_mean - slope * x_mean, slope, slope * xy / yy], axis=-1)
 
 
-def mean_noise(variable, ndvi, increment):
+def mean_noise(variable, ndvi, increment, slope=None):
     """
     Relative equivalent noise of a sample by increments.
 
@@ -205,6 +208,8 @@ def mean_noise(variable, ndvi, increment):
     variable, ndvi : array, shape (n,)
     increment : float
         Width, in units of the variable.
+    slope : float, optional
+        Of the sample's line, where it is known.
 
     Returns
     -------
@@ -216,7 +221,7 @@ def mean_noise(variable, ndvi, increment):
     sums = uncertainty.increment_sums(variable[None], ndvi[None], first, increment, increments, origin)
     count, mean, deviation = uncertainty.increment_moments(sums)
     enough = count >= _FEWEST
-    slope = line(variable, ndvi)[1]
+    slope = line(variable, ndvi)[1] if slope is None else slope
     return mean[enough], uncertainty.equivalent_noise(deviation[enough], slope, mean[enough])
 
 
@@ -236,20 +241,29 @@ def draw(pixels, count, seed, draws):
     -------
     samples : array, shape (k, draws, count)
     """
-    order = np.random.default_rng(seed).random((draws, pixels.shape[1])).argsort(axis=1)
-    return pixels[:, order[:, :count]]
+    return pixels[:, _drawn(tuple(seed), pixels.shape[1], count, draws)]
 
 
-def _scene(cases, land, seed, treatment, arp):
+# Readings of a scene, and scenes that differ in one number, have samples of the same places.
+@lru_cache(maxsize=256)
+def _drawn(seed, pixels, count, draws):
+    order = np.random.default_rng(seed).random((draws, pixels)).argsort(axis=1)
+    return order[:, :count].copy()
+
+
+def _scene(cases, chains, land, seed, treatment, arp):
     """What each reading gives of a scene, a list of dicts."""
-    ground = ground_of(cases[0], treatment, arp, seed, land)
-    truth = [block_means(cases[0], ground, array) for array in (ground.lai, ground.fpar)]
-    limits = cell_limits(ground)
-    key = [seed, friedl1995.scenes().index((treatment, arp))]
+    first, kernels = chains[0], chains[0].kernels
+    cells = cells_of(cases[0], treatment, arp, seed, land, kernels)
+    truth = [first.means(array, cases[0].pixel) for array in (cells.lai, cells.fpar)]
+    toa = kernels.toa(cells.reflectance)
+    limits = np.array([(each.min(), each.max()) for each in (cells.lai, cells.fpar, kernels.ndvi(toa))])
+    key = (seed, friedl1995.scenes().index((treatment, arp)))
     found = []
-    for case in cases:
-        image = scene_image(case, ground)
-        found.append(_statistics(pixel_values(*truth, ndvi(image)), limits, key))
+    for chain in chains:
+        image = chain.image(chain.kernels.toa(cells.reflectance))
+        ndvi = chain.kernels.ndvi(chain.kernels.planetary(image))
+        found.append(_statistics(paired(*truth, ndvi), limits, key))
     return found
 
 
@@ -259,9 +273,13 @@ def _statistics(pixels, limits, key):
     for suffix, values in (("", pixels), ("_200", samples)):
         lines = np.stack([line(values[2], values[k]) for k in range(2)])
         found |= {name + suffix: lines[..., number] for number, name in enumerate(COEFFICIENTS)}
-    found["ren"] = [
-        np.mean([mean_noise(*pair, INCREMENTS[name])[1].mean() for pair in zip(samples[k], samples[2], strict=True)])
-        for k, name in enumerate(VARIABLES)
-    ]
+    found["ren"] = [_noise_of_samples(samples[k], samples[2], INCREMENTS[name]) for k, name in enumerate(VARIABLES)]
     found["range_kept"] = np.ptp(samples, axis=-1).mean(axis=-1) / np.ptp(limits, axis=-1)
     return found
+
+
+def _noise_of_samples(variable, ndvi, increment):
+    """Mean relative equivalent noise of samples, each in the mean over its increments."""
+    slopes = line(variable, ndvi)[:, 1]
+    samples = zip(variable, ndvi, slopes, strict=True)
+    return np.mean([mean_noise(one, seen, increment, slope)[1].mean() for one, seen, slope in samples])

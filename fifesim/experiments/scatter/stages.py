@@ -1,6 +1,7 @@
 """Images of a scene with any of its stages at their ideal."""
 
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -13,16 +14,17 @@ from fifesim.analysis.rasters.means import aggregate
 from fifesim.base.footprints import regularize
 from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
+from fifesim.chain.arrays import shared_operators
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.experiments.scatter.blocks import middle_cells, spread_out
+from fifesim.experiments.scatter.cells import Stand, arrays_of, tangent
 from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
 from fifesim.rasters import grid as grids
-from fifesim.rasters.regularization import areas, operators
+from fifesim.rasters.regularization import areas
 from fifesim.scenario.ground import absorbed_light
-from fifesim.scenario.land import elevation
+from fifesim.scenario.land import elevation, in_memory
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
-from fifesim.sensor import raster as sensor
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import pixel_grid
@@ -42,9 +44,6 @@ STAGES = {
 _TRUE = ("cover", "clumping", "covariance")
 _SENSED = ("NDVI scaling", "point spread", "registration", "quantisation", "noise")
 VARIABLES = ("lai", "fpar")
-
-# Half of the step of LAI by which tangents are taken: wide beside the error of the table of reflectance, 1e-6. [1]
-_STEP = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +166,7 @@ class _Ground:
 
     land: xr.Dataset
     middle: xr.DataArray
+    stand: Stand | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,8 +191,21 @@ class _Scene:
         kind = frozenset(at_work) & set(PROPERTIES)
         if kind not in self.grounds:
             land = ground_with(self.scenario, self.grid, kind, self.setup.dem)
-            self.grounds[kind] = _Ground(land, self.spread_out(land["lai"]))
+            self.grounds[kind] = self.made(land, self.spread_out(land["lai"]))
         return self.grounds[kind]
+
+    @cached_property
+    def arrays(self):
+        """The chain and the slopes of one stand, where plain arrays do."""
+        return arrays_of(self.setup, self.bands, self.grid)
+
+    def made(self, land, middle):
+        """A ground, as arrays too where they do."""
+        chain, slopes = self.arrays
+        if chain is None or set(land.data_vars) != {"lai"}:
+            return _Ground(land, middle)
+        fpar_inf = self.scenario.ground.fpar_inf
+        return _Ground(land, middle, Stand(chain, slopes, land["lai"].values, middle.values, fpar_inf))
 
     def spread_out(self, cells):
         """Means over the pixels of the truth, on the cells."""
@@ -205,7 +218,7 @@ def _scene(scenario):
     blocks = grids.aligned(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     # In memory: every set of stages with topography asks for them.
-    dem, horizon = (each if each is None else each.compute() for each in elevation(scenario, grid)[:2])
+    dem, horizon = in_memory(*elevation(scenario, grid)[:2])
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, grid, blocks, image)
 
 
@@ -215,7 +228,7 @@ def _even(scene):
     land = {name: scene.spread_out(each) for name, each in whole.land.items() if name != "cover" and each.ndim == 2}
     if "cover" in whole.land:
         land["cover"] = middle_cells(whole.land["cover"], scene.blocks)
-    return _Ground(whole.land.assign(land), whole.middle)
+    return scene.made(whole.land.assign(land), whole.middle)
 
 
 def _red_and_nir(bands):
@@ -223,13 +236,6 @@ def _red_and_nir(bands):
     coords = {"wavelength": ("band", [band.wavelength for band in bands])}
     numbers = xr.DataArray(np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords=coords)
     return tuple(bands[number.item()] for number in red_and_nir(numbers))
-
-
-def _tangent(function, lai, middle):
-    """A function of leaf area along its tangent at the middle."""
-    low, high = np.maximum(middle - _STEP, 0.0), middle + _STEP
-    at = function(middle)
-    return at.copy(data=at.data + ((function(high) - function(low)) / (high - low) * (lai - middle)).data)
 
 
 def _truths(scene, switches):
@@ -249,7 +255,10 @@ def _states(switches, names):
 
 def _truth(scene, ground, curve):
     """LAI and FPAR by blocks."""
-    setup = _setup_over(scene, ground)
+    setup, stand = _setup_over(scene, ground), ground.stand
+    if stand is not None:
+        size, (rows, columns) = grids.cell_size(scene.blocks)[0], scene.shape
+        return [stand.chain.means(each, size)[:rows, :columns] for each in (stand.lai, stand.fpar(bool(curve)))]
 
     def fpar(area):
         return absorbed_light(scene.scenario, setup, ground.land.assign(lai=area))
@@ -257,7 +266,7 @@ def _truth(scene, ground, curve):
     lai, size, (rows, columns) = ground.land["lai"], grids.cell_size(scene.blocks)[0], scene.shape
     return [
         aggregate(array, size, min_valid=scene.setup.min_valid).values[:rows, :columns]
-        for array in (lai, fpar(lai) if curve else _tangent(fpar, lai, ground.middle))
+        for array in (lai, fpar(lai) if curve else tangent(fpar, lai, ground.middle))
     ]
 
 
@@ -269,6 +278,10 @@ def _setup_over(scene, ground):
 
 def _cells(scene, ground, at_work):
     """Red, near infrared and NDVI of the cells, as light leaves the ground or the air, shape (3, y, x)."""
+    if ground.stand is not None:
+        light = [name in at_work for name in ("non-linearity", "topography", "atmosphere")]
+        red, nir = ground.stand.light(*light)
+        return np.stack([red, nir, indices.normalized_difference(nir, red)])
     setup = _setup_over(scene, ground)
     setup = setup if "topography" in at_work else replace(setup, dem=None, horizon=None)
 
@@ -276,7 +289,7 @@ def _cells(scene, ground, at_work):
         return reflectance_of(setup, ground.land.assign(lai=area))
 
     lai = ground.land["lai"]
-    seen = reflectance(lai) if "non-linearity" in at_work else _tangent(reflectance, lai, ground.middle)
+    seen = reflectance(lai) if "non-linearity" in at_work else tangent(reflectance, lai, ground.middle)
     if "atmosphere" in at_work:
         seen = chain.to_toa(seen, adjacency=setup.adjacency)
     red, nir = red_and_nir(seen)
@@ -310,7 +323,7 @@ def _means(scene, cells, blurred, displaced):
     means = np.empty((len(cells), rows, columns))
     for layer, band in enumerate((red, nir, red)):
         spreads = setup.instrument.line_spreads(band) if blurred else areas(scene.blocks)
-        along = operators(spreads, grid, box[:rows, :columns], shifts)
+        along = shared_operators(spreads, grid, box[:rows, :columns], tuple(map(float, shifts)))
         means[layer] = regularize(cells[layer], *along, min_valid=setup.min_valid)
     return means
 
@@ -320,17 +333,17 @@ def _recorded(scene, means, counts, grains):
     setup, geometry, bands = scene.setup, scene.setup.geometry, scene.bands
     known = [(band.full_scale_radiance, band.min_radiance, band.solar_irradiance) for band in bands]
     full_scale, lowest, irradiance = np.array(known).T[..., None, None]
-    radiance = sensor.as_radiance(xr.DataArray(means, dims=("band", "y", "x")), bands, geometry)
+    distance = geometry.earth_sun_distance
+    radiance = calibration.reflectance_to_radiance(means, irradiance, geometry.mu_s, distance)
     if grains:
-        first = grids.lattice_position(scene.image)
-        radiance = noisy(radiance, setup.instrument, bands, setup.noise, setup.seed, first, setup.noise_models)
-    radiance = radiance.values
+        plain, first = xr.DataArray(radiance, dims=("band", "y", "x")), grids.lattice_position(scene.image)
+        said = setup.noise, setup.seed, first, setup.noise_models
+        radiance = noisy(plain, setup.instrument, bands, *said).values
     if counts:
         gain, offset = calibration.gain_offset(full_scale, lowest, setup.instrument.bits)
         compression = np.array([band.compressed_count(setup.instrument.bits) for band in bands])[:, None, None]
         dn = calibration.radiance_to_dn(radiance, gain, offset, setup.instrument.bits, compression)
         radiance = calibration.dn_to_radiance(dn, gain, offset, compression)
-    distance = geometry.earth_sun_distance
     red, nir = calibration.radiance_to_reflectance(radiance, irradiance, geometry.mu_s, distance)
     return indices.normalized_difference(nir, red)
 

@@ -16,6 +16,9 @@ from fifesim.base import datasets
 _REACH = 8.5
 _NODES = 2**14 + 1
 
+# Of so many the quantiles of ranks are kept, 2 MB.
+_FEW = 2**18
+
 # A support that starts at zero may start this far below it.
 _ROUNDING = 1e-12
 
@@ -246,7 +249,7 @@ def truncated_normal(mean, standard_deviation, lower, upper):
 
 
 # Some hundredths of a second each; treatments and the distributions of drawn shares are the same objects each time.
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def quantile_table(distribution):
     """
     Quantiles of a distribution at evenly spaced standard normal deviates.
@@ -259,7 +262,7 @@ def quantile_table(distribution):
     Returns
     -------
     table : array, shape (16385,)
-        For deviates from -8.5 to 8.5; increasing, not negative.
+        For deviates from -8.5 to 8.5; increasing, not negative. Kept for who asks again.
     """
     deviates = np.linspace(-_REACH, _REACH, _NODES)
     lower = distribution.ppf(stats.norm.cdf(deviates[deviates <= 0]))
@@ -328,7 +331,28 @@ def rank_map(field, distribution):
     >>> rank_map(np.array([3.0, -1.0]), stats.uniform()).tolist()
     [0.75, 0.25]
     """
-    order = np.argsort(field, axis=None, kind="stable")
     values = np.empty(field.size)
-    values[order] = distribution.ppf((np.arange(field.size) + 0.5) / field.size)
+    values[np.argsort(field, axis=None, kind="stable")] = rank_quantiles(distribution, field.size)
     return values.reshape(field.shape)
+
+
+def rank_quantiles(distribution, count):
+    """
+    Quantiles of a distribution that ranks stand for.
+
+    Parameters
+    ----------
+    distribution : frozen scipy distribution
+    count : int
+
+    Returns
+    -------
+    quantiles : array, shape (count,)
+        At (rank + 1/2) / count. Those of few are kept for who asks again.
+    """
+    return (_kept_quantiles if count <= _FEW else _kept_quantiles.__wrapped__)(distribution, count)
+
+
+@lru_cache(maxsize=16)
+def _kept_quantiles(distribution, count):
+    return distribution.ppf((np.arange(count) + 0.5) / count)

@@ -1,0 +1,164 @@
+"""Many realisations of scenarios in memory: small scenes as arrays, without labels and graphs for each."""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from fifesim.chain.arrays import ArrayChain
+from fifesim.chain.kernels import Kernels, labelled_only
+from fifesim.chain.landscapes import aggregate
+from fifesim.chain.setup import Setup, reflectance_of
+from fifesim.ground.landscape.raster import scene_cells
+from fifesim.ground.terrain.rasters.dem import beside_altitude
+from fifesim.ground.terrain.rasters.light import light_on_slopes
+from fifesim.rasters import cf, directions
+from fifesim.rasters import grid as grids
+from fifesim.scenario.ground import fpar_kinds, ground_scene, truth_of
+from fifesim.scenario.land import elevation, in_memory
+from fifesim.scenario.scenario import Scenario
+from fifesim.scenario.simulation import setup_of, simulate
+from fifesim.sensor.description.rasters.carried import attributes_of
+
+# Of a run, what a regression takes.
+KEPT = ("image", "truth")
+
+# Larger scenes go by chunks. [cell]
+_LARGEST = 4_000_000
+
+
+def realise(scenario, keep=KEPT):
+    """
+    Nodes of a scenario's run, in memory.
+
+    Scenes of the same grid, air, canopy or instrument share what is made of it, and scenes of the same seed and arp the
+    tiles of their field: let them follow each other.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    keep : sequence of str, optional
+        Among ``scene``, ``image``, ``truth``, ``terrain`` and ``level``; the others are not computed.
+
+    Returns
+    -------
+    nodes : dict of str to xarray.Dataset
+        With the bits and the coordinates of `fifesim.simulate`. Image and truth come without the history of how they
+        were made.
+
+    Raises
+    ------
+    ValueError
+        If the run has no such node, or the scenario asks for what cannot be.
+
+    See Also
+    --------
+    fifesim.chain.arrays.ArrayChain
+    """
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"realise takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+    grid, setup = scenario.geobox(), setup_of(scenario)
+    small = grid.shape.x * grid.shape.y <= _LARGEST
+    if small and set(keep) <= set(KEPT) and not labelled_only(setup):
+        return _of_arrays(scenario, grid, setup, keep)
+    run = simulate(scenario, chunks=None if small else "auto")
+    missing = [name for name in keep if name not in run.children]
+    if missing:
+        raise ValueError(f"keep names {', '.join(missing)}, and this run has {', '.join(run.children)}")
+    return {name: run[name].to_dataset().compute(scheduler="synchronous") for name in keep}
+
+
+def _of_arrays(scenario, grid, setup, keep):
+    """Image and truth by the kernels alone, where the ground is one stand on level ground; slopes have labels too."""
+    chain, own = ArrayChain(setup, grid, _kernels(scenario, setup)), scenario.ground
+    made, dem, horizon = {}, None, None
+    if scenario.terrain.dem != "flat":
+        dem, horizon = in_memory(*elevation(scenario, grid)[:2])
+    if scenario.landscape.is_one() and not own.lai_file:
+        land = scene_cells(grid, own.distribution, own.arp, own.seed, own.method)
+    else:
+        land = ground_scene(scenario, grid, dem=dem)
+    if "image" in keep and isinstance(land, np.ndarray):
+        reflectance = chain.kernels.reflectance(land)
+        if dem is not None:
+            light = beside_altitude(dem, chain.kernels.air.altitude), chain.grid, setup.geometry, horizon
+            reflectance = chain.kernels.on_slopes(reflectance, light_on_slopes(*light))
+    elif "image" in keep:
+        reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
+    if "image" in keep:
+        made["image"] = _image(chain, reflectance)
+    if "truth" in keep:
+        made["truth"] = _truth(scenario, chain, land)
+    return made
+
+
+def _image(chain, reflectance):
+    """Image and its NDVI, with the coordinates that they have."""
+    kernels = chain.kernels
+    dn = chain.image(kernels.toa(reflectance))
+    gain, offset, _ = kernels.scale
+    along = {"band": [band.name for band in kernels.bands], "wavelength": [band.wavelength for band in kernels.bands]}
+    along |= {"gain": gain, "offset": offset}
+    along |= {"compression": kernels.compression} if kernels.compression.any() else {}
+    along |= {"solar_irradiance": kernels.irradiance}
+    own = attributes_of(kernels.instrument) | {"atmosphere": kernels.air.text}
+    attrs = cf.attributes("dn") | own | {"_FillValue": dn.dtype.type(0)}
+    variables = {"dn": xr.Variable(("band", "y", "x"), dn, attrs)}
+    if kernels.shows_ndvi:
+        ndvi = kernels.ndvi(kernels.planetary(dn))
+        variables["ndvi"] = xr.Variable(("y", "x"), ndvi, cf.attributes("ndvi") | own)
+    coords = grids.coordinates(chain.pixels) | cf.band_coordinates(**along)
+    return _placed(variables, coords, directions.coordinates_of(kernels.setup.geometry))
+
+
+def _truth(scenario, chain, land):
+    """Means over the blocks of the truth."""
+    size = scenario.sensor.size
+    if not scenario.landscape.is_one():
+        return aggregate(truth_of(scenario, chain.setup, land), size, min_valid=chain.setup.min_valid)
+    fpar_inf = scenario.ground.fpar_inf
+    lai = land if isinstance(land, np.ndarray) else land["lai"].values
+    kinds = fpar_kinds(scenario)
+    cells = {"lai": lai} | {name: chain.kernels.fpar(lai, fpar_inf, leaves) for name, leaves in kinds.items()}
+    variables = {
+        name: xr.Variable(("y", "x"), chain.means(each, size), cf.attributes(name)) for name, each in cells.items()
+    }
+    return _placed(variables, grids.coordinates(chain.blocks(size)))
+
+
+def _placed(variables, coordinates, others=None):
+    """Dataset on a grid; coordinates are not compared with each other, for they are made for it."""
+    for each in variables.values():
+        each.encoding = {"grid_mapping": "spatial_ref"}
+    bare = {name: each.variable for name, each in coordinates.items()}
+    return xr.Dataset(variables, bare | (others or {}))
+
+
+def _kernels(scenario, setup):
+    """What does not depend on place and seeds, made once for all scenes that say the same."""
+    others = {"grid": True, "ground": {"seed", "arp", "distribution", "method"}, "sensor": {"seed", "offset"}}
+    said = scenario.model_dump_json(exclude=others)
+    if scenario.files:
+        # A file may change under its name.
+        return Kernels(setup)
+    return _known(_Keyed((said, setup.geometry), setup))
+
+
+class _Keyed(NamedTuple):
+    """A setup by what it is told."""
+
+    key: tuple
+    setup: Setup
+
+    def __hash__(self):
+        return hash(self.key)
+
+    def __eq__(self, other):
+        return self.key == other.key
+
+
+@lru_cache(maxsize=32)
+def _known(keyed):
+    return Kernels(keyed.setup)
