@@ -1,11 +1,13 @@
 """Elevation of a scenario, and how far the land around it is known."""
 
 import numpy as np
+import xarray as xr
 
 import fifesim
+from fifesim.ground.terrain.rasters import light as slopes_light
 from fifesim.rasters import grid as grids
-from fifesim.scenario.land import elevation
-from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.land import elevation, in_memory
+from fifesim.scenario.scenario import Scenario, parse_scenario
 
 GRID = {"west": 707970.0, "north": 4331220.0, "width": 300.0, "height": 240.0}
 
@@ -34,3 +36,14 @@ def test_horizon_is_found_on_multiples_of_its_cells_from_the_origin_of_the_crs()
     for origin, cell in ((affine.c, affine.a), (affine.f, affine.e)):
         # Places are middles of cells of the land around, which lie on whole multiples.
         assert abs(((origin + cell / 2) / (cell / 2)) - round((origin + cell / 2) / (cell / 2))) < 1e-6
+
+
+def test_in_memory_is_the_horizon_that_lies_above_the_elevation():
+    one = Scenario(grid={"west": 708000.0, "north": 4331000.0, "width": 300.0, "height": 300.0})
+    dem, horizon, _ = elevation(one, one.geobox())
+    whole, (dem, above) = horizon.compute(), in_memory(dem, horizon)
+    assert dem.chunks is None and above.chunks is None and above.size < whole.size / 100
+    xr.testing.assert_equal(above, whole.sel(y=above.y, x=above.x))
+    light = [slopes_light.illumination(dem, one.sun_and_view(), each) for each in (above, whole)]
+    np.testing.assert_array_equal(*light)
+    assert in_memory(None, None) == (None, None)
