@@ -11,22 +11,18 @@ from odc.geo.geobox import GeoBox
 from fifesim.analysis import indices
 from fifesim.analysis.rasters.indices import red_and_nir
 from fifesim.analysis.rasters.means import aggregate
-from fifesim.base.footprints import regularize
 from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
-from fifesim.chain.arrays import shared_operators
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.experiments.scatter.blocks import middle_cells, spread_out
 from fifesim.experiments.scatter.cells import Stand, arrays_of, tangent
 from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
+from fifesim.experiments.scatter.sensed import images_of
 from fifesim.rasters import grid as grids
-from fifesim.rasters.regularization import areas
 from fifesim.scenario.ground import absorbed_light
 from fifesim.scenario.land import elevation, in_memory
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
-from fifesim.sensor.response import calibration
-from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import pixel_grid
 
 # In this order along the axes of what `pixels` gives.
@@ -143,12 +139,12 @@ def displaced_pixels(scenario, offsets):
         at_work = {name for name, state in zip(lit, states, strict=True) if state}
         cells = _cells(scene, scene.ground(at_work), at_work)
         for found, one, each in zip(images, scenes, switches, strict=True):
-            found.append(_images(one, cells, [each[name] for name in _SENSED]))
+            found.append(images_of(one, cells, [each[name] for name in _SENSED]))
     truths, even = _truths(scene, switches[0]), _even(scene)
     even_cells, even_truth = _cells(scene, even, set(stages[0])), _truth(scene, even, True)
     found = []
     for k, one in enumerate(scenes):
-        of_even = _images(one, even_cells, [switches[k][name][-1:] for name in _SENSED]).reshape(scene.shape)
+        of_even = images_of(one, even_cells, [switches[k][name][-1:] for name in _SENSED]).reshape(scene.shape)
         found.append(_with_data(stages[k], _in_order(images[k], switches[k], lit), truths, of_even, even_truth))
     return found
 
@@ -294,58 +290,6 @@ def _cells(scene, ground, at_work):
         seen = chain.to_toa(seen, adjacency=setup.adjacency)
     red, nir = red_and_nir(seen)
     return np.stack([red.values, nir.values, indices.normalized_difference(nir.values, red.values)])
-
-
-def _images(scene, cells, switches):
-    """NDVI with the stages of the sensor at work or ideal, shape (one axis for each of them, y, x)."""
-    scaling, spread, registration, quantisation, noise = switches
-    found = np.empty((*map(len, switches), *scene.shape))
-    for (i, blurred), (j, displaced) in product(enumerate(spread), enumerate(registration)):
-        means = _means(scene, cells, blurred, displaced)
-        red, nir, of_cells = means
-        of_means = indices.normalized_difference(nir, red)
-        for (k, counts), (m, grains) in product(enumerate(quantisation), enumerate(noise)):
-            recorded = _recorded(scene, means[:2], counts, grains)
-            for n, of_reflectance in enumerate(scaling):
-                # What the detector did stays as it is.
-                found[n, i, j, k, m] = recorded if of_reflectance else of_cells + (recorded - of_means)
-    return found
-
-
-def _means(scene, cells, blurred, displaced):
-    """Means over footprints, shape (3, y, x)."""
-    red, nir = scene.bands
-    setup, grid = scene.setup, scene.grid
-    box = scene.image if displaced else scene.blocks
-    sizes = grids.cell_size(box)
-    shifts = [offset * size for offset, size in zip(setup.offset, sizes, strict=True)] if displaced else (0.0, 0.0)
-    rows, columns = scene.shape
-    means = np.empty((len(cells), rows, columns))
-    for layer, band in enumerate((red, nir, red)):
-        spreads = setup.instrument.line_spreads(band) if blurred else areas(scene.blocks)
-        along = shared_operators(spreads, grid, box[:rows, :columns], tuple(map(float, shifts)))
-        means[layer] = regularize(cells[layer], *along, min_valid=setup.min_valid)
-    return means
-
-
-def _recorded(scene, means, counts, grains):
-    """NDVI of what the detectors record of the mean reflectances."""
-    setup, geometry, bands = scene.setup, scene.setup.geometry, scene.bands
-    known = [(band.full_scale_radiance, band.min_radiance, band.solar_irradiance) for band in bands]
-    full_scale, lowest, irradiance = np.array(known).T[..., None, None]
-    distance = geometry.earth_sun_distance
-    radiance = calibration.reflectance_to_radiance(means, irradiance, geometry.mu_s, distance)
-    if grains:
-        plain, first = xr.DataArray(radiance, dims=("band", "y", "x")), grids.lattice_position(scene.image)
-        said = setup.noise, setup.seed, first, setup.noise_models
-        radiance = noisy(plain, setup.instrument, bands, *said).values
-    if counts:
-        gain, offset = calibration.gain_offset(full_scale, lowest, setup.instrument.bits)
-        compression = np.array([band.compressed_count(setup.instrument.bits) for band in bands])[:, None, None]
-        dn = calibration.radiance_to_dn(radiance, gain, offset, setup.instrument.bits, compression)
-        radiance = calibration.dn_to_radiance(dn, gain, offset, compression)
-    red, nir = calibration.radiance_to_reflectance(radiance, irradiance, geometry.mu_s, distance)
-    return indices.normalized_difference(nir, red)
 
 
 def _with_data(stages, images, truth, even, even_truth):
