@@ -59,6 +59,9 @@ class CellProgress:
         standard error where that is none.
     """
 
+    # What is done, the word for what is counted, and decimals of how many a second.
+    label, counted, decimals = "simulating", "cells", None
+
     def __init__(self, cells, done=0, as_json=False):
         self._cells, self._before, self._done, self._as_json = cells, done, done, as_json
         self._start, self._said = time.monotonic(), -_PAUSE
@@ -73,7 +76,7 @@ class CellProgress:
             disable=as_json or not sys.stderr.isatty(),
             transient=True,
         )
-        self._task = self._bar.add_task("simulating", total=cells, completed=done, said="")
+        self._task = self._bar.add_task(self.label, total=cells, completed=done, said="")
 
     def __enter__(self):
         self._bar.start()
@@ -104,13 +107,17 @@ class CellProgress:
         elif now - self._told >= _LONG_PAUSE:
             self._told, state = now, self.state()
             left = f", {format_time(state['seconds_left'])} left" if state["seconds_left"] else ""
-            print(f"simulating: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
+            print(f"{self.label}: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
 
     def _in_words(self, state):
-        return (
-            f"{state['cells_done'] / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, "
-            f"{state['cells_per_second'] / 1e6:.1f} million/s, {state['memory'] / 1e9:.2f} GB"
-        )
+        return f"{self._counted_in_words()}, {state['memory'] / 1e9:.2f} GB"
+
+    def _counted_in_words(self):
+        rate = self._rate() / 1e6
+        return f"{self._done / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, {rate:.1f} million/s"
+
+    def _rate(self):
+        return (self._done - self._before) / max(time.monotonic() - self._start, 1e-9)
 
     def state(self):
         """
@@ -121,17 +128,25 @@ class CellProgress:
         state : dict
             ``cells_done``, ``cells``, ``cells_per_second``, ``seconds_left`` and ``memory`` [byte].
         """
-        elapsed = max(time.monotonic() - self._start, 1e-9)
-        rate = (self._done - self._before) / elapsed
+        rate = self._rate()
         left = (self._cells - self._done) / rate if rate else None
         return {
             "event": "progress",
-            "cells_done": self._done,
-            "cells": self._cells,
-            "cells_per_second": round(rate),
+            f"{self.counted}_done": self._done,
+            self.counted: self._cells,
+            f"{self.counted}_per_second": round(rate, self.decimals),
             "seconds_left": None if left is None else round(left, 1),
             "memory": memory(),
         }
+
+
+class ChipProgress(CellProgress):
+    """Count of chips done, as `CellProgress` counts cells."""
+
+    label, counted, decimals = "making chips", "chips", 1
+
+    def _counted_in_words(self):
+        return f"{self._done} of {self._cells} chips, {self._rate():.1f}/s"
 
 
 def steps(sequence, label):

@@ -147,7 +147,7 @@ def _corners(study, rounds):
 
 def _drawn(study, count, landscape):
     """Values of the keys that are drawn, by landscape or by chip."""
-    shared = {key: distribution for key, distribution in study.drawn.items() if _is_of_a_landscape(key)}
+    shared = {key: distribution for key, distribution in study.drawn.items() if is_of_a_landscape(key)}
     own = {key: distribution for key, distribution in study.drawn.items() if key not in shared}
     found = {}
     for keys, stream, number in ((shared, _OF_LANDSCAPES, study.landscapes), (own, _OF_CHIPS, count)):
@@ -157,9 +157,19 @@ def _drawn(study, count, landscape):
     return {key: [found[key][at] for at in landscape] if key in shared else found[key] for key in study.drawn}
 
 
-def _is_of_a_landscape(key):
-    """What makes the random field itself: tiles of it are shared by chips."""
-    return key.key in ("arp", "arps")
+def is_of_a_landscape(key):
+    """
+    Whether a key is drawn for each landscape: it makes the random field itself, whose tiles are shared by chips.
+
+    Parameters
+    ----------
+    key : fifesim.scenario.named_keys.NamedKey
+
+    Returns
+    -------
+    answer : bool
+    """
+    return key.key in ("arp", "arps") or (key.key == "seed" and key.place != ("sensor",))
 
 
 def _seeds(study, count, landscape):

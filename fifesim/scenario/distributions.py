@@ -77,6 +77,18 @@ class Distribution:
         return list(self.values) if self.kind == "choice" else list(self.within or self.values)
 
     @property
+    def in_words(self):
+        """Kind and numbers as a table of them has it, a str."""
+        listed = ", ".join(map(_plain, self.values))
+        if self.kind == "normal":
+            return f"normal, mean and deviation {listed}, within {_plain(self.within[0])} to {_plain(self.within[1])}"
+        if self.kind == "choice":
+            weights = f", weights {', '.join(map(_plain, self.weights))}" if self.weights else ""
+            return f"one of {listed}{weights}"
+        low, high = map(_plain, self.values)
+        return f"{self.kind}, {low} to {high}"
+
+    @property
     def table(self):
         """As TOML has it, a dict."""
         beside = {name: list(found) for name in _BESIDE.values() if (found := getattr(self, name))}
@@ -178,3 +190,7 @@ def _weights(values, weights):
 
 def _is_number(value):
     return isinstance(value, int | float | np.number) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _plain(value):
+    return f"{value:g}" if _is_number(value) else str(value)
