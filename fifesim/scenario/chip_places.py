@@ -1,4 +1,4 @@
-"""Where the chips of a landscape lie: windows of the ground lattice that do not overlap, by tiles of the random field."""
+"""Where the chips of a landscape lie: windows of the ground that do not overlap, by tiles of its random field."""
 
 import math
 

@@ -137,7 +137,9 @@ def distribution_of(table, convert=lambda value: value):
     if len(kinds) != 1:
         given = ", ".join(map(str, table)) or "nothing"
         hint = nearest(given, list(_KINDS)) if len(table) == 1 else ""
-        raise ValueError(in_a_line(f"needs one of {', '.join(_KINDS)}, got {given}: {hint}such as {{ uniform = [5, 45] }}"))
+        raise ValueError(
+            in_a_line(f"needs one of {', '.join(_KINDS)}, got {given}: {hint}such as {{ uniform = [5, 45] }}")
+        )
     (kind,) = kinds
     beside = _BESIDE.get(kind)
     for name in table:
@@ -151,7 +153,9 @@ def distribution_of(table, convert=lambda value: value):
             raise ValueError(f"normal = {shown(table[kind])} needs within = [low, high] beside it, where it is cut off")
         within = _range(kind, _listed("within", table["within"], convert))
         if not values[1] > 0:
-            raise ValueError(f"normal = {shown(table[kind])}: the second number, the standard deviation, must be above 0")
+            raise ValueError(
+                f"normal = {shown(table[kind])}: the second number, the standard deviation, must be above 0"
+            )
         return Distribution(kind, values, within=within)
     return Distribution(kind, _range(kind, values))
 

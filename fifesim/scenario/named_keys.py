@@ -38,8 +38,9 @@ class NamedKey(NamedTuple):
         """Meaning and unit, a dict as a coordinate has it: what plots write beside it."""
         # The description's first words name the key; ranges and hints follow them.
         meaning = self.section.model_fields[self.key].description.split(";")[0]
-        found = {"long_name": meaning if self.entry is None else f"{self.entry}: {meaning}"}
-        return {name: text for name, text in (found | {"units": self.section.unit(self.key)}).items() if text}
+        entry = f"{self.key.replace('_', ' ')}: {self.entry}"
+        found = {"long_name": entry if self.entry else meaning, "units": self.section.unit(self.key)}
+        return {name: text for name, text in found.items() if text}
 
 
 def find_key(name, called="the axis"):

@@ -158,7 +158,11 @@ def read_study(path):
 
 def _check_ground(scenario):
     """A study draws its ground: maps of real ground have one landscape."""
-    for path, names in {("ground", "lai_file"): (None,), ("terrain", "dem"): LAND_FORMS, ("landscape", "cover"): COVERS}.items():
+    for path, names in {
+        ("ground", "lai_file"): (None,),
+        ("terrain", "dem"): LAND_FORMS,
+        ("landscape", "cover"): COVERS,
+    }.items():
         section, key = path
         value = getattr(getattr(scenario, section), key)
         if value not in names:
@@ -171,7 +175,9 @@ def _check_ground(scenario):
         raise ValueError('ground.method = "periodic" has no windows to cut chips from: type method = "streaming"')
     lacking = [key for key in ("width", "height") if key not in scenario.grid.model_fields_set]
     if lacking:
-        raise ValueError(f"grid.{lacking[0]} is not given: it is the size of a chip, such as width = 1110, height = 1110")
+        raise ValueError(
+            f"grid.{lacking[0]} is not given: it is the size of a chip, such as width = 1110, height = 1110"
+        )
 
 
 def _check_plan(study):
@@ -182,10 +188,12 @@ def _check_plan(study):
     split, landscapes = study.split, study.landscapes
     if not isinstance(landscapes, int) or isinstance(landscapes, bool) or landscapes < 1:
         raise ValueError(f"dataset.landscapes = {shown(landscapes)}: must be a whole number from 1 up")
-    numbers = isinstance(split, Mapping) and all(isinstance(share, int | float) and share > 0 for share in split.values())
+    numbers = isinstance(split, Mapping) and all(
+        isinstance(share, int | float) and share > 0 for share in split.values()
+    )
     if not numbers or not split or abs(sum(split.values()) - 1) > 1e-6:
         raise ValueError(
-            f"dataset.split = {shown(split)}: must be shares above 0 that sum to 1, such as {{ train = 0.8, test = 0.2 }}"
+            f"dataset.split = {shown(split)} must be shares that sum to 1, such as {{ train = 0.8, test = 0.2 }}"
         )
     if landscapes < len(split):
         raise ValueError(
@@ -227,7 +235,9 @@ def _in_unit(key, value):
 def _check_may_be_drawn(key, scenario):
     *_, last = key.path
     if last == "seed":
-        raise ValueError(f"draw.{key.name}: landscapes and noise have seeds of their own, from {key.name} on: leave it out")
+        raise ValueError(
+            f"draw.{key.name}: landscapes and noise have seeds of their own, from {key.name} on: leave it out"
+        )
     if key.path in _FIXED or key.place == ("grid",):
         raise ValueError(f"draw.{key.name}: is the same for all chips: give one value under [{'.'.join(key.place)}]")
     if key.place[0] == "classes" and key.place[1] not in scenario.classes:

@@ -179,7 +179,9 @@ def _put(found, at, nodes, layout):
     image, truth = nodes["image"], nodes["truth"]
     unknown = set(truth.data_vars) - set(layout.truth)
     if unknown:
-        raise ValueError(f"has a truth that others have not, {', '.join(sorted(unknown))}: draw it for all, or for none")
+        raise ValueError(
+            f"has a truth that others have not, {', '.join(sorted(unknown))}: draw it for all, or for none"
+        )
     found["dn"][at] = image["dn"].values
     if layout.has_ndvi:
         found["ndvi"][at] = image["ndvi"].values

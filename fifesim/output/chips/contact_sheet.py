@@ -24,7 +24,7 @@ _TRUTH = {
 _ROWS = 3
 
 
-def contact_sheet(dataset):
+def contact_sheet(dataset, parts):
     """
     Pictures of the first chips of each part of a dataset.
 
@@ -32,6 +32,8 @@ def contact_sheet(dataset):
     ----------
     dataset : xarray.Dataset
         Of chips, lazy or in memory.
+    parts : sequence of str
+        Parts of the split in their order; those without chips are left out.
 
     Returns
     -------
@@ -39,7 +41,7 @@ def contact_sheet(dataset):
         All chips of a row share their colours.
     """
     split = dataset["split"].values
-    parts = {name: np.flatnonzero(split == name)[:_SHOWN] for name in dict.fromkeys(split.tolist())}
+    parts = {name: chips for name in parts if (chips := np.flatnonzero(split == name)[:_SHOWN]).size}
     chosen = dataset.isel(chip=np.concatenate(list(parts.values()))).load()
     names = [name for name in _TRUTH if name in chosen][:_ROWS]
     figure = Figure(figsize=(1.15 * chosen.sizes["chip"] + 1.4, 1.25 * (len(names) + 1) + 0.9), layout="constrained")
@@ -54,11 +56,9 @@ def contact_sheet(dataset):
         figure.colorbar(drawn, ax=row, fraction=0.01, pad=0.005).ax.tick_params(labelsize=7)
     for axis in axes.flat:
         axis.set(xticks=[], yticks=[], facecolor=_NO_DATA)
-    first = 0
-    for name, chips in parts.items():
-        for axis, chip in zip(axes[0, first : first + len(chips)], chips, strict=True):
-            axis.set_title(f"{name if axis is axes[0, first] else ''}\nchip {chip}", fontsize=8)
-        first += len(chips)
+    shown = [(name, chip, not at) for name, chips in parts.items() for at, chip in enumerate(chips)]
+    for axis, (name, chip, is_first) in zip(axes[0], shown, strict=True):
+        axis.set_title(f"{name if is_first else ''}\nchip {chip}", fontsize=8, fontweight="bold" if is_first else None)
     return figure
 
 
@@ -67,7 +67,9 @@ def _row(axes, values, colours):
     finite = values[np.isfinite(values)]
     low, high = np.percentile(finite, (0.5, 99.5)) if finite.size else (0.0, 1.0)
     high = max(high, low + 1e-6)
-    return [axis.imshow(each, cmap=colours, vmin=low, vmax=high, interpolation="nearest") for axis, each in zip(axes, values, strict=True)][0]
+    style = {"cmap": colours, "vmin": low, "vmax": high, "interpolation": "nearest"}
+    drawn = [axis.imshow(each, **style) for axis, each in zip(axes, values, strict=True)]
+    return drawn[0]
 
 
 def _composite(chosen):

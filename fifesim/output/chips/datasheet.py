@@ -34,7 +34,7 @@ def write(folder, chips, shards, page, picture):
         Names of the files.
     """
     with xr.open_zarr(folder, chunks=None) as dataset:
-        sheet = pages.png(contact_sheet(dataset), _DPI)
+        sheet = pages.png(contact_sheet(dataset, list(chips.study.split)), _DPI)
         ranges = ranges_of(dataset, shards)
         text = datasheet_page(dataset, chips, ranges, sheet)
     (folder / picture).write_bytes(sheet)

@@ -197,11 +197,12 @@ def _known(chips, layout, table):
 
 def _about(chips, layout, table):
     """Attributes of the dataset."""
-    study = chips.study
-    coordinates = [*table.data_vars, *LIGHT, "spatial_ref", *(name for name in layout.bands.coords if name != "band")]
+    study, (rows, columns) = chips.study, layout.pixels
+    of_bands = (name for name in layout.bands.coords if name != "band")
+    coordinates = [*table.data_vars, *LIGHT, "spatial_ref", *of_bands]
     return {
         "Conventions": "CF-1.11",
-        "title": f"{len(chips)} simulated chips of {layout.pixels[0]} x {layout.pixels[1]} pixels of {layout.pixel:g} m",
+        "title": f"{len(chips)} simulated chips of {rows} x {columns} pixels of {layout.pixel:g} m",
         "source": f"fifesim {versions()['fifesim']}, simulated; no measurement",
         "references": "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5",
         "instrument": study.scenario.sensor.instrument,
