@@ -160,8 +160,13 @@ def sun_position(time, latitude, longitude, altitude=0.0):
     ----------
     NREL solar position algorithm, as implemented in pvlib; true (not refracted) zenith
     """
-    times = utc(time)
-    sun = pvlib.solarposition.get_solarposition(times, latitude, longitude, altitude=altitude).iloc[0]
+    return _sun(utc(time)[0], float(latitude), float(longitude), float(altitude))
+
+
+# Many scenes share their sun, and to find it takes as long as all that is done to their cells.
+@lru_cache(maxsize=256)
+def _sun(time, latitude, longitude, altitude):
+    sun = pvlib.solarposition.get_solarposition(utc(time), latitude, longitude, altitude=altitude).iloc[0]
     return Geometry(float(sun["zenith"]), float(sun["azimuth"]), earth_sun_distance=earth_sun_distance(time))
 
 

@@ -1,14 +1,35 @@
-"""Many realisations of scenarios in memory: small scenes without a graph each."""
+"""Many realisations of scenarios in memory: small scenes as arrays, without labels and graphs for each."""
 
-from fifesim.scenario.simulation import simulate
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from fifesim.chain.arrays import ArrayChain, labelled_only
+from fifesim.chain.landscapes import aggregate
+from fifesim.chain.setup import reflectance_of
+from fifesim.ground.landscape.raster import scene_cells
+from fifesim.rasters import cf, directions
+from fifesim.rasters import grid as grids
+from fifesim.scenario.ground import fpar_kinds, ground_scene, truth_of
+from fifesim.scenario.land import elevation
+from fifesim.scenario.scenario import Scenario
+from fifesim.scenario.simulation import setup_of, simulate
+from fifesim.sensor.description.rasters.carried import attributes_of
 
 # Of a run, what a regression takes.
 KEPT = ("image", "truth")
+
+# Larger scenes go by chunks. [cell]
+_LARGEST = 4_000_000
 
 
 def realise(scenario, keep=KEPT):
     """
     Nodes of a scenario's run, in memory.
+
+    Scenes of the same grid, air, canopy or instrument share what is made of it, and scenes of the same seed and arp the
+    tiles of their field: let them follow each other.
 
     Parameters
     ----------
@@ -19,15 +40,82 @@ def realise(scenario, keep=KEPT):
     Returns
     -------
     nodes : dict of str to xarray.Dataset
-        With the bits of `fifesim.simulate`.
+        With the bits and the coordinates of `fifesim.simulate`. Image and truth come without the history of how they
+        were made.
 
     Raises
     ------
     ValueError
         If the run has no such node, or the scenario asks for what cannot be.
+
+    See Also
+    --------
+    fifesim.chain.arrays.ArrayChain
     """
-    run = simulate(scenario)
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"realise takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+    grid, setup = scenario.geobox(), setup_of(scenario)
+    small = grid.shape.x * grid.shape.y <= _LARGEST
+    if small and set(keep) <= set(KEPT) and not labelled_only(setup):
+        return _of_arrays(scenario, grid, setup, keep)
+    run = simulate(scenario, chunks=None if small else "auto")
     missing = [name for name in keep if name not in run.children]
     if missing:
         raise ValueError(f"keep names {', '.join(missing)}, and this run has {', '.join(run.children)}")
     return {name: run[name].to_dataset().compute(scheduler="synchronous") for name in keep}
+
+
+def _of_arrays(scenario, grid, setup, keep):
+    """Image and truth by the kernels alone, where the ground is one stand on level ground; slopes have labels too."""
+    chain, own = ArrayChain(setup, grid), scenario.ground
+    made = {}
+    if scenario.terrain.dem == "flat" and scenario.landscape.is_one() and not own.lai_file:
+        land = scene_cells(chain.grid, own.distribution, own.arp, own.seed, own.method)
+        reflectance = chain.reflectance(land) if "image" in keep else None
+    else:
+        dem, horizon, _ = elevation(scenario, grid)
+        land = ground_scene(scenario, grid, dem=dem)
+        on_slopes = replace(setup, dem=dem, horizon=horizon)
+        reflectance = reflectance_of(on_slopes, land).values if "image" in keep else None
+    if "image" in keep:
+        made["image"] = _image(chain, reflectance)
+    if "truth" in keep:
+        made["truth"] = _truth(scenario, chain, land)
+    return made
+
+
+def _image(chain, reflectance):
+    """Image and its NDVI, with the coordinates that they have."""
+    dn = chain.image(chain.toa(reflectance))
+    gain, offset, _ = chain.scale
+    along = {"band": [band.name for band in chain.bands], "wavelength": [band.wavelength for band in chain.bands]}
+    along |= {"gain": gain, "offset": offset}
+    along |= {"compression": chain.compression} if chain.compression.any() else {}
+    along |= {"solar_irradiance": chain.irradiance}
+    own = attributes_of(chain.instrument) | {"atmosphere": chain.air.text}
+    attrs = cf.attributes("dn") | own | {"_FillValue": dn.dtype.type(0)}
+    variables = {"dn": xr.Variable(("band", "y", "x"), dn, attrs)}
+    if chain.shows_ndvi:
+        variables["ndvi"] = xr.Variable(("y", "x"), chain.ndvi(chain.planetary(dn)), cf.attributes("ndvi") | own)
+    coords = grids.coordinates(chain.pixels) | cf.band_coordinates(**along)
+    return _placed(directions.with_geometry(xr.Dataset(variables, coords), chain.setup.geometry))
+
+
+def _truth(scenario, chain, land):
+    """Means over the blocks of the truth."""
+    size = scenario.sensor.size
+    if not scenario.landscape.is_one():
+        return aggregate(truth_of(scenario, chain.setup, land), size, min_valid=chain.setup.min_valid)
+    fpar_inf = scenario.ground.fpar_inf
+    lai = land if isinstance(land, np.ndarray) else land["lai"].values
+    cells = {"lai": lai} | {name: chain.fpar(lai, fpar_inf, kind) for name, kind in fpar_kinds(scenario).items()}
+    variables = {
+        name: xr.Variable(("y", "x"), chain.means(each, size), cf.attributes(name)) for name, each in cells.items()
+    }
+    return _placed(xr.Dataset(variables, grids.coordinates(chain.blocks(size))))
+
+
+def _placed(nodes):
+    for each in nodes.variables.values():
+        each.encoding = {"grid_mapping": "spatial_ref"}
+    return nodes

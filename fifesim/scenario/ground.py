@@ -132,10 +132,25 @@ def truth_of(scenario, setup, land):
     truth : xarray.Dataset
         ``lai``, ``fpar`` and where leaves are dead ``green_fpar``, and all else that varies but ``cover``.
     """
-    kinds = {"fpar": "all"} | ({"green_fpar": "green"} if _has_dead_leaves(scenario) else {})
-    absorbed = {name: absorbed_light(scenario, setup, land, kind) for name, kind in kinds.items()}
+    absorbed = {name: absorbed_light(scenario, setup, land, kind) for name, kind in fpar_kinds(scenario).items()}
     varying = {name: each for name, each in land.data_vars.items() if name not in ("lai", "cover") and each.ndim == 2}
     return xr.Dataset({"lai": land["lai"], **absorbed, **varying})
+
+
+def fpar_kinds(scenario):
+    """
+    Which leaves absorb the light that an image of a scenario is compared with.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Returns
+    -------
+    kinds : dict of str to str
+        By name of the truth, what `fifesim.fpar` takes as ``leaves``.
+    """
+    return {"fpar": "all"} | ({"green_fpar": "green"} if _has_dead_leaves(scenario) else {})
 
 
 def absorbed_light(scenario, setup, land, leaves="all"):

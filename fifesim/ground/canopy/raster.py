@@ -1,5 +1,7 @@
 """The canopy on labelled rasters: its reflectance on level ground, and the light that it absorbs."""
 
+from functools import partial
+
 import numpy as np
 import xarray as xr
 
@@ -167,26 +169,70 @@ def fpar(
     --------
     fifesim.ground.canopy.absorption.fpar, fifesim.ground.canopy.absorption.green_fpar
     """
+    geometry = directions.given_geometry(geometry, lai, time)
+    if "sza" in directions.varying(geometry):
+        directions.uniform_geometry(geometry, "fpar")
+    lai = checked_scene(lai)
+    said = {"leaf_angles": leaf_angles, "fpar_inf": fpar_inf, "leaves": leaves}
+    shares = {"brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
+    kernel, rasters, shares = fpar_kernel(lai, geometry, **said, **shares)
+    out = chunking.pointwise(kernel, lai, *rasters)
+    out = grids.place(out, grids.geobox(lai))
+    of = "" if leaves == "all" else "green leaves, "
+    extinction = absorption.extinction_coefficient(float(geometry.sza), leaf_angles)
+    said = f"fpar: Beer's law, {of}{canopy_shares.in_words(shares)}K {float(extinction):.4f}, limit {fpar_inf:g}"
+    return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=lai, history=said)
+
+
+def fpar_kernel(
+    lai,
+    geometry,
+    *,
+    leaf_angles="spherical",
+    fpar_inf=absorption.FPAR_INF,
+    leaves="all",
+    brown=0.0,
+    dissociation=0.0,
+    crown_cover=1.0,
+):
+    """
+    Kernel of the light that a canopy absorbs, and the rasters that it takes.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims (y, x), or None
+        Whose CRS the rasters have where they lost theirs.
+    geometry : fifesim.base.geometry.Geometry or xarray.Dataset
+        Of one sun.
+    leaf_angles, fpar_inf, leaves, brown, dissociation, crown_cover : optional
+        As in `fpar`.
+
+    Returns
+    -------
+    kernel : callable
+        ``kernel(lai, *blocks)`` gives the fraction from leaf area, and blocks of the rasters. [1]
+    rasters : list of xarray.DataArray
+    shares : dict of str to float or xarray.DataArray
+        Those that it uses.
+
+    Raises
+    ------
+    ValueError
+        As in `fpar`.
+    """
     if not 0 < fpar_inf <= 1:
         raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
     if leaves not in ("all", "green"):
         raise ValueError(f"leaves must be 'all' or 'green', got {leaves!r}: which of them absorb the light")
-    geometry = directions.given_geometry(geometry, lai, time)
-    if "sza" in directions.varying(geometry):
-        directions.uniform_geometry(geometry, "fpar")
-    extinction = float(absorption.extinction_coefficient(float(geometry.sza), leaf_angles))
-    lai = checked_scene(lai)
     shares = {"crown_cover": canopy_shares.share("crown_cover", crown_cover, lai)}
     if leaves == "green":
         shares |= {"brown": canopy_shares.share("brown", brown, lai)}
         shares |= {"dissociation": canopy_shares.share("dissociation", dissociation, lai)}
-    kernel, rasters = canopy_shares.with_shares(_fpar, shares)
-    light = {"extinction": extinction, "fpar_inf": fpar_inf, "sza": float(geometry.sza)}
-    out = chunking.pointwise(kernel, lai, *rasters, **light)
-    out = grids.place(out, grids.geobox(lai))
-    of = "" if leaves == "all" else "green leaves, "
-    said = f"fpar: Beer's law, {of}{canopy_shares.in_words(shares)}K {extinction:.4f}, limit {fpar_inf:g}"
-    return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=lai, history=said)
+    sza = float(geometry.sza)
+    extinction = float(absorption.extinction_coefficient(sza, leaf_angles))
+    light = {"extinction": extinction, "fpar_inf": fpar_inf, "sza": sza}
+    kernel, rasters = canopy_shares.with_shares(partial(_fpar, **light), shares)
+    return kernel, rasters, shares
 
 
 def checked_scene(lai):

@@ -167,7 +167,33 @@ def one_layer(raster):
     return raster
 
 
-def _streaming_scene(grid, density, arp, seed, chunks):
+def scene_cells(grid, distribution, arp, seed, method="streaming"):
+    """
+    Cells of a scene in memory, without labels.
+
+    Parameters
+    ----------
+    grid, distribution, arp, seed, method
+        As in `lai_scene`.
+
+    Returns
+    -------
+    lai : array, shape (y, x)
+        [m2 m-2]
+
+    Raises
+    ------
+    ValueError, TypeError
+        As in `lai_scene`.
+    """
+    density = lai_distribution(distribution)
+    if method == "periodic":
+        return _periodic_cells(grid, density, arp, seed)
+    return _streaming_cells(grid, density, arp, seed)(0, 0, tuple(grid.shape))
+
+
+def _streaming_cells(grid, density, arp, seed):
+    """Kernel that makes cells of a scene from their row and column."""
     row, column = grids.lattice_position(grid)
     table = quantile_table(density)
 
@@ -175,12 +201,22 @@ def _streaming_scene(grid, density, arp, seed, chunks):
         field = streaming_field(seed, arp, row + first_row, column + first_column, shape)
         return quantile_map(field, table)
 
+    return cells
+
+
+def _streaming_scene(grid, density, arp, seed, chunks):
+    cells = _streaming_cells(grid, density, arp, seed)
     # A first window raises what streaming_field refuses before anything lazy is built.
     cells(0, 0, (0, 0))
     return places.tiles(cells, grid, chunks, tile=TILE)
 
 
 def _periodic_scene(grid, density, arp, seed, chunks):
+    field = xr.DataArray(_periodic_cells(grid, density, arp, seed), dims=("y", "x"))
+    return grids.place(field if chunks is None else field.chunk(chunks), grid)
+
+
+def _periodic_cells(grid, density, arp, seed):
     # Noise, spectrum, field, ranks, quantiles and result are in memory together.
     needed, free = 48 * grid.shape.x * grid.shape.y, psutil.virtual_memory().available
     if needed > free:
@@ -188,8 +224,7 @@ def _periodic_scene(grid, density, arp, seed, chunks):
             f"a periodic field of {grid.shape.y} x {grid.shape.x} cells needs {needed / 1e9:.1f} GB of memory, "
             f'{free / 1e9:.1f} GB are free: use method="streaming", which needs no more for a larger scene'
         )
-    field = xr.DataArray(rank_map(periodic_field(seed, arp, tuple(grid.shape)), density), dims=("y", "x"))
-    return grids.place(field if chunks is None else field.chunk(chunks), grid)
+    return rank_map(periodic_field(seed, arp, tuple(grid.shape)), density)
 
 
 def distribution_name(source):

@@ -3,12 +3,12 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.base.kinds import described
 from fifesim.base.warned import warn
 from fifesim.rasters import directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
 from fifesim.sensor.description.band_names import band_called
+from fifesim.sensor.response.rasters.footprints import check_scene, shifts_of
 
 
 def matching_bands(array, instrument):
@@ -236,15 +236,10 @@ def means_by_band(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_va
     --------
     fifesim.base.footprints.regularize
     """
-    if not hasattr(offset, "__len__") or len(offset) != 2:
-        raise ValueError(
-            f"offset must be two, of rows and of columns in pixels, such as (0.5, 0.0), got {described(offset)}"
-        )
-    down, across = grids.cell_size(pixels)
-    shifts = _shift(offset[0], pixels.shape.y, down, "rows"), _shift(offset[1], pixels.shape.x, across, "columns")
+    shifts = shifts_of(offset, pixels)
 
     def means(part, spreads, names):
-        _check_scene(spreads, grids.geobox(array), min_valid, f"{instrument.name} {names}")
+        check_scene(spreads, grids.geobox(array), min_valid, f"{instrument.name} {names}")
         return regularized(part, spreads, pixels, shifts=shifts, min_valid=min_valid)
 
     return grids.place(by_line_spread(means, array, instrument, bands), pixels)
@@ -311,32 +306,3 @@ def directions_on(pixels, geometry):
         return geometry
     kept = {name: geometry[name].variable for name in geometry.data_vars if name not in names}
     return xr.Dataset(kept | {name: averaged[name](geometry[name]) for name in names})
-
-
-def _shift(offset, size, pixel, axis):
-    """Metres of an offset in pixels, a number or one for each of an axis."""
-    offset = np.asarray(offset, float)
-    if offset.ndim > 1 or (offset.ndim and offset.size != size) or not np.all(np.isfinite(offset)):
-        raise ValueError(
-            f"the offset of {axis} must be a finite number of pixels, or {size} of them, one for each of the image's "
-            f"{axis}, got shape {offset.shape}"
-        )
-    return offset * pixel
-
-
-def _check_scene(spreads, scene, min_valid, name):
-    """Refuse a point spread of which no pixel can hold enough."""
-    along, across = spreads
-    height, width = (count * size for count, size in zip(scene.shape, grids.cell_size(scene), strict=True))
-    share = _within(along, height) * _within(across, width)
-    if share < min(min_valid, 1.0) - 1e-9:
-        raise ValueError(
-            f"the point spread of {name}, {2 * along.half_width:.1f} x {2 * across.half_width:.1f} m, is wider than "
-            f"the scene of {height:g} x {width:g} m, which holds {share:.0%} of it: simulate a larger scene, or accept "
-            "it with min_valid="
-        )
-
-
-def _within(spread, size):
-    """Share of a response that a scene of this size holds around its middle."""
-    return float(spread.cumulative(size / 2) - spread.cumulative(-size / 2))
