@@ -114,10 +114,13 @@ from .rasters.files import to_geotiff as to_geotiff  # method, of a Dataset too
 from .rasters.files import open_image as open_image
 from .scenario.simulation import simulate as simulate
 from .scenario.sweeps import sweep as sweep
+from .output.chips.folder import dataset as dataset
 from .experiments.scatter.shares import budget as budget
 from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import default_scenario as default_scenario
 from .scenario.scenario import read_scenario as read_scenario
+from .scenario.studies import Study as Study
+from .scenario.studies import read_study as read_study
 from .experiments.friedl1995.reproduction import reproduce as reproduce
 from .experiments.friedl1995.figures import plot_reproduction as plot_reproduction
 from .experiments.verification.areas import verify as verify

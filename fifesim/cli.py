@@ -6,7 +6,6 @@ import os
 import sys
 import warnings
 from contextlib import contextmanager
-from enum import IntEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -14,20 +13,13 @@ import typer
 from typer.core import TyperGroup
 
 from fifesim.base.foreign import in_a_line
-
-# Of a message, and of a line in one of many. [character]
-_LONGEST, _SHORTEST = 500, 50
+from fifesim.output.terminal import Exit
+from fifesim.output.terminal import say as _say
+from fifesim.output.terminal import stop as _stop
+from fifesim.output.terminal import tell as _tell
 
 # What click, or the one that typer brings, says of arguments.
 _UsageError = typer.BadParameter.__base__
-
-
-class Exit(IntEnum):
-    """Exit codes: what was asked cannot be done, what could be done failed, and somebody pressed Ctrl-C."""
-
-    MISTAKE = 2
-    FAILURE = 1
-    INTERRUPTED = 130
 
 
 class _Door(TyperGroup):
@@ -65,6 +57,10 @@ app = typer.Typer(
 
 
 _Paper = Annotated[bool, typer.Option("--paper", help="The paper's one stand, in the place of the landscape.")]
+_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")]
+_Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")]
+_Scheduler = Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")]
+_AsJson = Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")]
 _AllowRemote = Annotated[
     bool, typer.Option("--allow-remote", help="Rasters may come from addresses, in any format of GDAL.")
 ]
@@ -92,13 +88,13 @@ def simulate(
     context: typer.Context,
     scenario: Annotated[Path | None, typer.Argument(help="TOML file; a landscape on the FIFE site by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("fife"),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
+    overwrite: _Overwrite = False,
+    resume: _Resume = False,
     scene: Annotated[bool, typer.Option("--scene", help="Write the cells too: scene.zarr.")] = False,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; one for each core by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Compute on so many processes.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")] = False,
+    scheduler: _Scheduler = None,
+    as_json: _AsJson = False,
     paper: _Paper = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only estimate time, memory and disk.")] = False,
     allow_remote: _AllowRemote = False,
@@ -127,17 +123,41 @@ def simulate(
         _say(estimate_in_words(estimate(found, output, **options), as_json))
         return
     found.complete()
-    try:
-        with cluster(workers, scheduler) as client:
-            options = {"overwrite": overwrite, "resume": resume, "scene": scene, "as_json": as_json}
-            files = simulate_to_folder(found, output, threads=threads, client=client, **options)
-    except KeyboardInterrupt:
-        kept = f"what is finished is kept, go on with --resume -o {output}" if output.exists() else "nothing is written"
-        _stop(f"interrupted; {kept}", Exit.INTERRUPTED)
-    if as_json:
-        _say(json.dumps({"event": "finished", "files": [str(path) for path in files]}))
-        return
-    _say(*files)
+    with _kept(output), cluster(workers, scheduler) as client:
+        options = {"overwrite": overwrite, "resume": resume, "scene": scene, "as_json": as_json}
+        files = simulate_to_folder(found, output, threads=threads, client=client, **options)
+    _say_finished(files, as_json)
+
+
+@app.command()
+def dataset(
+    study: Annotated[Path | None, typer.Argument(help="TOML file: a scenario, and in [draw] what varies.")] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the chips, a Zarr store.")] = Path(
+        "chips.zarr"
+    ),
+    chips: Annotated[int | None, typer.Option("-n", "--chips", min=1, help="How many; 1000 by default.")] = None,
+    overwrite: _Overwrite = False,
+    resume: _Resume = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
+    scheduler: _Scheduler = None,
+    as_json: _AsJson = False,
+):
+    """Make a training set: images and truth of many chips, as sharded Zarr with a datasheet."""
+    with _importing():
+        from fifesim.output.chips.folder import dataset_to_folder, study_to_resume
+        from fifesim.output.run.workers import cluster, usable_cores
+        from fifesim.scenario.studies import read_study
+
+    found, count = study_to_resume(output) if resume else (None, None)
+    if study is None and found is None:
+        raise ValueError("a dataset is of a study: type its file, such as study.toml; to go on, --resume and -o")
+    found = found if study is None else read_study(study)
+    if workers is None and scheduler is None:
+        workers = usable_cores()
+    with _kept(output), cluster(None if workers == 1 else workers, scheduler) as client:
+        options = {"overwrite": overwrite, "resume": resume, "client": client, "as_json": as_json}
+        files = dataset_to_folder(found, output, chips or count or 1000, **options)
+    _say_finished(files, as_json)
 
 
 @app.command()
@@ -163,7 +183,7 @@ def reproduce(
     cells: Annotated[int | None, typer.Option(help="Along the edge of a scene, of 3.33 m each; 333 for TM.")] = None,
     seed: Annotated[int, typer.Option(help="Of the first realisation; the others follow.")] = 1995,
     scenes: Annotated[bool, typer.Option("--scenes", help="Write image, truth and scene of each scenario.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+    overwrite: _Overwrite = False,
 ):
     """Repeat the paper: table2.csv, figures 3 to 9, the nine scenarios, report.html."""
     with _importing():
@@ -190,7 +210,7 @@ def budget(
     cells: Annotated[int | None, typer.Option(help="Along the edge of a scene; 333, or 12 large pixels.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the first scene; the scenario's by default.")] = None,
     sensor: Annotated[str | None, typer.Option(help="An instrument over level ground, instead of a file.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+    overwrite: _Overwrite = False,
     allow_remote: _AllowRemote = False,
 ):
     """Find where the scatter comes from, stage by stage: budget.csv, budget.png, report.html, scenario.toml."""
@@ -252,7 +272,7 @@ def verify():
     found = []
     _say(HEADING)
     try:
-        for text in by_stage(_kept(deviations(), found)):
+        for text in by_stage(_collected(deviations(), found)):
             _say(text)
     except FileNotFoundError as error:
         # A table that the installation lacks is no mistake of who asks.
@@ -262,11 +282,27 @@ def verify():
         raise typer.Exit(Exit.FAILURE)
 
 
-def _kept(items, kept):
+def _collected(items, kept):
     """Items as they come, which go into a list too."""
     for item in items:
         kept.append(item)
         yield item
+
+
+@contextmanager
+def _kept(output):
+    """Who interrupts a run is told what is left of it."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        kept = f"what is finished is kept, go on with --resume -o {output}" if output.exists() else "nothing is written"
+        _stop(f"interrupted; {kept}", Exit.INTERRUPTED)
+
+
+def _say_finished(files, as_json):
+    """Files that a run has made."""
+    names = [str(path) for path in files]
+    _say(*([json.dumps({"event": "finished", "files": names})] if as_json else names))
 
 
 @contextmanager
@@ -300,28 +336,3 @@ def _check_spelling(scenario):
 
     if scenario is not None:
         check_spelling(scenario)
-
-
-def _say(*texts, err=False):
-    """Print texts, in which names and values from elsewhere cannot steer a terminal."""
-    for text in texts:
-        typer.echo("\n".join(in_a_line(line, sys.maxsize) for line in str(text).split("\n")), err=err)
-
-
-def _tell(message, *_):
-    """A warning is a line too."""
-    _say(in_a_line(f"fifesim: warning: {message}"), err=True)
-
-
-def _stop(error, code):
-    lines = str(error).split("\n")
-    length = max(_LONGEST // len(lines), 40)
-    _say(
-        "\n".join(in_a_line(line, length) for line in ["fifesim: " + lines[0], *lines[1:]][: _LONGEST // 40]), err=True
-    )
-    try:
-        sys.stdout.flush()
-    except OSError:
-        # What standard output does not take would be said again, at length, when the interpreter ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    sys.exit(code)

@@ -26,7 +26,7 @@ class Layout(NamedTuple):
     ----------
     bands : xarray.Dataset
         Coordinates along ``band``.
-    truth, terrain : tuple of str
+    truth : tuple of str
         Names of what is known of the ground of the pixels.
     has_ndvi : bool
     dn : numpy.dtype
@@ -41,7 +41,6 @@ class Layout(NamedTuple):
 
     bands: xr.Dataset
     truth: tuple[str, ...]
-    terrain: tuple[str, ...]
     has_ndvi: bool
     dn: np.dtype
     pixels: tuple[int, int]
@@ -51,7 +50,7 @@ class Layout(NamedTuple):
     @property
     def variables(self):
         """Dimensions and type of what is stored of each chip, a dict of (tuple of str, numpy.dtype) by name."""
-        planes = (("ndvi",) if self.has_ndvi else ()) + self.truth + self.terrain
+        planes = (("ndvi",) if self.has_ndvi else ()) + self.truth
         found = {"dn": (("band", "y", "x"), self.dn), "toa_reflectance": (("band", "y", "x"), np.dtype(_FLOAT))}
         found |= {name: (("y", "x"), np.dtype(_FLOAT)) for name in planes}
         return found | {name: ((), np.dtype(float)) for name in LIGHT}
@@ -94,34 +93,18 @@ def layout_of(chips):
     ValueError
         If the scenario asks for what cannot be.
     """
-    nodes = realise(chips.scenario(0), kept_of(chips.study))
+    nodes = realise(chips.scenario(0))
     image, truth = nodes["image"], _fullest(chips.study)
     size = chips.study.scenario.sensor.size
     return Layout(
         bands=xr.Dataset(coords={name: image[name].variable for name in _ALONG_BAND if name in image.coords}),
         truth=tuple(dict.fromkeys((*nodes["truth"].data_vars, *truth))),
-        terrain=tuple(nodes["terrain"].data_vars) if "terrain" in nodes else (),
         has_ndvi="ndvi" in image,
         dn=image["dn"].dtype,
         pixels=(image.sizes["y"], image.sizes["x"]),
         pixel=size,
         crs=image["spatial_ref"].variable,
     )
-
-
-def kept_of(study):
-    """
-    Nodes of a run that a chip is made of.
-
-    Parameters
-    ----------
-    study : fifesim.scenario.studies.Study
-
-    Returns
-    -------
-    names : tuple of str
-    """
-    return ("image", "truth") + (("terrain",) if study.scenario.terrain.dem != "flat" else ())
 
 
 def _fullest(study):
@@ -159,13 +142,13 @@ def chip_arrays(chips, first, last, layout, each=lambda count: None):
     ValueError
         If a chip cannot be simulated, or has another truth than the layout.
     """
-    count, kept = last - first, kept_of(chips.study)
+    count = last - first
     found = {name: np.empty((count, *layout.shape(dims)), dtype) for name, (dims, dtype) in layout.variables.items()}
     # Neighbours of a landscape are cut from one tile of its field.
     for chip in sorted(range(first, last), key=lambda chip: (chips.landscape[chip], chip)):
         scenario = chips.scenario(chip)
         try:
-            nodes = realise(scenario, kept)
+            nodes = realise(scenario)
             _put(found, chip - first, nodes, layout)
         except ValueError as error:
             raise ValueError(f"chip {chip}: {error}") from error
@@ -190,8 +173,6 @@ def _put(found, at, nodes, layout):
         other = "fpar" if name == "green_fpar" else None
         source = truth.get(name, truth.get(other) if other else None)
         found[name][at] = np.nan if source is None else source.values
-    for name in layout.terrain:
-        found[name][at] = nodes["terrain"][name].values
     for name in LIGHT:
         found[name][at] = image[name].values
 

@@ -19,7 +19,6 @@ _TRUTH = {
     "brown": "copper_r",
     "soil": "cividis",
     "moisture": "Blues",
-    "dem": "gist_earth",
 }
 _ROWS = 3
 
