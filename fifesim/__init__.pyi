@@ -121,6 +121,7 @@ from .scenario.scenario import default_scenario as default_scenario
 from .scenario.scenario import read_scenario as read_scenario
 from .scenario.studies import Study as Study
 from .scenario.studies import read_study as read_study
+from .scenario.chips import chips_of as chips_of
 from .experiments.friedl1995.reproduction import reproduce as reproduce
 from .experiments.friedl1995.figures import plot_reproduction as plot_reproduction
 from .experiments.verification.areas import verify as verify

@@ -126,6 +126,7 @@ OF_FUNCTION = {
     | _of(PATH, "sensor")
     | _of(TEXT, "reading"),
     "dataset": _of(NUMBER, "n"),
+    "chips_of": _of(NUMBER, "n") | _of(ANYTHING, "study"),
     "plot_reproduction": _of(NUMBER, "number") | _of(REPRODUCED, "found") | _of(TEXT, "reading"),
 }
 """The same of single functions, where it is another."""

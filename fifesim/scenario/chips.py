@@ -95,14 +95,15 @@ class Chips:
         return xr.Dataset(found, coords={"chip": np.arange(len(self))})
 
 
-def chips_of(study, count):
+def chips_of(study, n):
     """
     Chips of a study.
 
     Parameters
     ----------
-    study : fifesim.scenario.studies.Study
-    count : int
+    study : fifesim.Study
+    n : int
+        How many.
 
     Returns
     -------
@@ -119,9 +120,9 @@ def chips_of(study, count):
     Every round of as many chips as there are landscapes has one chip of each, in a drawn order: points of a sequence
     that a landscape took in turn would lie in one part of the space.
     """
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise ValueError(f"n must be a whole number of chips from 1 up, got {count!r}")
-    landscapes = study.landscapes
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+        raise ValueError(f"n must be a whole number of chips from 1 up, got {n!r}")
+    count, landscapes = int(n), study.landscapes
     rounds = -(-count // landscapes)
     orders = [generator(study.seed, _ORDER, (0, each, 0, 0)).permutation(landscapes) for each in range(rounds)]
     landscape = np.concatenate(orders)[:count]

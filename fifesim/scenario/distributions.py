@@ -72,6 +72,11 @@ class Distribution:
         return np.clip(found, low, high).tolist()
 
     @property
+    def usual(self):
+        """The median, or the first choice."""
+        return self.values[0] if self.kind == "choice" else self.quantile([0.5])[0]
+
+    @property
     def extremes(self):
         """What may be refused: both ends, or all that there is to choose, a list."""
         return list(self.values) if self.kind == "choice" else list(self.within or self.values)

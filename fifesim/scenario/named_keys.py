@@ -77,8 +77,10 @@ def find_key(name, called="the axis"):
         written = " or ".join(each.name for each in found)
         raise ValueError(f"{called} {shown(name)} is a key of several sections: write {written}")
     known = {each for place in Scenario().sections() for each in Keys.section(place).model_fields}
-    hint = nearest(str(name).split(".")[-1], sorted(known))
-    raise ValueError(f"{called} {shown(name)} is no key of a scenario: {hint}keys are {', '.join(sorted(known))}")
+    hint = nearest(parts[-1] if parts else "classes", sorted(known))
+    raise ValueError(
+        f"{called} {shown(name)} is no key of a scenario: {hint}`fifesim scenario` prints all that there are"
+    )
 
 
 def _has(section, parts):

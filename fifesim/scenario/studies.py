@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from types import MappingProxyType
 
 from fifesim.base.foreign import shown
@@ -92,7 +93,8 @@ class Study:
         while sum(found.values()) < self.landscapes:
             found[max(found, key=lambda name: shares[name] - found[name])] += 1
         while sum(found.values()) > self.landscapes:
-            found[max(found, key=lambda name: found[name] - shares[name])] -= 1
+            several = [name for name, number in found.items() if number > 1]
+            found[max(several, key=lambda name: found[name] - shares[name])] -= 1
         return found
 
     def to_toml(self):
@@ -153,7 +155,18 @@ def read_study(path):
         if name not in known:
             hint = nearest(str(name), known)
             raise ValueError(f"unknown key dataset.{name}: {hint}allowed are {', '.join(known)}")
+    if isinstance(draws, Mapping):
+        draws = {name: _with_whole_paths(name, table, Path(path).parent.absolute()) for name, table in _flat(draws)}
     return Study(parse_scenario(values), draws, **plan)
+
+
+def _with_whole_paths(name, table, folder):
+    """A distribution whose choices of files have their full paths."""
+    key = find_key(name, called="draw:")
+    if not isinstance(table, Mapping) or not isinstance(table.get("choice"), list) or key.entry:
+        return table
+    choices = [str(folder / each) if key.section.names_a_file(key.key, each) else each for each in table["choice"]]
+    return table | {"choice": choices}
 
 
 def _check_ground(scenario):
@@ -270,9 +283,9 @@ def _settled(scenario, drawn):
 
 
 def _check_extremes(study):
-    """Each key takes the ends of its distribution, where others have their middle."""
-    middle = {key: distribution.quantile([0.5])[0] for key, distribution in study.drawn.items()}
-    _check(study, middle, "draw, all at their medians: ")
+    """Each key takes the ends of its distribution, where others are usual."""
+    middle = {key: distribution.usual for key, distribution in study.drawn.items()}
+    _check(study, middle, "draw, all at their medians or first choices: ")
     for key, distribution in study.drawn.items():
         for value in distribution.extremes:
             _check(study, middle | {key: value}, f"draw.{key.name} = {shown(distribution.table)} at {shown(value)}: ")

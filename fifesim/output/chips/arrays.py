@@ -113,7 +113,7 @@ def _fullest(study):
     for key, distribution in study.drawn.items():
         ends = distribution.extremes
         numbers = all(isinstance(value, int | float) for value in ends)
-        drawn[key.path] = max(ends) if numbers and min(ends) == 0 else distribution.quantile([0.5])[0]
+        drawn[key.path] = max(ends) if numbers and min(ends) == 0 else distribution.usual
     side = 2 * study.scenario.sensor.size
     small = {("grid", "width"): side, ("grid", "height"): side}
     return realise(study.scenario_with(drawn | small), ("truth",))["truth"].data_vars

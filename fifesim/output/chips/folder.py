@@ -26,8 +26,8 @@ DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.
 # Of shards that are written, what their files' checksums are saved by.
 _SAVED = "chips"
 
-# So many chips are looked at before the first is made: what of a study cannot be is told early. [1]
-_LOOKED_AT = 1000
+# So many chips are looked at before the first is made, and so many closely: what cannot be is told early. [1]
+_LOOKED_AT, _CLOSELY = 1000, 50
 
 _RETRIES = 3
 
@@ -66,8 +66,8 @@ def dataset(study, folder, n=1000, *, overwrite=False, resume=False, client=None
 
     Notes
     -----
-    Chip k is `fifesim.simulate` of ``study.chips(n).scenario(k)``, to the bit, whatever makes it; truth and reflectance
-    are kept in single precision.
+    Chip k is `fifesim.simulate` of ``fifesim.chips_of(study, n).scenario(k)``, to the bit, whatever makes it; truth and
+    reflectance are kept in single precision.
     """
     study = study if isinstance(study, Study) else read_study(study)
     dataset_to_folder(study, folder, n, overwrite=overwrite, resume=resume, client=client)
@@ -154,6 +154,11 @@ def _look_at(chips):
     last = len(chips) - 1
     for chip in (*range(min(last, _LOOKED_AT)), last):
         scenario = chips.scenario(chip)
+        if chip < _CLOSELY:
+            try:
+                scenario.complete()
+            except ValueError as error:
+                raise ValueError(f"chip {chip}: {error}") from None
     try:
         scenario.geobox()
     except ValueError as error:
