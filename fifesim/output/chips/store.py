@@ -36,8 +36,8 @@ class Shards:
 
     def __init__(self, count, size, together):
         self._count = count
-        self.chunk = max(min(10, _CHUNK // size, count), 1)
-        wanted = min(together, max(_FEWEST, -(-count // _SHARDS)), max(_SHARD // size, 1))
+        wanted = min(count, together, max(_FEWEST, -(-count // _SHARDS)), max(_SHARD // size, 1))
+        self.chunk = max(min(10, _CHUNK // size, wanted), 1)
         self.length = -(-wanted // self.chunk) * self.chunk
 
     def __len__(self):
@@ -142,7 +142,10 @@ def write_shard(folder, first, arrays):
     import zarr  # slow, and few runs write chips
 
     for name, values in arrays.items():
-        zarr.open_array(folder, path=name, mode="r+")[first : first + len(values)] = values
+        array = zarr.open_array(folder, path=name, mode="r+")
+        # What may lie there of a run that was stopped would be read first.
+        _file(folder / name / "c" / str(first // (array.shards or array.chunks)[0])).unlink(missing_ok=True)
+        array[first : first + len(values)] = values
 
 
 def checksums(folder, names, shard):
