@@ -100,8 +100,12 @@ def diffuse_fraction(atmosphere, bands, geometry):
     --------
     fifesim.atmosphere.schemes.lookup.varying_diffuse_fraction
     """
-    if "sza" not in directions.varying(geometry):
-        return engines.band_terms(atmosphere, tuple(bands), geometry.sza, 0.0, 0.0).diffuse_fraction
+    varies = directions.varying(geometry)
+    if "sza" not in varies:
+        # In 5S what comes down does not know the view: the run is the one that `to_toa` asks for.
+        known = atmosphere.engine == "5S" and not varies and geometry.vza <= engines.LARGEST_ZENITH
+        view = (geometry.vza, geometry.raa) if known else (0.0, 0.0)
+        return engines.band_terms(atmosphere, tuple(bands), geometry.sza, *view).diffuse_fraction
 
     def kernel(sza):
         return lookup.varying_diffuse_fraction(sza, atmosphere=atmosphere, bands=tuple(bands))

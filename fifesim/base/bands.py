@@ -91,6 +91,32 @@ def nearest(wavelengths, window):
     return int(inside[np.argmin(np.abs(wavelengths[inside] - window.best))]) if inside.size else None
 
 
+class Quadrature(NamedTuple):
+    """Means over a band of spectra at the same wavelengths: where its nodes lie among these, and their weights."""
+
+    nodes: np.ndarray
+    index: np.ndarray
+    share: np.ndarray
+    weight: np.ndarray
+    total: float
+
+    def mean(self, values):
+        """
+        Mean of a spectrum over the response.
+
+        Parameters
+        ----------
+        values : array, shape (..., n)
+
+        Returns
+        -------
+        mean : array, shape (...)
+        """
+        values = np.asarray(values, float)
+        spectrum = values[..., self.index] * (1 - self.share) + values[..., self.index + 1] * self.share
+        return np.trapezoid(spectrum * self.weight, self.nodes) / self.total
+
+
 @dataclass(frozen=True)
 class Band:
     """
@@ -157,13 +183,32 @@ class Band:
         ValueError
             If the spectrum does not cover the band.
         """
-        values, wavelength = np.asarray(values, float), np.asarray(wavelength, float)
+        return self.quadrature(wavelength, weight).mean(values)
+
+    def quadrature(self, wavelength, weight=1.0):
+        """
+        What `mean` takes of any spectrum at the same wavelengths.
+
+        Parameters
+        ----------
+        wavelength, weight
+            As in `mean`.
+
+        Returns
+        -------
+        quadrature : Quadrature
+
+        Raises
+        ------
+        ValueError
+            As in `mean`.
+        """
+        wavelength = np.asarray(wavelength, float)
         nodes, response = self._nodes(wavelength)
         weight = response * np.interp(nodes, wavelength, np.broadcast_to(weight, wavelength.shape))
         index = np.clip(np.searchsorted(wavelength, nodes) - 1, 0, wavelength.size - 2)
         share = (nodes - wavelength[index]) / (wavelength[index + 1] - wavelength[index])
-        spectrum = values[..., index] * (1 - share) + values[..., index + 1] * share
-        return np.trapezoid(spectrum * weight, nodes) / np.trapezoid(weight, nodes)
+        return Quadrature(nodes, index, share, weight, np.trapezoid(weight, nodes))
 
     def _nodes(self, wavelength):
         """Wavelengths of both the response and a spectrum inside the band, with the response there."""

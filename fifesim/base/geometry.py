@@ -235,6 +235,11 @@ def earth_sun_distance(time):
     >>> round(earth_sun_distance("1987-06-06T16:35:00Z"), 3)
     1.015
     """
+    return _distance(utc(time)[0])
+
+
+@lru_cache(maxsize=256)
+def _distance(time):
     return float(pvlib.solarposition.nrel_earthsun_distance(utc(time)).iloc[0])
 
 

@@ -28,10 +28,25 @@ def with_geometry(array, geometry, names=_GEOMETRY):
     -------
     array : xarray.DataArray or xarray.Dataset
     """
-    angles = {} if geometry is None else {name: _angle(geometry, name) for name in names}
-    return array.assign_coords(
-        {name: xr.Variable(angle.dims, angle.data, cf.attributes(name)) for name, angle in angles.items()}
-    )
+    return array.assign_coords({} if geometry is None else coordinates_of(geometry, names))
+
+
+def coordinates_of(geometry, names=_GEOMETRY):
+    """
+    Coordinates by which a raster carries the directions of sun and sensor.
+
+    Parameters
+    ----------
+    geometry : fifesim.base.geometry.Geometry or xarray.Dataset
+    names : sequence of str, optional
+        Which of them; all by default.
+
+    Returns
+    -------
+    coordinates : dict of str to xarray.Variable
+    """
+    angles = {name: _angle(geometry, name) for name in names}
+    return {name: xr.Variable(angle.dims, angle.data, cf.attributes(name)) for name, angle in angles.items()}
 
 
 def geometry_of(array):

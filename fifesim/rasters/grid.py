@@ -1,16 +1,18 @@
 """Grids as odc GeoBoxes: what a DataArray's grid is, and where cells and pixels lie."""
 
+from functools import lru_cache
+
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
-from odc.geo.xr import xr_coords
 
 from fifesim.base.lattice import centres, whole_cells
 from fifesim.rasters import projection
 from fifesim.rasters.axes import check_axes
+from fifesim.rasters.references import reference_of
 
 _LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
 
@@ -46,7 +48,13 @@ def grid_at(crs, west, north, width, height, cell):
     if not max(width / across, height / down) < _LONGEST:
         raise ValueError(f"{size} over {_LONGEST} cells {of} along a side: type a smaller size, or a larger cell")
     shape = int(height / down + 1e-6), int(width / across + 1e-6)
-    return check_grid(GeoBox(shape, Affine(across, 0.0, west, 0.0, -down, north), projection.horizontal(crs)))
+    return _checked(shape, (across, 0.0, west, 0.0, -down, north), projection.horizontal(crs))
+
+
+# A scenario asks for its grid at every step.
+@lru_cache(maxsize=64)
+def _checked(shape, transform, crs):
+    return check_grid(GeoBox(shape, Affine(*transform), crs))
 
 
 def check_grid(grid):
@@ -147,7 +155,7 @@ def coordinates(grid):
         attrs = {"standard_name": f"projection_{axis}_coordinate", "long_name": f"{axis} coordinate of projection"}
         attrs |= {"units": "m", "axis": axis.upper()}
         out[axis] = xr.DataArray(values, dims=axis, attrs=attrs)
-    out["spatial_ref"] = xr_coords(_snapped(grid))["spatial_ref"]
+    out["spatial_ref"] = reference_of(_snapped(grid))
     return out
 
 

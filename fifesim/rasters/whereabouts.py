@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 import pyproj
+from odc.geo.crs import CRS
 
 from fifesim.rasters import projection
 
@@ -22,7 +23,13 @@ def middle(grid):
         East of Greenwich, and north; a datum, 100 m, does not matter here. [degree]
     """
     x, y = projection.transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)
-    return degrees_at(grid.crs.to_wkt(), float(x), float(y))
+    return degrees_at(_wkt(str(grid.crs)), float(x), float(y))
+
+
+@lru_cache(maxsize=64)
+def _wkt(crs):
+    """A CRS in full: it takes longer to write than all else that a small scene asks of its place."""
+    return CRS(crs).to_wkt()
 
 
 @lru_cache(maxsize=256)

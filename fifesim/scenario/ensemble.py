@@ -1,13 +1,16 @@
 """Many realisations of scenarios in memory: small scenes as arrays, without labels and graphs for each."""
 
 from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from fifesim.chain.arrays import ArrayChain, labelled_only
+from fifesim.chain.arrays import ArrayChain
+from fifesim.chain.kernels import Kernels, labelled_only
 from fifesim.chain.landscapes import aggregate
-from fifesim.chain.setup import reflectance_of
+from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.ground.landscape.raster import scene_cells
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
@@ -67,11 +70,11 @@ def realise(scenario, keep=KEPT):
 
 def _of_arrays(scenario, grid, setup, keep):
     """Image and truth by the kernels alone, where the ground is one stand on level ground; slopes have labels too."""
-    chain, own = ArrayChain(setup, grid), scenario.ground
+    chain, own = ArrayChain(setup, grid, _kernels(scenario, setup)), scenario.ground
     made = {}
     if scenario.terrain.dem == "flat" and scenario.landscape.is_one() and not own.lai_file:
-        land = scene_cells(chain.grid, own.distribution, own.arp, own.seed, own.method)
-        reflectance = chain.reflectance(land) if "image" in keep else None
+        land = scene_cells(grid, own.distribution, own.arp, own.seed, own.method)
+        reflectance = chain.kernels.reflectance(land) if "image" in keep else None
     else:
         dem, horizon, _ = elevation(scenario, grid)
         land = ground_scene(scenario, grid, dem=dem)
@@ -86,19 +89,21 @@ def _of_arrays(scenario, grid, setup, keep):
 
 def _image(chain, reflectance):
     """Image and its NDVI, with the coordinates that they have."""
-    dn = chain.image(chain.toa(reflectance))
-    gain, offset, _ = chain.scale
-    along = {"band": [band.name for band in chain.bands], "wavelength": [band.wavelength for band in chain.bands]}
+    kernels = chain.kernels
+    dn = chain.image(kernels.toa(reflectance))
+    gain, offset, _ = kernels.scale
+    along = {"band": [band.name for band in kernels.bands], "wavelength": [band.wavelength for band in kernels.bands]}
     along |= {"gain": gain, "offset": offset}
-    along |= {"compression": chain.compression} if chain.compression.any() else {}
-    along |= {"solar_irradiance": chain.irradiance}
-    own = attributes_of(chain.instrument) | {"atmosphere": chain.air.text}
+    along |= {"compression": kernels.compression} if kernels.compression.any() else {}
+    along |= {"solar_irradiance": kernels.irradiance}
+    own = attributes_of(kernels.instrument) | {"atmosphere": kernels.air.text}
     attrs = cf.attributes("dn") | own | {"_FillValue": dn.dtype.type(0)}
     variables = {"dn": xr.Variable(("band", "y", "x"), dn, attrs)}
-    if chain.shows_ndvi:
-        variables["ndvi"] = xr.Variable(("y", "x"), chain.ndvi(chain.planetary(dn)), cf.attributes("ndvi") | own)
+    if kernels.shows_ndvi:
+        ndvi = kernels.ndvi(kernels.planetary(dn))
+        variables["ndvi"] = xr.Variable(("y", "x"), ndvi, cf.attributes("ndvi") | own)
     coords = grids.coordinates(chain.pixels) | cf.band_coordinates(**along)
-    return _placed(directions.with_geometry(xr.Dataset(variables, coords), chain.setup.geometry))
+    return _placed(variables, coords, directions.coordinates_of(kernels.setup.geometry))
 
 
 def _truth(scenario, chain, land):
@@ -108,14 +113,45 @@ def _truth(scenario, chain, land):
         return aggregate(truth_of(scenario, chain.setup, land), size, min_valid=chain.setup.min_valid)
     fpar_inf = scenario.ground.fpar_inf
     lai = land if isinstance(land, np.ndarray) else land["lai"].values
-    cells = {"lai": lai} | {name: chain.fpar(lai, fpar_inf, kind) for name, kind in fpar_kinds(scenario).items()}
+    kinds = fpar_kinds(scenario)
+    cells = {"lai": lai} | {name: chain.kernels.fpar(lai, fpar_inf, leaves) for name, leaves in kinds.items()}
     variables = {
         name: xr.Variable(("y", "x"), chain.means(each, size), cf.attributes(name)) for name, each in cells.items()
     }
-    return _placed(xr.Dataset(variables, grids.coordinates(chain.blocks(size))))
+    return _placed(variables, grids.coordinates(chain.blocks(size)))
 
 
-def _placed(nodes):
-    for each in nodes.variables.values():
+def _placed(variables, coordinates, others=None):
+    """Dataset on a grid; coordinates are not compared with each other, for they are made for it."""
+    for each in variables.values():
         each.encoding = {"grid_mapping": "spatial_ref"}
-    return nodes
+    bare = {name: each.variable for name, each in coordinates.items()}
+    return xr.Dataset(variables, bare | (others or {}))
+
+
+def _kernels(scenario, setup):
+    """What does not depend on place and seeds, made once for all scenes that say the same."""
+    others = {"grid": True, "ground": {"seed", "arp", "distribution", "method"}, "sensor": {"seed", "offset"}}
+    said = scenario.model_dump_json(exclude=others)
+    if scenario.files:
+        # A file may change under its name.
+        return Kernels(setup)
+    return _known(_Keyed((said, setup.geometry), setup))
+
+
+class _Keyed(NamedTuple):
+    """A setup by what it is told."""
+
+    key: tuple
+    setup: Setup
+
+    def __hash__(self):
+        return hash(self.key)
+
+    def __eq__(self, other):
+        return self.key == other.key
+
+
+@lru_cache(maxsize=32)
+def _known(keyed):
+    return Kernels(keyed.setup)

@@ -1,6 +1,7 @@
 """What an atmosphere does to light, wavelength by wavelength and band by band."""
 
-from functools import lru_cache
+import math
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -133,14 +134,25 @@ def on_wavelengths(scattering, nodes, wavelength):
         By cubics that do not overshoot: logarithms, and for a transmittance that of its optical depth, against the
         logarithm of the wavelength.
     """
-    log_nodes, log_wavelength = np.log(nodes), np.log(wavelength)
+    through = ["transmittance" in name for name in Scattering._fields]
+    depths = [-np.log(each) if is_one else each for each, is_one in zip(scattering, through, strict=True)]
+    # One interpolator for all: to make one takes longer than to use it.
+    found = _of_rows(partial(_between, np.log(nodes), np.log(wavelength)), depths)
+    return Scattering(*(np.exp(-each) if is_one else each for each, is_one in zip(found, through, strict=True)))
 
-    def between(values, is_transmittance):
-        values = np.maximum(-np.log(values) if is_transmittance else values, _TINY)
-        values = np.exp(PchipInterpolator(log_nodes, np.log(values), axis=-1)(log_wavelength))
-        return np.exp(-values) if is_transmittance else values
 
-    return Scattering(*(between(getattr(scattering, name), "transmittance" in name) for name in Scattering._fields))
+def _between(log_nodes, log_wavelength, values):
+    logs = np.log(np.maximum(values, _TINY))
+    return np.exp(PchipInterpolator(log_nodes, logs, axis=-1)(log_wavelength))
+
+
+def _of_rows(function, arrays):
+    """What a function of the last axis makes of several arrays, asked once."""
+    arrays = [np.asarray(each, float) for each in arrays]
+    rows = function(np.concatenate([each.reshape(-1, each.shape[-1]) for each in arrays]))
+    ends = np.cumsum([math.prod(each.shape[:-1]) for each in arrays])[:-1]
+    parts = np.split(rows, ends)
+    return [part.reshape(each.shape[:-1] + rows.shape[1:]) for part, each in zip(parts, arrays, strict=True)]
 
 
 def band_means(scattering, nodes, atmosphere, bands, sza, vza):
@@ -193,7 +205,7 @@ def band_means(scattering, nodes, atmosphere, bands, sza, vza):
 
 
 def _one_band(scattering, nodes, atmosphere, band, sza, vza):
-    wavelength, weight = _steps(band.limits, band.name)
+    wavelength, _ = _steps(band.limits, band.name)
     light = on_wavelengths(scattering, nodes, wavelength)
     air_mass = 1 / np.cos(np.radians(sza)) + 1 / np.cos(np.radians(vza))[:, None]
     gas = gases.gas_transmittance(wavelength, atmosphere, air_mass)
@@ -201,9 +213,7 @@ def _one_band(scattering, nodes, atmosphere, band, sza, vza):
     ground = gas * light.transmittance_down * light.transmittance_up
     path = light.reflectance * gas + light.molecules_reflectance * (dry - gas)
 
-    def mean(spectrum):
-        return band.mean(spectrum, wavelength, weight)
-
+    mean = _quadrature(band).mean
     down, up, direct = map(mean, (light.transmittance_down, light.transmittance_up, light.direct_transmittance_down))
     used = mean(ground)
     return BandTerms(
@@ -219,6 +229,12 @@ def _one_band(scattering, nodes, atmosphere, band, sza, vza):
         diffuse_up_molecules=mean(light.diffuse_up_molecules),
         diffuse_up_aerosol=mean(light.diffuse_up_aerosol),
     )
+
+
+@lru_cache(maxsize=256)
+def _quadrature(band):
+    """Means over a band, of spectra on its `_steps`."""
+    return band.quadrature(*_steps(band.limits, band.name))
 
 
 @lru_cache(maxsize=256)

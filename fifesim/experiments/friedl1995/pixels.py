@@ -107,9 +107,24 @@ def pixel_values(truth, *images):
     -------
     values : array, shape (rasters, pixels)
     """
-    rasters = (truth, *images)
-    rows, columns = min(raster.sizes["y"] for raster in rasters), min(raster.sizes["x"] for raster in rasters)
-    values = np.stack([raster.values[:rows, :columns].ravel() for raster in rasters])
+    return paired(*(raster.values for raster in (truth, *images)))
+
+
+def paired(*arrays):
+    """
+    Pixels of several arrays paired by row and column, without those where one has no data.
+
+    Parameters
+    ----------
+    *arrays : array, shape (y, x)
+        The larger ones are cut.
+
+    Returns
+    -------
+    values : array, shape (arrays, pixels)
+    """
+    rows, columns = (min(sizes) for sizes in zip(*(each.shape for each in arrays), strict=True))
+    values = np.stack([each[:rows, :columns].ravel() for each in arrays])
     return values[:, np.isfinite(values).all(axis=0)]
 
 

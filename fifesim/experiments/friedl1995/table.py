@@ -1,16 +1,18 @@
 """Table 2 of Friedl et al. (1995) over realisations, and how far it agrees with the paper's."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from fifesim.analysis import uncertainty
-from fifesim.chain.images import ndvi
+from fifesim.chain.arrays import ArrayChain
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
-from fifesim.experiments.friedl1995.pixels import block_means, cell_limits, ground_of, pixel_values, scene_image
+from fifesim.experiments.friedl1995.cells import cells_of
+from fifesim.experiments.friedl1995.pixels import paired
 from fifesim.ground.landscape.distribution import treatments
 
 SAMPLE = 200
@@ -62,7 +64,8 @@ def realise(case, seeds, readings=None, distributions=None, arps=ARPS, each=iter
     distributions = treatments() if distributions is None else list(distributions)
     land = case.land()
     scenes = [(seed, treatment, arp) for seed in seeds for treatment in distributions for arp in arps]
-    found = [_scene(cases, land, *scene) for scene in each(scenes)]
+    chains = [ArrayChain(one.setup, one.grid) for one in cases]
+    found = [_scene(cases, chains, land, *scene) for scene in each(scenes)]
     shape = (len(seeds), len(distributions), len(arps), len(cases))
     outer = ("realisation", "distribution", "arp", "reading")
     variables = {}
@@ -236,20 +239,29 @@ def draw(pixels, count, seed, draws):
     -------
     samples : array, shape (k, draws, count)
     """
-    order = np.random.default_rng(seed).random((draws, pixels.shape[1])).argsort(axis=1)
-    return pixels[:, order[:, :count]]
+    return pixels[:, _drawn(tuple(seed), pixels.shape[1], count, draws)]
 
 
-def _scene(cases, land, seed, treatment, arp):
+# Readings of a scene, and scenes that differ in one number, have samples of the same places.
+@lru_cache(maxsize=256)
+def _drawn(seed, pixels, count, draws):
+    order = np.random.default_rng(seed).random((draws, pixels)).argsort(axis=1)
+    return order[:, :count].copy()
+
+
+def _scene(cases, chains, land, seed, treatment, arp):
     """What each reading gives of a scene, a list of dicts."""
-    ground = ground_of(cases[0], treatment, arp, seed, land)
-    truth = [block_means(cases[0], ground, array) for array in (ground.lai, ground.fpar)]
-    limits = cell_limits(ground)
-    key = [seed, friedl1995.scenes().index((treatment, arp))]
+    first, kernels = chains[0], chains[0].kernels
+    cells = cells_of(cases[0], treatment, arp, seed, land, kernels)
+    truth = [first.means(array, cases[0].pixel) for array in (cells.lai, cells.fpar)]
+    toa = kernels.toa(cells.reflectance)
+    limits = np.array([(each.min(), each.max()) for each in (cells.lai, cells.fpar, kernels.ndvi(toa))])
+    key = (seed, friedl1995.scenes().index((treatment, arp)))
     found = []
-    for case in cases:
-        image = scene_image(case, ground)
-        found.append(_statistics(pixel_values(*truth, ndvi(image)), limits, key))
+    for chain in chains:
+        image = chain.image(chain.kernels.toa(cells.reflectance))
+        ndvi = chain.kernels.ndvi(chain.kernels.planetary(image))
+        found.append(_statistics(paired(*truth, ndvi), limits, key))
     return found
 
 

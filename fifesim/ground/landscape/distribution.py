@@ -16,6 +16,9 @@ from fifesim.base import datasets
 _REACH = 8.5
 _NODES = 2**14 + 1
 
+# Of so many the quantiles of ranks are kept, 2 MB.
+_FEW = 2**18
+
 # A support that starts at zero may start this far below it.
 _ROUNDING = 1e-12
 
@@ -320,7 +323,30 @@ def rank_map(field, distribution):
     >>> rank_map(np.array([3.0, -1.0]), stats.uniform()).tolist()
     [0.75, 0.25]
     """
-    order = np.argsort(field, axis=None, kind="stable")
     values = np.empty(field.size)
-    values[order] = distribution.ppf((np.arange(field.size) + 0.5) / field.size)
+    values[np.argsort(field, axis=None, kind="stable")] = rank_quantiles(distribution, field.size)
     return values.reshape(field.shape)
+
+
+def rank_quantiles(distribution, count):
+    """
+    Quantiles of a distribution that ranks stand for.
+
+    Parameters
+    ----------
+    distribution : frozen scipy distribution
+    count : int
+
+    Returns
+    -------
+    quantiles : array, shape (count,)
+        At (rank + 1/2) / count. Those of few are kept for who asks again.
+    """
+    return (_kept_quantiles if count <= _FEW else _rank_quantiles)(distribution, count)
+
+
+def _rank_quantiles(distribution, count):
+    return distribution.ppf((np.arange(count) + 0.5) / count)
+
+
+_kept_quantiles = lru_cache(maxsize=16)(_rank_quantiles)
