@@ -48,9 +48,7 @@ class ArrayChain:
     @cached_property
     def pixels(self):
         """Grid of the image, an `odc.geo.geobox.GeoBox`."""
-        return pixel_grid(
-            self.grid, self.kernels.instrument, self.kernels.bands, self.setup.onto, self.setup.interval
-        )
+        return pixel_grid(self.grid, self.kernels.instrument, self.kernels.bands, self.setup.onto, self.setup.interval)
 
     def image(self, toa):
         """
@@ -152,4 +150,3 @@ def _operators(spreads, cells, pixels, shifts=(0.0, 0.0)):
 
 
 _made_operators = lru_cache(maxsize=256)(operators)
-

@@ -110,14 +110,11 @@ class CellProgress:
             print(f"{self.label}: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
 
     def _in_words(self, state):
-        return f"{self._counted_in_words()}, {state['memory'] / 1e9:.2f} GB"
+        rate = state[f"{self.counted}_per_second"]
+        return f"{self._counted_in_words(rate)}, {state['memory'] / 1e9:.2f} GB"
 
-    def _counted_in_words(self):
-        rate = self._rate() / 1e6
-        return f"{self._done / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, {rate:.1f} million/s"
-
-    def _rate(self):
-        return (self._done - self._before) / max(time.monotonic() - self._start, 1e-9)
+    def _counted_in_words(self, rate):
+        return f"{self._done / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, {rate / 1e6:.1f} million/s"
 
     def state(self):
         """
@@ -128,7 +125,8 @@ class CellProgress:
         state : dict
             ``cells_done``, ``cells``, ``cells_per_second``, ``seconds_left`` and ``memory`` [byte].
         """
-        rate = self._rate()
+        elapsed = max(time.monotonic() - self._start, 1e-9)
+        rate = (self._done - self._before) / elapsed
         left = (self._cells - self._done) / rate if rate else None
         return {
             "event": "progress",
@@ -145,8 +143,8 @@ class ChipProgress(CellProgress):
 
     label, counted, decimals = "making chips", "chips", 1
 
-    def _counted_in_words(self):
-        return f"{self._done} of {self._cells} chips, {self._rate():.1f}/s"
+    def _counted_in_words(self, rate):
+        return f"{self._done} of {self._cells} chips, {rate:.1f}/s"
 
 
 def steps(sequence, label):

@@ -119,6 +119,16 @@ def chips_of(study, n):
     -----
     Every round of as many chips as there are landscapes has one chip of each, in a drawn order: points of a sequence
     that a landscape took in turn would lie in one part of the space.
+
+    Examples
+    --------
+    >>> from fifesim.scenario.scenario import Scenario
+    >>> chip = Scenario(grid={"width": 180, "height": 180}, terrain={"dem": "flat"})
+    >>> chips = chips_of(Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10), 20)
+    >>> np.bincount(chips.landscape).tolist()
+    [2, 2, 2, 2, 2, 2, 2, 2, 2, 2]
+    >>> chips.scenario(3).atmosphere.visibility == float(chips.table()["atmosphere.visibility"][3])
+    True
     """
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
         raise ValueError(f"n must be a whole number of chips from 1 up, got {n!r}")

@@ -61,6 +61,17 @@ class Study:
         If a key or a distribution is not possible, or a value of it not allowed.
     TypeError
         If the scenario is none.
+
+    See Also
+    --------
+    fifesim.chips_of, fifesim.dataset
+
+    Examples
+    --------
+    >>> chip = Scenario(grid={"width": 180, "height": 180}, terrain={"dem": "flat"})
+    >>> study = Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10)
+    >>> study.quotas()
+    {'train': 8, 'validation': 1, 'test': 1}
     """
 
     scenario: Scenario
@@ -147,6 +158,10 @@ def read_study(path):
     ------
     ValueError
         If it is missing or not TOML, or a key, a value or a distribution is wrong.
+
+    Examples
+    --------
+    >>> study = read_study("study.toml")  # doctest: +SKIP
     """
     values = load_values(path)
     plan, draws = values.pop("dataset", {}), values.pop("draw", None)

@@ -4,7 +4,7 @@ import json
 import re
 import time
 
-from fifesim.output.progress import CellProgress, memory, since_start, steps
+from fifesim.output.progress import CellProgress, ChipProgress, memory, since_start, steps
 
 
 def test_lines_say_where_the_run_is(capsys):
@@ -49,3 +49,18 @@ def test_nothing_is_printed_of_a_short_run_without_a_terminal(capsys):
 
 def test_memory_is_that_of_a_python_with_numpy():
     assert 20e6 < memory() < 100e9
+
+
+def test_chips_are_counted_as_cells_are(capsys, monkeypatch):
+    with ChipProgress(100, 40, as_json=True) as progress:
+        progress.advance(60)
+    *_, last = map(json.loads, capsys.readouterr().out.splitlines())
+    assert (last["chips_done"], last["chips"], last["seconds_left"]) == (100, 100, 0)
+    now = iter(range(0, 10**6, 25))
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(now)))
+    with ChipProgress(8) as progress:
+        for _ in range(8):
+            progress.advance(1)
+    assert re.match(
+        r"making chips: \d of 8 chips, 0\.0/s, \d+\.\d+ GB, .* left$", capsys.readouterr().err.splitlines()[0]
+    )

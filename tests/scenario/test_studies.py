@@ -1,5 +1,8 @@
 """Studies: what may be drawn, and what chips share."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 import fifesim
@@ -164,3 +167,11 @@ def test_unknown_keys_of_the_plan_are_refused(path):
 def test_every_part_has_its_share_of_landscapes_and_one_at_least(landscapes, split, quotas):
     study = Study(parse_scenario(SMALL), DRAWS, landscapes=landscapes, split=split)
     assert list(study.quotas().values()) == quotas
+
+
+def test_the_study_of_the_page_is_valid(tmp_path):
+    page = Path(__file__).parents[2] / "docs" / "howto" / "training_set.md"
+    (block,) = re.findall(r"^```toml\n(.*?)^```", page.read_text("utf-8"), re.S | re.M)
+    (tmp_path / "study.toml").write_text(block)
+    study = read_study(tmp_path / "study.toml")
+    assert len(study.drawn) == 7 and study.landscapes == 50

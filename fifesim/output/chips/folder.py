@@ -68,6 +68,11 @@ def dataset(study, folder, n=1000, *, overwrite=False, resume=False, client=None
     -----
     Chip k is `fifesim.simulate` of ``fifesim.chips_of(study, n).scenario(k)``, to the bit, whatever makes it; truth and
     reflectance are kept in single precision.
+
+    Examples
+    --------
+    >>> chips = dataset("study.toml", "chips.zarr", 10_000)  # doctest: +SKIP
+    >>> train = chips.sel(chip=chips.split == "train")  # doctest: +SKIP
     """
     study = study if isinstance(study, Study) else read_study(study)
     dataset_to_folder(study, folder, n, overwrite=overwrite, resume=resume, client=client)

@@ -2,10 +2,13 @@
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -179,6 +182,27 @@ def test_a_file_that_is_chosen_is_an_input(tmp_path, study):
 def test_the_folder_has_what_people_read(whole):
     assert all((whole / name).stat().st_size > 100 for name in (DATASHEET, CONTACT_SHEET))
     assert not (whole / UNFINISHED).exists()
+
+
+def test_the_loader_of_the_page_reads_each_chip_of_a_part_once(whole, monkeypatch):
+    """With what it takes of PyTorch in the place of it, as the second of two processes that share the shards."""
+    page = Path(__file__).parents[3] / "docs" / "howto" / "training_set.md"
+    (block,) = re.findall(r"^:class: no-run\n(.*?)^```", page.read_text("utf-8"), re.S | re.M)
+    workers = [SimpleNamespace(id=number, num_workers=2) for number in (0, 1)]
+    data = SimpleNamespace(IterableDataset=object, DataLoader=lambda chips, **options: chips)
+    data.get_worker_info = lambda: workers[0]
+    monkeypatch.setitem(sys.modules, "torch", SimpleNamespace(utils=SimpleNamespace(data=data), from_numpy=np.asarray))
+    monkeypatch.chdir(whole.parent)
+    names = {}
+    exec(compile(block, page, "exec"), names)
+    found = list(names["loader"])
+    data.get_worker_info = lambda: workers[1]
+    found += list(names["loader"])
+    store = xr.open_zarr(whole)
+    train = store.isel(chip=np.flatnonzero(store.split == "train"))
+    assert len(found) == train.sizes["chip"]
+    expected = {(x.tobytes(), y.tobytes()) for x, y in zip(train.toa_reflectance.values, train.lai.values, strict=True)}
+    assert {(x.tobytes(), y.tobytes()) for x, y in found} == expected
 
 
 @pytest.mark.slow
