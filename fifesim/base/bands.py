@@ -153,7 +153,7 @@ class Band:
     @property
     def center(self):
         """Response-weighted mean wavelength [um]."""
-        return float(self.mean(self.wavelength, self.wavelength))
+        return _center(self)
 
     @property
     def limits(self):
@@ -222,6 +222,11 @@ class Band:
         own = [w for w in self.wavelength if low <= w <= high]
         nodes = np.union1d(inside, own)
         return nodes, np.interp(nodes, self.wavelength, self.response)
+
+
+@lru_cache(maxsize=1024)
+def _center(band):
+    return float(band.mean(band.wavelength, band.wavelength))
 
 
 def _numbers(band, name):

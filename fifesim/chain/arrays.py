@@ -48,7 +48,9 @@ class ArrayChain:
     @cached_property
     def pixels(self):
         """Grid of the image, an `odc.geo.geobox.GeoBox`."""
-        return pixel_grid(self.grid, self.kernels.instrument, self.kernels.bands, self.setup.onto, self.setup.interval)
+        return pixel_grid(
+            self.grid, self.kernels.instrument, self.kernels.bands, self.setup.onto, self.setup.interval
+        )
 
     def image(self, toa):
         """
@@ -111,7 +113,7 @@ class ArrayChain:
         fifesim.analysis.rasters.means.aggregate
         """
         blocks = self.blocks(size)
-        return regularize(values, *_operators(areas(blocks), self.grid, blocks), min_valid=self.setup.min_valid)
+        return regularize(values, *shared_operators(areas(blocks), self.grid, blocks), min_valid=self.setup.min_valid)
 
     def _footprint_means(self, toa):
         """Means over the footprints of pixels, of bands that share a line spread at a time."""
@@ -123,7 +125,7 @@ class ArrayChain:
         for spreads, numbers in groups.items():
             names = ", ".join(bands[number].name for number in numbers)
             check_scene(spreads, self.grid, self.setup.min_valid, f"{instrument.name} {names}")
-            along = _operators(spreads, self.grid, self.pixels, shifts)
+            along = shared_operators(spreads, self.grid, self.pixels, shifts)
             means[numbers] = regularize(toa[numbers], *along, min_valid=self.setup.min_valid)
         return means
 
@@ -144,9 +146,21 @@ def as_carried(grid):
     return grids.geobox(grids.place(xr.DataArray(np.broadcast_to(0.0, grid.shape), dims=("y", "x")), grid))
 
 
-def _operators(spreads, cells, pixels, shifts=(0.0, 0.0)):
-    """Operators of scenes that share their grid, made once; a CRS takes long to compare, and does not matter here."""
-    return _made_operators(spreads, *(GeoBox(each.shape, each.affine, None) for each in (cells, pixels)), shifts)
+def shared_operators(spreads, cells, pixels, shifts=(0.0, 0.0)):
+    """
+    Operators of `fifesim.rasters.regularization.operators`, kept for scenes that share them.
+
+    Parameters
+    ----------
+    spreads, cells, pixels, shifts
+        As there, shifts as numbers.
+
+    Returns
+    -------
+    rows, columns : fifesim.base.footprints.AxisOperator
+    """
+    # A CRS takes longer to compare than an operator to make, and does not matter to it.
+    return _kept_operators(spreads, *(GeoBox(each.shape, each.affine, None) for each in (cells, pixels)), shifts)
 
 
-_made_operators = lru_cache(maxsize=256)(operators)
+_kept_operators = lru_cache(maxsize=256)(operators)

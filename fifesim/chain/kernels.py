@@ -16,6 +16,7 @@ from fifesim.chain import landscapes
 from fifesim.chain.setup import Setup
 from fifesim.ground.canopy.raster import fpar_kernel
 from fifesim.ground.canopy.rasters.evaluation import canopy_kernel
+from fifesim.ground.terrain.light import slope_reflectance
 from fifesim.rasters import directions
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response import calibration
@@ -95,6 +96,29 @@ class Kernels:
         """
         kernel, blocks = self._canopy
         return kernel(lai, *blocks)
+
+    def on_slopes(self, level, light):
+        """
+        Reflectance of ground on slopes.
+
+        Parameters
+        ----------
+        level : array, shape (band, y, x)
+            Of level ground. [1]
+        light : tuple
+            From `fifesim.ground.terrain.rasters.light.light_on_slopes`.
+
+        Returns
+        -------
+        reflectance : array, shape (band, y, x)
+            [1]
+
+        See Also
+        --------
+        fifesim.ground.terrain.rasters.light.terrain_reflectance
+        """
+        air = self._terms.direct_transmittance_down, self._terms.transmittance_down
+        return slope_reflectance(level, *light, *air, self.setup.upwelling)
 
     def fpar(self, lai, fpar_inf, leaves="all"):
         """

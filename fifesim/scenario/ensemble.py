@@ -12,6 +12,8 @@ from fifesim.chain.kernels import Kernels, labelled_only
 from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.ground.landscape.raster import scene_cells
+from fifesim.ground.terrain.rasters.dem import beside_altitude
+from fifesim.ground.terrain.rasters.light import light_on_slopes
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
 from fifesim.scenario.ground import fpar_kinds, ground_scene, truth_of
@@ -71,15 +73,22 @@ def realise(scenario, keep=KEPT):
 def _of_arrays(scenario, grid, setup, keep):
     """Image and truth by the kernels alone, where the ground is one stand on level ground; slopes have labels too."""
     chain, own = ArrayChain(setup, grid, _kernels(scenario, setup)), scenario.ground
-    made = {}
-    if scenario.terrain.dem == "flat" and scenario.landscape.is_one() and not own.lai_file:
-        land = scene_cells(grid, own.distribution, own.arp, own.seed, own.method)
-        reflectance = chain.kernels.reflectance(land) if "image" in keep else None
-    else:
+    made, dem, horizon = {}, None, None
+    if scenario.terrain.dem != "flat":
         dem, horizon, _ = elevation(scenario, grid)
+    if scenario.landscape.is_one() and not own.lai_file:
+        land = scene_cells(grid, own.distribution, own.arp, own.seed, own.method)
+    else:
         land = ground_scene(scenario, grid, dem=dem)
-        on_slopes = replace(setup, dem=dem, horizon=horizon)
-        reflectance = reflectance_of(on_slopes, land).values if "image" in keep else None
+    if "image" in keep and isinstance(land, np.ndarray):
+        reflectance = chain.kernels.reflectance(land)
+        if dem is not None:
+            dem, horizon = beside_altitude(dem, chain.kernels.air.altitude), horizon.compute(scheduler="synchronous")
+            reflectance = chain.kernels.on_slopes(
+                reflectance, light_on_slopes(dem, chain.grid, setup.geometry, horizon)
+            )
+    elif "image" in keep:
+        reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
     if "image" in keep:
         made["image"] = _image(chain, reflectance)
     if "truth" in keep:

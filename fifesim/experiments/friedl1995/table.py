@@ -199,7 +199,7 @@ def line(x, y):
     return np.stack([y_mean - slope * x_mean, slope, slope * xy / yy], axis=-1)
 
 
-def mean_noise(variable, ndvi, increment):
+def mean_noise(variable, ndvi, increment, slope=None):
     """
     Relative equivalent noise of a sample by increments.
 
@@ -208,6 +208,8 @@ def mean_noise(variable, ndvi, increment):
     variable, ndvi : array, shape (n,)
     increment : float
         Width, in units of the variable.
+    slope : float, optional
+        Of the sample's line, where it is known.
 
     Returns
     -------
@@ -219,7 +221,7 @@ def mean_noise(variable, ndvi, increment):
     sums = uncertainty.increment_sums(variable[None], ndvi[None], first, increment, increments, origin)
     count, mean, deviation = uncertainty.increment_moments(sums)
     enough = count >= _FEWEST
-    slope = line(variable, ndvi)[1]
+    slope = line(variable, ndvi)[1] if slope is None else slope
     return mean[enough], uncertainty.equivalent_noise(deviation[enough], slope, mean[enough])
 
 
@@ -271,9 +273,13 @@ def _statistics(pixels, limits, key):
     for suffix, values in (("", pixels), ("_200", samples)):
         lines = np.stack([line(values[2], values[k]) for k in range(2)])
         found |= {name + suffix: lines[..., number] for number, name in enumerate(COEFFICIENTS)}
-    found["ren"] = [
-        np.mean([mean_noise(*pair, INCREMENTS[name])[1].mean() for pair in zip(samples[k], samples[2], strict=True)])
-        for k, name in enumerate(VARIABLES)
-    ]
+    found["ren"] = [_noise_of_samples(samples[k], samples[2], INCREMENTS[name]) for k, name in enumerate(VARIABLES)]
     found["range_kept"] = np.ptp(samples, axis=-1).mean(axis=-1) / np.ptp(limits, axis=-1)
     return found
+
+
+def _noise_of_samples(variable, ndvi, increment):
+    """Mean relative equivalent noise of samples, each in the mean over its increments."""
+    slopes = line(variable, ndvi)[:, 1]
+    samples = zip(variable, ndvi, slopes, strict=True)
+    return np.mean([mean_noise(one, seen, increment, slope)[1].mean() for one, seen, slope in samples])

@@ -13,10 +13,12 @@ from fifesim.analysis.rasters.means import aggregate
 from fifesim.base.footprints import regularize
 from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
+from fifesim.chain.arrays import shared_operators
 from fifesim.chain.setup import Setup, reflectance_of
+from fifesim.experiments.scatter.cells import Stand, stand_of, tangent
 from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
 from fifesim.rasters import grid as grids
-from fifesim.rasters.regularization import areas, operators
+from fifesim.rasters.regularization import areas
 from fifesim.scenario.ground import absorbed_light
 from fifesim.scenario.land import elevation
 from fifesim.scenario.scenario import Scenario
@@ -41,9 +43,6 @@ STAGES = {
 _TRUE = ("cover", "clumping", "covariance")
 _SENSED = ("NDVI scaling", "point spread", "registration", "quantisation", "noise")
 VARIABLES = ("lai", "fpar")
-
-# Half of the step of LAI by which tangents are taken: wide beside the error of the table of reflectance, 1e-6. [1]
-_STEP = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +137,7 @@ class _Ground:
 
     land: xr.Dataset
     middle: xr.DataArray
+    stand: Stand | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +162,13 @@ class _Scene:
         kind = frozenset(at_work) & set(PROPERTIES)
         if kind not in self.grounds:
             land = ground_with(self.scenario, self.grid, kind, self.setup.dem)
-            self.grounds[kind] = _Ground(land, self.spread_out(land["lai"]))
+            self.grounds[kind] = self.made(land, self.spread_out(land["lai"]))
         return self.grounds[kind]
+
+    def made(self, land, middle):
+        """A ground, as arrays too where they do."""
+        fpar_inf = self.scenario.ground.fpar_inf
+        return _Ground(land, middle, stand_of(self.setup, self.bands, self.grid, land, middle, fpar_inf))
 
     def spread_out(self, cells):
         """Means over the pixels of the truth, on the cells."""
@@ -187,7 +192,7 @@ def _even(scene):
     land = {name: scene.spread_out(each) for name, each in whole.land.items() if name != "cover" and each.ndim == 2}
     if "cover" in whole.land:
         land["cover"] = _middle_cells(whole.land["cover"], scene.blocks)
-    return _Ground(whole.land.assign(land), whole.middle)
+    return scene.made(whole.land.assign(land), whole.middle)
 
 
 def _red_and_nir(bands):
@@ -222,13 +227,6 @@ def _places(cells, blocks):
     return last, inside[0][:, None] & inside[1]
 
 
-def _tangent(function, lai, middle):
-    """A function of leaf area along its tangent at the middle."""
-    low, high = np.maximum(middle - _STEP, 0.0), middle + _STEP
-    at = function(middle)
-    return at.copy(data=at.data + ((function(high) - function(low)) / (high - low) * (lai - middle)).data)
-
-
 def _truths(scene, switches):
     """LAI and FPAR by blocks, shape (one axis for each stage, variable, y, x)."""
     kinds = [
@@ -246,7 +244,10 @@ def _states(switches, names):
 
 def _truth(scene, ground, curve):
     """LAI and FPAR by blocks."""
-    setup = _setup_over(scene, ground)
+    setup, stand = _setup_over(scene, ground), ground.stand
+    if stand is not None:
+        size, (rows, columns) = grids.cell_size(scene.blocks)[0], scene.shape
+        return [stand.chain.means(each, size)[:rows, :columns] for each in (stand.lai, stand.fpar(bool(curve)))]
 
     def fpar(area):
         return absorbed_light(scene.scenario, setup, ground.land.assign(lai=area))
@@ -254,7 +255,7 @@ def _truth(scene, ground, curve):
     lai, size, (rows, columns) = ground.land["lai"], grids.cell_size(scene.blocks)[0], scene.shape
     return [
         aggregate(array, size, min_valid=scene.setup.min_valid).values[:rows, :columns]
-        for array in (lai, fpar(lai) if curve else _tangent(fpar, lai, ground.middle))
+        for array in (lai, fpar(lai) if curve else tangent(fpar, lai, ground.middle))
     ]
 
 
@@ -266,6 +267,10 @@ def _setup_over(scene, ground):
 
 def _cells(scene, ground, at_work):
     """Red, near infrared and NDVI of the cells, as light leaves the ground or the air, shape (3, y, x)."""
+    if ground.stand is not None:
+        light = [name in at_work for name in ("non-linearity", "topography", "atmosphere")]
+        red, nir = ground.stand.light(*light)
+        return np.stack([red, nir, indices.normalized_difference(nir, red)])
     setup = _setup_over(scene, ground)
     setup = setup if "topography" in at_work else replace(setup, dem=None, horizon=None)
 
@@ -273,7 +278,7 @@ def _cells(scene, ground, at_work):
         return reflectance_of(setup, ground.land.assign(lai=area))
 
     lai = ground.land["lai"]
-    seen = reflectance(lai) if "non-linearity" in at_work else _tangent(reflectance, lai, ground.middle)
+    seen = reflectance(lai) if "non-linearity" in at_work else tangent(reflectance, lai, ground.middle)
     if "atmosphere" in at_work:
         seen = chain.to_toa(seen, adjacency=setup.adjacency)
     red, nir = red_and_nir(seen)
@@ -307,7 +312,7 @@ def _means(scene, cells, blurred, displaced):
     means = np.empty((len(cells), rows, columns))
     for layer, band in enumerate((red, nir, red)):
         spreads = setup.instrument.line_spreads(band) if blurred else areas(scene.blocks)
-        along = operators(spreads, grid, box[:rows, :columns], shifts)
+        along = shared_operators(spreads, grid, box[:rows, :columns], tuple(map(float, shifts)))
         means[layer] = regularize(cells[layer], *along, min_valid=setup.min_valid)
     return means
 

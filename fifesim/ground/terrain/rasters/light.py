@@ -1,6 +1,7 @@
 """Terrain on labelled rasters: sky, horizon and the light on a slope, from an elevation model."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -258,27 +259,60 @@ def _of_level(kernel, reflectance, dem, geometry, horizon, name, said):
 def _on_slopes(kernel, dem, horizon, geometry, reflectance=None, check=True):
     """Array of a kernel that takes the reflectance, if there is one, and what `slope_light` takes, from grid north."""
     dem = dem if reflectance is None else with_crs_of(dem, reflectance)
-    dem_grid = elevation_grid(dem)
-    grid = dem_grid if reflectance is None else grids.geobox(reflectance)
-    offset, shape = _offset(dem_grid, grid), tuple(grid.shape)
+    grid = elevation_grid(dem) if reflectance is None else grids.geobox(reflectance)
     level = None if reflectance is None else reflectance.data
     known = None if horizon is None else horizon.data
     level, data, known = lazy_together(level, dem.transpose("y", "x").data, known)
     horizon = None if horizon is None else horizon.copy(data=known)
+    of_block, reads = _light_on(grid, dem, data, horizon, geometry, check)
+    of = data if level is None else level
+    reads += [] if level is None else [chunking.margin_reads(level, 0)]
+    chunks = None if isinstance(of, np.ndarray) else of.chunks[-2:]
+    return chunking.windows(partial(of_block, kernel), reads, of.shape, chunks)
+
+
+def light_on_slopes(dem, grid, geometry, horizon=None):
+    """
+    What slopes of a grid make their light of, in memory: the last arguments of `slope_reflectance` but the air's.
+
+    Parameters
+    ----------
+    dem : xarray.DataArray, dims (y, x)
+        On the cells of the grid, or more of them, in memory. [m]
+    grid : odc.geo.geobox.GeoBox
+    geometry : fifesim.base.geometry.Geometry
+    horizon : xarray.DataArray, dims (direction, y, x), optional
+        As in `sky_view`.
+
+    Returns
+    -------
+    elevation, sky, cell, geometry
+        As `fifesim.ground.terrain.light.slope_reflectance` takes them.
+
+    Raises
+    ------
+    ValueError
+        As in `terrain_reflectance`.
+    """
+    data = dem.transpose("y", "x").data
+    of_block, reads = _light_on(grid, dem, data, horizon, geometry, True)
+    return chunking.windows(partial(of_block, lambda *light: light), reads, tuple(grid.shape))
+
+
+def _light_on(grid, dem, data, horizon, geometry, check):
+    """What gives a block of a kernel on slopes, and what that reads of elevation and sky."""
+    dem_grid = elevation_grid(dem)
+    offset, shape = _offset(dem_grid, grid), tuple(grid.shape)
     # Aspects and horizons count from the north of the grid.
     turn, cell = projection.convergence(grid), grids.cell_size(grid)
     geometry = replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
     layers, places = sky_above(data, dem_grid, source_resolution(dem), horizon, geometry, check)
     between = places.between(offset, shape)
 
-    def block(rows, columns, elevation, layers, *rho):
+    def of_block(kernel, rows, columns, elevation, layers, *rho):
         return kernel(*rho, elevation, between.sky(layers, rows, columns), cell, geometry)
 
-    reads = [chunking.margin_reads(data, 1, offset=offset, shape=shape), between.reads(layers)]
-    of = data if level is None else level
-    reads += [] if level is None else [chunking.margin_reads(level, 0)]
-    chunks = None if isinstance(of, np.ndarray) else of.chunks[-2:]
-    return chunking.windows(block, reads, of.shape, chunks)
+    return of_block, [chunking.margin_reads(data, 1, offset=offset, shape=shape), between.reads(layers)]
 
 
 def _offset(dem_grid, grid):
