@@ -152,9 +152,11 @@ def dataset(
     if study is None and found is None:
         raise ValueError("a dataset is of a study: type its file, such as study.toml; to go on, --resume and -o")
     found = found if study is None else read_study(study)
-    if workers is None and scheduler is None:
-        workers = usable_cores()
-    with _kept(output), cluster(None if workers == 1 else workers, scheduler) as client:
+    if scheduler is None:
+        workers = workers or usable_cores()
+        # One by itself is this process.
+        workers = workers if workers > 1 else None
+    with _kept(output), cluster(workers, scheduler) as client:
         options = {"overwrite": overwrite, "resume": resume, "client": client, "as_json": as_json}
         files = dataset_to_folder(found, output, chips or count or 1000, **options)
     _say_finished(files, as_json)
