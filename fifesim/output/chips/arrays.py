@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.rasters import cf
+from fifesim.scenario.chips import chips_of
 from fifesim.scenario.ensemble import realise
 from fifesim.sensor.response import calibration
 
@@ -13,6 +14,9 @@ from fifesim.sensor.response import calibration
 LIGHT = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
 
 _ALONG_BAND = ("band", "wavelength", "gain", "offset", "compression", "solar_irradiance")
+
+# Reflectance is computed of so many chips at once, in double precision.
+_AT_ONCE = 50
 
 # Seven digits are more than a mean of leaf area has.
 _FLOAT = np.float32
@@ -153,8 +157,28 @@ def chip_arrays(chips, first, last, layout, each=lambda count: None):
         except ValueError as error:
             raise ValueError(f"chip {chip}: {error}") from error
         each(1)
-    found["toa_reflectance"][:] = _reflectance(found, layout)
+    for start in range(0, count, _AT_ONCE):
+        part = {name: values[start : start + _AT_ONCE] for name, values in found.items()}
+        part["toa_reflectance"][:] = _reflectance(part, layout)
     return found
+
+
+def make_shard(study, count, first, last, layout):
+    """
+    Arrays of some chips, on a worker that knows the study alone.
+
+    Parameters
+    ----------
+    study : fifesim.scenario.studies.Study
+    count, first, last : int
+        Chips in all, the first of the shard, and that behind the last.
+    layout : fifesim.output.chips.arrays.Layout
+
+    Returns
+    -------
+    arrays : dict of str to array
+    """
+    return chip_arrays(chips_of(study, count), first, last, layout)
 
 
 def _put(found, at, nodes, layout):

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.output import pages
-from fifesim.output.chips.contact_sheet import contact_sheet
+from fifesim.output.chips.pictures import contact_sheet
 from fifesim.scenario.chips import is_of_a_landscape
 
 _TEMPLATE = Path(__file__).with_name("datasheet.html.j2")

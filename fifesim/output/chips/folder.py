@@ -10,7 +10,7 @@ import xarray as xr
 
 from fifesim.ground.landscape.field import TILE
 from fifesim.output.chips import datasheet
-from fifesim.output.chips.arrays import chip_arrays, layout_of
+from fifesim.output.chips.arrays import chip_arrays, layout_of, make_shard
 from fifesim.output.chips.store import ROOT, Shards, checksums, make_store, stored_names, write_shard
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
 from fifesim.output.progress import ChipProgress
@@ -244,24 +244,6 @@ def _on_client(chips, layout, shards, wanted, client):
         raise RuntimeError(f"{error}: has a worker too little memory? What is finished is kept, use --resume") from None
     finally:
         client.cancel(list(futures), force=True)
-
-
-def make_shard(study, count, first, last, layout):
-    """
-    Arrays of some chips, on a worker that knows the study alone.
-
-    Parameters
-    ----------
-    study : fifesim.scenario.studies.Study
-    count, first, last : int
-        Chips in all, the first of the shard, and that behind the last.
-    layout : fifesim.output.chips.arrays.Layout
-
-    Returns
-    -------
-    arrays : dict of str to array
-    """
-    return chip_arrays(chips_of(study, count), first, last, layout)
 
 
 def _remove_other_arrays(folder, names):

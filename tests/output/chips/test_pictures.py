@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from fifesim.output.chips.contact_sheet import contact_sheet
+from fifesim.output.chips.pictures import contact_sheet
 
 
 def dataset_of(bands, wavelengths, names=("lai", "fpar"), chips=7):
