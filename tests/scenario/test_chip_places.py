@@ -14,7 +14,7 @@ def test_the_spiral_goes_step_by_step_through_all_places():
     assert set(steps) == {1}
 
 
-@pytest.mark.parametrize("size", [(4, 5), (10, 3), (13, 4)])
+@pytest.mark.parametrize("size", [(4, 5), (3, 5), (10, 3), (13, 4)])
 @pytest.mark.parametrize("corner", [(0, 0), (-17, 23)])
 def test_no_two_chips_share_a_cell(size, corner):
     cells = set()

@@ -74,6 +74,8 @@ def test_chips_have_the_sun_and_the_air_of_the_study_wherever_they_lie():
     far = study.scenario_with({("grid", "west"): 600_000.0, ("grid", "north"): 4_200_000.0})
     assert far.sun_and_view() == study.scenario.sun_and_view()
     assert far.model_atmosphere() == study.scenario.model_atmosphere()
+    # Written out, so that no chip looks the sun up.
+    assert study.values["geometry"]["sza"] == study.scenario.sun_and_view().sza
     dates = Study(parse_scenario(SMALL), {"time": {"choice": ["1987-06-06T16:35Z", "1987-10-06T16:35Z"]}})
     drawn = {("geometry", "time"): "1987-10-06T16:35Z"}
     here = dates.scenario_with(drawn)
