@@ -48,9 +48,7 @@ class ArrayChain:
     @cached_property
     def pixels(self):
         """Grid of the image, an `odc.geo.geobox.GeoBox`."""
-        return pixel_grid(
-            self.grid, self.kernels.instrument, self.kernels.bands, self.setup.onto, self.setup.interval
-        )
+        return pixel_grid(self.grid, self.kernels.instrument, self.kernels.bands, self.setup.onto, self.setup.interval)
 
     def image(self, toa):
         """

@@ -27,7 +27,6 @@ _CANOPY = ("leaf_optics", "background", "leaf_angles", "hotspot", "brown", "diss
 _CANOPY += ("crown_cover", "crown_shape", "soil", "moisture")
 
 
-
 @dataclass(frozen=True, eq=False)
 class Kernels:
     """

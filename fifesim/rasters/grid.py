@@ -13,6 +13,7 @@ from fifesim.base.lattice import centres, whole_cells
 from fifesim.rasters import projection
 from fifesim.rasters.axes import check_axes
 from fifesim.rasters.references import reference_of
+from fifesim.rasters.spacing import along_axis, exact_cell
 
 _LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
 
@@ -130,8 +131,8 @@ def geobox(array):
         cure = ": one row tells no cell, give .rio.write_transform(...)" if 1 in (array.y.size, array.x.size) else ""
         raise ValueError(f"the raster's x and y are not the centres of a regular grid{cure}")
     a = found.affine
-    (west, cell_x), (north, cell_y) = _axis(array, "x", a.c, a.a), _axis(array, "y", a.f, a.e)
-    cell_x, cell_y = _exact_cell(array, cell_x, cell_y)
+    (west, cell_x), (north, cell_y) = along_axis(array, "x", a.c, a.a), along_axis(array, "y", a.f, a.e)
+    cell_x, cell_y = exact_cell(array, cell_x, cell_y)
     return check_grid(_snapped(GeoBox(found.shape, Affine(cell_x, a.b, west, a.d, cell_y, north), found.crs)))
 
 
@@ -331,28 +332,3 @@ def _snapped(grid):
     west, north = column * a.a + x_offset, row * a.e + y_offset
     crs = f"EPSG:{grid.crs.epsg}" if grid.crs and grid.crs.epsg else grid.crs
     return GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), crs)
-
-
-def _axis(array, name, edge, cell):
-    """Outer edge and cell along an axis, from all coordinates; odc-geo, whose these are, looks at two."""
-    if name not in array.coords:
-        return edge, cell
-    if array.sizes[name] == 1:
-        # Of a part, the GeoTransform is that of the whole: its cell holds, its corner does not.
-        return float(array.coords[name].values[0] - cell / 2), cell
-    centres = array.coords[name].values.astype(float)
-    even, cell = np.linspace(centres[0], centres[-1], centres.size, retstep=True)
-    # Single precision resolves half a metre of a northing, a sixtieth of a 30 m cell.
-    if not np.allclose(centres, even, rtol=0, atol=abs(cell) / 60):
-        raise ValueError(f"the raster's {name} is not evenly spaced: interpolate it onto a regular grid with .interp")
-    return float(centres[0] - cell / 2), float(cell)
-
-
-def _exact_cell(array, cell_x, cell_y):
-    """Cell size from the GeoTransform, which keeps its digits, where the coordinates agree with it."""
-    transform = array.coords["spatial_ref"].attrs.get("GeoTransform") if "spatial_ref" in array.coords else None
-    if transform:
-        numbers = [float(number) for number in transform.split()]
-        if np.allclose((numbers[1], numbers[5]), (cell_x, cell_y), rtol=1e-6):
-            return numbers[1], numbers[5]
-    return cell_x, cell_y

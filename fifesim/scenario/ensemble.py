@@ -17,7 +17,7 @@ from fifesim.ground.terrain.rasters.light import light_on_slopes
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
 from fifesim.scenario.ground import fpar_kinds, ground_scene, truth_of
-from fifesim.scenario.land import elevation
+from fifesim.scenario.land import elevation, in_memory
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of, simulate
 from fifesim.sensor.description.rasters.carried import attributes_of
@@ -75,7 +75,7 @@ def _of_arrays(scenario, grid, setup, keep):
     chain, own = ArrayChain(setup, grid, _kernels(scenario, setup)), scenario.ground
     made, dem, horizon = {}, None, None
     if scenario.terrain.dem != "flat":
-        dem, horizon, _ = elevation(scenario, grid)
+        dem, horizon = in_memory(*elevation(scenario, grid)[:2])
     if scenario.landscape.is_one() and not own.lai_file:
         land = scene_cells(grid, own.distribution, own.arp, own.seed, own.method)
     else:
@@ -83,10 +83,8 @@ def _of_arrays(scenario, grid, setup, keep):
     if "image" in keep and isinstance(land, np.ndarray):
         reflectance = chain.kernels.reflectance(land)
         if dem is not None:
-            dem, horizon = beside_altitude(dem, chain.kernels.air.altitude), horizon.compute(scheduler="synchronous")
-            reflectance = chain.kernels.on_slopes(
-                reflectance, light_on_slopes(dem, chain.grid, setup.geometry, horizon)
-            )
+            light = beside_altitude(dem, chain.kernels.air.altitude), chain.grid, setup.geometry, horizon
+            reflectance = chain.kernels.on_slopes(reflectance, light_on_slopes(*light))
     elif "image" in keep:
         reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
     if "image" in keep:

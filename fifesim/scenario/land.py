@@ -5,8 +5,10 @@ import numpy as np
 from fifesim.ground.terrain.rasters import light as terrain_raster
 from fifesim.ground.terrain.rasters import sky as sky_raster
 from fifesim.ground.terrain.rasters import slopes
+from fifesim.ground.terrain.rasters.dem import elevation_grid
 from fifesim.ground.terrain.rasters.elevation import fine_dem, source_dem
 from fifesim.ground.terrain.rasters.hills import flint_hills
+from fifesim.ground.terrain.rasters.places import horizon_places
 from fifesim.rasters import grid as grids
 
 # The synthetic hills around a scene are made at this resolution, as its own horizons are. [m]
@@ -60,6 +62,26 @@ def elevation(scenario, grid, chunks=None):
     horizon = sky_raster.horizon(around, reach=terrain.horizon_reach, beside=dem)
     _check_sun(middle, around, horizon, scenario.sun_and_view())
     return dem, horizon, reach
+
+
+def in_memory(dem, horizon):
+    """
+    Elevation and horizon in memory, of the horizon what lies above the elevation.
+
+    Parameters
+    ----------
+    dem, horizon : xarray.DataArray or None
+        From `elevation`.
+
+    Returns
+    -------
+    dem, horizon : xarray.DataArray or None
+    """
+    if horizon is None:
+        return dem if dem is None else dem.compute(), None
+    _, (rows, columns) = horizon_places(elevation_grid(dem), horizon)
+    # A scene of a thousand pixels needs a hundredth of what lies within reach.
+    return dem.compute(), horizon.isel(y=rows, x=columns).compute()
 
 
 def cut(raster, grid):

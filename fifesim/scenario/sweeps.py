@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
+from fifesim.scenario.ensemble import realise
 from fifesim.scenario.named_keys import changed, find_key, in_text
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import simulate
@@ -81,11 +82,13 @@ def sweep(scenario, axes, measures=None, *, pair="coordinates"):
 
 def _point(scenario, measures, pair):
     """Results of one scenario, computed in this thread: the points are what runs in parallel."""
-    run = simulate(scenario)
-    kept = xr.DataTree.from_dict({name: run[name].to_dataset() for name in ("image", "truth")})
-    kept = kept.map_over_datasets(lambda each: each.compute(scheduler="synchronous"))
     if measures is not None:
+        run = simulate(scenario)
+        kept = xr.DataTree.from_dict({name: run[name].to_dataset() for name in ("image", "truth")})
+        # What measures a run may look at all that it says.
+        kept = kept.map_over_datasets(lambda each: each.compute(scheduler="synchronous"))
         return np.array([float(measure(kept)) for measure in measures.values()])
+    kept = realise(scenario)
     fits = [regress(kept["truth"][name], kept["image"]["ndvi"], pair=pair) for name in VARIABLES]
     return np.array([[getattr(fit, name) for fit in fits] for name in STATISTICS], float)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fifesim.chain.arrays import ArrayChain
-from fifesim.chain.kernels import Kernels, labelled_only
+from fifesim.chain.kernels import labelled_only
 from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.ground.terrain.rasters.light import light_on_slopes
 
@@ -82,9 +82,9 @@ class Stand:
         return function(self.lai) if curve else tangent(function, self.lai, self.middle)
 
 
-def stand_of(setup, bands, grid, land, middle, fpar_inf):
+def arrays_of(setup, bands, grid):
     """
-    Cells of a scene, where plain arrays do.
+    What stands on one grid share, where plain arrays do.
 
     Parameters
     ----------
@@ -93,24 +93,21 @@ def stand_of(setup, bands, grid, land, middle, fpar_inf):
     bands : sequence of fifesim.sensor.description.band.InstrumentBand
         Red and near infrared.
     grid : odc.geo.geobox.GeoBox
-    land : xarray.Dataset
-        In memory.
-    middle, fpar_inf
-        As of `Stand`.
 
     Returns
     -------
-    stand : Stand or None
+    chain : fifesim.chain.arrays.ArrayChain or None
         None where more than leaf area varies.
+    slopes : tuple or None
     """
     level = replace(setup, dem=None, horizon=None, bands=tuple(band.name for band in bands))
-    if set(land.data_vars) != {"lai"} or labelled_only(level):
-        return None
-    chain, slopes = ArrayChain(level, grid, Kernels(level)), None
-    if setup.dem is not None:
-        dem = beside_altitude(setup.dem, chain.kernels.air.altitude)
-        slopes = light_on_slopes(dem, chain.grid, setup.geometry, setup.horizon)
-    return Stand(chain, slopes, land["lai"].values, middle.values, fpar_inf)
+    if labelled_only(level):
+        return None, None
+    chain = ArrayChain(level, grid)
+    if setup.dem is None:
+        return chain, None
+    dem = beside_altitude(setup.dem, chain.kernels.air.altitude)
+    return chain, light_on_slopes(dem, chain.grid, setup.geometry, setup.horizon)
 
 
 def tangent(function, lai, middle):

@@ -1,6 +1,7 @@
 """Images of a scene with any of its stages at their ideal."""
 
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -15,15 +16,15 @@ from fifesim.base.line_spread import Boxcar
 from fifesim.chain import steps as chain
 from fifesim.chain.arrays import shared_operators
 from fifesim.chain.setup import Setup, reflectance_of
-from fifesim.experiments.scatter.cells import Stand, stand_of, tangent
+from fifesim.experiments.scatter.blocks import middle_cells, spread_out_means
+from fifesim.experiments.scatter.cells import Stand, arrays_of, tangent
 from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas
 from fifesim.scenario.ground import absorbed_light
-from fifesim.scenario.land import elevation
+from fifesim.scenario.land import elevation, in_memory
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
-from fifesim.sensor import raster as sensor
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import pixel_grid
@@ -165,15 +166,23 @@ class _Scene:
             self.grounds[kind] = self.made(land, self.spread_out(land["lai"]))
         return self.grounds[kind]
 
+    @cached_property
+    def arrays(self):
+        """The chain and the slopes of one stand, where plain arrays do."""
+        return arrays_of(self.setup, self.bands, self.grid)
+
     def made(self, land, middle):
         """A ground, as arrays too where they do."""
+        chain, slopes = self.arrays
+        if chain is None or set(land.data_vars) != {"lai"}:
+            return _Ground(land, middle)
         fpar_inf = self.scenario.ground.fpar_inf
-        return _Ground(land, middle, stand_of(self.setup, self.bands, self.grid, land, middle, fpar_inf))
+        return _Ground(land, middle, Stand(chain, slopes, land["lai"].values, middle.values, fpar_inf))
 
     def spread_out(self, cells):
         """Means over the pixels of the truth, on the cells."""
         means = aggregate(cells, grids.cell_size(self.blocks)[0], min_valid=self.setup.min_valid)
-        return _spread_out(means, cells)
+        return spread_out_means(means, cells)
 
 
 def _scene(scenario):
@@ -182,7 +191,7 @@ def _scene(scenario):
     blocks = grids.aligned(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     # In memory: every set of stages with topography asks for them.
-    dem, horizon = (each if each is None else each.compute() for each in elevation(scenario, grid)[:2])
+    dem, horizon = in_memory(*elevation(scenario, grid)[:2])
     return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, grid, blocks, image)
 
 
@@ -191,7 +200,7 @@ def _even(scene):
     whole = scene.ground(PROPERTIES)
     land = {name: scene.spread_out(each) for name, each in whole.land.items() if name != "cover" and each.ndim == 2}
     if "cover" in whole.land:
-        land["cover"] = _middle_cells(whole.land["cover"], scene.blocks)
+        land["cover"] = middle_cells(whole.land["cover"], scene.blocks)
     return scene.made(whole.land.assign(land), whole.middle)
 
 
@@ -200,31 +209,6 @@ def _red_and_nir(bands):
     coords = {"wavelength": ("band", [band.wavelength for band in bands])}
     numbers = xr.DataArray(np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords=coords)
     return tuple(bands[number.item()] for number in red_and_nir(numbers))
-
-
-def _spread_out(means, cells):
-    """Means of blocks over their cells; a cell of no block keeps its own, and one without data has none."""
-    (rows, columns), inside = _places(cells, grids.geobox(means))
-    spread = means.values[rows][:, columns]
-    return cells.copy(data=np.where(inside & np.isfinite(spread) & np.isfinite(cells.values), spread, cells.values))
-
-
-def _middle_cells(cells, blocks):
-    """The cell in the middle of each block over its cells; one of no block keeps its own."""
-    (rows, columns), inside = _places(cells, blocks)
-    sizes = zip(grids.cell_size(blocks), grids.cell_size(grids.geobox(cells)), strict=True)
-    down, across = (block / cell for block, cell in sizes)
-    middle = cells.values[((rows + 0.5) * down).astype(int)][:, ((columns + 0.5) * across).astype(int)]
-    return cells.copy(data=np.where(inside & (cells.values >= 0), middle, cells.values))
-
-
-def _places(cells, blocks):
-    """Row and column of the block of each cell, at most the last, and whether the cell lies in it."""
-    sizes = zip(grids.cell_size(grids.geobox(cells)), grids.cell_size(blocks), cells.shape, strict=True)
-    places = [np.floor((np.arange(count) + 0.5) * cell / block + 1e-9).astype(int) for cell, block, count in sizes]
-    inside = [place < count for place, count in zip(places, blocks.shape, strict=True)]
-    last = [np.minimum(place, count - 1) for place, count in zip(places, blocks.shape, strict=True)]
-    return last, inside[0][:, None] & inside[1]
 
 
 def _truths(scene, switches):
@@ -322,17 +306,17 @@ def _recorded(scene, means, counts, grains):
     setup, geometry, bands = scene.setup, scene.setup.geometry, scene.bands
     known = [(band.full_scale_radiance, band.min_radiance, band.solar_irradiance) for band in bands]
     full_scale, lowest, irradiance = np.array(known).T[..., None, None]
-    radiance = sensor.as_radiance(xr.DataArray(means, dims=("band", "y", "x")), bands, geometry)
+    distance = geometry.earth_sun_distance
+    radiance = calibration.reflectance_to_radiance(means, irradiance, geometry.mu_s, distance)
     if grains:
-        first = grids.lattice_position(scene.image)
-        radiance = noisy(radiance, setup.instrument, bands, setup.noise, setup.seed, first, setup.noise_models)
-    radiance = radiance.values
+        plain, first = xr.DataArray(radiance, dims=("band", "y", "x")), grids.lattice_position(scene.image)
+        said = setup.noise, setup.seed, first, setup.noise_models
+        radiance = noisy(plain, setup.instrument, bands, *said).values
     if counts:
         gain, offset = calibration.gain_offset(full_scale, lowest, setup.instrument.bits)
         compression = np.array([band.compressed_count(setup.instrument.bits) for band in bands])[:, None, None]
         dn = calibration.radiance_to_dn(radiance, gain, offset, setup.instrument.bits, compression)
         radiance = calibration.dn_to_radiance(dn, gain, offset, compression)
-    distance = geometry.earth_sun_distance
     red, nir = calibration.radiance_to_reflectance(radiance, irradiance, geometry.mu_s, distance)
     return indices.normalized_difference(nir, red)
 

@@ -342,11 +342,9 @@ def rank_quantiles(distribution, count):
     quantiles : array, shape (count,)
         At (rank + 1/2) / count. Those of few are kept for who asks again.
     """
-    return (_kept_quantiles if count <= _FEW else _rank_quantiles)(distribution, count)
+    return (_kept_quantiles if count <= _FEW else _kept_quantiles.__wrapped__)(distribution, count)
 
 
-def _rank_quantiles(distribution, count):
+@lru_cache(maxsize=16)
+def _kept_quantiles(distribution, count):
     return distribution.ppf((np.arange(count) + 0.5) / count)
-
-
-_kept_quantiles = lru_cache(maxsize=16)(_rank_quantiles)

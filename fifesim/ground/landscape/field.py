@@ -153,6 +153,19 @@ def _tile(weights, arp, tile_row, tile_column):
     return tile
 
 
+def keep_tiles(count):
+    """
+    Keep more tiles than a large scene needs, for many small ones that share them; those that are kept go.
+
+    Parameters
+    ----------
+    count : int
+        Each takes 4 MB of memory.
+    """
+    global _tile
+    _tile = lru_cache(maxsize=count)(_tile.__wrapped__)
+
+
 def window_field(seed, arp, row, column, shape):
     """
     Window of the streaming field, filtered by itself instead of by its tiles.

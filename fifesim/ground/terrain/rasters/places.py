@@ -186,16 +186,16 @@ def chunks_beside(dem, coarse):
     Parameters
     ----------
     dem : xarray.DataArray, dims (y, x)
-        Lazy elevation.
+        Elevation; where it is not lazy, all of it is one chunk.
     coarse : odc.geo.geobox.GeoBox
 
     Returns
     -------
     chunks : (tuple of int, tuple of int)
     """
-    grid = grids.geobox(dem)
+    grid, own = grids.geobox(dem), dem.chunks or tuple((size,) for size in dem.shape)
     chunks = []
-    for at, cut, sizes in zip(_positions(grid, coarse), _around(grid, coarse), dem.chunks, strict=True):
+    for at, cut, sizes in zip(_positions(grid, coarse), _around(grid, coarse), own, strict=True):
         inside = np.clip(np.round(at[cut]), 0, sum(sizes) - 1)
         beyond = cut.start, at.size - min(cut.stop, at.size)
         chunks.append(tuple(filter(None, (beyond[0], *chunking.runs(inside, sizes), beyond[1]))))

@@ -36,7 +36,8 @@ def horizon(dem, *, directions=DIRECTIONS, reach=REACH, resolution=None, beside=
         Spacing of the cells at which the horizon is found, as a whole number of cells; by default the attribute
         ``source_resolution`` of ``dem``, else 30 m. [m]
     beside : xarray.DataArray, dims (y, x), optional
-        A lazy elevation model that ``dem`` lies around. A lazy result then has a chunk for each of its.
+        An elevation model that ``dem`` lies around. A lazy result then has a chunk for each of its, one if it is not
+        lazy.
 
     Returns
     -------
@@ -58,7 +59,7 @@ def horizon(dem, *, directions=DIRECTIONS, reach=REACH, resolution=None, beside=
     horizons.horizon_margin(*places.cell, reach)
     useful = _useful_reach(reach, places)
     reads = chunking.margin_reads(samples[0], *horizons.horizon_margin(*places.cell, useful))
-    if chunks is not None and beside is not None and beside.chunks is not None:
+    if chunks is not None and beside is not None:
         chunks = chunks_beside(beside.transpose("y", "x"), places.coarse)
 
     def kernel(rows, columns, block):
