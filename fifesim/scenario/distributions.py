@@ -100,21 +100,6 @@ class Distribution:
         return {self.kind: list(self.values)} | beside
 
 
-def is_distribution(table):
-    """
-    Whether a table of TOML is meant as a distribution, and not as a table of keys.
-
-    Parameters
-    ----------
-    table : object
-
-    Returns
-    -------
-    answer : bool
-    """
-    return isinstance(table, Mapping) and any(name in _KINDS for name in table)
-
-
 def distribution_of(table, convert=lambda value: value):
     """
     Distribution of a table.
