@@ -115,11 +115,15 @@ from .rasters.files import open_image as open_image
 from .output.styles import write_style as write_style
 from .scenario.simulation import simulate as simulate
 from .scenario.sweeps import sweep as sweep
+from .output.chips.folder import dataset as dataset
 from .experiments.scatter.shares import budget as budget
 from .experiments.explorer.writing import explore as explore
 from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import default_scenario as default_scenario
 from .scenario.scenario import read_scenario as read_scenario
+from .scenario.studies import Study as Study
+from .scenario.studies import read_study as read_study
+from .scenario.chips import chips_of as chips_of
 from .experiments.friedl1995.reproduction import reproduce as reproduce
 from .experiments.friedl1995.figures import plot_reproduction as plot_reproduction
 from .experiments.verification.areas import verify as verify

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from fifesim.output.terminal import Door, Exit, Quiet, Verbose, report
+from fifesim.output.terminal import Door, Exit, Quiet, Verbose, kept, report
 from fifesim.output.terminal import importing as _importing
 from fifesim.output.terminal import say as _say
 from fifesim.output.terminal import stop as _stop
@@ -24,6 +24,10 @@ app = typer.Typer(
 
 
 _Paper = Annotated[bool, typer.Option("--paper", help="The paper's one stand, in the place of the landscape.")]
+_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")]
+_Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")]
+_Scheduler = Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")]
+_AsJson = Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")]
 _AllowRemote = Annotated[
     bool, typer.Option("--allow-remote", help="Rasters may come from addresses, in any format of GDAL.")
 ]
@@ -51,13 +55,13 @@ def simulate(
     context: typer.Context,
     scenario: Annotated[Path | None, typer.Argument(help="TOML file; a landscape on the FIFE site by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("fife"),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
+    overwrite: _Overwrite = False,
+    resume: _Resume = False,
     scene: Annotated[bool, typer.Option("--scene", help="Write the cells too: scene.zarr.")] = False,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; one for each core by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Compute on so many processes.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")] = False,
+    scheduler: _Scheduler = None,
+    as_json: _AsJson = False,
     paper: _Paper = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only estimate time, memory and disk.")] = False,
     allow_remote: _AllowRemote = False,
@@ -89,18 +93,11 @@ def simulate(
         _say(estimate_in_words(estimate(found, output, **options), as_json))
         return
     found.complete()
-    try:
-        with cluster(workers, scheduler) as client:
-            options = {"overwrite": overwrite, "resume": resume, "scene": scene, "as_json": as_json}
-            files = simulate_to_folder(found, output, threads=threads, client=client, **options)
-    except KeyboardInterrupt:
-        kept = f"what is finished is kept, go on with --resume -o {output}" if output.exists() else "nothing is written"
-        _stop(f"interrupted; {kept}", Exit.INTERRUPTED)
-    seconds = time.monotonic() - start
-    if as_json:
-        _say(json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)}))
-        return
-    report(files, seconds, f"{output / 'report.html'} in a browser, {output / 'image.tif'} in a GIS")
+    with kept(output), cluster(workers, scheduler) as client:
+        options = {"overwrite": overwrite, "resume": resume, "scene": scene, "as_json": as_json}
+        files = simulate_to_folder(found, output, threads=threads, client=client, **options)
+    look = f"{output / 'report.html'} in a browser, {output / 'image.tif'} in a GIS"
+    report(files, time.monotonic() - start, look, as_json)
 
 
 @app.command()
@@ -121,6 +118,42 @@ def rerun(
     _say(in_words(file, found))
     if found.differing:
         raise typer.Exit(Exit.FAILURE)
+
+
+@app.command()
+def dataset(
+    study: Annotated[Path | None, typer.Argument(help="TOML file: a scenario, and in [draw] what varies.")] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the chips, a Zarr store.")] = Path(
+        "chips.zarr"
+    ),
+    chips: Annotated[int | None, typer.Option("-n", "--chips", min=1, help="How many; 1000 by default.")] = None,
+    overwrite: _Overwrite = False,
+    resume: _Resume = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
+    scheduler: _Scheduler = None,
+    as_json: _AsJson = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+):
+    """Make a training set: images and truth of many chips, as sharded Zarr with a datasheet."""
+    start = time.monotonic()
+    with _importing():
+        from fifesim.output.chips.folder import dataset_to_folder, study_to_resume
+        from fifesim.output.run.workers import cluster, usable_cores
+        from fifesim.scenario.studies import read_study
+
+    found, count = study_to_resume(output) if resume else (None, None)
+    if study is None and found is None:
+        raise ValueError("a dataset is of a study: type its file, such as study.toml; to go on, --resume and -o")
+    found = found if study is None else read_study(study)
+    if scheduler is None:
+        workers = workers or usable_cores()
+        # One by itself is this process.
+        workers = workers if workers > 1 else None
+    with kept(output), cluster(workers, scheduler) as client:
+        options = {"overwrite": overwrite, "resume": resume, "client": client, "as_json": as_json}
+        files = dataset_to_folder(found, output, chips or count or 1000, **options)
+    report(files, time.monotonic() - start, f"{output / 'datasheet.html'} in a browser", as_json)
 
 
 @app.command()
@@ -146,7 +179,7 @@ def reproduce(
     cells: Annotated[int | None, typer.Option(help="Along the edge of a scene, of 3.33 m each; 333 for TM.")] = None,
     seed: Annotated[int, typer.Option(help="Of the first realisation; the others follow.")] = 1995,
     scenes: Annotated[bool, typer.Option("--scenes", help="Write image, truth and scene of each scenario.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+    overwrite: _Overwrite = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
@@ -178,7 +211,7 @@ def budget(
     cells: Annotated[int | None, typer.Option(help="Along the edge of a scene; 333, or 12 large pixels.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the first scene; the scenario's by default.")] = None,
     sensor: Annotated[str | None, typer.Option(help="An instrument over level ground, instead of a file.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")] = False,
+    overwrite: _Overwrite = False,
     allow_remote: _AllowRemote = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
@@ -265,7 +298,7 @@ def verify():
     found = []
     _say(HEADING)
     try:
-        for text in by_stage(_kept(deviations(), found)):
+        for text in by_stage(_collected(deviations(), found)):
             _say(text)
     except FileNotFoundError as error:
         # A table that the installation lacks is no mistake of who asks.
@@ -275,7 +308,7 @@ def verify():
         raise typer.Exit(Exit.FAILURE)
 
 
-def _kept(items, kept):
+def _collected(items, kept):
     """Items as they come, which go into a list too."""
     for item in items:
         kept.append(item)

@@ -254,6 +254,55 @@ def test_json_says_how_far_it_is(invoke, small, monkeypatch):
     assert lines[-1]["seconds"] > 0
 
 
+STUDY = """
+[grid]
+width = 180
+height = 180
+
+[terrain]
+dem = "flat"
+
+[dataset]
+landscapes = 3
+
+[draw]
+visibility = { uniform = ["10 km", 60] }
+"""
+
+
+def test_dataset_makes_chips_and_names_what_people_read(invoke, tmp_path):
+    (tmp_path / "study.toml").write_text(STUDY)
+    result = invoke("dataset", "study.toml", "-n", 4, "--workers", 1, "--json")
+    assert result.exit_code == 0, result.output
+    *_, progress, last = map(json.loads, result.stdout.splitlines())
+    assert progress["chips_done"] == progress["chips"] == 4
+    assert last["files"] == [
+        f"chips.zarr{name}" for name in ("", "/datasheet.html", "/contact_sheet.png", "/study.toml")
+    ]
+    assert all((tmp_path / name).exists() for name in last["files"])
+    again = invoke("dataset", "study.toml", "-n", 4, "--workers", 1)
+    assert again.exit_code == 2 and "is not empty" in again.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text", "said"),
+    [
+        ([], STUDY, "a dataset is of a study: type its file"),
+        (["--resume"], STUDY, "a dataset is of a study: type its file"),
+        (["study.toml"], STUDY.replace("visibility", "visibilty"), "did you mean 'visibility'"),
+        (["study.toml"], STUDY.replace("uniform", "unifrom"), "did you mean 'uniform'"),
+        (["study.toml"], STUDY.replace('"10 km"', "1"), "draw.atmosphere.visibility"),
+        (["study.toml"], "[grid]\nwidth = 180\nheight = 180\n", "a study draws something"),
+        (["study.toml", "--workers", "2", "--scheduler", "tcp://nowhere:1"], STUDY, "give one of them"),
+    ],
+)
+def test_a_mistake_in_a_study_is_named_and_nothing_is_written(invoke, tmp_path, arguments, text, said):
+    (tmp_path / "study.toml").write_text(text)
+    result = invoke("dataset", *arguments, "-n", 2)
+    assert result.exit_code == 2 and said in result.stderr, result.output
+    assert len(result.stderr) <= 520 and not (tmp_path / "chips.zarr").exists()
+
+
 def test_workers_and_a_scheduler_are_not_asked_for_together(invoke, small):
     result = invoke("simulate", small, "--workers", 2, "--scheduler", "tcp://nowhere:1")
     assert result.exit_code == 2

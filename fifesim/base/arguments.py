@@ -42,6 +42,7 @@ from fifesim.base.kinds import (
     SCENARIO,
     SETUP,
     SPREAD,
+    STUDY,
     SURROUNDINGS,
     TABLES,
     TEXT,
@@ -76,10 +77,12 @@ KINDS = (
     | _of(LEAF, "leaf_optics brown_leaf")
     | _of(HORIZON, "horizon")
     | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality reflect")
+    | _of(FLAG, "resume")
     | _of(TEXT, "angles scaling pair quantity method datum vertical_units engine profile along band leaves")
     | _of(NAMES, "bands noise engines")
     | _of(MAPPING, "arps correlations covariates reference tags")
-    | _of(PATH, "path")
+    | _of(PATH, "path folder")
+    | _of(STUDY, "study")
     | _of(FILE_OR_RASTER, "path_or_raster")
     | _of(RASTER, "dem elevation beside truth ndvi variable lai")
     | _of(GRID, "grid onto")
@@ -122,6 +125,8 @@ OF_FUNCTION = {
     | _of(FILE_BY_BAND, "optics background")
     | _of(PATH, "sensor")
     | _of(TEXT, "reading"),
+    "dataset": _of(NUMBER, "n"),
+    "chips_of": _of(NUMBER, "n") | _of(ANYTHING, "study"),
     "plot_reproduction": _of(NUMBER, "number") | _of(REPRODUCED, "found") | _of(TEXT, "reading"),
 }
 """The same of single functions, where it is another."""

@@ -175,6 +175,10 @@ SETUP = Kind("a fifesim.Setup", lambda value: is_a(value, "Setup"))
 TRACK = Kind("a fifesim.Track", lambda value: is_a(value, "Track"))
 REGRESSION = Kind("a fifesim.Regression, as fifesim.regress gives it", lambda value: is_a(value, "Regression"))
 SCENARIO = Kind("a fifesim.Scenario, as fifesim.read_scenario gives it", lambda value: is_a(value, "Scenario"))
+STUDY = Kind(
+    "the path of a study, such as 'study.toml', or a fifesim.Study",
+    lambda value: is_path(value) or is_a(value, "Study"),
+)
 SPREAD = Kind(
     "a line spread function, such as fifesim.instrument('TM').line_spread", lambda value: hasattr(value, "half_width")
 )

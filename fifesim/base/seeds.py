@@ -2,8 +2,8 @@
 Seeds, and random numbers that are a function of a seed and of a place.
 
 Each stage draws from streams of its own, so that one seed serves them all: 1 is the periodic field, 2 the library of
-spectra, 16 and up are the synthetic hills, 2**40 and up the bands of a sensor, 2**50 and up make seeds of the fields of
-a landscape. The streaming field has its own generator.
+spectra, 3 to 6 parameters and landscapes of the chips of a study, 16 and up are the synthetic hills, 2**40 and up the
+bands of a sensor, 2**50 and up make seeds of the fields of a landscape. The streaming field has its own generator.
 """
 
 import numpy as np

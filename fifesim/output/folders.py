@@ -109,6 +109,30 @@ def results(folder, names, *, overwrite=False, resume=False, worth_keeping=None)
 
 
 @contextmanager
+def errors_with_their_file(folder):
+    """
+    Have errors of the system say which file they met, and what can be done; a context manager.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Of results.
+
+    Raises
+    ------
+    OSError
+        In place of another.
+    """
+    try:
+        yield
+    except OSError as error:
+        name = f" ({error.filename})" if error.filename and str(error.filename) not in str(error.strerror) else ""
+        said = f"{error.strerror}{name}" if error.strerror else str(error)
+        hint = f"; what is finished is kept, go on with --resume -o {folder}"
+        raise OSError(f"{said}{hint if (folder / UNFINISHED).exists() else ''}") from error
+
+
+@contextmanager
 def _held(folder):
     """The hidden folder of a run, held by a lock that ends with this process, however that ends; gone where empty."""
     hidden = folder / UNFINISHED

@@ -73,6 +73,9 @@ class CellProgress:
         standard error where that is none.
     """
 
+    # What is done, the word for what is counted, and decimals of how many a second.
+    label, counted, decimals = "simulating", "cells", None
+
     def __init__(self, cells, done=0, as_json=False):
         self._cells, self._before, self._done, self._as_json = cells, done, done, as_json
         self._start, self._said = time.monotonic(), -_PAUSE
@@ -87,7 +90,7 @@ class CellProgress:
             disable=as_json or not _shows_bars(),
             transient=True,
         )
-        self._task = self._bar.add_task("simulating", total=cells, completed=done, said="")
+        self._task = self._bar.add_task(self.label, total=cells, completed=done, said="")
 
     def __enter__(self):
         self._bar.start()
@@ -118,13 +121,14 @@ class CellProgress:
         elif now - self._told >= _LONG_PAUSE and not is_quiet():
             self._told, state = now, self.state()
             left = f", {format_time(state['seconds_left'])} left" if state["seconds_left"] else ""
-            print(f"simulating: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
+            print(f"{self.label}: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
 
     def _in_words(self, state):
-        return (
-            f"{state['cells_done'] / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, "
-            f"{state['cells_per_second'] / 1e6:.1f} million/s, {state['memory'] / 1e9:.2f} GB"
-        )
+        rate = state[f"{self.counted}_per_second"]
+        return f"{self._counted_in_words(rate)}, {state['memory'] / 1e9:.2f} GB"
+
+    def _counted_in_words(self, rate):
+        return f"{self._done / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, {rate / 1e6:.1f} million/s"
 
     def state(self):
         """
@@ -140,12 +144,21 @@ class CellProgress:
         left = (self._cells - self._done) / rate if rate else None
         return {
             "event": "progress",
-            "cells_done": self._done,
-            "cells": self._cells,
-            "cells_per_second": round(rate),
+            f"{self.counted}_done": self._done,
+            self.counted: self._cells,
+            f"{self.counted}_per_second": round(rate, self.decimals),
             "seconds_left": None if left is None else round(left, 1),
             "memory": memory(),
         }
+
+
+class ChipProgress(CellProgress):
+    """Count of chips done, as `CellProgress` counts cells."""
+
+    label, counted, decimals = "making chips", "chips", 1
+
+    def _counted_in_words(self, rate):
+        return f"{self._done} of {self._cells} chips, {rate:.1f}/s"
 
 
 def steps(sequence, label):

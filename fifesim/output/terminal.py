@@ -1,6 +1,7 @@
 """How commands speak: one line for a mistake, an exit code that says whose it is, nothing that steers a terminal."""
 
 import gc
+import json
 import logging
 import os
 import sys
@@ -153,7 +154,24 @@ def tell(message, *_):
     say(in_a_line(f"fifesim: warning: {message}"), err=True)
 
 
-def report(files, seconds, look):
+@contextmanager
+def kept(output):
+    """
+    A context within which who interrupts a run is told what is left of it.
+
+    Parameters
+    ----------
+    output : pathlib.Path
+        Folder of the results.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        left = f"what is finished is kept, go on with --resume -o {output}" if output.exists() else "nothing is written"
+        stop(f"interrupted; {left}", Exit.INTERRUPTED)
+
+
+def report(files, seconds, look, as_json=False):
     """
     Say which files a command has made, how long it took, and where to look first, unless it is to be quiet.
 
@@ -163,8 +181,12 @@ def report(files, seconds, look):
     seconds : float
     look : str
         What to open, such as ``"out/report.html in a browser"``.
+    as_json : bool, optional
+        A line of JSON instead.
     """
-    if not is_quiet():
+    if as_json:
+        say(json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)}))
+    elif not is_quiet():
         say(*files, f"done in {in_time(seconds)}: open {look}")
 
 

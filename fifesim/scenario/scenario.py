@@ -119,14 +119,14 @@ class Scenario(Keys):
         distance = 1.0 if time is None else geometry.earth_sun_distance(time)
         if given.sza is not None:
             return geometry.Geometry(given.sza, given.saa, given.vza, given.vaa, distance)
-        sun = geometry.sun_position(time, *self._place(), 1000 * self.atmosphere.altitude)
+        sun = geometry.sun_position(time, *self.sun_place(), 1000 * self.atmosphere.altitude)
         return geometry.Geometry(sun.sza, sun.saa, given.vza, given.vaa, distance)
 
     def _time(self):
         """Date and time: as given, else that of FIFE on its site."""
         return self.geometry.time or (fife.TIME if on_fife_site(self.geobox()) else None)
 
-    def _place(self):
+    def sun_place(self):
         """Latitude and longitude of the sun: as given, else FIFE's on its site, else those of the grid's middle."""
         longitude, latitude = whereabouts.middle(self.geobox())
         if on_fife_site(self.geobox()):

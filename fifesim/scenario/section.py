@@ -97,10 +97,28 @@ class Section(BaseModel):
     def _strip_units(cls, values):
         if not isinstance(values, dict):
             raise ValueError(f"expected a table of keys, got {shown(values)}")
-        return {key: cls._in_unit(key, value) for key, value in values.items()}
+        return {key: cls.in_unit(key, value) for key, value in values.items()}
 
     @classmethod
-    def _in_unit(cls, key, value):
+    def in_unit(cls, key, value):
+        """
+        Value of a key without its unit.
+
+        Parameters
+        ----------
+        key : str
+        value : object
+            A number, or text such as ``"45 km"``; all else stays as it is.
+
+        Returns
+        -------
+        value : object
+
+        Raises
+        ------
+        ValueError
+            If the unit is not that of the key.
+        """
         unit = cls.unit(key) if key in cls.model_fields else ""
         if unit and isinstance(value, bool):
             raise ValueError(f"{key} = {value}: {key} is in {unit}; write a number")

@@ -1,5 +1,6 @@
 """Scenarios along axes: what a regression becomes as a parameter varies, in one lazy Dataset."""
 
+from functools import partial
 from itertools import product
 
 import dask
@@ -9,8 +10,8 @@ import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
 from fifesim.scenario.ensemble import realise
-from fifesim.scenario.keys import Keys
-from fifesim.scenario.scenario import Scenario, parse_scenario
+from fifesim.scenario.named_keys import changed, find_key, in_text
+from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import simulate
 
 # What is kept of a regression of the truth on NDVI.
@@ -99,55 +100,22 @@ def _axis(name, given):
         raise ValueError(f"the axis {name!r} needs a list of values, got {values!r}: write [value], even for one")
     if _has_function(given):
         return list(values), given[1]
-    *place, key = _place(name)
-
-    def change(scenario, value):
-        values = scenario.model_dump(exclude_unset=True)
-        table = values
-        for part in place:
-            table = table.setdefault(part, {})
-        # numpy's numbers are not what a scenario takes.
-        table[key] = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
-        return parse_scenario(values)
-
-    return list(given), change
+    return list(given), partial(changed, find_key(name))
 
 
 def _labels(values):
     """Values as a coordinate: text where they are lists, which have no place along one dimension."""
     if all(np.ndim(value) == 0 for value in values):
         return values
-    return [", ".join(str(part) for part in np.ravel(value).tolist()) or "none" for value in values]
+    return [in_text(np.atleast_1d(value)) for value in values]
 
 
 def _meaning(name, given):
     """Attributes of an axis: what plots write beside it."""
     if _has_function(given):
         return {}
-    *place, key = _place(name)
-    keys = Keys.section(place)
-    # The description's first words name the key; ranges and hints follow them.
-    found = {"long_name": keys.model_fields[key].description.split(";")[0], "units": keys.unit(key)}
-    return {name: text for name, text in found.items() if text}
+    return find_key(name).attributes
 
 
 def _has_function(given):
     return isinstance(given, tuple) and len(given) == 2 and callable(given[1])
-
-
-def _place(name):
-    """Names of the tables that an axis lies in, and its key."""
-    *given, key = name.split(".")
-    places = [tuple(given)] if given else [(each,) for each in Keys.model_fields if each != "classes"]
-    sections = {place: Keys.section(place) for place in places}
-    found = [place for place, section in sections.items() if section and key in section.model_fields]
-    if len(found) == 1:
-        return *found[0], key
-    if found:
-        written = " or ".join(".".join((*place, key)) for place in found)
-        raise ValueError(f"the axis {name!r} is a key of several sections: write {written}")
-    known = {each for place in Scenario().sections() for each in Keys.section(place).model_fields}
-    raise ValueError(
-        f"the axis {name!r} is no key of a scenario: keys are {', '.join(sorted(known))}; or give a pair (values, "
-        "function of a scenario and a value)"
-    )

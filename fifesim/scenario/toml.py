@@ -164,6 +164,30 @@ def write_scenario(scenario):
     return "\n".join(lines) + "\n"
 
 
+def plain_table(place, values):
+    """
+    Lines of a TOML table.
+
+    Parameters
+    ----------
+    place : sequence of str
+        Its name.
+    values : mapping
+        Numbers, texts, lists and tables of them, by key; what is None is left out.
+
+    Returns
+    -------
+    lines : list of str
+
+    Examples
+    --------
+    >>> plain_table(["draw"], {"brown": {"uniform": [0.0, 0.5]}})
+    ['[draw]', 'brown = { uniform = [0.0, 0.5] }']
+    """
+    keys = (f"{_toml_key(key)} = {_toml(value)}" for key, value in values.items() if value is not None)
+    return [f"[{'.'.join(map(_toml_key, place))}]", *keys]
+
+
 def _table(name, section):
     """Lines of a table and of those in it."""
     lines, tables = [f"[{name}]  # {inspect.getdoc(type(section)).splitlines()[0]}"], []
@@ -188,6 +212,8 @@ def _toml(value):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list):
         return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_toml_key(key)} = {_toml(each)}" for key, each in value.items()) + " }"
     return repr(value)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from fifesim.base.logs import quiet
 from fifesim.output import progress
-from fifesim.output.progress import CellProgress, doing, memory, since_start, steps
+from fifesim.output.progress import CellProgress, ChipProgress, doing, memory, since_start, steps
 
 
 def test_lines_say_where_the_run_is(capsys):
@@ -81,3 +81,18 @@ def test_quiet_has_no_lines_either(capsys, monkeypatch):
         for _ in range(5):
             progress.advance(2)
     assert capsys.readouterr() == ("", "")
+
+
+def test_chips_are_counted_as_cells_are(capsys, monkeypatch):
+    with ChipProgress(100, 40, as_json=True) as progress:
+        progress.advance(60)
+    *_, last = map(json.loads, capsys.readouterr().out.splitlines())
+    assert (last["chips_done"], last["chips"], last["seconds_left"]) == (100, 100, 0)
+    now = iter(range(0, 10**6, 25))
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(now)))
+    with ChipProgress(8) as progress:
+        for _ in range(8):
+            progress.advance(1)
+    assert re.match(
+        r"making chips: \d of 8 chips, 0\.0/s, \d+\.\d+ GB, .* left$", capsys.readouterr().err.splitlines()[0]
+    )

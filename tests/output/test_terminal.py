@@ -5,7 +5,7 @@ import logging
 import pytest
 
 from fifesim.base.logs import LOG, quiet
-from fifesim.output.terminal import in_time, listening, report
+from fifesim.output.terminal import Exit, in_time, listening, report, say, stop, tell
 
 
 def test_the_last_line_says_how_long_it_took_and_what_to_open(capsys):
@@ -34,3 +34,22 @@ def test_the_logger_is_heard_within_a_context_only(capsys):
     (line,) = capsys.readouterr().err.splitlines()
     assert line.endswith("a name \\x1b[31m")
     assert not LOG.handlers and LOG.level == logging.NOTSET
+
+
+def test_names_from_elsewhere_cannot_steer_a_terminal(capsys):
+    say("one\x1b[31m", "two\nthree")
+    assert capsys.readouterr().out == "one\\x1b[31m\ntwo\nthree\n"
+
+
+def test_a_warning_is_a_line(capsys):
+    tell(UserWarning("a\nb"))
+    assert capsys.readouterr().err == "fifesim: warning: a\\nb\n"
+
+
+@pytest.mark.parametrize("code", Exit)
+def test_a_mistake_ends_with_its_code_and_at_most_500_characters(code, capsys):
+    with pytest.raises(SystemExit) as caught:
+        stop(ValueError("x" * 2000), code)
+    assert caught.value.code == code
+    said = capsys.readouterr().err
+    assert said.startswith("fifesim: xxx") and len(said) <= 501

@@ -1,7 +1,6 @@
 """A run: a scenario simulated into a folder of files, block by block, which can be stopped and gone on with."""
 
 import os
-from contextlib import contextmanager
 from pathlib import Path
 
 import dask
@@ -15,13 +14,13 @@ from fifesim.analysis.rasters.regression import regress
 from fifesim.base.logs import LOG
 from fifesim.chain.images import ndvi
 from fifesim.output import report, stac
-from fifesim.output.folders import UNFINISHED, check_folder, results
+from fifesim.output.folders import check_folder, errors_with_their_file, results
 from fifesim.output.progress import CellProgress, doing
 from fifesim.output.run.engine import run_engine
-from fifesim.output.run.identity import NotThisRun, begin, check_inputs, identity_of
+from fifesim.output.run.identity import begin, check_inputs, identity_of
 from fifesim.output.run.origin import origin_tags
 from fifesim.output.run.products import chunk_checksum, make_scene_store, products_of, wanted_blocks
-from fifesim.output.run.saved import SUFFIX, save_block, saved_array, saved_block, saved_blocks
+from fifesim.output.run.saved import has_blocks, save_block, saved_array, saved_block, saved_blocks
 from fifesim.output.run.schedule import run_on_client, run_on_threads, tasks_of
 from fifesim.output.run.size import check_size
 from fifesim.output.run.workers import usable_cores
@@ -105,8 +104,8 @@ def simulate_to_folder(
     complete = scenario.complete()
     check_size(complete, folder)
     identity, names = identity_of(complete, scene), FILES + (SCENE,) * scene
-    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=_has_blocks)
-    with _errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
+    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks)
+    with errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
         begin(unfinished, identity)
         run_engine(complete)
         tree = simulate(complete)
@@ -123,24 +122,6 @@ def simulate_to_folder(
         check_inputs(complete, identity)
     LOG.info("wrote %s into %s", ", ".join(names), folder)
     return [folder / name for name in names]
-
-
-def _has_blocks(unfinished, error):
-    """Whether a stopped run can go on: not with what can never end well, nor from nothing."""
-    hopeless = isinstance(error, ValueError | TypeError) and not isinstance(error, NotThisRun)
-    return not hopeless and any((unfinished / "blocks").glob(f"*/*{SUFFIX}"))
-
-
-@contextmanager
-def _errors_with_their_file(folder):
-    """Errors of the system say which file they met, and what can be done."""
-    try:
-        yield
-    except OSError as error:
-        name = f" ({error.filename})" if error.filename and str(error.filename) not in str(error.strerror) else ""
-        said = f"{error.strerror}{name}" if error.strerror else str(error)
-        hint = f"; what is finished is kept, go on with --resume -o {folder}"
-        raise OSError(f"{said}{hint if (folder / UNFINISHED).exists() else ''}") from error
 
 
 def _compute(found, lai, folder, client, threads, as_json):

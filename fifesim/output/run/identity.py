@@ -11,7 +11,8 @@ from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.toml import write_scenario
 from fifesim.sensor.description.instruments import tables_of
 
-_STATE = "run.json"
+STATE = "run.json"
+"""File of what else must be the same."""
 
 
 class NotThisRun(ValueError):
@@ -53,7 +54,7 @@ def identity_of(scenario, scene):
         Texts of files by name.
     """
     state = {"versions": versions(), "inputs": inputs_of(scenario), "scene": bool(scene)}
-    return {_STATE: json.dumps(state), BEGUN: write_scenario(scenario)}
+    return {STATE: json.dumps(state), BEGUN: write_scenario(scenario)}
 
 
 def inputs_of(scenario):
@@ -115,10 +116,10 @@ def begin(unfinished, identity):
 def _check_same(unfinished, identity):
     try:
         before = {name: (unfinished / name).read_text(encoding="utf-8") for name in identity}
-        kept, state = (json.loads(each[_STATE]) for each in (before, identity))
+        kept, state = (json.loads(each[STATE]) for each in (before, identity))
         changed = [key for key in state if kept[key] != state[key]]
     except (OSError, ValueError, KeyError, TypeError):
-        raise NotThisRun(f"{unfinished / _STATE} is not what a run writes: begin again with --overwrite") from None
+        raise NotThisRun(f"{unfinished / STATE} is not what a run writes: begin again with --overwrite") from None
     if before[BEGUN] != identity[BEGUN]:
         old, new = ({line.strip() for line in each[BEGUN].splitlines()} for each in (before, identity))
         lines = sorted(line.partition("#")[0].strip() for line in old - new) or ["keys"]
@@ -130,6 +131,7 @@ def _check_same(unfinished, identity):
         "versions": "was begun with other versions of its packages: begin again with --overwrite",
         "inputs": "was begun with an input file that has changed: begin again with --overwrite",
         "scene": "was begun with --scene or without it: give it as it was",
+        "chips": f"was begun with {kept.get('chips')} chips: give it as it was",
     }
     for key in changed:
         raise NotThisRun(f"the run to resume {said[key]}")
@@ -150,7 +152,7 @@ def check_inputs(scenario, identity):
     ValueError
         If a file is not what it was.
     """
-    before, now = json.loads(identity[_STATE])["inputs"], inputs_of(scenario)
+    before, now = json.loads(identity[STATE])["inputs"], inputs_of(scenario)
     changed = [name for name in sorted(before | now) if before.get(name) != now.get(name)]
     if changed:
         raise ValueError(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fifesim.output.run.identity import NotThisRun
 from fifesim.rasters.windows import array_from_windows
 
 SUFFIX = ".npy"
@@ -117,6 +118,24 @@ def saved_array(folder, name, array):
     return array_from_windows(
         _load, [], array.chunks[-2:], ask, token=f"saved-{folder}-{name}", leading=leading, dtype=array.dtype
     )
+
+
+def has_blocks(unfinished, error):
+    """
+    Whether a run that an error stopped can go on: not with what can never end well, nor from nothing.
+
+    Parameters
+    ----------
+    unfinished : pathlib.Path
+        Its hidden folder.
+    error : BaseException
+
+    Returns
+    -------
+    answer : bool
+    """
+    hopeless = isinstance(error, ValueError | TypeError) and not isinstance(error, NotThisRun)
+    return not hopeless and any((unfinished / "blocks").glob(f"*/*{SUFFIX}"))
 
 
 def _path(folder, name, index):

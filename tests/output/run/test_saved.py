@@ -4,7 +4,8 @@ import dask.array as da
 import numpy as np
 import pytest
 
-from fifesim.output.run.saved import save_block, saved_array, saved_blocks
+from fifesim.output.run.identity import NotThisRun
+from fifesim.output.run.saved import has_blocks, save_block, saved_array, saved_blocks
 
 CELLS = np.random.default_rng(2).random((2, 7, 9))
 
@@ -61,3 +62,10 @@ def test_a_place_that_takes_nothing_is_named(tmp_path, array):
     (tmp_path / "image" / "00000-00000-00000.npy").mkdir(parents=True)
     with pytest.raises(OSError, match=r"00000-00000-00000\.npy"):
         save(tmp_path, array, (0, 0, 0))
+
+
+def test_a_run_goes_on_where_it_has_blocks_and_can_end_well(tmp_path, array):
+    assert not has_blocks(tmp_path, OSError())
+    save(tmp_path / "blocks", array, (0, 0, 0))
+    assert has_blocks(tmp_path, OSError()) and has_blocks(tmp_path, KeyboardInterrupt())
+    assert has_blocks(tmp_path, NotThisRun()) and not has_blocks(tmp_path, ValueError())

@@ -1,0 +1,253 @@
+"""A dataset: the chips of a study written into a folder shard by shard, which can be stopped and gone on with."""
+
+import json
+import shutil
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from fifesim.ground.landscape.field import TILE
+from fifesim.output.chips import datasheet
+from fifesim.output.chips.arrays import chip_arrays, layout_of, make_shard
+from fifesim.output.chips.store import ROOT, Shards, checksums, make_store, stored_names, write_shard
+from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
+from fifesim.output.progress import ChipProgress
+from fifesim.output.provenance import versions
+from fifesim.output.run.identity import STATE, begin, inputs_of
+from fifesim.output.run.saved import has_blocks, save_block, saved_block
+from fifesim.rasters.clients import found_client
+from fifesim.scenario.chips import chips_of
+from fifesim.scenario.studies import Study, read_study
+
+DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.toml"
+
+# Of shards that are written, what their files' checksums are saved by.
+_SAVED = "chips"
+
+# So many chips are looked at before the first is made, and so many closely: what cannot be is told early. [1]
+_LOOKED_AT, _CLOSELY = 1000, 50
+
+_RETRIES = 3
+
+
+def dataset(study, folder, n=1000, *, overwrite=False, resume=False, client=None):
+    """
+    Make a training set: chips of a study in a folder, as sharded Zarr.
+
+    Parameters
+    ----------
+    study : str, path or fifesim.Study
+    folder : str or path
+        Made where it does not exist; a Zarr store, with datasheet.html, contact_sheet.png and study.toml in it.
+    n : int, optional
+        Chips.
+    overwrite : bool, optional
+        Replace an earlier dataset where the folder holds one.
+    resume : bool, optional
+        Go on with a run of the same study that was stopped in this folder; begin where there is none.
+    client : distributed.Client, optional
+        Make shards on the workers of a cluster, by default on those of the current client where there is one.
+
+    Returns
+    -------
+    dataset : xarray.Dataset
+        Lazy. Along ``chip``: digital numbers ``dn``, ``toa_reflectance`` and ``ndvi`` of the image, ``lai``, ``fpar``
+        and all else that is true of the ground of its pixels, and as coordinates what was drawn, ``landscape`` and
+        ``split``.
+
+    Raises
+    ------
+    ValueError
+        If the study cannot be, or the folder holds something; nothing is written then.
+    OSError
+        If a file cannot be read or written. Shards that are finished are kept.
+
+    Notes
+    -----
+    Chip k is `fifesim.simulate` of ``fifesim.chips_of(study, n).scenario(k)``, to the bit, whatever makes it; truth and
+    reflectance are kept in single precision.
+
+    Examples
+    --------
+    >>> chips = dataset("study.toml", "chips.zarr", 10_000)  # doctest: +SKIP
+    >>> train = chips.sel(chip=chips.split == "train")  # doctest: +SKIP
+    """
+    study = study if isinstance(study, Study) else read_study(study)
+    dataset_to_folder(study, folder, n, overwrite=overwrite, resume=resume, client=client)
+    return xr.open_zarr(folder)
+
+
+def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, client=None, as_json=False):
+    """
+    Make the chips of a study in a folder.
+
+    Parameters
+    ----------
+    study : fifesim.scenario.studies.Study
+    folder : str or path
+    count : int
+        Chips.
+    overwrite, resume, client
+        As in `dataset`.
+    as_json : bool, optional
+        Print progress as lines of JSON.
+
+    Returns
+    -------
+    files : list of pathlib.Path
+        The folder, and what in it is for people.
+
+    Raises
+    ------
+    ValueError
+        As in `dataset`.
+    OSError
+        As in `dataset`.
+    """
+    folder = Path(folder)
+    check_folder(folder, overwrite, resume)
+    chips = chips_of(study, count)
+    _look_at(chips)
+    layout = layout_of(chips)
+    shards = Shards(count, layout.size, _together(study))
+    identity = _identity_of(chips)
+    files = [DATASHEET, CONTACT_SHEET, STUDY]
+    # By its root a store is one: it comes last.
+    names = [*stored_names(chips, layout), *files, ROOT]
+    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks)
+    with errors_with_their_file(folder), kept as unfinished:
+        begin(unfinished, identity)
+        _remove_partial(unfinished)
+        make_store(unfinished, chips, layout, shards)
+        _compute(chips, layout, shards, unfinished, client or found_client(), as_json)
+        datasheet.write(unfinished, chips, shards, DATASHEET, CONTACT_SHEET)
+        (unfinished / STUDY).write_text(study.to_toml(), encoding="utf-8")
+        if _inputs(chips) != json.loads(identity[STATE])["inputs"]:
+            raise ValueError("a file that the study names changed while it was read: begin again when it is whole")
+        if overwrite:
+            _remove_other_arrays(folder, names)
+    return [folder, *(folder / name for name in files)]
+
+
+def study_to_resume(folder):
+    """
+    Study of a run that was stopped, and how many chips it makes.
+
+    Parameters
+    ----------
+    folder : path
+        Of its results.
+
+    Returns
+    -------
+    study : fifesim.scenario.studies.Study or None
+        None where no run was stopped.
+    count : int or None
+    """
+    path = Path(folder) / UNFINISHED
+    if not (path / BEGUN).is_file():
+        return None, None
+    with suppress(OSError, ValueError):
+        return read_study(path / BEGUN), json.loads((path / STATE).read_text(encoding="utf-8")).get("chips")
+    return read_study(path / BEGUN), None
+
+
+def _look_at(chips):
+    """Scenarios of some chips, so that one that cannot be is found before a day of work."""
+    last = len(chips) - 1
+    for chip in (*range(min(last, _LOOKED_AT)), last):
+        scenario = chips.scenario(chip)
+        if chip < _CLOSELY:
+            try:
+                scenario.complete()
+            except ValueError as error:
+                raise ValueError(f"chip {chip}: {error}") from None
+    try:
+        scenario.geobox()
+    except ValueError as error:
+        raise ValueError(f"chip {last}: {error}; with more landscapes chips lie nearer to each other") from None
+
+
+def _remove_partial(folder):
+    """What a run that was killed was writing."""
+    for path in folder.rglob("*.partial"):
+        if path.is_file():
+            path.unlink()
+
+
+def _together(study):
+    """Chips of all landscapes that fill a tile of their fields each."""
+    rows, columns = study.scenario.geobox().shape
+    return max(TILE // rows, 1) * max(TILE // columns, 1) * study.landscapes
+
+
+def _identity_of(chips):
+    """What must be the same for shards of two runs to fit together."""
+    state = {"versions": versions(), "inputs": _inputs(chips), "chips": len(chips)}
+    return {STATE: json.dumps(state), BEGUN: chips.study.to_toml()}
+
+
+def _inputs(chips):
+    """Files that chips read, those among which it is drawn included."""
+    study, found = chips.study, inputs_of(chips.study.scenario)
+    for key, distribution in study.drawn.items():
+        if key.entry is None and any(key.section.names_a_file(key.key, value) for value in distribution.extremes):
+            for value in distribution.extremes:
+                found |= inputs_of(study.scenario_with({key.path: value}))
+    return found
+
+
+def _compute(chips, layout, shards, folder, client, as_json):
+    """Make and write the shards that are not written yet."""
+    blocks, names = folder / "blocks", list(layout.variables)
+    wanted = [shard for shard in range(len(shards)) if not _is_written(folder, blocks, names, shard)]
+    done = len(chips) - sum(np.diff(shards.range_of(shard)).item() for shard in wanted)
+    with ChipProgress(len(chips), done, as_json) as progress:
+
+        def deliver(shard, arrays):
+            write_shard(folder, shards.range_of(shard)[0], arrays)
+            save_block(blocks, _SAVED, (shard,), checksums(folder, names, shard))
+
+        if client is None:
+            for shard in wanted:
+                deliver(shard, chip_arrays(chips, *shards.range_of(shard), layout, progress.advance))
+        else:
+            for shard, arrays in _on_client(chips, layout, shards, wanted, client):
+                deliver(shard, arrays)
+                progress.advance(np.diff(shards.range_of(shard)).item())
+
+
+def _is_written(folder, blocks, names, shard):
+    """Whether the files of a shard are what was written."""
+    try:
+        return np.array_equal(saved_block(blocks, _SAVED, (shard,)), checksums(folder, names, shard))
+    except (OSError, ValueError):
+        return False
+
+
+def _on_client(chips, layout, shards, wanted, client):
+    """Shards and their arrays, made on the workers of a cluster, as they come."""
+    from distributed import KilledWorker, as_completed  # there already, where a client is
+
+    options = {"pure": False, "retries": _RETRIES}
+    futures = {
+        client.submit(make_shard, chips.study, len(chips), *shards.range_of(shard), layout, **options): shard
+        for shard in wanted
+    }
+    try:
+        for future, arrays in as_completed(list(futures), loop=client.loop, with_results=True):
+            yield futures.pop(future), arrays
+            future.release()
+    except KilledWorker as error:
+        raise RuntimeError(f"{error}: has a worker too little memory? What is finished is kept, use --resume") from None
+    finally:
+        client.cancel(list(futures), force=True)
+
+
+def _remove_other_arrays(folder, names):
+    """Arrays of an earlier dataset, which would look like some of this one's."""
+    for path in folder.iterdir():
+        if path.name not in (UNFINISHED, *names) and (path / ROOT).is_file():
+            shutil.rmtree(path)

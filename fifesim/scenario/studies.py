@@ -1,0 +1,313 @@
+"""Studies: a scenario, and what of it is drawn anew for each of many chips."""
+
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+
+from fifesim.base.foreign import shown
+from fifesim.base.seeds import check_seed
+from fifesim.scenario.distributions import distribution_of
+from fifesim.scenario.ground_keys import COVERS
+from fifesim.scenario.keys import LAND_FORMS
+from fifesim.scenario.named_keys import find_key, put, values_of
+from fifesim.scenario.scenario import Scenario, grid_keys, parse_scenario
+from fifesim.scenario.section import nearest
+from fifesim.scenario.sequences import SEQUENCES
+from fifesim.scenario.toml import load_values, plain_table
+
+_HEADING = "# Study of a fifesim dataset. Make it with: fifesim dataset THIS_FILE -o chips.zarr -n 1000"
+_SPLIT = MappingProxyType({"train": 0.8, "validation": 0.1, "test": 0.1})
+
+# What makes the shape of a chip or the map that it is cut from.
+_FIXED = {
+    ("ground", "lai_file"),
+    ("ground", "method"),
+    ("landscape", "cover"),
+    ("terrain", "dem"),
+    *(("sensor", key) for key in ("instrument", "bands", "pixel", "interval")),
+}
+_SUN = ("time", "latitude", "longitude", "sza", "saa")
+_BY_BAND = (("leaf_reflectance", "leaf_transmittance"), ("background",))
+
+
+@dataclass(frozen=True)
+class Study:
+    """
+    A scenario of the size of a chip, and what of it is drawn anew for each of many.
+
+    Parameters
+    ----------
+    scenario : fifesim.Scenario
+        Its grid has the size of a chip; chips of a landscape are windows of the ground about it, which do not overlap.
+    draws : mapping
+        By name of a key, as `fifesim.sweep` has them, the table of a distribution: ``{"visibility": {"uniform":
+        [10, 60]}, "ground.brown": {"normal": [0.2, 0.1], "within": [0, 1]}}``; also ``log-uniform``, ``choice``,
+        perhaps with ``weights``, and ``integers``. An ``arp`` is drawn for each landscape, all else for each chip.
+    sequence : {"sobol", "latin-hypercube", "random"}, optional
+        Of the draws. A chip of a Latin hypercube depends on how many there are, others do not.
+    seed : int, optional
+        Of the draws.
+    landscapes : int, optional
+        Pairs of seed and arp; seeds count from those of the scenario.
+    split : mapping of str to float, optional
+        Shares of the landscapes by name; by default train .8, validation .1, test .1.
+
+    Raises
+    ------
+    ValueError
+        If a key or a distribution is not possible, or a value of it not allowed.
+    TypeError
+        If the scenario is none.
+
+    See Also
+    --------
+    fifesim.chips_of, fifesim.dataset
+
+    Examples
+    --------
+    >>> chip = Scenario(grid={"width": 180, "height": 180}, terrain={"dem": "flat"})
+    >>> study = Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10)
+    >>> study.quotas()
+    {'train': 8, 'validation': 1, 'test': 1}
+    """
+
+    scenario: Scenario
+    draws: Mapping[str, Mapping]
+    sequence: str = "sobol"
+    seed: int = 0
+    landscapes: int = 50
+    split: Mapping[str, float] = field(default_factory=lambda: dict(_SPLIT))
+
+    def __post_init__(self):
+        if not isinstance(self.scenario, Scenario):
+            raise TypeError(f"a study takes a Scenario, got {type(self.scenario).__name__}: see fifesim.read_scenario")
+        check_seed(self.seed)
+        _check_ground(self.scenario)
+        _check_plan(self)
+        drawn = dict(_draws(self.draws, self.scenario))
+        object.__setattr__(self, "draws", {key.name: distribution.table for key, distribution in drawn.items()})
+        object.__setattr__(self, "drawn", drawn)
+        _check_extremes(self)
+
+    @cached_property
+    def values(self):
+        """What all chips share, nested as in a scenario; sun and altitude are those of the scenario's own place."""
+        return _settled(self.scenario, {key.path for key in self.drawn})
+
+    def quotas(self):
+        """Landscapes of each part of the split, a dict of int by name."""
+        shares = {name: share * self.landscapes for name, share in self.split.items()}
+        found = {name: max(int(share + 1e-9), 1) for name, share in shares.items()}
+        while sum(found.values()) < self.landscapes:
+            found[max(found, key=lambda name: shares[name] - found[name])] += 1
+        while sum(found.values()) > self.landscapes:
+            several = [name for name, number in found.items() if number > 1]
+            found[max(several, key=lambda name: found[name] - shares[name])] -= 1
+        return found
+
+    def to_toml(self):
+        """The study as a TOML file has it, a str; reading it gives the same study."""
+        plan = {"sequence": self.sequence, "seed": self.seed, "landscapes": self.landscapes, "split": dict(self.split)}
+        tables = {("dataset",): plan, ("draw",): self.draws}
+        for place, section in self.scenario.sections().items():
+            tables[place] = section.with_whole_paths().model_dump(exclude_unset=True)
+        written = ("\n".join(plain_table(place, values)) for place, values in tables.items() if values)
+        return "\n\n".join([_HEADING, *written]) + "\n"
+
+    def scenario_with(self, drawn):
+        """
+        Scenario of values that are drawn, at the study's own place.
+
+        Parameters
+        ----------
+        drawn : mapping of tuple of str to object
+            By the path of a key.
+
+        Returns
+        -------
+        scenario : fifesim.scenario.scenario.Scenario
+
+        Raises
+        ------
+        ValueError
+            If they are not allowed.
+        """
+        values = deepcopy(self.values)
+        for path, value in drawn.items():
+            put(values, path, value)
+        return parse_scenario(values)
+
+
+def read_study(path):
+    """
+    Study of a TOML file: a scenario with the tables ``[draw]`` and ``[dataset]``.
+
+    Parameters
+    ----------
+    path : str or path
+        Files that it names lie relative to it.
+
+    Returns
+    -------
+    study : Study
+
+    Raises
+    ------
+    ValueError
+        If it is missing or not TOML, or a key, a value or a distribution is wrong.
+
+    Examples
+    --------
+    >>> study = read_study("study.toml")  # doctest: +SKIP
+    """
+    values = load_values(path)
+    plan, draws = values.pop("dataset", {}), values.pop("draw", None)
+    known = ("sequence", "seed", "landscapes", "split")
+    for name in plan if isinstance(plan, dict) else [plan]:
+        if name not in known:
+            hint = nearest(str(name), known)
+            raise ValueError(f"unknown key dataset.{name}: {hint}allowed are {', '.join(known)}")
+    if isinstance(draws, Mapping):
+        draws = {name: _with_whole_paths(name, table, Path(path).parent.absolute()) for name, table in _flat(draws)}
+    return Study(parse_scenario(values), draws, **plan)
+
+
+def _with_whole_paths(name, table, folder):
+    """A distribution whose choices of files have their full paths."""
+    key = find_key(name, called="draw:")
+    if not isinstance(table, Mapping) or not isinstance(table.get("choice"), list) or key.entry:
+        return table
+    choices = [str(folder / each) if key.section.names_a_file(key.key, each) else each for each in table["choice"]]
+    return table | {"choice": choices}
+
+
+def _check_ground(scenario):
+    """A study draws its ground: maps of real ground have one landscape."""
+    for path, names in {
+        ("ground", "lai_file"): (None,),
+        ("terrain", "dem"): LAND_FORMS,
+        ("landscape", "cover"): COVERS,
+    }.items():
+        section, key = path
+        value = getattr(getattr(scenario, section), key)
+        if value not in names:
+            drawn = " or ".join(name for name in names if name) or "none"
+            raise ValueError(
+                f"{section}.{key} = {shown(value)}: chips of one map would share ground between training and test; a "
+                f"study takes {drawn}"
+            )
+    if scenario.ground.method != "streaming":
+        raise ValueError('ground.method = "periodic" has no windows to cut chips from: type method = "streaming"')
+    lacking = [key for key in ("width", "height") if key not in scenario.grid.model_fields_set]
+    if lacking:
+        raise ValueError(
+            f"grid.{lacking[0]} is not given: it is the size of a chip, such as width = 1110, height = 1110"
+        )
+
+
+def _check_plan(study):
+    """Sequence, number of landscapes and their split."""
+    if study.sequence not in SEQUENCES:
+        hint = nearest(str(study.sequence), list(SEQUENCES))
+        raise ValueError(f"dataset.sequence = {shown(study.sequence)}: {hint}must be one of {', '.join(SEQUENCES)}")
+    split, landscapes = study.split, study.landscapes
+    if not isinstance(landscapes, int) or isinstance(landscapes, bool) or landscapes < 1:
+        raise ValueError(f"dataset.landscapes = {shown(landscapes)}: must be a whole number from 1 up")
+    numbers = isinstance(split, Mapping) and all(
+        isinstance(share, int | float) and share > 0 for share in split.values()
+    )
+    if not numbers or not split or abs(sum(split.values()) - 1) > 1e-6:
+        raise ValueError(
+            f"dataset.split = {shown(split)} must be shares that sum to 1, such as {{ train = 0.8, test = 0.2 }}"
+        )
+    if landscapes < len(split):
+        raise ValueError(
+            f"dataset.landscapes = {landscapes} cannot be split into {', '.join(split)}, which share no landscape: "
+            f"give {len(split)} or more, or another split"
+        )
+
+
+def _draws(draws, scenario):
+    """Keys that are drawn, and their distributions."""
+    if not isinstance(draws, Mapping) or not draws:
+        raise ValueError("a study draws something: give a table [draw], such as visibility = { uniform = [10, 60] }")
+    known = set()
+    for name, table in _flat(draws):
+        key = find_key(name, called="draw:")
+        _check_may_be_drawn(key, scenario)
+        if key in known:
+            raise ValueError(f"draw.{key.name} is given twice")
+        known.add(key)
+        try:
+            yield key, distribution_of(table, lambda value, key=key: _in_unit(key, value))
+        except ValueError as error:
+            raise ValueError(f"draw.{key.name}: {error}") from None
+
+
+def _flat(table, above=""):
+    """Names of tables within tables with dots between them, and what they are drawn from."""
+    for name, found in table.items():
+        if isinstance(found, Mapping) and found and all(isinstance(each, Mapping) for each in found.values()):
+            yield from _flat(found, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", found
+
+
+def _in_unit(key, value):
+    return value if key.entry else key.section.in_unit(key.key, value)
+
+
+def _check_may_be_drawn(key, scenario):
+    *_, last = key.path
+    if last == "seed":
+        raise ValueError(
+            f"draw.{key.name}: landscapes and noise have seeds of their own, from {key.name} on: leave it out"
+        )
+    if key.path in _FIXED or key.place == ("grid",):
+        raise ValueError(f"draw.{key.name}: is the same for all chips: give one value under [{'.'.join(key.place)}]")
+    if key.place[0] == "classes" and key.place[1] not in scenario.classes:
+        known = ", ".join(scenario.classes) or "none"
+        raise ValueError(f"draw.{key.name}: there is no [{'.'.join(key.place)}], classes are {known}")
+
+
+def _settled(scenario, drawn):
+    """
+    Values that chips share, with what depends on the place written out.
+
+    Chips lie beside the scenario's grid, and sun and air are not meant to change with their place.
+    """
+    whole, values = scenario.complete(), values_of(scenario)
+    latitude, longitude = scenario.sun_place()
+    sun = {"time": whole.geometry.time, "latitude": latitude, "longitude": longitude}
+    if not any(("geometry", key) in drawn for key in _SUN):
+        light = scenario.sun_and_view()
+        sun |= {"sza": light.sza, "saa": light.saa}
+    settled = {("geometry", key): value for key, value in sun.items() if value is not None}
+    settled |= {("atmosphere", "altitude"): scenario.atmosphere.altitude, ("terrain", "dem"): scenario.terrain.dem}
+    settled |= {("grid", key): value for key, value in grid_keys(scenario.geobox())}
+    for keys in _BY_BAND:
+        # One band is drawn, the others have to be there.
+        if any(path[:2] == ("ground", key) for path in drawn for key in keys if len(path) == 3):
+            settled |= {("ground", key): dict(getattr(whole.ground, key)) for key in keys}
+    for path, value in settled.items():
+        put(values, path, value)
+    return values
+
+
+def _check_extremes(study):
+    """Each key takes the ends of its distribution, where others are usual."""
+    middle = {key: distribution.usual for key, distribution in study.drawn.items()}
+    _check(study, middle, "draw, all at their medians or first choices: ")
+    for key, distribution in study.drawn.items():
+        for value in distribution.extremes:
+            _check(study, middle | {key: value}, f"draw.{key.name} = {shown(distribution.table)} at {shown(value)}: ")
+
+
+def _check(study, drawn, said):
+    try:
+        study.scenario_with({key.path: value for key, value in drawn.items()}).complete()
+    except ValueError as error:
+        raise ValueError(f"{said}{error}") from None

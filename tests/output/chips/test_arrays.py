@@ -1,0 +1,78 @@
+"""Chips in memory are what simulating each of them by itself gives."""
+
+import numpy as np
+import pytest
+
+import fifesim
+from fifesim.output.chips.arrays import chip_arrays, layout_of
+from fifesim.scenario.chips import chips_of
+from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.studies import Study
+
+SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
+DRAWS = {"visibility": {"uniform": [10, 60]}, "brown": {"choice": [0.0, 0.3]}, "sza": {"uniform": [20, 50]}}
+
+
+@pytest.fixture(scope="module")
+def chips():
+    sun = {"geometry": {"sza": 30.0, "saa": 120.0}}
+    return chips_of(Study(parse_scenario(SMALL | sun), DRAWS, landscapes=3), 7)
+
+
+@pytest.fixture(scope="module")
+def layout(chips):
+    return layout_of(chips)
+
+
+@pytest.fixture(scope="module")
+def arrays(chips, layout):
+    return chip_arrays(chips, 2, 7, layout)
+
+
+@pytest.mark.parametrize("chip", [2, 5])
+def test_a_chip_has_the_bits_of_its_scenario(chip, chips, arrays):
+    run = fifesim.simulate(chips.scenario(chip))
+    at = chip - 2
+    np.testing.assert_array_equal(arrays["dn"][at], run["image"]["dn"])
+    np.testing.assert_array_equal(arrays["ndvi"][at], run["image"]["ndvi"].values.astype(np.float32))
+    for name in ("lai", "fpar"):
+        np.testing.assert_array_equal(arrays[name][at], run["truth"][name].values.astype(np.float32))
+    assert arrays["sza"][at] == float(run["image"]["sza"])
+
+
+def test_reflectance_is_that_of_the_image(chips, arrays):
+    image = fifesim.simulate(chips.scenario(3))["image"]["dn"]
+    expected = fifesim.sensor.raster.to_reflectance(image).values
+    np.testing.assert_array_equal(arrays["toa_reflectance"][1], expected.astype(np.float32))
+
+
+def test_green_leaves_are_all_leaves_where_none_is_dead(chips, arrays):
+    brown = np.array([chips.scenario(chip).ground.brown for chip in range(2, 7)])
+    assert {0.0, 0.3} == set(brown.tolist())
+    alike = (arrays["green_fpar"] == arrays["fpar"]).all(axis=(1, 2))
+    np.testing.assert_array_equal(alike, brown == 0)
+
+
+def test_layout_says_shapes_and_types(layout, arrays):
+    for name, (dims, dtype) in layout.variables.items():
+        assert arrays[name].shape == (5, *layout.shape(dims)) and arrays[name].dtype == dtype
+    assert layout.size == sum(each.nbytes for each in arrays.values()) / 5
+    assert layout.pixels == (6, 6) and layout.pixel == 30
+    assert layout.bands["band"].values.tolist() == ["TM3", "TM4"]
+
+
+def test_a_part_of_the_chips_is_a_slice(chips, layout, arrays):
+    for name, values in chip_arrays(chips, 4, 6, layout).items():
+        np.testing.assert_array_equal(values, arrays[name][2:4])
+
+
+def test_each_chip_is_told(chips, layout):
+    told = []
+    chip_arrays(chips, 0, 3, layout, told.append)
+    assert told == [1, 1, 1]
+
+
+def test_a_truth_that_others_have_not_names_its_chip(chips, layout):
+    without = layout._replace(truth=("lai", "fpar"))
+    with pytest.raises(ValueError, match=r"chip \d: has a truth that others have not, green_fpar"):
+        chip_arrays(chips, 0, 7, without)

@@ -1,0 +1,244 @@
+"""Datasets: whole or not there, and the same bits whatever stopped them and whoever made them."""
+
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+import fifesim
+from fifesim.output.chips import arrays, datasheet, store
+from fifesim.output.chips import folder as chips_folder
+from fifesim.output.chips.folder import CONTACT_SHEET, DATASHEET, STUDY, dataset_to_folder, study_to_resume
+from fifesim.output.folders import UNFINISHED
+from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.studies import Study, read_study
+
+SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
+DRAWS = {"visibility": {"uniform": [10, 60]}, "ground.brown": {"choice": [0.0, 0.3]}}
+COUNT = 7
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_shards():
+    """Of two chips, so that there are four; nobody looks at the pictures."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(store, "_FEWEST", 2)
+        patch.setattr(datasheet, "contact_sheet", lambda dataset, parts: Figure((1, 1)))
+        yield
+
+
+@pytest.fixture(scope="module")
+def study():
+    return Study(parse_scenario(SMALL), DRAWS, landscapes=3, seed=5)
+
+
+@pytest.fixture(scope="module")
+def whole(study, tmp_path_factory):
+    """A dataset that nobody disturbed."""
+    folder = tmp_path_factory.mktemp("whole") / "chips.zarr"
+    dataset_to_folder(study, folder, COUNT)
+    return folder
+
+
+def contents(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def stopping(monkeypatch, after, error=KeyboardInterrupt):
+    """Have the making of chips end with an error."""
+    made, realise = [], arrays.realise
+
+    def stop(*arguments):
+        made.append(1)
+        if len(made) > after:
+            raise error
+        return realise(*arguments)
+
+    monkeypatch.setattr(arrays, "realise", stop)
+    return made
+
+
+def test_the_function_gives_what_it_wrote(study, whole, tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(study.to_toml())
+    found = fifesim.dataset(path, tmp_path / "chips.zarr", COUNT)
+    assert contents(tmp_path / "chips.zarr") == contents(whole)
+    xr.testing.assert_identical(found, xr.open_zarr(whole))
+    assert found.sizes == {"chip": COUNT, "band": 2, "y": 6, "x": 6}
+
+
+def test_a_chip_is_its_scenario_simulated(study, whole):
+    run = fifesim.simulate(fifesim.chips_of(study, COUNT).scenario(4))
+    chip = xr.open_zarr(whole, mask_and_scale=False).isel(chip=4)
+    np.testing.assert_array_equal(chip.dn, run["image"]["dn"])
+    assert float(chip["atmosphere.visibility"]) == fifesim.chips_of(study, 40).scenario(4).atmosphere.visibility
+
+
+def test_the_study_is_in_the_folder(study, whole):
+    assert read_study(whole / STUDY) == study
+    assert xr.open_zarr(whole).attrs["study"] == (whole / STUDY).read_text()
+
+
+# The layout takes two scenes, and chips come in shards of two.
+@pytest.mark.parametrize("after", [5, 8])
+def test_a_stopped_run_goes_on_to_the_same_bits(after, study, whole, tmp_path, monkeypatch):
+    folder = tmp_path / "chips.zarr"
+    with monkeypatch.context() as patch:
+        stopping(patch, after)
+        with pytest.raises(KeyboardInterrupt):
+            dataset_to_folder(study, folder, COUNT)
+    assert {path.name for path in folder.iterdir()} == {UNFINISHED}
+    assert study_to_resume(folder) == (study, COUNT)
+    with pytest.raises(ValueError, match="holds a run that is not finished"):
+        dataset_to_folder(study, folder, COUNT)
+    made = stopping(monkeypatch, 100)
+    dataset_to_folder(study, folder, COUNT, resume=True)
+    assert len(made) == 2 + COUNT - 2 * ((after - 2) // 2)
+    assert contents(folder) == contents(whole)
+
+
+def test_half_written_shards_do_not_count(study, whole, tmp_path, monkeypatch):
+    folder = tmp_path / "chips.zarr"
+    with monkeypatch.context() as patch:
+        stopping(patch, 8)
+        with pytest.raises(KeyboardInterrupt):
+            dataset_to_folder(study, folder, COUNT)
+    hidden = folder / UNFINISHED
+    half = hidden / "lai" / "c" / "1" / "0" / "0"
+    half.write_bytes(half.read_bytes()[:100])
+    (hidden / "dn" / "c" / "2" / "0" / "0").mkdir(parents=True, exist_ok=True)
+    (hidden / "dn" / "c" / "2" / "0" / "0" / "0.1f2e.partial").write_bytes(b"half")
+    (hidden / "zarr.json").unlink()
+    dataset_to_folder(study, folder, COUNT, resume=True)
+    assert contents(folder) == contents(whole)
+
+
+def test_nothing_is_left_of_a_run_that_cannot_end_well(study, tmp_path, monkeypatch):
+    stopping(monkeypatch, 6, ValueError("cannot be"))
+    with pytest.raises(ValueError, match=r"chip \d: cannot be"):
+        dataset_to_folder(study, tmp_path / "chips.zarr", COUNT)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("count", "draws", "message"),
+    [(9, DRAWS, "was begun with 7 chips"), (7, {"visibility": {"uniform": [10, 50]}}, "is of another scenario, with")],
+)
+def test_another_run_is_not_gone_on_with(count, draws, message, study, tmp_path, monkeypatch):
+    folder = tmp_path / "chips.zarr"
+    with monkeypatch.context() as patch:
+        stopping(patch, 5)
+        with pytest.raises(KeyboardInterrupt):
+            dataset_to_folder(study, folder, COUNT)
+    before = contents(folder)
+    other = Study(study.scenario, draws, landscapes=3, seed=5)
+    with pytest.raises(ValueError, match=message):
+        dataset_to_folder(other, folder, count, resume=True)
+    assert contents(folder) == before
+
+
+def test_an_earlier_dataset_is_replaced_with_all_its_arrays(whole, study, tmp_path):
+    folder = tmp_path / "chips.zarr"
+    sun = Study(study.scenario, {"vza": {"uniform": [0, 20]}}, landscapes=3)
+    dataset_to_folder(sun, folder, 2)
+    assert (folder / "geometry.vza").is_dir()
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(ValueError, match="is not empty"):
+        dataset_to_folder(study, folder, COUNT)
+    dataset_to_folder(study, folder, COUNT, overwrite=True)
+    assert contents(folder) == contents(whole) | {"notes.txt": b"mine"}
+
+
+def test_what_a_study_cannot_be_is_told_before_anything_is_written(study, tmp_path, monkeypatch):
+    draws = {"brown": {"choice": [0.3, 0.95]}, "landscape.deviations.brown": {"choice": [0.05, 0.25]}}
+    with pytest.raises(ValueError, match=r"chip \d+: landscape\.deviations: brown"):
+        dataset_to_folder(Study(study.scenario, draws, landscapes=3), tmp_path / "chips.zarr", 20)
+    wide = parse_scenario(SMALL | {"grid": {"width": 30_000.0, "height": 30_000.0}})
+    far = fifesim.chips_of(Study(wide, DRAWS, landscapes=1, split={"all": 1.0}), 60_000)
+    monkeypatch.setattr(chips_folder, "_LOOKED_AT", 1)
+    with pytest.raises(ValueError, match=r"chip 59999: .*with more landscapes chips lie nearer"):
+        chips_folder._look_at(far)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_chosen_is_an_input(tmp_path, study):
+    samples = tmp_path / "mine.csv"
+    samples.write_text("lai\n0.5\n0.7\n0.9\n1.1\n1.4\n")
+    draws = {"distribution": {"choice": ["burned-grazed", str(samples)]}}
+    chips = fifesim.chips_of(Study(study.scenario, draws, landscapes=3), 2)
+    assert list(chips_folder._inputs(chips)) == [str(samples)]
+
+
+def test_the_folder_has_what_people_read(whole):
+    assert all((whole / name).stat().st_size > 100 for name in (DATASHEET, CONTACT_SHEET))
+    assert not (whole / UNFINISHED).exists()
+
+
+def test_the_loader_of_the_page_reads_each_chip_of_a_part_once(whole, monkeypatch):
+    """With what it takes of PyTorch in the place of it, as the second of two processes that share the shards."""
+    page = Path(__file__).parents[3] / "docs" / "howto" / "training_set.md"
+    (block,) = re.findall(r"^:class: no-run\n(.*?)^```", page.read_text("utf-8"), re.S | re.M)
+    workers = [SimpleNamespace(id=number, num_workers=2) for number in (0, 1)]
+    data = SimpleNamespace(IterableDataset=object, DataLoader=lambda chips, **options: chips)
+    data.get_worker_info = lambda: workers[0]
+    monkeypatch.setitem(sys.modules, "torch", SimpleNamespace(utils=SimpleNamespace(data=data), from_numpy=np.asarray))
+    monkeypatch.chdir(whole.parent)
+    names = {}
+    exec(compile(block, page, "exec"), names)
+    found = list(names["loader"])
+    data.get_worker_info = lambda: workers[1]
+    found += list(names["loader"])
+    store = xr.open_zarr(whole)
+    train = store.isel(chip=np.flatnonzero(store.split == "train"))
+    assert len(found) == train.sizes["chip"]
+    expected = {(x.tobytes(), y.tobytes()) for x, y in zip(train.toa_reflectance.values, train.lai.values, strict=True)}
+    assert {(x.tobytes(), y.tobytes()) for x, y in found} == expected
+
+
+@pytest.mark.slow
+def test_workers_make_the_same_bits(study, whole, tmp_path):
+    from fifesim.output.run.workers import cluster
+
+    with cluster(workers=2) as client:
+        dataset_to_folder(study, tmp_path / "chips.zarr", COUNT, client=client)
+    assert contents(tmp_path / "chips.zarr") == contents(whole)
+
+
+@pytest.mark.slow
+def test_a_run_killed_at_any_moment_goes_on_to_the_same_bits(study, whole, tmp_path):
+    """Five times, at moments drawn over the time that a run takes."""
+    (tmp_path / "study.toml").write_text(study.to_toml())
+    code = (
+        "import sys; from matplotlib.figure import Figure; from fifesim.output.chips import datasheet, store; "
+        "store._FEWEST = 2; datasheet.contact_sheet = lambda dataset, parts: Figure((1, 1)); "
+        "from fifesim.cli import app; "
+        f"app(['dataset', 'study.toml', '-n', '{COUNT}', '--workers', '1', *sys.argv[1:]])"
+    )
+    run = [sys.executable, "-c", code]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    start = time.monotonic()
+    subprocess.run([*run, "-o", "first.zarr"], cwd=tmp_path, env=environment, check=True)
+    length = time.monotonic() - start
+    assert contents(tmp_path / "first.zarr") == contents(whole)
+    moments = random.Random(1)
+    for _ in range(5):
+        process = subprocess.Popen([*run, "-o", "chips.zarr", "--resume"], cwd=tmp_path, env=environment)
+        time.sleep(moments.uniform(0.3, 1.0) * length)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        if (tmp_path / "chips.zarr" / "zarr.json").exists():
+            break
+    else:
+        subprocess.run([*run, "-o", "chips.zarr", "--resume"], cwd=tmp_path, env=environment, check=True)
+    found = contents(tmp_path / "chips.zarr")
+    assert {name: value for name, value in found.items() if not name.startswith(UNFINISHED)} == contents(whole)

@@ -1,0 +1,58 @@
+"""The contact sheet shows what it says."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from fifesim.output.chips.pictures import contact_sheet
+
+
+def dataset_of(bands, wavelengths, names=("lai", "fpar"), chips=7):
+    generator = np.random.default_rng(0)
+    rasters = {name: (("chip", "y", "x"), generator.random((chips, 5, 4))) for name in names}
+    reflectance = ("chip", "band", "y", "x"), generator.random((chips, len(bands), 5, 4))
+    split = ["test", "train", "train", "train", "train", "train", "test"][:chips]
+    coordinates = {"band": list(bands), "wavelength": ("band", list(wavelengths)), "split": ("chip", split)}
+    return xr.Dataset(rasters | {"toa_reflectance": reflectance}, coords=coordinates)
+
+
+def test_a_few_chips_of_each_part_in_its_order():
+    figure = contact_sheet(dataset_of(["TM3", "TM4"], [0.66, 0.84]), ["train", "validation", "test"])
+    titles = [axis.get_title() for axis in figure.axes if axis.get_title()]
+    assert titles == ["train\nchip 1", "\nchip 2", "\nchip 3", "\nchip 4", "test\nchip 0", "\nchip 6"]
+    labels = [axis.get_ylabel() for axis in figure.axes if axis.get_ylabel()]
+    assert labels == ["image: TM4,\nTM3", "leaf area index", "FPAR"]
+
+
+def test_a_row_shares_its_colours():
+    figure = contact_sheet(dataset_of(["TM3", "TM4"], [0.66, 0.84]), ["train", "test"])
+    images = [axis.images[0] for axis in figure.axes if axis.images and axis.images[0].get_array().ndim == 2]
+    limits = {image.get_clim() for image in images[:6]}
+    assert len(limits) == 1
+
+
+@pytest.mark.parametrize(
+    ("bands", "wavelengths", "said"),
+    [
+        (["B03", "B04", "B08"], [0.56, 0.66, 0.84], "image: B08,\nB04,\nB03"),
+        (["TM5"], [1.65], "image: TM5"),
+    ],
+)
+def test_bands_are_those_of_a_false_colour(bands, wavelengths, said):
+    assert contact_sheet(dataset_of(bands, wavelengths), ["train"]).axes[0].get_ylabel() == said
+
+
+def test_pixels_without_data_are_clear():
+    dataset = dataset_of(["TM3", "TM4"], [0.66, 0.84])
+    dataset["toa_reflectance"][1, 0, 2, 3] = np.nan
+    picture = contact_sheet(dataset, ["train"]).axes[0].images[0].get_array()
+    assert picture[2, 3, 3] == 0 and (np.delete(picture[..., 3].ravel(), 11) == 1).all()
+
+
+def test_near_infrared_is_red():
+    dataset = dataset_of(["TM3", "TM4"], [0.66, 0.84])
+    dataset["toa_reflectance"][1, 1] = 0.0
+    dataset["toa_reflectance"][1, 1, 0, 0] = 1.0
+    picture = contact_sheet(dataset, ["train"]).axes[0].images[0].get_array()
+    assert picture[0, 0, 0] > picture[1:, :, 0].max()
+    np.testing.assert_array_equal(picture[..., 1], picture[..., 2])

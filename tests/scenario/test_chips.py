@@ -1,0 +1,102 @@
+"""Chips: by landscape apart, drawn as the study says, and each a scenario of its own."""
+
+import numpy as np
+import pytest
+
+from fifesim.scenario.chips import chips_of
+from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.studies import Study
+
+SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
+DRAWS = {
+    "visibility": {"uniform": [10, 60]},
+    "ground.arp": {"uniform": [0.05, 0.2]},
+    "distribution": {"choice": ["burned-grazed", "burned-ungrazed"]},
+}
+
+
+def study_of(sections=(), **plan):
+    return Study(parse_scenario(SMALL | dict(sections)), DRAWS, **{"landscapes": 8} | plan)
+
+
+@pytest.fixture(scope="module")
+def chips():
+    return chips_of(study_of(), 300)
+
+
+@pytest.mark.parametrize("sequence", ["sobol", "random"])
+def test_chips_are_the_same_however_many_there_are(sequence):
+    few, many = (chips_of(study_of(sequence=sequence), count).table() for count in (13, 200))
+    assert few.equals(many.isel(chip=slice(13)))
+
+
+def test_a_latin_hypercube_has_a_chip_in_every_slice():
+    table = chips_of(study_of(sequence="latin-hypercube"), 50).table()
+    slices = np.sort(np.floor(table["atmosphere.visibility"].values - 10))
+    np.testing.assert_array_equal(slices, np.arange(50))
+
+
+def test_no_landscape_is_in_two_parts(chips):
+    parts = {name: set(chips.landscape[chips.split == name].tolist()) for name in ("train", "validation", "test")}
+    assert [len(each) for each in parts.values()] == [6, 1, 1]
+    assert set.union(*parts.values()) == set(range(8))
+
+
+def test_no_two_chips_share_ground(chips):
+    """They may lie at the same place where their seeds differ."""
+    table = chips.table()
+    places = {
+        (int(a), b, c) for a, b, c in zip(table["ground.seed"], table.west.values, table.north.values, strict=True)
+    }
+    assert len(places) == len(chips)
+    for name in ("west", "north"):
+        apart = np.diff(np.unique(table[name].values))
+        assert apart.min() >= 180 - 1e-6
+
+
+def test_a_landscape_has_one_seed_and_one_arp(chips):
+    table = chips.table()
+    for name in ("ground.seed", "ground.arp"):
+        assert len(np.unique(table[name])) == 8
+        assert all(len(np.unique(each[name])) == 1 for _, each in table.groupby("landscape"))
+    assert table["ground.seed"].values.min() == chips.study.scenario.ground.seed
+
+
+def test_every_landscape_sees_the_whole_range_of_what_is_drawn_by_chip():
+    """Points of a Sobol sequence that are eight apart lie in an eighth of the first dimension."""
+    table = chips_of(study_of(), 8 * 40).table()
+    for _, each in table.groupby("landscape"):
+        assert np.ptp(each["atmosphere.visibility"].values) > 35
+        assert len(set(each["ground.distribution"].values.tolist())) == 2
+
+
+def test_a_chip_is_its_row_of_the_table(chips):
+    table = chips.table()
+    for chip in (0, 17, 299):
+        scenario, row = chips.scenario(chip), table.isel(chip=chip)
+        box = scenario.geobox()
+        assert (box.affine.c, box.affine.f) == pytest.approx((float(row.west), float(row.north)), abs=1e-6)
+        assert box.shape == (54, 54)
+        assert scenario.atmosphere.visibility == float(row["atmosphere.visibility"])
+        assert scenario.ground.arp == float(row["ground.arp"])
+        assert scenario.ground.distribution == str(row["ground.distribution"].values)
+
+
+def test_hills_and_noise_have_seeds_of_their_own():
+    sections = {"terrain": {"dem": "flint-hills", "seed": 100}, "sensor": {"instrument": "MSI", "noise": ["shot"]}}
+    table = chips_of(study_of(sections), 24).table()
+    np.testing.assert_array_equal(table["terrain.seed"], 100 + table.landscape)
+    np.testing.assert_array_equal(table["sensor.seed"], np.arange(24))
+    assert "terrain.seed" not in chips_of(study_of(), 2).table()
+
+
+def test_two_seeds_are_two_sets():
+    one, other = (chips_of(study_of(seed=seed), 50).table() for seed in (0, 1))
+    assert (one["atmosphere.visibility"] != other["atmosphere.visibility"]).all()
+    assert (one.landscape != other.landscape).any()
+
+
+@pytest.mark.parametrize("count", [0, -1, 2.5, True])
+def test_a_number_of_chips_is_a_whole_one(count):
+    with pytest.raises(ValueError, match="n must be a whole number of chips from 1 up"):
+        chips_of(study_of(), count)

@@ -1,0 +1,179 @@
+"""Studies: what may be drawn, and what chips share."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import fifesim
+from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.studies import Study, read_study
+
+GRID = {"width": 180.0, "height": 180.0}
+SMALL = {"grid": GRID, "terrain": {"dem": "flat"}}
+DRAWS = {"visibility": {"uniform": [10, 60]}}
+
+WHOLE = """
+[grid]
+width = 180
+height = "0.18 km"
+
+[terrain]
+dem = "flat"
+
+[dataset]
+sequence = "random"
+seed = 3
+landscapes = 4
+split = { train = 0.75, test = 0.25 }
+
+[draw]
+visibility = { log-uniform = ["5 km", 60] }
+"ground.arp" = { uniform = [0.05, 0.2] }
+
+[draw.ground]
+leaf.chlorophyll = { normal = [40, 10], within = [10, 80] }
+distribution = { choice = ["burned-grazed", "mine.csv"] }
+"""
+
+
+@pytest.fixture
+def path(tmp_path):
+    (tmp_path / "mine.csv").write_text("lai\n" + "\n".join(str(0.1 * k) for k in range(1, 9)))
+    (tmp_path / "study.toml").write_text(WHOLE)
+    return tmp_path / "study.toml"
+
+
+def test_a_file_says_what_is_drawn(path):
+    study = read_study(path)
+    assert (study.sequence, study.seed, study.landscapes, study.split) == (
+        "random",
+        3,
+        4,
+        {"train": 0.75, "test": 0.25},
+    )
+    assert {key.name: one.table for key, one in study.drawn.items()} == {
+        "atmosphere.visibility": {"log-uniform": [5.0, 60.0]},
+        "ground.arp": {"uniform": [0.05, 0.2]},
+        "ground.leaf.chlorophyll": {"normal": [40.0, 10.0], "within": [10.0, 80.0]},
+        "ground.distribution": {"choice": ["burned-grazed", str(path.parent / "mine.csv")]},
+    }
+
+
+def test_a_study_is_written_as_it_is_read(path, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    again = tmp_path / "elsewhere" / "again.toml"
+    again.write_text(read_study(path).to_toml())
+    assert read_study(again) == read_study(path)
+    assert read_study(again).to_toml() == read_study(path).to_toml()
+
+
+def test_chips_have_the_sun_and_the_air_of_the_study_wherever_they_lie():
+    """The paper's overpass is that of its site, which chips leave."""
+    study = Study(parse_scenario(SMALL), DRAWS)
+    far = study.scenario_with({("grid", "west"): 600_000.0, ("grid", "north"): 4_200_000.0})
+    assert far.sun_and_view() == study.scenario.sun_and_view()
+    assert far.model_atmosphere() == study.scenario.model_atmosphere()
+    # Written out, so that no chip looks the sun up.
+    assert study.values["geometry"]["sza"] == study.scenario.sun_and_view().sza
+    dates = Study(parse_scenario(SMALL), {"time": {"choice": ["1987-06-06T16:35Z", "1987-10-06T16:35Z"]}})
+    drawn = {("geometry", "time"): "1987-10-06T16:35Z"}
+    here = dates.scenario_with(drawn)
+    far = dates.scenario_with(drawn | {("grid", "west"): 600_000.0})
+    assert here.sun_and_view() == far.sun_and_view() != study.scenario.sun_and_view()
+
+
+def test_one_band_may_be_drawn_beside_the_others():
+    study = Study(parse_scenario(SMALL), {"ground.background.TM3": {"uniform": [0.05, 0.2]}})
+    found = study.scenario_with({("ground", "background", "TM3"): 0.07}).ground.background
+    assert found["TM3"] == 0.07 and found["TM4"] == study.scenario.complete().ground.background["TM4"]
+
+
+@pytest.mark.parametrize(
+    ("draws", "message"),
+    [
+        ({}, r"a study draws something: give a table \[draw\]"),
+        ({"visibilty": {"uniform": [10, 60]}}, "draw: 'visibilty' is no key of a scenario: did you mean 'visibility'"),
+        ({"visibility": {"unifrom": [10, 60]}}, r"draw\.atmosphere\.visibility: needs .* did you mean 'uniform'"),
+        ({"visibility": {"uniform": [1, 60]}}, r"draw\.atmosphere\.visibility = .* at 1\.0: .*greater than"),
+        ({"visibility": {"uniform": ["10 m", "60 miles"]}}, r"visibility is in km"),
+        ({"visibility": 5}, r"draw\.atmosphere\.visibility: a distribution is a table"),
+        ({"ground.seed": {"integers": [1, 9]}}, r"draw\.ground\.seed: landscapes and noise have seeds of their own"),
+        ({"pixel": {"choice": [30.0, 60.0]}}, r"draw\.sensor\.pixel: is the same for all chips"),
+        ({"width": {"uniform": [200, 300]}}, r"draw\.grid\.width: is the same for all chips"),
+        ({"visibility": {"uniform": [9, 60]}, "atmosphere": {"visibility": {"uniform": [9, 60]}}}, "is given twice"),
+        ({"classes.grass.brown": {"uniform": [0, 1]}}, r"there is no \[classes\.grass\], classes are none"),
+        ({"sza": {"uniform": [20, 50]}}, "draw, all at their medians or first choices: .*sza and saa go together"),
+        ({"sza": {"uniform": [20, 89.9]}, "saa": {"uniform": [0, 90]}}, r"draw\.geometry\.sza = .* at 89\.9"),
+        ({"distribution": {"choice": ["burned-grazed", "burnt"]}}, r"draw\.ground\.distribution .* 'burnt'"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_drawn_is_refused(draws, message):
+    with pytest.raises(ValueError, match=message) as caught:
+        Study(parse_scenario(SMALL), draws)
+    assert len(str(caught.value)) <= 500
+
+
+@pytest.mark.parametrize(
+    ("plan", "message"),
+    [
+        ({"sequence": "sobel"}, "did you mean 'sobol'"),
+        ({"landscapes": 0}, "must be a whole number from 1 up"),
+        ({"landscapes": 2}, "cannot be split into train, validation, test"),
+        ({"split": {"train": 0.8}}, "must be shares that sum to 1"),
+        ({"split": {"train": 1.5, "test": -0.5}}, "must be shares that sum to 1"),
+        ({"seed": -1}, "seed must be a whole number"),
+    ],
+)
+def test_impossible_plans_are_refused(plan, message):
+    with pytest.raises(ValueError, match=message):
+        Study(parse_scenario(SMALL), DRAWS, **plan)
+
+
+@pytest.mark.parametrize(
+    ("section", "keys", "message"),
+    [
+        ("terrain", {"dem": "dem.tif"}, "terrain.dem = 'dem.tif': chips of one map would share ground"),
+        ("landscape", {"cover": "cover.tif"}, "landscape.cover = .* a study takes none or pastures"),
+        ("ground", {"lai_file": "lai.tif"}, "ground.lai_file = 'lai.tif': chips of one map"),
+        ("ground", {"method": "periodic"}, "has no windows to cut chips from"),
+        ("grid", {"cell": 5.0}, "grid.width is not given: it is the size of a chip"),
+    ],
+)
+def test_ground_that_is_not_drawn_is_refused(section, keys, message):
+    with pytest.raises(ValueError, match=message):
+        Study(parse_scenario(SMALL | {section: keys}), DRAWS)
+
+
+def test_a_study_takes_a_scenario():
+    with pytest.raises(TypeError, match="a study takes a Scenario, got dict"):
+        fifesim.Study({}, DRAWS)
+
+
+def test_unknown_keys_of_the_plan_are_refused(path):
+    path.write_text(WHOLE.replace("sequence =", "sequnce ="))
+    with pytest.raises(ValueError, match=r"unknown key dataset\.sequnce: did you mean 'sequence'"):
+        read_study(path)
+
+
+@pytest.mark.parametrize(
+    ("landscapes", "split", "quotas"),
+    [
+        (50, {"train": 0.8, "validation": 0.1, "test": 0.1}, [40, 5, 5]),
+        (3, {"train": 0.8, "validation": 0.1, "test": 0.1}, [1, 1, 1]),
+        (11, {"train": 0.8, "validation": 0.1, "test": 0.1}, [9, 1, 1]),
+        (7, {"a": 0.5, "b": 0.5}, [4, 3]),
+        (1, {"all": 1.0}, [1]),
+    ],
+)
+def test_every_part_has_its_share_of_landscapes_and_one_at_least(landscapes, split, quotas):
+    study = Study(parse_scenario(SMALL), DRAWS, landscapes=landscapes, split=split)
+    assert list(study.quotas().values()) == quotas
+
+
+def test_the_study_of_the_page_is_valid(tmp_path):
+    page = Path(__file__).parents[2] / "docs" / "howto" / "training_set.md"
+    (block,) = re.findall(r"^```toml\n(.*?)^```", page.read_text("utf-8"), re.S | re.M)
+    (tmp_path / "study.toml").write_text(block)
+    study = read_study(tmp_path / "study.toml")
+    assert len(study.drawn) == 7 and study.landscapes == 50
