@@ -1,6 +1,5 @@
 """The command line. Everything slow to import is imported by the command that needs it, so that --help is instant."""
 
-import json
 import os
 import time
 from pathlib import Path

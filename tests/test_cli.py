@@ -73,7 +73,7 @@ def test_rerun_makes_the_same_file_again(first, invoke, monkeypatch, tmp_path):
     monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
     result = invoke("rerun", first[0] / "image.tif", "-o", "again.tif")
     assert result.exit_code == 0, result.output
-    assert result.stdout == f"{first[0]}/image.tif made again: the same bits in all of 1200 values\n"
+    assert result.stdout == f"{first[0]}/image.tif made again: the same bits in all of 1800 values\n"
     assert (tmp_path / "again.tif").read_bytes() == (first[0] / "image.tif").read_bytes()
     refused = invoke("rerun", first[0] / "image.tif", "-o", "again.tif")
     assert refused.exit_code == 2 and "--overwrite" in refused.stderr

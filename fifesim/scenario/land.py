@@ -58,7 +58,8 @@ def elevation(scenario, grid, chunks=None):
         options = {"fill": terrain.fill, "vertical_units": terrain.vertical_units}
         dem = fine_dem(terrain.dem, grid, chunks=chunks, **options)
         around, reach = source_dem(terrain.dem, grid, terrain.horizon_reach, chunks="auto", **options)
-        middle = around[_middle(around.shape)].compute()
+        # A few blocks of the file, at once: whether the sun shines is asked before anything is made.
+        middle = around[_middle(around.shape)].compute(scheduler="synchronous")
     horizon = sky_raster.horizon(around, reach=terrain.horizon_reach, beside=dem)
     _check_sun(middle, around, horizon, scenario.sun_and_view())
     return dem, horizon, reach

@@ -1,5 +1,6 @@
 """Studies: a scenario, and what of it is drawn anew for each of many chips."""
 
+import os
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -113,7 +114,7 @@ class Study:
         plan = {"sequence": self.sequence, "seed": self.seed, "landscapes": self.landscapes, "split": dict(self.split)}
         tables = {("dataset",): plan, ("draw",): self.draws}
         for place, section in self.scenario.sections().items():
-            tables[place] = section.with_whole_paths().model_dump(exclude_unset=True)
+            tables[place] = section.with_paths(os.path.abspath).model_dump(exclude_unset=True)
         written = ("\n".join(plain_table(place, values)) for place, values in tables.items() if values)
         return "\n\n".join([_HEADING, *written]) + "\n"
 

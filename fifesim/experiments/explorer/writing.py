@@ -40,6 +40,13 @@ def explore(scenario=None, path="explore.html", *, overwrite=False):
     See Also
     --------
     fifesim.budget, fifesim.sweep
+
+    Examples
+    --------
+    Some minutes of simulations:
+
+    >>> import fifesim
+    >>> fifesim.explore(fifesim.Scenario(), "mine.html")  # doctest: +SKIP
     """
     if scenario is not None and not isinstance(scenario, Scenario):
         raise TypeError(f"explore takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
