@@ -248,6 +248,10 @@ def _distance(time):
     return float(pvlib.solarposition.nrel_earthsun_distance(utc(time)).iloc[0])
 
 
+# Day and month in another order are another season, and a time alone is today's.
+_WRITTEN = re.compile(r"\s*\d{4}-?\d{2}-?\d{2}[T ]\d{2}(:?\d{2}.*)?\s*")
+
+
 def utc(time):
     """
     A time in UTC.
@@ -255,7 +259,7 @@ def utc(time):
     Parameters
     ----------
     time : str or datetime
-        Taken as UTC where it names no time zone; a text with the time of day.
+        Taken as UTC where it names no time zone; a text after ISO 8601, with the time of day.
 
     Returns
     -------
@@ -264,10 +268,15 @@ def utc(time):
     Raises
     ------
     ValueError
-        If it is no time, or a date alone: midnight is another sun.
+        If it is no time, a date alone, for midnight is another sun, or a text in another order.
     """
     if isinstance(time, str) and re.fullmatch(r"\s*\d{4}-?\d{2}-?\d{2}\s*", time):
         raise ValueError(f"time = {time!r} is a date alone: add the time of day, such as {time.strip()}T17:10Z")
+    if isinstance(time, str) and not _WRITTEN.fullmatch(time):
+        raise ValueError(
+            f"time = {time!r} could be read in several ways: write year, month, day and time of day, such as "
+            "1987-06-06T16:35Z or 1987-06-06 11:35-05:00"
+        )
     try:
         # A number would be taken for nanoseconds since 1970.
         stamp = pd.NaT if isinstance(time, int | float | np.number) else pd.Timestamp(time)

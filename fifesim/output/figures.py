@@ -11,7 +11,7 @@ _COLORS = ("#2166ac", "#b2182b", "#1a9850", "#762a83", "#e08214", "#35978f")
 
 # Places of axes and colour bar: laying a figure out by its words takes longer than drawing it. [1]
 _PANEL, _BESIDE = (0.15, 0.17, 0.82, 0.72), (0.88, 0.14, 0.025, 0.66)
-_PLOT = (0.115, 0.14, 0.74, 0.77)
+_PLOT = (0.125, 0.14, 0.73, 0.77)
 
 NAMES = {
     "lai": "leaf area index",
@@ -98,11 +98,11 @@ def histogram_figures(image, truth, detail):
     """
     figures = [Figure(figsize=(3.6, 2.6)) for _ in range(3)]
     leaves, fpar, counts = (figure.add_axes(_PANEL) for figure in figures)
-    top = float(np.nanmax(detail)) if detail.notnull().any() else 1.0
+    top = max((float(each.max()) for each in (detail, truth["lai"]) if each.notnull().any()), default=1.0)
     bins = np.linspace(0, max(top, 1e-6), 60)
     for values, label, color in (
         (detail, "cells in the middle", "#a6d96a"),
-        (truth["lai"], "means over pixels", "#1a9850"),
+        (truth["lai"], "means over all pixels", "#1a9850"),
     ):
         leaves.hist(
             _finite(values), bins=bins, density=True, alpha=0.7, label=label, color=color, histtype="stepfilled"

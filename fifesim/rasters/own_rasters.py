@@ -110,6 +110,11 @@ def check_reflectance(values):
     ValueError
         If a value is below -0.5 or beyond 5.
 
+    Warns
+    -----
+    UserWarning
+        If most are above 1.
+
     Examples
     --------
     >>> float(check_reflectance(np.array([0.2, np.nan]))[0])
@@ -119,8 +124,13 @@ def check_reflectance(values):
     if np.any(wrong):
         raise ValueError(
             f"reflectance of {values[wrong].flat[0]:g}: it is a fraction, and {LOWEST:g} to {HIGHEST:g} is allowed. "
-            "Mask no data with .where(raster != nodata), divide scaled values by their scale, and calibrate digital "
-            "numbers with fifesim.calibrate"
+            "Mask no data with .where(raster != nodata), multiply scaled values by their scale (0.01 for percent, "
+            "0.0001 where 1 is written 10000), and calibrate digital numbers with fifesim.calibrate"
+        )
+    if values.size and np.mean(values > 1) > 0.5:
+        warn(
+            "most values of a block are reflectances above 1, as no ground has: where they are percent, divide them by "
+            "100, and where they are scaled, multiply them by their scale"
         )
     return values
 
@@ -168,7 +178,13 @@ def _named(array):
 def _physical(array, name):
     """Values in their unit, NaN where there are no data; looked at when they are computed."""
     if array.dtype.kind in "iub" and scale_and_offset(array) == (1.0, 0.0):
-        scaled = "for scaled reflectance type .assign_attrs(scale_factor=0.0001, _FillValue=0), as its product says"
+        if "FIFESIM" in array.attrs:
+            raise ValueError(
+                f"{array.name or 'the raster'} is an image that fifesim wrote, without its calibration: open its file "
+                "with fifesim.open_image, which brings it back"
+            )
+        nodata = "" if has_no_data(array) else ", _FillValue=0"
+        scaled = f"for scaled reflectance type .assign_attrs(scale_factor=0.0001{nodata}), as its product says"
         counts = "calibrate digital numbers with fifesim.calibrate"
         cures = f"{counts}; {scaled}" if array.dtype.itemsize < 2 else f"{scaled}; {counts}"
         raise ValueError(

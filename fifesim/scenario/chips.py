@@ -122,9 +122,11 @@ def chips_of(study, n):
 
     Examples
     --------
-    >>> from fifesim.scenario.scenario import Scenario
-    >>> chip = Scenario(grid={"width": 180, "height": 180}, terrain={"dem": "flat"})
-    >>> chips = chips_of(Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10), 20)
+    >>> import fifesim
+    >>> import numpy as np
+    >>> chip = fifesim.Scenario(grid={"width": 180, "height": 180}, terrain={"dem": "flat"})
+    >>> study = fifesim.Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10)
+    >>> chips = fifesim.chips_of(study, 20)
     >>> np.bincount(chips.landscape).tolist()
     [2, 2, 2, 2, 2, 2, 2, 2, 2, 2]
     >>> chips.scenario(3).atmosphere.visibility == float(chips.table()["atmosphere.visibility"][3])

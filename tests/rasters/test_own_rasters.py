@@ -1,5 +1,7 @@
 """Rasters as people have them, and what is not taken for a reflectance in silence."""
 
+import warnings
+
 import numpy as np
 import pytest
 import rasterio
@@ -79,6 +81,25 @@ def test_what_can_be_a_reflectance():
     for wrong in (-0.51, 5.01, np.inf):
         with pytest.raises(ValueError, match=r"-0\.5 to 5 is allowed"):
             check_reflectance(np.array([0.2, wrong]))
+
+
+def test_a_dark_scene_in_percent_is_a_warning():
+    """Below 5 % everywhere, so that no value is impossible; a few bright cells are none."""
+    with pytest.warns(UserWarning, match=r"reflectances above 1.*divide them by\s+100"):
+        check_reflectance(np.linspace(0.9, 4.5, 100))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_reflectance(np.append(np.full(60, 0.2), np.full(40, 1.2)))
+
+
+def test_what_has_no_data_is_not_told_another_value(fractions):
+    whole = (fractions * 10000).astype("int16")
+    with pytest.raises(ValueError, match=r"scale_factor=0\.0001\), as"):
+        incoming(whole.assign_attrs(_FillValue=-9999), "surface_reflectance")
+    with pytest.raises(ValueError, match=r"scale_factor=0\.0001, _FillValue=0\), as"):
+        incoming(whole, "surface_reflectance")
+    with pytest.raises(ValueError, match=r"open its file with fifesim\.open_image"):
+        incoming(whole.assign_attrs(FIFESIM="{}"), "surface_reflectance")
 
 
 def test_fractions_that_say_a_scale_are_asked_whether_it_was_applied(fractions):

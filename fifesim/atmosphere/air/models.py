@@ -315,6 +315,11 @@ def _checked(what, value, low, high, unit):
             f"{what} must be a number from {low} to {high} [{unit}], got {described(value)}: leave the unit out"
         )
     if not low <= value <= high:
+        if unit == "km" and 10 * high < value <= 1000 * high:
+            raise ValueError(
+                f"{what} must be from {low} to {high} {unit}, got {value:g}: where that is metres, type "
+                f"{what}={value / 1000:g}"
+            )
         nearest = low if value < low else high
         raise ValueError(
             f"{what} must be from {low} to {high} {unit}, got {value:g}: type {what}={nearest}, the nearest allowed"

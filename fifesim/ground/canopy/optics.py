@@ -259,7 +259,8 @@ def check_lai(lai):
         wrong = (cells < 0) | (cells > LARGEST_LAI)
         raise ValueError(
             f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
-            f"{wrong.sum()} of {cells.size} cells: set cells without data to NaN, such as lai.where(lai >= 0)"
+            f"{wrong.sum()} of {cells.size} cells: set cells without data to NaN, such as lai.where(lai >= 0), and "
+            "multiply scaled numbers by their scale"
         )
     return lai
 

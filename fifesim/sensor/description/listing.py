@@ -1,7 +1,7 @@
 """Instruments as text, for people to read."""
 
 from fifesim.sensor.description.fields import TwoAxes, by_axes
-from fifesim.sensor.description.responses import knows_blur
+from fifesim.sensor.description.responses import knows_blur, with_response
 from fifesim.sensor.description.spectral_response import half_peak
 
 
@@ -156,21 +156,32 @@ def blur_in_words(instrument, bands):
     --------
     >>> from fifesim.sensor.description.instruments import instrument
     >>> blur_in_words(instrument("TM"), ["TM3", "TM4"])
-    'modulation transfer at the Nyquist frequency 0.69'
+    'modulation transfer at the Nyquist frequency 0.69; the detector alone has 0.64: the image of TM3, TM4 is sharper'
     """
     chosen = instrument.select(bands)
-    found = []
-    for band in chosen:
-        pairs = zip(instrument.line_spreads(band), instrument.ground_intervals(band), strict=True)
-        found.append(_pair([float(spread.mtf(0.5 / step)) for spread, step in pairs], ".2f"))
-    named = [f"{band.name} {passed}" for band, passed in zip(chosen, found, strict=True)]
+    passed = [_transfer(instrument, band) for band in chosen]
+    found = [_pair(each, ".2f") for each in passed]
+    named = [f"{band.name} {text}" for band, text in zip(chosen, found, strict=True)]
     each = found[:1] if len(set(found)) == 1 else named
     text = f"modulation transfer at the Nyquist frequency {', '.join(each)}"
     unknown = [band.name for band in chosen if not knows_blur(instrument, band)]
     if unknown:
         text += f"; of {', '.join(unknown)} the detector alone is known: the image is sharper than the instrument's"
         text += _published(instrument, "blur")
+    detector = with_response(instrument, "detector")
+    alone = [_transfer(detector, band) for band in detector.select([band.name for band in chosen])]
+    # To the two digits that are shown.
+    sharper = [k for k, each in enumerate(passed) if max(each) > max(alone[k]) + 0.005]
+    if sharper:
+        text += f"; the detector alone has {_pair(alone[sharper[0]], '.2f')}: the image of "
+        text += f"{', '.join(chosen[k].name for k in sharper)} is sharper"
     return text
+
+
+def _transfer(instrument, band):
+    """Modulation transfer at the Nyquist frequency of the own interval, along and across the track."""
+    pairs = zip(instrument.line_spreads(band), instrument.ground_intervals(band), strict=True)
+    return [float(spread.mtf(0.5 / step)) for spread, step in pairs]
 
 
 def noise_in_words(instrument, bands, kinds=()):

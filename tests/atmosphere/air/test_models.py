@@ -28,6 +28,14 @@ def test_visibility_gives_the_optical_thickness_of_6s(visibility, aot):
     assert Atmosphere(visibility=visibility).aot == pytest.approx(aot, abs=5e-6)
 
 
+@pytest.mark.parametrize(
+    ("given", "cure"), [({"altitude": 400}, "altitude=0.4"), ({"visibility": 23e3}, "visibility=23")]
+)
+def test_metres_are_told_in_kilometres(given, cure):
+    with pytest.raises(ValueError, match=f"where that is metres, type {cure}$"):
+        Atmosphere(**given)
+
+
 def test_aerosol_does_not_depend_on_altitude():
     assert Atmosphere(altitude=0).aot == Atmosphere(altitude=3).aot
 
@@ -67,7 +75,7 @@ def test_text_reads_well():
         ({"aerosol": "continentl"}, r"aerosol must be one of .*, got 'continentl': type aerosol='continental'"),
         ({"visibility": 3}, r"visibility must be from 5 to 100 km, got 3: type visibility=5"),
         ({"visibility": float("nan")}, r"visibility must be from 5 to 100 km, got nan"),
-        ({"altitude": 400}, r"altitude must be from 0 to 4 km, got 400: type altitude=4"),
+        ({"altitude": 5}, r"altitude must be from 0 to 4 km, got 5: type altitude=4"),
     ],
 )
 def test_a_mistake_is_named(arguments, message):
