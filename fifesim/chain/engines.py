@@ -9,6 +9,7 @@ from fifesim.analysis.indices import normalized_difference
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import coupling
 from fifesim.atmosphere.schemes import engines as schemes
+from fifesim.atmosphere.schemes.mixed_air import whole_scattering
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.base.geometry import fife_geometry
 from fifesim.base.kinds import described
@@ -108,7 +109,7 @@ def engine_error(setup=None):
 
     See Also
     --------
-    fifesim.atmosphere.schemes.engines.scattering
+    fifesim.atmosphere.schemes.engines.scattering, fifesim.atmosphere.schemes.mixed_air.whole_scattering
     """
     setup, air, bands, geometry = _case(setup)
     surface = _surface(setup, air, None, len(bands))
@@ -116,8 +117,8 @@ def engine_error(setup=None):
     increasing = np.argsort(wavelength)
     views = geometry.sza, np.array([geometry.vza]), np.array([geometry.raa])
     toa = []
-    for each in (air, replace(air, engine="successive-orders")):
-        light = schemes.scattering(each, wavelength[increasing], *views)
+    for scattering in (schemes.scattering, whole_scattering):
+        light = scattering(air, wavelength[increasing], *views)
         down, up = light.transmittance_down, light.transmittance_up
         terms = light.reflectance, down, up, light.spherical_albedo, 1.0
         toa.append(np.ravel(coupling.apparent_reflectance(surface[increasing], *terms)))

@@ -189,10 +189,31 @@ def angles(east, north):
     slope, aspect : array
         As of `slope_aspect`. [degree]
     """
-    slope = np.degrees(np.arctan(np.hypot(east, north)))
     # 0 - x and not -x: level ground must not face -0.
     aspect = np.degrees(np.arctan2(0 - east, 0 - north)) % 360
-    return slope, np.where(aspect == 360, 0.0, aspect)
+    return steepness(east, north), np.where(aspect == 360, 0.0, aspect)
+
+
+def steepness(east, north):
+    """
+    Slope of a gradient alone: aspects take longer.
+
+    Parameters
+    ----------
+    east, north : array
+        Rise eastward and northward. [m m-1]
+
+    Returns
+    -------
+    slope : array
+        [degree]
+
+    Examples
+    --------
+    >>> round(float(steepness(0.6, 0.8)), 9)
+    45.0
+    """
+    return np.degrees(np.arctan(np.hypot(east, north)))
 
 
 @njit(nogil=True, cache=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.mixed_air import mixed_scattering, mixed_stokes
+from fifesim.atmosphere.schemes.mixed_air import _quadrature, mixed_scattering, mixed_stokes, whole_scattering
 
 WAVELENGTH = np.array([0.47, 0.86])
 SZA, VZA, RAA = 50.0, np.array([0.0, 35.0]), np.array([60.0])
@@ -15,6 +15,19 @@ HAZE = Atmosphere(visibility=10.0)
 @pytest.fixture(scope="module")
 def hazy():
     return mixed_scattering(HAZE, WAVELENGTH, SZA, VZA, RAA)
+
+
+def test_the_whole_alone_is_that_beside_its_parts(hazy):
+    whole = whole_scattering(HAZE, WAVELENGTH, SZA, VZA, RAA)
+    for name, values in whole._asdict().items():
+        np.testing.assert_array_equal(values, getattr(hazy, name))
+
+
+def test_gauss_points_are_those_of_a_full_matrix():
+    points, weights = np.polynomial.legendre.leggauss(500)
+    found = _quadrature()
+    np.testing.assert_allclose(found[0], points, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found[1], weights, rtol=1e-13)
 
 
 def test_light_that_is_not_scattered_falls_off_with_the_depth_of_both(hazy):

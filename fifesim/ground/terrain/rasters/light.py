@@ -8,9 +8,10 @@ import xarray as xr
 
 from fifesim.base.geometry import fife_geometry
 from fifesim.ground.terrain import sky as skies
-from fifesim.ground.terrain.light import slope_light, slope_reflectance, topographic_factor
+from fifesim.ground.terrain.light import slope_light, slope_reflectance
 from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid, source_resolution
 from fifesim.ground.terrain.rasters.sky import sky_above
+from fifesim.ground.terrain.slope_factors import slope_factor
 from fifesim.rasters import cf, directions, projection
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -194,14 +195,12 @@ def kt_on_slopes(reflectance, dem, *, direct_transmittance, transmittance_down, 
 
     See Also
     --------
-    fifesim.ground.terrain.light.topographic_factor
+    fifesim.ground.terrain.slope_factors.slope_factor
     """
-    direct, total = (np.reshape(each, (-1, 1, 1)) for each in (direct_transmittance, transmittance_down))
 
     def kernel(rho, elevation, sky, cell, seen):
         light = slope_light(elevation, sky, cell, seen)
-        ct = skies.terrain_view(light.sky_view, light.cosine)
-        return topographic_factor(light.sky_view, ct, rho, light.mu_s_local, geometry.mu_s, direct, total)
+        return slope_factor(light, rho, geometry.mu_s, direct_transmittance, transmittance_down)
 
     return _of_level(kernel, reflectance, dem, geometry, horizon, "kt", "kt: Eq. 4")
 

@@ -1,7 +1,7 @@
 """Slope and aspect of labelled elevation."""
 
 from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid
-from fifesim.ground.terrain.slope import slope_aspect
+from fifesim.ground.terrain.slope import angles, gradient, steepness
 from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -38,7 +38,7 @@ def slope(dem):
     >>> bool((dem.fifesim.slope() < 30).all())
     True
     """
-    return _slope_or_aspect(dem, "slope", 0)
+    return _slope_or_aspect(dem, "slope", steepness)
 
 
 def aspect(dem):
@@ -73,14 +73,14 @@ def aspect(dem):
     >>> bool(((aspect >= 0) & (aspect < 360)).all())
     True
     """
-    return _slope_or_aspect(dem, "aspect", 1)
+    return _slope_or_aspect(dem, "aspect", lambda east, north: angles(east, north)[1])
 
 
-def _slope_or_aspect(dem, name, which):
+def _slope_or_aspect(dem, name, of_gradient):
     grid = elevation_grid(dem)
 
     def kernel(block):
-        return slope_aspect(block, *grids.cell_size(grid))[which]
+        return of_gradient(*gradient(block, *grids.cell_size(grid)))
 
     out = grids.place(chunking.neighbourhood(kernel, dem, 1), grid)
     return cf.label(out, name, source=dem, history=f"{name}: central differences", references=REFERENCE)
