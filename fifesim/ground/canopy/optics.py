@@ -1,6 +1,7 @@
 """Leaf and background optics of bands, and the ranges that SAIL accepts."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -129,9 +130,17 @@ def _leaf_means(bands, leaf):
     """Leaf optics by band."""
     if not bands:
         return {}
-    wavelength, *spectra = leaf_spectrum(leaf)
-    means = band_means(bands, wavelength, spectra)
+    means = _means_of_numbers(tuple(bands), leaf) if not leaf.varying() else _means_of(bands, leaf)
     return {band.name: tuple(pair) for band, pair in zip(bands, means.T.tolist(), strict=True)}
+
+
+def _means_of(bands, leaf):
+    wavelength, *spectra = leaf_spectrum(leaf)
+    return band_means(bands, wavelength, spectra)
+
+
+# Dead leaves stay the same where green ones vary.
+_means_of_numbers = lru_cache(maxsize=64)(_means_of)
 
 
 def _background_means(bands, mixture):
