@@ -55,8 +55,8 @@ def leaf_optics(bands, given=None):
     [0.11, 0.87]
     """
     if given is None:
-        given = datasets.table("leaf_optics.csv").set_index("band").T.to_dict("list")
-        given |= _leaf_means(_lacking(given, bands), Leaf())
+        given = _default_leaves()
+        given = given | _leaf_means(_lacking(given, bands), Leaf())
     elif isinstance(given, Leaf):
         given = _leaf_means(_responses(bands, "Leaf"), given)
     if isinstance(given, Mapping):
@@ -99,8 +99,8 @@ def background(bands, given=None):
     elif is_mixture(given) and not set(given) <= set(_names(bands)):
         given = Background(given)
     if given is None:
-        given = datasets.table("background.csv").set_index("band")["background"].to_dict()
-        given |= _background_means(_lacking(given, bands), Background(_DEFAULT_BACKGROUND))
+        given = _default_background()
+        given = given | _background_means(_lacking(given, bands), Background(_DEFAULT_BACKGROUND))
     elif isinstance(given, Background | Spectrum):
         given = _background_means(_responses(bands, type(given).__name__), given)
     if isinstance(given, Mapping):
@@ -108,6 +108,16 @@ def background(bands, given=None):
     reflectance = _for_bands(given, bands, "background")
     check_background(reflectance)
     return reflectance
+
+
+@lru_cache(maxsize=1)
+def _default_leaves():
+    return datasets.table("leaf_optics.csv").set_index("band").T.to_dict("list")
+
+
+@lru_cache(maxsize=1)
+def _default_background():
+    return datasets.table("background.csv").set_index("band")["background"].to_dict()
 
 
 def _names(bands):
