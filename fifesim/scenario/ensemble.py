@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
+import dask
 import numpy as np
 import xarray as xr
 
@@ -24,6 +25,9 @@ from fifesim.sensor.description.rasters.carried import attributes_of
 
 # Of a run, what a regression takes.
 KEPT = ("image", "truth")
+
+# Light of an image, by the names of its coordinates.
+LIGHT = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
 
 # Larger scenes go by chunks. [cell]
 _LARGEST = 4_000_000
@@ -60,44 +64,97 @@ def realise(scenario, keep=KEPT):
     if not isinstance(scenario, Scenario):
         raise TypeError(f"realise takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, setup = scenario.geobox(), setup_of(scenario)
-    small = grid.shape.x * grid.shape.y <= _LARGEST
-    if small and set(keep) <= set(KEPT) and not labelled_only(setup):
+    if _is_small(grid) and set(keep) <= set(KEPT) and not labelled_only(setup):
         return _of_arrays(scenario, grid, setup, keep)
-    run = simulate(scenario, chunks=None if small else "auto")
+    run = simulate(scenario, chunks=None if _is_small(grid) else "auto")
     missing = [name for name in keep if name not in run.children]
     if missing:
         raise ValueError(f"keep names {', '.join(missing)}, and this run has {', '.join(run.children)}")
     return {name: run[name].to_dataset().compute(scheduler="synchronous") for name in keep}
 
 
+def realise_arrays(scenario):
+    """
+    Image and truth of a scenario's run as arrays, for whom labels of each take longer than they are worth.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Returns
+    -------
+    image : dict of str to array
+        ``dn``, ``ndvi`` where there are the bands for one, and numbers, or arrays, of `LIGHT`.
+    truth : dict of str to array
+        The bits of `realise` in both.
+
+    Raises
+    ------
+    ValueError
+        If the scenario asks for what cannot be.
+    """
+    grid, setup = scenario.geobox(), setup_of(scenario)
+    if not _is_small(grid) or labelled_only(setup):
+        image, truth = realise(scenario).values()
+        return _values(image) | {name: image[name].values for name in LIGHT}, _values(truth)
+    chain, land, reflectance = _scene(scenario, grid, setup, True)
+    truth = _truth(scenario, chain, land)
+    light = {name: getattr(setup.geometry, name) for name in LIGHT}
+    return _image(chain, reflectance) | light, truth if isinstance(truth, dict) else _values(truth)
+
+
+def _values(dataset):
+    return {str(name): each.values for name, each in dataset.data_vars.items()}
+
+
+def _is_small(grid):
+    return grid.shape.x * grid.shape.y <= _LARGEST
+
+
 def _of_arrays(scenario, grid, setup, keep):
-    """Image and truth by the kernels alone, where the ground is one stand on level ground; slopes have labels too."""
+    """Image and truth by the kernels alone, with the labels that they have."""
+    chain, land, reflectance = _scene(scenario, grid, setup, "image" in keep)
+    made = {}
+    if "image" in keep:
+        made["image"] = _labelled_image(chain, _image(chain, reflectance))
+    if "truth" in keep:
+        made["truth"] = _labelled_truth(scenario, chain, _truth(scenario, chain, land))
+    return made
+
+
+def _scene(scenario, grid, setup, lit):
+    """A chain, the ground, and if it is lit the reflectance; of one stand as arrays."""
     chain, own = ArrayChain(setup, grid, _kernels(scenario, setup)), scenario.ground
-    made, dem, horizon = {}, None, None
+    dem, horizon, reflectance = None, None, None
     if scenario.terrain.dem != "flat":
-        dem, horizon = in_memory(*elevation(scenario, grid)[:2])
+        # Threads take longer to start than so few cells to make.
+        with dask.config.set(scheduler="synchronous"):
+            dem, horizon = in_memory(*elevation(scenario, grid)[:2])
     if scenario.landscape.is_one() and not own.lai_file:
         land = scene_cells(grid, own.distribution, own.arp, own.seed, own.method)
     else:
         land = ground_scene(scenario, grid, dem=dem)
-    if "image" in keep and isinstance(land, np.ndarray):
+    if lit and isinstance(land, np.ndarray):
         reflectance = chain.kernels.reflectance(land)
         if dem is not None:
             light = beside_altitude(dem, chain.kernels.air.altitude), chain.grid, setup.geometry, horizon
             reflectance = chain.kernels.on_slopes(reflectance, light_on_slopes(*light))
-    elif "image" in keep:
+    elif lit:
         reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
-    if "image" in keep:
-        made["image"] = _image(chain, reflectance)
-    if "truth" in keep:
-        made["truth"] = _truth(scenario, chain, land)
-    return made
+    return chain, land, reflectance
 
 
 def _image(chain, reflectance):
-    """Image and its NDVI, with the coordinates that they have."""
-    kernels = chain.kernels
-    dn = chain.image(kernels.toa(reflectance))
+    """Image and its NDVI."""
+    dn = chain.image(chain.kernels.toa(reflectance))
+    if not chain.kernels.shows_ndvi:
+        return {"dn": dn}
+    return {"dn": dn, "ndvi": chain.kernels.ndvi(chain.kernels.planetary(dn))}
+
+
+def _labelled_image(chain, image):
+    """The same with its coordinates."""
+    kernels, dn = chain.kernels, image["dn"]
     gain, offset, _ = kernels.scale
     along = {"band": [band.name for band in kernels.bands], "wavelength": [band.wavelength for band in kernels.bands]}
     along |= {"gain": gain, "offset": offset}
@@ -106,15 +163,14 @@ def _image(chain, reflectance):
     own = attributes_of(kernels.instrument) | {"atmosphere": kernels.air.text}
     attrs = cf.attributes("dn") | own | {"_FillValue": dn.dtype.type(0)}
     variables = {"dn": xr.Variable(("band", "y", "x"), dn, attrs)}
-    if kernels.shows_ndvi:
-        ndvi = kernels.ndvi(kernels.planetary(dn))
-        variables["ndvi"] = xr.Variable(("y", "x"), ndvi, cf.attributes("ndvi") | own)
+    if "ndvi" in image:
+        variables["ndvi"] = xr.Variable(("y", "x"), image["ndvi"], cf.attributes("ndvi") | own)
     coords = grids.coordinates(chain.pixels) | cf.band_coordinates(**along)
     return _placed(variables, coords, directions.coordinates_of(kernels.setup.geometry))
 
 
 def _truth(scenario, chain, land):
-    """Means over the blocks of the truth."""
+    """Means over the blocks of the truth: of one stand as arrays, else as a dataset."""
     size = scenario.sensor.size
     if not scenario.landscape.is_one():
         return aggregate(truth_of(scenario, chain.setup, land), size, min_valid=chain.setup.min_valid)
@@ -122,10 +178,14 @@ def _truth(scenario, chain, land):
     lai = land if isinstance(land, np.ndarray) else land["lai"].values
     kinds = fpar_kinds(scenario)
     cells = {"lai": lai} | {name: chain.kernels.fpar(lai, fpar_inf, leaves) for name, leaves in kinds.items()}
-    variables = {
-        name: xr.Variable(("y", "x"), chain.means(each, size), cf.attributes(name)) for name, each in cells.items()
-    }
-    return _placed(variables, grids.coordinates(chain.blocks(size)))
+    return {name: chain.means(each, size) for name, each in cells.items()}
+
+
+def _labelled_truth(scenario, chain, truth):
+    if not isinstance(truth, dict):
+        return truth
+    variables = {name: xr.Variable(("y", "x"), means, cf.attributes(name)) for name, means in truth.items()}
+    return _placed(variables, grids.coordinates(chain.blocks(scenario.sensor.size)))
 
 
 def _placed(variables, coordinates, others=None):

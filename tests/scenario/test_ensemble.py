@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fifesim.scenario.ensemble import realise
+from fifesim.scenario.ensemble import LIGHT, realise, realise_arrays
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import simulate
 
@@ -48,6 +48,11 @@ def test_a_realisation_has_the_bits_and_the_coordinates_of_the_same_scene_simula
             # What it says, it says as the scene alone.
             assert {each: variable.attrs.get(each) for each in got.attrs} == got.attrs
         assert node.odc.geobox == expected.odc.geobox
+    image, truth = realise_arrays(one)
+    assert set(image) == {*found["image"].data_vars, *LIGHT} and set(truth) == set(found["truth"].data_vars)
+    for name, values in (image | truth).items():
+        node = found["image"] if name in image else found["truth"]
+        np.testing.assert_array_equal(values, node[name])
 
 
 def test_a_node_that_a_run_lacks_is_named():

@@ -1,5 +1,7 @@
 """Amount and optics of the aerosol."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from fifesim.atmosphere.air import components
@@ -43,12 +45,19 @@ def aerosol_optical_thickness(visibility):
     >>> aerosol_optical_thickness(10.0) > aerosol_optical_thickness(50.0)
     True
     """
-    levels = datasets.table("aerosol_profile.csv")
-    hazy, clear = levels["visibility_5km"].to_numpy(), levels["visibility_23km"].to_numpy()
+    hazy, clear, thickness = _particles()
     slope = (hazy - clear) / (1 / 5 - 1 / 23)
     number = clear + slope * (1 / visibility - 1 / 23)
-    layers = np.sqrt(number[1:] * number[:-1]) * np.diff(levels["altitude"])
+    layers = np.sqrt(number[1:] * number[:-1]) * thickness
     return float(_EXTINCTION_PER_PARTICLE * layers.sum())
+
+
+@lru_cache(maxsize=1)
+def _particles():
+    """Their number at levels of both visibilities, and the layers between these."""
+    levels = datasets.table("aerosol_profile.csv")
+    hazy, clear = levels["visibility_5km"].to_numpy(), levels["visibility_23km"].to_numpy()
+    return hazy, clear, np.diff(levels["altitude"])
 
 
 def parts(aerosol):

@@ -48,11 +48,14 @@ def exponential_chain(lai, *rates):
     >>> float(exponential_chain(3.0, 0.0, 0.0, 0.0))
     4.5
     """
-    given = np.broadcast_arrays(lai, *rates)
-    flat = np.stack([each.ravel() for each in given], dtype=float)
+    given = [np.asarray(each, float) for each in (lai, *rates)]
+    flat = np.empty((len(given), *np.broadcast_shapes(*(each.shape for each in given))))
+    for number, each in enumerate(given):
+        flat[number] = each
+    shape, flat = flat.shape[1:], flat.reshape(len(given), -1)
     chains = np.empty(flat.shape[1])
     _chains(flat[0], flat[1:], chains)
-    return chains.reshape(given[0].shape)[()]
+    return chains.reshape(shape)[()]
 
 
 @numba.njit(nogil=True, cache=True)

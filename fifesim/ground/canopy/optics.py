@@ -1,6 +1,7 @@
 """Leaf and background optics of bands, and the ranges that SAIL accepts."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -54,8 +55,8 @@ def leaf_optics(bands, given=None):
     [0.11, 0.87]
     """
     if given is None:
-        given = datasets.table("leaf_optics.csv").set_index("band").T.to_dict("list")
-        given |= _leaf_means(_lacking(given, bands), Leaf())
+        given = _default_leaves()
+        given = given | _leaf_means(_lacking(given, bands), Leaf())
     elif isinstance(given, Leaf):
         given = _leaf_means(_responses(bands, "Leaf"), given)
     if isinstance(given, Mapping):
@@ -98,8 +99,8 @@ def background(bands, given=None):
     elif is_mixture(given) and not set(given) <= set(_names(bands)):
         given = Background(given)
     if given is None:
-        given = datasets.table("background.csv").set_index("band")["background"].to_dict()
-        given |= _background_means(_lacking(given, bands), Background(_DEFAULT_BACKGROUND))
+        given = _default_background()
+        given = given | _background_means(_lacking(given, bands), Background(_DEFAULT_BACKGROUND))
     elif isinstance(given, Background | Spectrum):
         given = _background_means(_responses(bands, type(given).__name__), given)
     if isinstance(given, Mapping):
@@ -107,6 +108,16 @@ def background(bands, given=None):
     reflectance = _for_bands(given, bands, "background")
     check_background(reflectance)
     return reflectance
+
+
+@lru_cache(maxsize=1)
+def _default_leaves():
+    return datasets.table("leaf_optics.csv").set_index("band").T.to_dict("list")
+
+
+@lru_cache(maxsize=1)
+def _default_background():
+    return datasets.table("background.csv").set_index("band")["background"].to_dict()
 
 
 def _names(bands):
@@ -129,9 +140,17 @@ def _leaf_means(bands, leaf):
     """Leaf optics by band."""
     if not bands:
         return {}
-    wavelength, *spectra = leaf_spectrum(leaf)
-    means = band_means(bands, wavelength, spectra)
+    means = _means_of_numbers(tuple(bands), leaf) if not leaf.varying() else _means_of(bands, leaf)
     return {band.name: tuple(pair) for band, pair in zip(bands, means.T.tolist(), strict=True)}
+
+
+def _means_of(bands, leaf):
+    wavelength, *spectra = leaf_spectrum(leaf)
+    return band_means(bands, wavelength, spectra)
+
+
+# Dead leaves stay the same where green ones vary.
+_means_of_numbers = lru_cache(maxsize=64)(_means_of)
 
 
 def _background_means(bands, mixture):

@@ -1,6 +1,7 @@
 """PROSPECT-D: reflectance and transmittance of a leaf from its chemistry and structure."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.special import exp1
@@ -258,11 +259,20 @@ def plate(refractive_index, tau, angle):
     >>> bool(abs(sum(plate(1.4, 1.0, 40.0)) - 1) < 1e-14)
     True
     """
-    entering = interface_transmissivity(refractive_index, angle)
-    leaving = interface_transmissivity(refractive_index, 90.0) / np.asarray(refractive_index, float) ** 2
+    n = np.asarray(refractive_index, float)
+    entering, leaving = (_passing(n.tobytes(), n.shape, cone) for cone in (angle, 90.0))
+    leaving = leaving / n**2
     inside = 1 - leaving
     transmittance = entering * tau * leaving / (1 - inside**2 * tau**2)
     return 1 - entering + inside * tau * transmittance, transmittance
+
+
+@lru_cache(maxsize=16)
+def _passing(refractive_index, shape, angle):
+    """`interface_transmissivity` of the bytes of an array: leaves differ in all else."""
+    passing = np.asarray(interface_transmissivity(np.frombuffer(refractive_index).reshape(shape), angle))
+    passing.flags.writeable = False
+    return passing
 
 
 def pile(reflectance, transmittance, layers):

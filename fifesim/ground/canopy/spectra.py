@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -147,6 +148,11 @@ def spectrum_names():
     >>> "soil_dry" in spectrum_names()
     True
     """
+    return _spectrum_names()
+
+
+@lru_cache(maxsize=1)
+def _spectrum_names():
     return (*datasets.table("ground_spectra.csv").columns.drop("wavelength"), SHADE)
 
 
@@ -205,14 +211,21 @@ def band_means(bands, wavelength, values):
                 f"has {wavelength[0]:g} to {wavelength[-1]:g} um; give leaf_optics= and background= by band, or "
                 "bands= without it"
             )
+    nodes, weight, index, share = _nodes(wavelength.tobytes())
+    fine = values[..., index] * (1 - share) + values[..., index + 1] * share
+    return np.stack([band.mean(fine, nodes, weight) for band in bands], axis=-1)
+
+
+@lru_cache(maxsize=32)
+def _nodes(wavelength):
+    """Wavelengths of a spectrum (its bytes) and of the sun, sunlight there, and their places in the spectrum."""
+    wavelength = np.frombuffer(wavelength)
     sun_wavelength, sun = solar_spectrum()
     inside = (sun_wavelength > wavelength[0]) & (sun_wavelength < wavelength[-1])
     nodes = np.union1d(wavelength, sun_wavelength[inside])
     weight = np.interp(nodes, sun_wavelength, sun)
     index = np.clip(np.searchsorted(wavelength, nodes, side="right") - 1, 0, wavelength.size - 2)
-    share = (nodes - wavelength[index]) / (wavelength[index + 1] - wavelength[index])
-    fine = values[..., index] * (1 - share) + values[..., index + 1] * share
-    return np.stack([band.mean(fine, nodes, weight) for band in bands], axis=-1)
+    return nodes, weight, index, (nodes - wavelength[index]) / (wavelength[index + 1] - wavelength[index])
 
 
 def background_means(bands, given):
@@ -287,8 +300,7 @@ def _is_file(name):
 
 def _spectrum(name):
     if not _is_file(name):
-        table = datasets.table("ground_spectra.csv")
-        return Spectrum(table["wavelength"], table[name])
+        return _known_spectrum(name)
     try:
         table = pd.read_csv(name, comment="#", skipinitialspace=True)
     except OSError as error:
@@ -303,3 +315,9 @@ def _spectrum(name):
         return Spectrum(table["wavelength"], table["reflectance"])
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
+
+
+@lru_cache(maxsize=16)
+def _known_spectrum(name):
+    table = datasets.table("ground_spectra.csv")
+    return Spectrum(table["wavelength"], table[name])

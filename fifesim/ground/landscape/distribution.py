@@ -36,7 +36,12 @@ def treatments():
     >>> treatments()
     ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """
-    return datasets.table("lai_distributions.csv")["treatment"].tolist()
+    return list(_treatments())
+
+
+@lru_cache(maxsize=1)
+def _treatments():
+    return tuple(datasets.table("lai_distributions.csv")["treatment"].tolist())
 
 
 def lai_distribution(source):

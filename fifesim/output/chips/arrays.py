@@ -7,11 +7,8 @@ import xarray as xr
 
 from fifesim.rasters import cf
 from fifesim.scenario.chips import chips_of
-from fifesim.scenario.ensemble import realise
+from fifesim.scenario.ensemble import LIGHT, realise, realise_arrays
 from fifesim.sensor.response import calibration
-
-# What of a chip's light varies from one to the next, by the coordinates of its image.
-LIGHT = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
 
 _ALONG_BAND = ("band", "wavelength", "gain", "offset", "compression", "solar_irradiance")
 
@@ -152,8 +149,7 @@ def chip_arrays(chips, first, last, layout, each=lambda count: None):
     for chip in sorted(range(first, last), key=lambda chip: (chips.landscape[chip], chip)):
         scenario = chips.scenario(chip)
         try:
-            nodes = realise(scenario)
-            _put(found, chip - first, nodes, layout)
+            _put(found, chip - first, *realise_arrays(scenario), layout)
         except ValueError as error:
             raise ValueError(f"chip {chip}: {error}") from error
         each(1)
@@ -181,24 +177,22 @@ def make_shard(study, count, first, last, layout):
     return chip_arrays(chips_of(study, count), first, last, layout)
 
 
-def _put(found, at, nodes, layout):
-    """What the nodes of a run say of a chip."""
-    image, truth = nodes["image"], nodes["truth"]
-    unknown = set(truth.data_vars) - set(layout.truth)
+def _put(found, at, image, truth, layout):
+    """What the arrays of a run say of a chip."""
+    unknown = set(truth) - set(layout.truth)
     if unknown:
         raise ValueError(
             f"has a truth that others have not, {', '.join(sorted(unknown))}: draw it for all, or for none"
         )
-    found["dn"][at] = image["dn"].values
+    found["dn"][at] = image["dn"]
     if layout.has_ndvi:
-        found["ndvi"][at] = image["ndvi"].values
+        found["ndvi"][at] = image["ndvi"]
     for name in layout.truth:
         # Where no leaf is dead, green leaves are all leaves.
         other = "fpar" if name == "green_fpar" else None
-        source = truth.get(name, truth.get(other) if other else None)
-        found[name][at] = np.nan if source is None else source.values
+        found[name][at] = truth.get(name, truth.get(other, np.nan))
     for name in LIGHT:
-        found[name][at] = image[name].values
+        found[name][at] = image[name]
 
 
 def _reflectance(found, layout):

@@ -7,9 +7,10 @@ import zlib
 
 import numpy as np
 
-from fifesim.output.chips.arrays import LIGHT, attributes_of
+from fifesim.output.chips.arrays import attributes_of
 from fifesim.output.provenance import versions
 from fifesim.rasters import cf
+from fifesim.scenario.ensemble import LIGHT
 
 # Of a shard in memory, and of the part of one that is read at once. [byte]
 _SHARD, _CHUNK = 32 * 2**20, 2**19

@@ -56,7 +56,7 @@ def contents(folder):
 
 def stopping(monkeypatch, after, error=KeyboardInterrupt):
     """Have the making of chips end with an error."""
-    made, realise = [], arrays.realise
+    made, realise = [], arrays.realise_arrays
 
     def stop(*arguments):
         made.append(1)
@@ -64,7 +64,7 @@ def stopping(monkeypatch, after, error=KeyboardInterrupt):
             raise error
         return realise(*arguments)
 
-    monkeypatch.setattr(arrays, "realise", stop)
+    monkeypatch.setattr(arrays, "realise_arrays", stop)
     return made
 
 
@@ -89,8 +89,8 @@ def test_the_study_is_in_the_folder(study, whole):
     assert xr.open_zarr(whole).attrs["study"] == (whole / STUDY).read_text()
 
 
-# The layout takes two scenes, and chips come in shards of two.
-@pytest.mark.parametrize("after", [5, 8])
+# Chips come in shards of two.
+@pytest.mark.parametrize("after", [3, 6])
 def test_a_stopped_run_goes_on_to_the_same_bits(after, study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
     with monkeypatch.context() as patch:
@@ -103,14 +103,14 @@ def test_a_stopped_run_goes_on_to_the_same_bits(after, study, whole, tmp_path, m
         dataset_to_folder(study, folder, COUNT)
     made = stopping(monkeypatch, 100)
     dataset_to_folder(study, folder, COUNT, resume=True)
-    assert len(made) == 2 + COUNT - 2 * ((after - 2) // 2)
+    assert len(made) == COUNT - 2 * (after // 2)
     assert contents(folder) == contents(whole)
 
 
 def test_half_written_shards_do_not_count(study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
     with monkeypatch.context() as patch:
-        stopping(patch, 8)
+        stopping(patch, 6)
         with pytest.raises(KeyboardInterrupt):
             dataset_to_folder(study, folder, COUNT)
     hidden = folder / UNFINISHED
@@ -124,7 +124,7 @@ def test_half_written_shards_do_not_count(study, whole, tmp_path, monkeypatch):
 
 
 def test_nothing_is_left_of_a_run_that_cannot_end_well(study, tmp_path, monkeypatch):
-    stopping(monkeypatch, 6, ValueError("cannot be"))
+    stopping(monkeypatch, 4, ValueError("cannot be"))
     with pytest.raises(ValueError, match=r"chip \d: cannot be"):
         dataset_to_folder(study, tmp_path / "chips.zarr", COUNT)
     assert list(tmp_path.iterdir()) == []
@@ -137,7 +137,7 @@ def test_nothing_is_left_of_a_run_that_cannot_end_well(study, tmp_path, monkeypa
 def test_another_run_is_not_gone_on_with(count, draws, message, study, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
     with monkeypatch.context() as patch:
-        stopping(patch, 5)
+        stopping(patch, 3)
         with pytest.raises(KeyboardInterrupt):
             dataset_to_folder(study, folder, COUNT)
     before = contents(folder)
