@@ -51,7 +51,8 @@ ndvi, truth = image.fifesim.ndvi(), land.fifesim.aggregate(30).lai
 fit = fifesim.regress(truth, ndvi)
 fit.plot(truth, ndvi)
 print(
-    f"R² = {fit.r2:.2f}: {100 * (1 - fit.r2):.0f} % of the variance of leaf area is not in a line on NDVI"
+    f"R² = {fit.r2:.2f}: {100 * (1 - fit.r2):.0f} % of the variance of leaf area"
+    " is not in a line on NDVI"
 )
 
 # %%

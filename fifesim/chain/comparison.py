@@ -102,7 +102,7 @@ def comparison_table(images, truth=None):
 
     See Also
     --------
-    fifesim.analysis.rasters.regression.regress
+    fifesim.regress
 
     Examples
     --------
