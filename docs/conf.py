@@ -68,7 +68,12 @@ numpydoc_show_class_members = False
 sphinx_gallery_conf = {
     "examples_dirs": "gallery_src",
     "gallery_dirs": "gallery",
-    "subsection_order": ["gallery_src/ground", "gallery_src/air", "gallery_src/instruments", "gallery_src/answers"],
+    "subsection_order": [
+        "gallery_src/ground",
+        "gallery_src/air",
+        "gallery_src/instruments",
+        "gallery_src/answers",
+    ],
     "nested_sections": True,
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
@@ -108,8 +113,15 @@ def _cite_tables(app, what, name, obj, options, lines):
 def _thumbnails(app):
     """Small pictures that show something: the left of each page's first picture, without white margins."""
     for script in Path(app.srcdir, "gallery_src").rglob("plot_*.py"):
-        images = Path(app.srcdir, "gallery", script.parent.relative_to(Path(app.srcdir, "gallery_src")), "images")
-        chosen = re.search(r"sphinx_gallery_thumbnail_number = (\d+)", script.read_text("utf-8"))
+        images = Path(
+            app.srcdir,
+            "gallery",
+            script.parent.relative_to(Path(app.srcdir, "gallery_src")),
+            "images",
+        )
+        chosen = re.search(
+            r"sphinx_gallery_thumbnail_number = (\d+)", script.read_text("utf-8")
+        )
         source = images / f"sphx_glr_{script.stem}_{int(chosen[1]) if chosen else 1:03d}.png"
         if source.exists():
             _cropped(source).save(images / "thumb" / f"sphx_glr_{script.stem}_thumb.png")

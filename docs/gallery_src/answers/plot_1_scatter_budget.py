@@ -27,7 +27,10 @@ budgets = {
 figure, axis = plt.subplots(figsize=(9, 5), layout="constrained")
 stages = budgets[arps[0]]["stage"].values
 used = [
-    any(abs(each["share"].sel(stage=stage, variable="lai")).max() > 0 for each in budgets.values())
+    any(
+        abs(each["share"].sel(stage=stage, variable="lai")).max() > 0
+        for each in budgets.values()
+    )
     for stage in stages
 ]  # this ground is one stand: no other cover, no dead leaves
 stages = stages[used]
