@@ -23,8 +23,8 @@ land.lai.fifesim.plot()
 print(land)
 
 # %%
-# **2. The light that leaves it.** SAIL gives the reflectance of each cell, and the slope decides how much sun and sky it
-# has. Bands are those of an instrument: here the green, red and near infrared of the Thematic Mapper.
+# **2. The light that leaves it.** SAIL gives the reflectance of each cell, and the slope decides how much sun and sky
+# it has. Bands are those of an instrument: here the green, red and near infrared of the Thematic Mapper.
 
 bands = ["TM2", "TM3", "TM4"]
 rho = land.fifesim.surface_reflectance("TM", bands=bands, dem=dem)
