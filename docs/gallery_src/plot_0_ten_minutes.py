@@ -2,8 +2,8 @@
 Ten minutes
 ===========
 
-One scene, every step seen: from leaf area on the ground to what NDVI tells of it. Each block is a step of the chain, and
-each result is a DataArray that lies in the right place; run them one after the other.
+One scene, every step seen: from leaf area on the ground to what NDVI tells of it. Each block is a step of the chain,
+and each result is a DataArray that lies in the right place; run them one after the other.
 """
 
 import matplotlib.pyplot as plt

@@ -3,10 +3,11 @@ What soil, dead leaves and cover add
 ====================================
 
 The last question of Friedl et al. (1995): how much scatter do soil, land cover and dead leaves add beside the
-instrument? Here it is for the default landscape, which is made up (:ref:`sphx_glr_gallery_instruments_plot_4_landscape.py` shows it), through TM, MSI and MODIS with
-all that is known of each: blur, noise, and the error of the product's place. Bars are the parts of 1 − R² of leaf area
-on NDVI that each stage adds, the mean over all orders in which the stages can come (Shapley); below zero a stage makes
-the relation straighter. Whiskers are standard errors over the windows of the site. ``python
+instrument? Here it is for the default landscape, which is made up
+(:ref:`sphx_glr_gallery_instruments_plot_4_landscape.py` shows it), through TM, MSI and MODIS with all that is known
+of each: blur, noise, and the error of the product's place. Bars are the parts of 1 − R² of leaf area on NDVI that
+each stage adds, the mean over all orders in which the stages can come (Shapley); below zero a stage makes the
+relation straighter. Whiskers are standard errors over the windows of the site. ``python
 docs/make_landscape_budget.py`` computes the table.
 """
 
