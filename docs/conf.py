@@ -1,6 +1,7 @@
 """Sphinx configuration. Build with: sphinx-build -W -b html docs docs/_build/html"""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ os.environ.setdefault(
 )  # before numpy is loaded: its matrices here are small
 
 from docutils import nodes
+from PIL import Image, ImageChops
 from sphinx.addnodes import pending_xref
 from sphinx.ext import autosummary
 
@@ -66,6 +68,13 @@ numpydoc_show_class_members = False
 sphinx_gallery_conf = {
     "examples_dirs": "gallery_src",
     "gallery_dirs": "gallery",
+    "subsection_order": [
+        "gallery_src/ground",
+        "gallery_src/air",
+        "gallery_src/instruments",
+        "gallery_src/answers",
+    ],
+    "nested_sections": True,
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
     "capture_repr": (),
@@ -96,6 +105,43 @@ def _skip(app, what, name, obj, skip, options):
     return True if made else None
 
 
+def _cite_tables(app, what, name, obj, options, lines):
+    """The page that shows the list of tables, in the place of its path in the repository."""
+    lines[:] = [line.replace("``data/README.md``", ":doc:`/data`") for line in lines]
+
+
+def _thumbnails(app):
+    """Small pictures that show something: the left of each page's first picture, without white margins."""
+    for script in Path(app.srcdir, "gallery_src").rglob("plot_*.py"):
+        images = Path(
+            app.srcdir,
+            "gallery",
+            script.parent.relative_to(Path(app.srcdir, "gallery_src")),
+            "images",
+        )
+        chosen = re.search(
+            r"sphinx_gallery_thumbnail_number = (\d+)", script.read_text("utf-8")
+        )
+        source = images / f"sphx_glr_{script.stem}_{int(chosen[1]) if chosen else 1:03d}.png"
+        if source.exists():
+            _cropped(source).save(images / "thumb" / f"sphx_glr_{script.stem}_thumb.png")
+
+
+def _cropped(source, size=(400, 280)):
+    """A picture without its margins, cut to the proportions of `size`."""
+    picture = Image.open(source).convert("RGB")
+    white = Image.new("RGB", picture.size, "white")
+    picture = picture.crop(ImageChops.difference(picture, white).getbbox())
+    width, height = picture.size
+    if width * size[1] > height * size[0]:
+        picture = picture.crop((0, 0, height * size[0] // size[1], height))
+    else:
+        picture = picture.crop((0, 0, width, width * size[1] // size[0]))
+    return picture.resize(size, Image.Resampling.LANCZOS)
+
+
 def setup(app):
+    app.connect("autodoc-process-docstring", _cite_tables)
+    app.connect("builder-inited", _thumbnails, priority=900)  # after the gallery is drawn
     app.add_role("cite", _cite)
     app.connect("autodoc-skip-member", _skip)

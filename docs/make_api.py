@@ -53,7 +53,7 @@ def functions():
 
 
 def _file(group):
-    return f"{group.lower().replace(' ', '_')}.rst"
+    return group.lower().replace(" ", "_").replace("'", "") + ".rst"
 
 
 def _group(group, names):

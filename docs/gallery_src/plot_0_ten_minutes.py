@@ -2,8 +2,8 @@
 Ten minutes
 ===========
 
-One scene, every step seen: from leaf area on the ground to what NDVI tells of it. Each block is a step of the chain, and
-each result is a DataArray that lies in the right place; run them one after the other.
+One scene, every step seen: from leaf area on the ground to what NDVI tells of it. Each block is a step of the chain,
+and each result is a DataArray that lies in the right place; run them one after the other.
 """
 
 import matplotlib.pyplot as plt
@@ -23,8 +23,8 @@ land.lai.fifesim.plot()
 print(land)
 
 # %%
-# **2. The light that leaves it.** SAIL gives the reflectance of each cell, and the slope decides how much sun and sky it
-# has. Bands are those of an instrument: here the green, red and near infrared of the Thematic Mapper.
+# **2. The light that leaves it.** SAIL gives the reflectance of each cell, and the slope decides how much sun and sky
+# it has. Bands are those of an instrument: here the green, red and near infrared of the Thematic Mapper.
 
 bands = ["TM2", "TM3", "TM4"]
 rho = land.fifesim.surface_reflectance("TM", bands=bands, dem=dem)
@@ -51,7 +51,8 @@ ndvi, truth = image.fifesim.ndvi(), land.fifesim.aggregate(30).lai
 fit = fifesim.regress(truth, ndvi)
 fit.plot(truth, ndvi)
 print(
-    f"R² = {fit.r2:.2f}: {100 * (1 - fit.r2):.0f} % of the variance of leaf area is not in a line on NDVI"
+    f"R² = {fit.r2:.2f}: {100 * (1 - fit.r2):.0f} % of the variance of leaf area"
+    " is not in a line on NDVI"
 )
 
 # %%

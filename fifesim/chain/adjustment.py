@@ -156,7 +156,7 @@ def as_seen_by(
 
     See Also
     --------
-    adjust_bands, fifesim.chain.steps.to_toa, fifesim.sensor.raster.sense
+    adjust_bands, to_toa, sense
 
     Examples
     --------

@@ -46,7 +46,7 @@ def compare(lai, instruments, setup=None, *, bands=None):
 
     See Also
     --------
-    fifesim.chain.setup.reflectance_of, fifesim.chain.setup.image_of
+    comparison_table, plot_comparison, Setup
 
     Examples
     --------
@@ -102,7 +102,7 @@ def comparison_table(images, truth=None):
 
     See Also
     --------
-    fifesim.analysis.rasters.regression.regress
+    regress
 
     Examples
     --------

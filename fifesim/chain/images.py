@@ -29,7 +29,7 @@ def ndvi(image):
 
     See Also
     --------
-    fifesim.analysis.rasters.indices.ndvi
+    fifesim.analysis.indices.normalized_difference
 
     Examples
     --------

@@ -119,9 +119,9 @@ def surface_reflectance(
     See Also
     --------
     fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.layers.two_layers,
-    fifesim.ground.canopy.crowns.clumped, fifesim.ground.canopy.raster.level_reflectance,
+    fifesim.ground.canopy.crowns.clumped,
     fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil_water.moistened,
-    fifesim.ground.terrain.rasters.light.terrain_reflectance
+    fifesim.ground.terrain.light.slope_reflectance
 
     Examples
     --------

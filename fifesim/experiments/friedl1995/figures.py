@@ -14,7 +14,7 @@ _DASHES = ("-", "--", ":")
 _BLACK, _GREY = "#222222", "#767676"
 _DOT = {"s": 9, "linewidths": 0, "alpha": 0.75}
 
-_LABELS = {"lai": "LAI [m² m⁻²]", "fpar": "FPAR [1]", "ndvi": "NDVI [1]"}
+_LABELS = {"lai": "LAI [m² m⁻²]", "fpar": "FPAR", "ndvi": "NDVI"}
 _FIGURE_WIDTH = 7.2
 
 NUMBERS = range(3, 10)
@@ -170,7 +170,7 @@ def _figure6(found, reading):
             if variable == "ndvi":
                 smooth = density.sample_density(values["analogue_ndvi"], at)
                 axis.plot(at, smooth, color=_GREY, linewidth=0.9, label="before digitising" if arp == first else None)
-        unit = "[m² m⁻²]⁻¹" if variable == "lai" else "[1]"
+        unit = " [m² m⁻²]⁻¹" if variable == "lai" else ""
         axis.set(xlabel=_LABELS[variable], ylabel=f"density {unit}", ylim=(0, None))
         _finish(axis)
     _legend_below(figure, figure.axes[-1])
@@ -186,7 +186,7 @@ def _figure7(found, reading):
             at, noise = friedl1995_table.mean_noise(values[variable], values["ndvi"], increment)
             axis.plot(at, noise, dash, color=color, marker=marker, markersize=4, linewidth=1.2,
                       label=f"arp {arp:g}, mean {noise.mean():.2f}")  # fmt: skip
-        axis.set(xlabel=_LABELS[variable], ylabel=f"REN of {variable.upper()} [1]", ylim=(0, None))
+        axis.set(xlabel=_LABELS[variable], ylabel=f"REN of {variable.upper()}", ylim=(0, None))
         _finish(axis)
         axis.legend(frameon=False, fontsize=8)
     return figure
@@ -211,11 +211,11 @@ def _figure8(found, reading):
         column[1].scatter(mean, of_mean - mean, color=_COLORS[0], label="simulated", **_DOT)
         column[1].scatter(mean, predicted, facecolors="none", edgecolors=_COLORS[1], s=10, linewidths=0.5,
                           label="second order")  # fmt: skip
-        column[1].set_xlabel("mean NDVI of the cells [1]")
+        column[1].set_xlabel("mean NDVI of the cells")
         for axis in column:
             _finish(axis)
-    axes[0, 0].set_ylabel("NDVI of mean reflectance [1]")
-    axes[1, 0].set_ylabel("difference [1]")
+    axes[0, 0].set_ylabel("NDVI of mean reflectance")
+    axes[1, 0].set_ylabel("difference")
     _legend_below(figure, axes[1, 0])
     return figure
 
@@ -233,10 +233,10 @@ def _figure9(found, reading):
             at, order = np.array([boa.min(), boa.max()]), np.argsort(boa)
             axis.plot(boa[order], clear[order], color=_BLACK, linewidth=1.1, label="atmosphere alone")
             axis.plot(at, at, ":", color=_GREY, linewidth=1, label="1 : 1")
-            axis.set(xlabel=f"{words}, ground [1]")
+            axis.set(xlabel=f"{words}, ground")
             axis.set_title(f"arp {arp:g}: R² = {np.corrcoef(boa, toa)[0, 1] ** 2:.2f}")
             _finish(axis)
-        row[0].set_ylabel(f"{words}, TOA [1]")
+        row[0].set_ylabel(f"{words}, TOA")
     _legend_below(figure, figure.axes[0])
     return figure
 

@@ -67,7 +67,7 @@ figure.legend(
 # **Other readings, and relief.** Lines of LAI on NDVI. Pixels on the blocks leave R² high; blur brings it down, too,
 # but raises the slopes. Relief is that of synthetic hills. From here on the numbers are those of :doc:`/paper`.
 
-folders = (Path(".."), Path("docs"))
+folders = (Path("../.."), Path("docs"))
 numbers = json.loads(
     next(at / "paper.json" for at in folders if (at / "paper.json").exists()).read_text("utf-8")
 )

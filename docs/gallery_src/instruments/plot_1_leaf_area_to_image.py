@@ -86,4 +86,4 @@ for axis, (name, true) in zip(axes, truth.items(), strict=True):
 
 # %%
 # R² is far above the paper's Table 2 (0.81): here each pixel lies on the very ground whose mean it is compared with.
-# :ref:`sphx_glr_gallery_plot_6_point_spread.py` shows what a drift between the two grids does.
+# :ref:`sphx_glr_gallery_instruments_plot_2_point_spread.py` shows what a drift between the two grids does.

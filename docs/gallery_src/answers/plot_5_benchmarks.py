@@ -6,6 +6,7 @@ fifesim beside results that others published: polarized light of the sky, ground
 :doc:`How good is it? </benchmarks>` says what the pictures mean.
 """
 
+# sphinx_gallery_thumbnail_number = 2
 import matplotlib.pyplot as plt
 import numpy as np
 

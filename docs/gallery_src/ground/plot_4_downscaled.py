@@ -22,7 +22,8 @@ ground = (hills * grass).transpose("y", "x").rename("lai").assign_attrs(grass.at
 lai_10m = ground.fifesim.aggregate(10)
 fine = lai_10m.fifesim.downscale(grid, arp=0.15, cv=0.44, seed=2)
 print(
-    f"largest difference of means over pixels: {float(abs(fine.fifesim.aggregate(10) - lai_10m).max()):.0e}"
+    "largest difference of means over pixels:",
+    f"{float(abs(fine.fifesim.aggregate(10) - lai_10m).max()):.0e}",
 )
 
 # %%

@@ -22,7 +22,7 @@ import pandas as pd
 table = pd.read_csv(
     next(
         path
-        for path in map(Path, ("../instruments.csv", "docs/instruments.csv"))
+        for path in map(Path, ("../../instruments.csv", "docs/instruments.csv"))
         if path.exists()
     )
 )

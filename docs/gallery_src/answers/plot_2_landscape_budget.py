@@ -3,10 +3,11 @@ What soil, dead leaves and cover add
 ====================================
 
 The last question of Friedl et al. (1995): how much scatter do soil, land cover and dead leaves add beside the
-instrument? Here it is for the default landscape, which is made up (see the page before), through TM, MSI and MODIS with
-all that is known of each: blur, noise, and the error of the product's place. Bars are the parts of 1 − R² of leaf area
-on NDVI that each stage adds, the mean over all orders in which the stages can come (Shapley); below zero a stage makes
-the relation straighter. Whiskers are standard errors over the windows of the site. ``python
+instrument? Here it is for the default landscape, which is made up
+(:ref:`sphx_glr_gallery_instruments_plot_4_landscape.py` shows it), through TM, MSI and MODIS with all that is known
+of each: blur, noise, and the error of the product's place. Bars are the parts of 1 − R² of leaf area on NDVI that
+each stage adds, the mean over all orders in which the stages can come (Shapley); below zero a stage makes the
+relation straighter. Whiskers are standard errors over the windows of the site. ``python
 docs/make_landscape_budget.py`` computes the table.
 """
 
@@ -19,7 +20,7 @@ import pandas as pd
 
 name = "landscape_budget.csv"
 table = pd.read_csv(
-    next(path for path in (Path("..") / name, Path("docs") / name) if path.exists())
+    next(path for path in (Path("../..") / name, Path("docs") / name) if path.exists())
 )
 table = table[table["variable"] == "lai"].set_index(["instrument", "stage"])
 instruments = list(dict.fromkeys(table.index.get_level_values("instrument")))
@@ -69,7 +70,8 @@ for instrument in instruments:
     said = ", ".join(f"{stage} {shares[stage]:.1f} ± {errors[stage]:.1f}" for stage in GROUND)
     print(f"{instrument}: {said} % of the variance.")
     print(
-        f"    Soil, dead leaves and cover add {ground:.1f} % together, place, blur, noise and counts {sensor:.1f} %."
+        f"    Soil, dead leaves and cover add {ground:.1f} % together,"
+        f" place, blur, noise and counts {sensor:.1f} %."
     )
 
 # %%

@@ -40,5 +40,6 @@ for arp in (0.05, 0.15, 0.24):
     )
     cells, pixels = float(lai.std()), float(lai.fifesim.aggregate(30).std())
     print(
-        f"arp {arp:.2f}: deviation {cells:.2f} of the cells, {pixels:.2f} of 30 m means, {pixels / cells:.0%} kept"
+        f"arp {arp:.2f}: deviation {cells:.2f} of the cells, {pixels:.2f} of 30 m means,"
+        f" {pixels / cells:.0%} kept"
     )
