@@ -1,5 +1,7 @@
 """What one engine of the atmosphere costs beside another, in the case of a setup."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +11,7 @@ from fifesim.analysis.indices import normalized_difference
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import coupling
 from fifesim.atmosphere.schemes import engines as schemes
+from fifesim.base.annotations import Names, Numbers
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.base.geometry import fife_geometry
 from fifesim.base.kinds import described
@@ -29,7 +32,9 @@ _LONG_NAMES = {
 }
 
 
-def compare_engines(setup=None, *, reflectance=None, engines=("5S", "successive-orders")):
+def compare_engines(
+    setup: Setup | None = None, *, reflectance: Numbers | None = None, engines: Names = ("5S", "successive-orders")
+) -> xr.Dataset:
     """
     What the atmosphere of a setup does by several engines.
 

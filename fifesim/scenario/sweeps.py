@@ -1,6 +1,10 @@
 """Scenarios along axes: what a regression becomes as a parameter varies, in one lazy Dataset."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
+from typing import Any
 
 import dask
 import dask.array as da
@@ -8,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
+from fifesim.base.annotations import Array, Pairing
 from fifesim.scenario.keys import Keys
 from fifesim.scenario.scenario import Scenario, parse_scenario
 from fifesim.scenario.simulation import simulate
@@ -17,7 +22,13 @@ STATISTICS = ("slope", "intercept", "r2", "residual_deviation", "n")
 VARIABLES = ("lai", "fpar")
 
 
-def sweep(scenario, axes, measures=None, *, pair="coordinates"):
+def sweep(
+    scenario: Scenario,
+    axes: Mapping[str, Sequence[Any] | Array],
+    measures: Mapping[str, Callable[[xr.DataTree], float]] | None = None,
+    *,
+    pair: Pairing = "coordinates",
+) -> xr.Dataset:
     """
     Simulate a scenario along axes of its parameters.
 

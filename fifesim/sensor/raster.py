@@ -1,17 +1,26 @@
 """The sensor on labelled rasters: from light at the top of the atmosphere to digital numbers, and back."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
 import numpy as np
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
+from fifesim.base.annotations import FilePath, Names, Numbers, Pair, Time
 from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf, chunks, directions, swaths
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import Directions, Image
 from fifesim.rasters.dates import by_date
 from fifesim.rasters.own_rasters import incoming
 from fifesim.rasters.windows import held
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 from fifesim.sensor.response import calibration
-from fifesim.sensor.response.noise import check_kinds
+from fifesim.sensor.response.noise import NoiseModel, check_kinds
 from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import (
@@ -30,21 +39,21 @@ MIN_VALID = 0.98
 
 @by_date
 def sense(
-    toa,
-    instrument=None,
+    toa: xr.DataArray,
+    instrument: FilePath | Instrument | None = None,
     *,
-    onto=None,
-    interval=None,
-    offset=(0.0, 0.0),
-    noise=(),
-    seed=0,
-    noise_models=None,
-    quantise=True,
-    scaling="detector",
-    min_valid=MIN_VALID,
-    geometry=None,
-    time=None,
-):
+    onto: GeoBox | None = None,
+    interval: Literal["native"] | Pair | None = None,
+    offset: Sequence[Numbers] = (0.0, 0.0),
+    noise: Names = (),
+    seed: int = 0,
+    noise_models: NoiseModel | Mapping[str, NoiseModel] | None = None,
+    quantise: bool = True,
+    scaling: Literal["detector", "product"] = "detector",
+    min_valid: float = MIN_VALID,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+) -> Image:
     """
     Image that an instrument records: regularized onto its pixels, with its noise, and digitised.
 
@@ -257,7 +266,7 @@ def _history(description, interval, offset, noise, seed, quantise, scaling):
 
 
 @by_date
-def to_radiance(image):
+def to_radiance(image: xr.DataArray) -> xr.DataArray:
     """
     Radiance of an image of digital numbers.
 
@@ -300,7 +309,7 @@ def to_radiance(image):
 
 
 @by_date
-def to_reflectance(image):
+def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     """
     Planetary reflectance of an image.
 

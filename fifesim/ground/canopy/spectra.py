@@ -1,5 +1,7 @@
 """Spectra of leaves and of what lies below them, mixed and averaged over bands."""
 
+from __future__ import annotations
+
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from fifesim.base import datasets
+from fifesim.base.annotations import NumberOrArray
 from fifesim.base.bands import solar_spectrum
 from fifesim.base.kinds import described
 
@@ -81,7 +84,7 @@ class Background:
     0.6
     """
 
-    fractions: Mapping
+    fractions: Mapping[str, NumberOrArray]
 
     def __post_init__(self):
         if not isinstance(self.fractions, Mapping):
@@ -99,7 +102,7 @@ class Background:
         check_shares(tuple(fractions), tuple(fractions.values()))
         object.__setattr__(self, "fractions", fractions)
 
-    def spectra(self):
+    def spectra(self) -> list[tuple[Spectrum, NumberOrArray]]:
         """Spectrum and share of each part that reflects, a list of (Spectrum, float)."""
         return [(_spectrum(name), value) for name, value in self.fractions.items() if name != SHADE and value > 0]
 
