@@ -26,6 +26,10 @@ class Distribution(Protocol):
         """Share of the distribution that lies below a value."""
 
     @property
+    def pdf(self) -> Callable[..., Any]:
+        """Density."""
+
+    @property
     def mean(self) -> Callable[[], Any]:
         """Mean."""
 

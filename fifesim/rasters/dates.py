@@ -10,7 +10,8 @@ from typing import ParamSpec, TypeVar
 import numpy as np
 import xarray as xr
 
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 def by_date(step: Callable[P, R]) -> Callable[P, R]:

@@ -79,7 +79,7 @@ class Instrument:
     bits: Annotated[int, Field(strict=True, ge=2, le=16)]
     lsf: SpatialResponse
     bands: Annotated[tuple[InstrumentBand, ...], Field(min_length=1)] = field(repr=False)
-    sources: Sources = field(repr=False, hash=False)
+    sources: Sources = field(repr=False, hash=False)  # type: ignore[valid-type]
     references: dict[str, str] = field(repr=False, hash=False)
     ifov: Angle | None = None
     detectors: Count | None = None
