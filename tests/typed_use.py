@@ -60,7 +60,7 @@ def air(rho: xr.DataArray) -> xr.DataArray:
     sun = fifesim.sun_position(datetime(1987, 6, 6, 16, 35), latitude=39.1, longitude=-96.5)
     low = fifesim.Setup(bands=["TM3", "TM4"], atmosphere=hazy, geometry=fifesim.Geometry(65, sun.saa))
     by_engine = fifesim.compare_engines(low, reflectance=[0.05, 0.3], engines=["5S"])
-    print(by_engine, fifesim.atmosphere.spectrum(hazy))
+    print(by_engine, fifesim.atmosphere.spectrum(hazy, fifesim.fife_geometry()).sizes, f"{sun.sza:.1f}")
     toa = fifesim.to_toa(rho, surroundings=0.2, adjacency=True)
     print(fifesim.index(fifesim.to_surface(toa, adjacency=True), "EVI2").mean())
     return toa
@@ -68,7 +68,7 @@ def air(rho: xr.DataArray) -> xr.DataArray:
 
 def image(toa: xr.DataArray) -> xr.DataArray:
     tm = fifesim.instrument("TM", response="system")
-    red, near_infrared = tm.red_and_near_infrared()
+    red, _ = tm.red_and_near_infrared()
     print(red.name, tm.line_spread.half_width, tm.line_spreads(red).across.mtf([0.01]), tm.source("altitude"))
     print(fifesim.snr("OLI", "OLI4", [50.0, 100.0]).max(), fifesim.psf(tm).sum(), fifesim.mtf(tm, ["TM3"]))
     fifesim.sense(toa, offset=(0.2, 0.0), interval="native", noise=["shot"], noise_models=fifesim.NoiseModel(0.1, 0.01))
@@ -120,6 +120,7 @@ def wrong(lai: xr.DataArray, dn: xr.DataArray, fit: fifesim.Regression) -> None:
     fifesim.surface_reflectance(lai, soil=lai.values)  # type: ignore[arg-type]
     fifesim.to_toa(lai.values)  # type: ignore[arg-type]
     fifesim.to_toa(lai, "hazy")  # type: ignore[arg-type]
+    fifesim.atmosphere.spectrum("tropical")  # type: ignore[arg-type]
     fifesim.to_toa(lai, geometry=(30, 120))  # type: ignore[arg-type]
     fifesim.sense(dn, offset=0.2)  # type: ignore[arg-type]
     fifesim.sense(dn, noise_models=0.1)  # type: ignore[arg-type]

@@ -143,7 +143,7 @@ def sense(
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
-    image = recorded(radiance, description, bands, quantise, geometry if scaling == "product" else None)
+    image = digital_numbers.recorded(radiance, description, bands, quantise, geometry if scaling == "product" else None)
     image = directions.with_geometry(grids.place(image.copy(data=held(image.data)), pixels), geometry)
     return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise, scaling))
 
@@ -185,48 +185,6 @@ def _is_radiance(array):
     return str(array.attrs.get("units", "1")).strip() == cf.QUANTITIES["toa_radiance"].units
 
 
-def recorded(radiance, description, bands, quantise, product_geometry=None):
-    """
-    What an instrument records of a radiance, with the coordinates of its bands.
-
-    Parameters
-    ----------
-    radiance : xarray.DataArray
-        With a dimension band. [W m-2 sr-1 um-1]
-    description : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.band.InstrumentBand
-        One for each of the array.
-    quantise : bool
-        Whether as digital numbers.
-    product_geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
-        Sun by which the agency's product scales them; the detector's own counts without.
-
-    Returns
-    -------
-    image : xarray.DataArray
-        Digital numbers, or the radiance itself.
-    """
-    along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
-    if quantise:
-        gain, offset, bits = digital_numbers.scale(description, bands, product_geometry)
-        scales = [xr.DataArray(each, dims="band") for each in (gain, offset)]
-        # A product's numbers are linear, whatever the detector's are.
-        compression = [band.compressed_count(bits) if product_geometry is None else 0 for band in bands]
-        dtype = np.uint8 if bits <= 8 else np.uint16
-        kernel = calibration.radiance_to_dn if not any(compression) else _compressed
-        scales += [xr.DataArray(compression, dims="band")] if any(compression) else []
-        radiance = chunks.pointwise(kernel, radiance, *scales, dtype=dtype, bits=bits)
-        along_band |= {"gain": gain, "offset": offset}
-        along_band |= {"compression": compression} if any(compression) else {}
-    along_band["solar_irradiance"] = [band.solar_irradiance for band in bands]
-    return radiance.assign_coords(cf.band_coordinates(**along_band))
-
-
-def _compressed(radiance, gain, offset, compression, bits):
-    """Digital numbers of bands of which some have a scale of square roots."""
-    return calibration.radiance_to_dn(radiance, gain, offset, bits, compression)
-
-
 def labelled(image, toa, description, history):
     """
     Image with the labels of what it is: digital numbers where it holds whole numbers, else radiance.
@@ -234,7 +192,7 @@ def labelled(image, toa, description, history):
     Parameters
     ----------
     image : xarray.DataArray
-        From `recorded`.
+        From `digital_numbers.recorded`.
     toa : xarray.DataArray
         What it was sensed of.
     description : fifesim.sensor.description.instruments.Instrument

@@ -16,8 +16,9 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters.annotations import Directions
 from fifesim.rasters.dates import by_date
 from fifesim.sensor.description.instrument_file import Instrument
-from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled, recorded
+from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled
 from fifesim.sensor.response.noise import NoiseModel
+from fifesim.sensor.response.rasters.digital_numbers import recorded
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import by_line_spread, common_size
 from fifesim.sensor.scan import track as scan
