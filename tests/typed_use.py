@@ -124,7 +124,7 @@ def wrong(lai: xr.DataArray, dn: xr.DataArray, fit: fifesim.Regression) -> None:
     fifesim.to_toa(lai, geometry=(30, 120))  # type: ignore[arg-type]
     fifesim.sense(dn, offset=0.2)  # type: ignore[arg-type]
     fifesim.sense(dn, noise_models=0.1)  # type: ignore[arg-type]
-    fifesim.sense(dn, None, grid)  # type: ignore[call-arg]
+    fifesim.sense(dn, onto=dn)  # type: ignore[arg-type]
     fifesim.snr("TM", "TM3", "50")  # type: ignore[arg-type]
     fifesim.compare(lai, 5)  # type: ignore[arg-type]
     fifesim.regress(lai, dn, pair="place")  # type: ignore[arg-type]

@@ -7,19 +7,19 @@ import odc.geo.xr  # noqa: F401  registers .odc
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
+from odc.geo.crs import MaybeCRS
 from odc.geo.geobox import GeoBox
 from odc.geo.xr import xr_coords
 
 from fifesim.base.annotations import Pair
 from fifesim.base.lattice import centres, whole_cells
 from fifesim.rasters import projection
-from fifesim.rasters.annotations import CRS
 from fifesim.rasters.axes import check_axes
 
 _LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
 
 
-def grid_at(crs: CRS, west: float, north: float, width: float, height: float, cell: Pair) -> GeoBox:
+def grid_at(crs: MaybeCRS, west: float, north: float, width: float, height: float, cell: Pair) -> GeoBox:
     """
     North-up grid from its corner, size and cell.
 
