@@ -18,12 +18,14 @@ from fifesim.accessor import PUBLIC
 ROOT = Path(__file__).parents[1]
 
 
-def methods(name, found):
+def methods(of, found):
     """Public methods and properties of a class that is written in the package."""
     for each, member in vars(found).items():
-        function = getattr(member, "fget", None) or inspect.unwrap(getattr(member, "__func__", member))
+        # Of a property, a cached one or a class method.
+        made_of = (getattr(member, name, None) for name in ("fget", "func", "__func__"))
+        function = inspect.unwrap(next(filter(None, made_of), member))
         if not each.startswith("_") and inspect.isfunction(function) and function.__module__ == found.__module__:
-            yield f"{name}.{each}", function
+            yield f"{of}.{each}", function
 
 
 FUNCTIONS = {"atmosphere.spectrum": fifesim.atmosphere.spectrum}
