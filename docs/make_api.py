@@ -76,7 +76,11 @@ def modules():
         path for folder in PHYSICS for path in sorted((PACKAGE / folder).rglob("[a-z]*.py"))
     )
     dotted = [".".join(path.relative_to(PACKAGE).with_suffix("").parts) for path in paths]
-    return [name for name in dotted if not name.endswith(".raster") and ".rasters." not in name]
+    return [
+        name
+        for name in dotted
+        if not name.endswith((".raster", ".annotations")) and ".rasters." not in name
+    ]
 
 
 def physics():

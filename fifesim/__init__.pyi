@@ -5,6 +5,10 @@ The package finds them here when they are first used, the API page lists them, a
 a method is one of the ``.fifesim`` accessor of a DataArray too, which hands it the raster as first argument.
 """
 
+from . import atmosphere as atmosphere
+
+__version__: str
+
 # Grids and geometry
 from .rasters.sites import fife_site as fife_site
 from .rasters.grid import grid_at as grid_at

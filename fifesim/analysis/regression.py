@@ -1,5 +1,7 @@
 """Linear regression from sums, so that the data need not be in memory."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 
@@ -7,6 +9,7 @@ import numba
 import numpy as np
 from scipy import stats
 
+from fifesim.base.annotations import Numbers
 from fifesim.base.methods import Method
 
 
@@ -58,16 +61,16 @@ class Regression:
         )
 
     @property
-    def slope_error(self):
+    def slope_error(self) -> float:
         """Standard error of the slope."""
         return self.residual_deviation / math.sqrt(self.x_sum_of_squares)
 
     @property
-    def intercept_error(self):
+    def intercept_error(self) -> float:
         """Standard error of the intercept."""
         return self.residual_deviation * math.sqrt(1.0 / self.n + self.x_mean**2 / self.x_sum_of_squares)
 
-    def predict(self, x):
+    def predict(self, x: Numbers) -> np.ndarray:
         """
         Value of the line.
 
@@ -81,7 +84,7 @@ class Regression:
         """
         return self.intercept + self.slope * x
 
-    def confidence_interval(self, x, level=0.95):
+    def confidence_interval(self, x: Numbers, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
         """
         Interval that holds the mean of y at x.
 
@@ -106,7 +109,7 @@ class Regression:
         """
         return self._interval(x, level, 0.0)
 
-    def prediction_interval(self, x, level=0.95):
+    def prediction_interval(self, x: Numbers, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
         """
         Interval that holds one new y at x.
 

@@ -1,5 +1,8 @@
 """Spectral bands: response-weighted means, solar irradiance, and which of them shows what."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
@@ -7,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pvlib
 
+from fifesim.base.annotations import Numbers
 from fifesim.base.kinds import described
 
 
@@ -143,8 +147,8 @@ class Band:
     """
 
     name: str
-    wavelength: tuple = field(repr=False)
-    response: tuple = field(repr=False)
+    wavelength: Sequence[float] = field(repr=False)
+    response: Sequence[float] = field(repr=False)
 
     def __post_init__(self):
         wavelength, response = (_numbers(self, name) for name in ("wavelength", "response"))
@@ -156,17 +160,17 @@ class Band:
         object.__setattr__(self, "response", response)
 
     @property
-    def center(self):
+    def center(self) -> float:
         """Response-weighted mean wavelength [um]."""
         return _center(self)
 
     @property
-    def limits(self):
+    def limits(self) -> tuple[float, float]:
         """Wavelengths between which the response is not zero [um]."""
         used = np.flatnonzero(self.response)
         return self.wavelength[max(used[0] - 1, 0)], self.wavelength[min(used[-1] + 1, len(self.wavelength) - 1)]
 
-    def mean(self, values, wavelength, weight=1.0):
+    def mean(self, values: Numbers, wavelength: Numbers, weight: Numbers = 1.0) -> np.ndarray:
         """
         Mean of a spectrum over the response, by the trapezoidal rule on the union of both wavelength sets.
 

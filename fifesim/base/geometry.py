@@ -1,5 +1,7 @@
 """Directions of sun and sensor."""
 
+from __future__ import annotations
+
 import re
 from dataclasses import dataclass
 from functools import lru_cache
@@ -76,17 +78,17 @@ class Geometry:
             )
 
     @property
-    def raa(self):
+    def raa(self) -> float:
         """Relative azimuth folded to [0, 180]; 0 has sun and sensor on the same side. [degree]"""
         return float(relative_azimuth(self.saa, self.vaa))
 
     @property
-    def mu_s(self):
+    def mu_s(self) -> float:
         """Cosine of the solar zenith angle [1]."""
         return np.cos(np.radians(self.sza))
 
     @property
-    def mu_v(self):
+    def mu_v(self) -> float:
         """Cosine of the sensor zenith angle [1]."""
         return np.cos(np.radians(self.vza))
 
@@ -288,7 +290,7 @@ def utc(time):
 
 
 @lru_cache
-def fife_geometry():
+def fife_geometry() -> Geometry:
     """
     The sun over the FIFE site on the paper's day, 6 June 1987 (Data), at 16:35 UTC and a nadir view, which are assumed.
 

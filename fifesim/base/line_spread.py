@@ -5,9 +5,13 @@ A line spread function (lsf) is any object with ``half_width`` [m], outside of w
 ``cumulative(x)``, its integral from there up to the distance x [m] from the pixel centre, 0 to 1.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
+
+from fifesim.base.annotations import Numbers
 
 
 class Transfer:
@@ -17,7 +21,7 @@ class Transfer:
     Each kind of part gives the formula, ``_mtf(frequency)``.
     """
 
-    def mtf(self, frequency):
+    def mtf(self, frequency: Numbers) -> np.ndarray:
         """
         Modulation transfer function, the Fourier transform of the line spread function.
 
@@ -42,7 +46,9 @@ class LineSpread(Transfer):
     ``_cumulative(x)``, and its transform ``_mtf(frequency)``.
     """
 
-    def cumulative(self, x):
+    half_width: float
+
+    def cumulative(self, x: Numbers) -> np.ndarray:
         """
         Share of the response that lies before a distance from the pixel centre.
 

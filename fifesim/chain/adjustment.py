@@ -1,5 +1,7 @@
 """From one sensor to another: the bands of an image as those of another instrument, and what it would have recorded."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from functools import lru_cache
@@ -7,16 +9,21 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
+from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.base import datasets
+from fifesim.base.annotations import FilePath, Names, Time
 from fifesim.chain.carried import as_bands_of
 from fifesim.chain.steps import to_toa
 from fifesim.ground.canopy.library import library_spectra
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import Directions, Image
 from fifesim.rasters.combination import combined
 from fifesim.rasters.dates import by_date
 from fifesim.sensor import raster as sensor
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of, carried_instrument
 from fifesim.sensor.description.spectral_response import half_peak
@@ -30,7 +37,14 @@ UNCERTAINTY = 0.0005
 
 
 @by_date
-def adjust_bands(reflectance, instrument, *, bands=None, source=None, uncertainty=UNCERTAINTY):
+def adjust_bands(
+    reflectance: xr.DataArray,
+    instrument: FilePath | Instrument,
+    *,
+    bands: Names | None = None,
+    source: FilePath | Instrument | None = None,
+    uncertainty: float = UNCERTAINTY,
+) -> xr.DataArray:
     """
     Surface reflectance in the bands of another instrument, by spectra that fit each pixel.
 
@@ -104,19 +118,19 @@ def adjust_bands(reflectance, instrument, *, bands=None, source=None, uncertaint
 
 @by_date
 def as_seen_by(
-    reflectance,
-    instrument,
+    reflectance: xr.DataArray,
+    instrument: FilePath | Instrument,
     *,
-    bands=None,
-    source=None,
-    atmosphere=None,
-    time=None,
-    geometry=None,
-    onto=None,
-    noise=(),
-    seed=0,
-    uncertainty=UNCERTAINTY,
-):
+    bands: Names | None = None,
+    source: FilePath | Instrument | None = None,
+    atmosphere: Atmosphere | None = None,
+    time: Time | None = None,
+    geometry: Directions | None = None,
+    onto: GeoBox | None = None,
+    noise: Names = (),
+    seed: int = 0,
+    uncertainty: float = UNCERTAINTY,
+) -> Image:
     """
     The image that another instrument would have recorded of a scene.
 
@@ -187,7 +201,9 @@ def _with_error(image, surface):
     return image.assign_coords(adjustment_error=error.variable)
 
 
-def spectral_adjustment(source, target, *, bands=None):
+def spectral_adjustment(
+    source: FilePath | Instrument, target: FilePath | Instrument, *, bands: Names | None = None
+) -> xr.Dataset:
     """
     Bands of one instrument as straight lines of those of another: target = slope * source + offset.
 

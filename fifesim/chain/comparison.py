@@ -1,11 +1,15 @@
 """One scene through many instruments."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import pandas as pd
 import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
+from fifesim.base.annotations import FilePath, Names
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
@@ -13,10 +17,17 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters.reductions import computed
 from fifesim.rasters.regularization import areas, regularized
 from fifesim.sensor import raster as sensor
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 
-def compare(lai, instruments, setup=None, *, bands=None):
+def compare(
+    lai: xr.DataArray | xr.Dataset,
+    instruments: Sequence[FilePath | Instrument],
+    setup: Setup | None = None,
+    *,
+    bands: Mapping[str, Names] | None = None,
+) -> xr.DataTree:
     """
     Images of one scene by many instruments, each on its own grid.
 
@@ -77,7 +88,7 @@ def compare(lai, instruments, setup=None, *, bands=None):
     return xr.DataTree.from_dict(nodes)
 
 
-def comparison_table(images, truth=None):
+def comparison_table(images: xr.DataTree, truth: xr.DataArray | None = None) -> pd.DataFrame:
     """
     What each of some images of one scene shows, a row for each instrument; computes.
 

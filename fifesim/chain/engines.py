@@ -1,5 +1,7 @@
 """What one engine of the atmosphere costs beside another, in the case of a setup."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +12,7 @@ from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import coupling
 from fifesim.atmosphere.schemes import engines as schemes
 from fifesim.atmosphere.schemes.mixed_air import whole_scattering
+from fifesim.base.annotations import Names, Numbers
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.base.geometry import fife_geometry
 from fifesim.base.kinds import described
@@ -30,7 +33,9 @@ _LONG_NAMES = {
 }
 
 
-def compare_engines(setup=None, *, reflectance=None, engines=("5S", "successive-orders")):
+def compare_engines(
+    setup: Setup | None = None, *, reflectance: Numbers | None = None, engines: Names = ("5S", "successive-orders")
+) -> xr.Dataset:
     """
     What the atmosphere of a setup does by several engines.
 

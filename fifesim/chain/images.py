@@ -1,5 +1,11 @@
 """What an image of any kind tells: it is brought to planetary reflectance first, as in the paper (Results)."""
 
+from __future__ import annotations
+
+from typing import Literal
+
+import xarray as xr
+
 from fifesim.analysis.rasters import indices
 from fifesim.rasters import cf
 from fifesim.rasters.dates import by_date
@@ -8,7 +14,7 @@ from fifesim.sensor import raster as sensor
 
 
 @by_date
-def ndvi(image):
+def ndvi(image: xr.DataArray) -> xr.DataArray:
     """
     Normalized difference vegetation index, from planetary reflectance as in the paper (Results).
 
@@ -46,7 +52,9 @@ def ndvi(image):
 
 
 @by_date
-def index(image, name):
+def index(
+    image: xr.DataArray, name: Literal["NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"]
+) -> xr.DataArray:
     """
     Spectral index of an image.
 

@@ -1,16 +1,21 @@
 """Landscapes in the chain: what a Dataset says of the ground, each class with its own canopy, and its true means."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from functools import partial
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters import means
+from fifesim.base.annotations import Time
+from fifesim.base.line_spread import LineSpread
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy import raster as ground
+from fifesim.ground.canopy.annotations import LeafAngles
 from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.optics import DEAD_LEAF
 from fifesim.ground.canopy.rasters import leaves, soils
@@ -21,6 +26,7 @@ from fifesim.ground.landscape.rasters.cover import classes_of
 from fifesim.ground.landscape.rasters.evaluation import by_class
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import Directions, NumberOrRaster, Raster
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
 
@@ -203,17 +209,17 @@ def _check_used(land, canopy):
 
 @by_date
 def fpar(
-    lai,
+    lai: xr.DataArray | xr.Dataset,
     *,
-    geometry=None,
-    time=None,
-    leaf_angles="spherical",
-    fpar_inf=absorption.FPAR_INF,
-    leaves="all",
-    brown=0.0,
-    dissociation=0.0,
-    crown_cover=1.0,
-):
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    leaf_angles: LeafAngles = "spherical",
+    fpar_inf: float = absorption.FPAR_INF,
+    leaves: Literal["all", "green"] = "all",
+    brown: NumberOrRaster = 0.0,
+    dissociation: NumberOrRaster = 0.0,
+    crown_cover: NumberOrRaster = 1.0,
+) -> xr.DataArray:
     """
     Fraction of photosynthetically active radiation that a canopy absorbs, or its green leaves.
 
@@ -280,7 +286,7 @@ def fpar(
     return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=land.lai, history=history)
 
 
-def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
+def aggregate(array: Raster, pixel: float = 30.0, *, min_valid: float = 0.98, lsf: LineSpread | None = None) -> Raster:
     """
     Means over square blocks of ground: the truth that a pixel is compared with.
 

@@ -1,17 +1,24 @@
 """Everything between the leaf area of a scene and its digital numbers, said once."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import Literal
 
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.base.annotations import FilePath, Names, Numbers, Pair
 from fifesim.base.foreign import in_a_line
-from fifesim.base.geometry import Geometry
 from fifesim.chain import steps
+from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
 from fifesim.ground.canopy.crowns import SHAPE
+from fifesim.rasters.annotations import Directions, NumberOrRaster
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import Instrument
+from fifesim.sensor.response.noise import NoiseModel
 
 # What surface_reflectance and sense take of a setup, by the same names.
 _GROUND = ("bands", "dem", "horizon", "upwelling", "atmosphere", "leaf_optics", "background", "leaf_angles", "hotspot")
@@ -58,32 +65,32 @@ class Setup:
     ['OLI']
     """
 
-    instrument: str | Instrument = "TM"
-    bands: tuple[str, ...] | None = None
+    instrument: FilePath | Instrument = "TM"
+    bands: Names | None = None
     atmosphere: Atmosphere | None = None
-    geometry: Geometry | xr.Dataset | None = None
-    leaf_optics: object = None
-    background: object = None
-    soil: float | xr.DataArray | None = None
-    moisture: float | xr.DataArray | None = None
-    leaf_angles: object = "spherical"
+    geometry: Directions | None = None
+    leaf_optics: LeafOptics | None = None
+    background: BelowLeaves | None = None
+    soil: NumberOrRaster | None = None
+    moisture: NumberOrRaster | None = None
+    leaf_angles: LeafAngles = "spherical"
     hotspot: float = 0.0
-    brown: float | xr.DataArray = 0.0
-    dissociation: float | xr.DataArray = 0.0
-    brown_leaf: object = None
-    crown_cover: float | xr.DataArray = 1.0
+    brown: NumberOrRaster = 0.0
+    dissociation: NumberOrRaster = 0.0
+    brown_leaf: LeafOptics | None = None
+    crown_cover: NumberOrRaster = 1.0
     crown_shape: float = SHAPE
     dem: xr.DataArray | None = None
     horizon: xr.DataArray | None = None
     upwelling: bool = True
     adjacency: bool = False
-    surroundings: object = None
+    surroundings: Numbers | None = None
     onto: GeoBox | None = None
-    interval: str | float | None = None
-    offset: tuple = (0.0, 0.0)
+    interval: Literal["native"] | Pair | None = None
+    offset: Sequence[Numbers] = (0.0, 0.0)
     min_valid: float = sensor.MIN_VALID
-    noise: tuple = ()
-    noise_models: object = None
+    noise: Names = ()
+    noise_models: NoiseModel | Mapping[str, NoiseModel] | None = None
     seed: int = 0
     quantise: bool = True
 

@@ -1,47 +1,56 @@
 """The steps of Figure 1 that need more than one stage: what a stage needs of another is handed to it here."""
 
+from __future__ import annotations
+
+import xarray as xr
+
 from fifesim.atmosphere import raster as atmosphere_raster
+from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import engines
+from fifesim.base.annotations import FilePath, Names, Numbers, Time
 from fifesim.chain import landscapes
 from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
 from fifesim.chain.seen_canopy import seen_through_air
+from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
 from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.rasters import soils
 from fifesim.ground.terrain.rasters import light as terrain
 from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.rasters import directions
+from fifesim.rasters.annotations import Directions, NumberOrRaster
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 
 
 @by_date
 def surface_reflectance(
-    lai,
-    instrument=None,
+    lai: xr.DataArray | xr.Dataset,
+    instrument: FilePath | Instrument | None = None,
     *,
-    bands=None,
-    dem=None,
-    horizon=None,
-    upwelling=True,
-    atmosphere=None,
-    geometry=None,
-    time=None,
-    leaf_optics=None,
-    background=None,
-    soil=None,
-    moisture=None,
-    leaf_angles="spherical",
-    hotspot=0.0,
-    brown=0.0,
-    dissociation=0.0,
-    brown_leaf=None,
-    crown_cover=1.0,
-    crown_shape=SHAPE,
-    exact=False,
-):
+    bands: Names | None = None,
+    dem: xr.DataArray | None = None,
+    horizon: xr.DataArray | None = None,
+    upwelling: bool = True,
+    atmosphere: Atmosphere | None = None,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    leaf_optics: LeafOptics | None = None,
+    background: BelowLeaves | None = None,
+    soil: NumberOrRaster | None = None,
+    moisture: NumberOrRaster | None = None,
+    leaf_angles: LeafAngles = "spherical",
+    hotspot: float = 0.0,
+    brown: NumberOrRaster = 0.0,
+    dissociation: NumberOrRaster = 0.0,
+    brown_leaf: LeafOptics | None = None,
+    crown_cover: NumberOrRaster = 1.0,
+    crown_shape: float = SHAPE,
+    exact: bool = False,
+) -> xr.DataArray:
     """
     Reflectance factor of the ground in the bands of an instrument.
 
@@ -165,7 +174,16 @@ def surface_reflectance(
 
 
 @by_date
-def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, time=None, instrument=None):
+def kt(
+    reflectance: xr.DataArray,
+    dem: xr.DataArray,
+    *,
+    horizon: xr.DataArray | None = None,
+    atmosphere: Atmosphere | None = None,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    instrument: FilePath | Instrument | None = None,
+) -> xr.DataArray:
     """
     Topographic correction factor Kt: what terrain does to the irradiance in each band.
 
@@ -216,16 +234,16 @@ def kt(reflectance, dem, *, horizon=None, atmosphere=None, geometry=None, time=N
 
 @by_date
 def to_toa(
-    reflectance,
-    atmosphere=None,
+    reflectance: xr.DataArray | xr.Dataset,
+    atmosphere: Atmosphere | None = None,
     *,
-    geometry=None,
-    time=None,
-    instrument=None,
-    elevation=None,
-    adjacency=False,
-    surroundings=None,
-):
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    instrument: FilePath | Instrument | None = None,
+    elevation: xr.DataArray | None = None,
+    adjacency: bool = False,
+    surroundings: Numbers | None = None,
+) -> xr.DataArray:
     """
     Apparent reflectance at the top of the atmosphere.
 
@@ -297,17 +315,17 @@ def to_toa(
 
 @by_date
 def to_surface(
-    reflectance,
-    atmosphere=None,
+    reflectance: xr.DataArray | xr.Dataset,
+    atmosphere: Atmosphere | None = None,
     *,
-    assume=False,
-    geometry=None,
-    time=None,
-    instrument=None,
-    elevation=None,
-    adjacency=False,
-    surroundings=None,
-):
+    assume: bool = False,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    instrument: FilePath | Instrument | None = None,
+    elevation: xr.DataArray | None = None,
+    adjacency: bool = False,
+    surroundings: Numbers | None = None,
+) -> xr.DataArray:
     """
     Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.
 

@@ -1,5 +1,9 @@
 """Three bands as a colour picture, and a part of the pixels of a raster that is too large to be drawn whole."""
 
+from __future__ import annotations
+
+from typing import Literal
+
 import numpy as np
 import xarray as xr
 
@@ -17,7 +21,12 @@ _DARK, _BEYOND = 0.7, 0.1
 _SAMPLE = 1000
 
 
-def rgb(image, composite="false colour", *, stretch=None):
+def rgb(
+    image: xr.DataArray,
+    composite: Literal["false colour", "natural colour"] | tuple[str, str, str] = "false colour",
+    *,
+    stretch: tuple[float, float] | None = None,
+) -> xr.DataArray:
     """
     Colours of an image, which ``.plot.imshow()`` shows.
 

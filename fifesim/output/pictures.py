@@ -1,12 +1,20 @@
 """Pictures that a person looks at while working: a raster, a regression, one scene through many instruments."""
 
+from __future__ import annotations
+
+from typing import Literal
+
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 from matplotlib import colormaps
-from matplotlib.colors import ListedColormap
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.figure import Figure
 
 from fifesim.analysis.rasters.pairs import matched
+from fifesim.analysis.regression import Regression
+from fifesim.base.annotations import Pairing
 from fifesim.base.scan_pixels import corners
 from fifesim.chain.comparison import recorded_images, shows_ndvi
 from fifesim.chain.images import ndvi
@@ -43,7 +51,17 @@ _SIZE = 1500
 _KILOMETRES = 3000.0
 
 
-def plot(raster, *, band=None, composite="false colour", stretch=None, cmap=None, limits=None, axes=None, size=_SIZE):
+def plot(
+    raster: xr.DataArray,
+    *,
+    band: str | None = None,
+    composite: Literal["false colour", "natural colour"] | tuple[str, str, str] = "false colour",
+    stretch: tuple[float, float] | None = None,
+    cmap: str | Colormap | None = None,
+    limits: tuple[float, float] | None = None,
+    axes: Axes | None = None,
+    size: int = _SIZE,
+) -> Axes:
     """
     Draw a raster as a map: an image in colours, one band or quantity by its colour map.
 
@@ -105,7 +123,15 @@ def plot(raster, *, band=None, composite="false colour", stretch=None, cmap=None
     return axes
 
 
-def plot_fit(fit, y=None, x=None, *, pair="coordinates", level=0.95, axes=None):
+def plot_fit(
+    fit: Regression,
+    y: xr.DataArray | None = None,
+    x: xr.DataArray | None = None,
+    *,
+    pair: Pairing = "coordinates",
+    level: float = 0.95,
+    axes: Axes | None = None,
+) -> Axes:
     """
     Draw a regression: its line and prediction interval, over the pixels where they are given.
 
@@ -175,7 +201,7 @@ def plot_fit(fit, y=None, x=None, *, pair="coordinates", level=0.95, axes=None):
     return axes
 
 
-def plot_comparison(images, *, limits=None):
+def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None = None) -> Figure:
     """
     Draw one scene through many instruments: their NDVI side by side, in the same colours.
 

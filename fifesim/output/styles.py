@@ -1,5 +1,7 @@
 """How QGIS shows a file: colours in a style file of the same name, which it takes by itself."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,6 +10,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.colors import ListedColormap, to_hex
 
+from fifesim.base.annotations import FilePath
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest
 from fifesim.base.foreign import in_a_line
 from fifesim.rasters.opening import ErrorsOfGdal, raster_file
@@ -41,7 +44,7 @@ class _Shown(NamedTuple):
     high: float
 
 
-def write_style(path, *, overwrite=False):
+def write_style(path: FilePath, *, overwrite: bool = False) -> Path:
     """
     Write a style beside a GeoTIFF, so that QGIS shows it in fitting colours when it is opened.
 

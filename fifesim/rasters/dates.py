@@ -1,15 +1,20 @@
 """Rasters over time: a step of one date, taken for each date by itself."""
 
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from functools import wraps
 from hashlib import blake2b
 from inspect import signature
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 import xarray as xr
 
+P = ParamSpec("P")
+R = TypeVar("R")
 
-def by_date(step):
+
+def by_date(step: Callable[P, R]) -> Callable[P, R]:
     """
     A step of a raster, made one of a raster with a dimension time too.
 

@@ -1,10 +1,13 @@
 """GeoTIFF files that a GIS opens in the right place, and that come back as they were."""
 
+from __future__ import annotations
+
 import errno
 import json
 import os
 import shutil
 import tempfile
+from collections.abc import Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,6 +20,7 @@ import xarray as xr
 from dask.utils import SerializableLock
 from rasterio.windows import Window
 
+from fifesim.base.annotations import Chunks, FilePath
 from fifesim.base.foreign import in_a_line
 from fifesim.base.geometry import ANGLES
 from fifesim.base.warned import warn
@@ -41,7 +45,9 @@ _COG = {"driver": "COG", "compress": "deflate", "predictor": "yes", "overview_re
 _COG |= {"copy_src_mdd": "yes"}
 
 
-def to_geotiff(raster, path, *, overwrite=False, tags=None):
+def to_geotiff(
+    raster: xr.DataArray | xr.Dataset, path: FilePath, *, overwrite: bool = False, tags: Mapping[str, str] | None = None
+) -> Path:
     """
     Write a raster as a cloud-optimised GeoTIFF.
 
@@ -117,7 +123,7 @@ def to_geotiff(raster, path, *, overwrite=False, tags=None):
     return path
 
 
-def open_image(path, chunks=None, *, allow_remote=False):
+def open_image(path: FilePath, chunks: Chunks | None = None, *, allow_remote: bool = False) -> xr.DataArray:
     """
     Open a GeoTIFF with its bands, wavelengths, sun and calibration.
 

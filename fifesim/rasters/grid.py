@@ -1,5 +1,7 @@
 """Grids as odc GeoBoxes: what a DataArray's grid is, and where cells and pixels lie."""
 
+from __future__ import annotations
+
 from functools import lru_cache
 
 import numpy as np
@@ -7,8 +9,10 @@ import odc.geo.xr  # noqa: F401  registers .odc
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
+from odc.geo.crs import MaybeCRS
 from odc.geo.geobox import GeoBox
 
+from fifesim.base.annotations import Pair
 from fifesim.base.lattice import centres, whole_cells
 from fifesim.rasters import projection
 from fifesim.rasters.axes import check_axes
@@ -18,7 +22,7 @@ from fifesim.rasters.spacing import along_axis, exact_cell
 _LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
 
 
-def grid_at(crs, west, north, width, height, cell):
+def grid_at(crs: MaybeCRS, west: float, north: float, width: float, height: float, cell: Pair) -> GeoBox:
     """
     North-up grid from its corner, size and cell.
 

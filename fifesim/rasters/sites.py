@@ -1,6 +1,9 @@
 """Study sites: their grids, and which scenes were made on them."""
 
+from __future__ import annotations
+
 from functools import lru_cache
+from typing import Literal
 
 import pyproj
 from affine import Affine
@@ -15,7 +18,11 @@ _NAME = "FIFE"
 _FAR = 1.0  # from the site a scene is another place [degree]
 
 
-def fife_site(cell, window=None, datum="NAD83"):
+def fife_site(
+    cell: float,
+    window: tuple[tuple[int, int], tuple[int, int]] | None = None,
+    datum: Literal["NAD83", "NAD27"] = "NAD83",
+) -> GeoBox:
     """
     Grid of the FIFE site, 15 km x 15 km in UTM zone 14.
 

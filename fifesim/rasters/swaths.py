@@ -1,11 +1,14 @@
 """Images of a scan on labelled rasters: by line and sample instead of rows and columns, and put onto a map."""
 
+from __future__ import annotations
+
 from functools import partial
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import dask.array as da
 import numpy as np
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
 from fifesim.base import scan_pixels
 from fifesim.rasters import chunks, projection
@@ -49,7 +52,9 @@ def placed_as(array, image):
 
 
 @by_date
-def grid_swath(image, grid, method="nearest", *, min_valid=0.5):
+def grid_swath(
+    image: xr.DataArray, grid: GeoBox, method: Literal["nearest", "mean"] = "nearest", *, min_valid: float = 0.5
+) -> xr.DataArray:
     """
     Image of a scan put onto a map.
 

@@ -1,14 +1,19 @@
 """The scenario of a run: every number with its unit and range, and what they mean."""
 
 import os
+from collections.abc import Callable
+from typing import Any, Self
 
+from odc.geo.geobox import GeoBox
 from pydantic import Field, ValidationError, model_validator
 
+from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import six_s
 from fifesim.atmosphere.schemes.engines import check_zenith
 from fifesim.base import datasets, fife, geometry
+from fifesim.base.annotations import FilePath
 from fifesim.base.foreign import shown
-from fifesim.ground.landscape.classes import fife_classes
+from fifesim.ground.landscape.classes import CoverClass, fife_classes
 from fifesim.ground.landscape.drawn import SHARES
 from fifesim.rasters import grid as grids
 from fifesim.rasters import whereabouts
@@ -53,7 +58,7 @@ class Scenario(Keys):
     atmosphere: Air = Air()
     sensor: Sensor = Sensor()
 
-    def __init__(self, /, **sections):
+    def __init__(self, /, **sections: Any) -> None:
         try:
             super().__init__(**sections)
         except ValidationError as error:
@@ -80,11 +85,11 @@ class Scenario(Keys):
             raise ValueError(f"classes: their shares sum to {sum(shares):g}: they must sum to 1")
         return self
 
-    def class_table(self):
+    def class_table(self) -> dict[str, CoverClass]:
         """Classes of cover by name, a dict of `CoverClass`; those of FIFE where the keys say none."""
         return {name: stand.cover_class(name, self.ground) for name, stand in self.classes.items()} or fife_classes()
 
-    def geobox(self):
+    def geobox(self) -> GeoBox:
         """
         Grid of the ground cells.
 
@@ -112,7 +117,7 @@ class Scenario(Keys):
             )
         return box
 
-    def sun_and_view(self):
+    def sun_and_view(self) -> geometry.Geometry:
         """Directions of sun and sensor, a `fifesim.base.geometry.Geometry`."""
         self._check_place()
         given, time = self.geometry, self._time()
@@ -148,12 +153,12 @@ class Scenario(Keys):
             where = whereabouts.place_in_words(*whereabouts.middle(self.geobox()))
             raise ValueError(f"grid: its middle, {where}, is not on the site of FIFE: give {'; and '.join(wanted)}")
 
-    def model_atmosphere(self):
+    def model_atmosphere(self) -> Atmosphere:
         """The atmosphere, a `fifesim.atmosphere.air.models.Atmosphere`."""
         self._check_place()
         return self.atmosphere.model()
 
-    def complete(self):
+    def complete(self) -> Self:
         """
         The same scenario with every default that a run decides written out.
 
@@ -184,7 +189,7 @@ class Scenario(Keys):
         found = self.model_copy(update=known)
         return found.with_paths(os.path.abspath)
 
-    def with_paths(self, change):
+    def with_paths(self, change: Callable[[str], str]) -> Self:
         """
         The same with other paths of its files.
 
@@ -243,12 +248,12 @@ class Scenario(Keys):
             six_s.check_installed()
 
     @property
-    def files(self):
+    def files(self) -> dict[tuple[str, ...], str]:
         """Paths of the files that the scenario reads, by the names of table and key, a dict of tuple to str."""
         return {(*place, key): path for place, table in self.sections().items() for key, path in table.files.items()}
 
 
-def default_scenario():
+def default_scenario() -> Scenario:
     """
     The landscape of the FIFE site that a run without a scenario simulates, ``data/fife.toml``.
 
@@ -309,7 +314,7 @@ def parse_scenario(values):
     return Scenario(**values)
 
 
-def read_scenario(path):
+def read_scenario(path: FilePath) -> Scenario:
     """
     Scenario of a TOML file.
 

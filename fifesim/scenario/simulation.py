@@ -1,9 +1,12 @@
 """Figure 1 end to end: a scenario as scene, image and truth."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import xarray as xr
 
+from fifesim.base.annotations import Chunks
 from fifesim.chain import steps as chain
 from fifesim.chain.comparison import shows_ndvi
 from fifesim.chain.images import ndvi
@@ -16,7 +19,7 @@ from fifesim.scenario.land import cut, elevation
 from fifesim.scenario.scenario import Scenario
 
 
-def simulate(scenario, chunks="auto"):
+def simulate(scenario: Scenario, chunks: Chunks = "auto") -> xr.DataTree:
     """
     Scene, image and truth of a scenario.
 

@@ -1,7 +1,11 @@
 """Scenarios along axes: what a regression becomes as a parameter varies, in one lazy Dataset."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import product
+from typing import Any
 
 import dask
 import dask.array as da
@@ -9,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
+from fifesim.base.annotations import Array, Pairing
 from fifesim.scenario.ensemble import realise
 from fifesim.scenario.named_keys import changed, find_key, in_text
 from fifesim.scenario.scenario import Scenario
@@ -19,7 +24,13 @@ STATISTICS = ("slope", "intercept", "r2", "residual_deviation", "n")
 VARIABLES = ("lai", "fpar")
 
 
-def sweep(scenario, axes, measures=None, *, pair="coordinates"):
+def sweep(
+    scenario: Scenario,
+    axes: Mapping[str, Sequence[Any] | Array],
+    measures: Mapping[str, Callable[[xr.DataTree], float]] | None = None,
+    *,
+    pair: Pairing = "coordinates",
+) -> xr.Dataset:
     """
     Simulate a scenario along axes of its parameters.
 

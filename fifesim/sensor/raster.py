@@ -1,17 +1,26 @@
 """The sensor on labelled rasters: from light at the top of the atmosphere to digital numbers, and back."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
 import numpy as np
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
+from fifesim.base.annotations import FilePath, Names, Numbers, Pair, Time
 from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf, chunks, directions, swaths
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import Directions, Image
 from fifesim.rasters.dates import by_date
 from fifesim.rasters.own_rasters import incoming
 from fifesim.rasters.windows import held
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 from fifesim.sensor.response import calibration
-from fifesim.sensor.response.noise import check_kinds
+from fifesim.sensor.response.noise import NoiseModel, check_kinds
 from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import (
@@ -30,21 +39,21 @@ MIN_VALID = 0.98
 
 @by_date
 def sense(
-    toa,
-    instrument=None,
+    toa: xr.DataArray,
+    instrument: FilePath | Instrument | None = None,
     *,
-    onto=None,
-    interval=None,
-    offset=(0.0, 0.0),
-    noise=(),
-    seed=0,
-    noise_models=None,
-    quantise=True,
-    scaling="detector",
-    min_valid=MIN_VALID,
-    geometry=None,
-    time=None,
-):
+    onto: GeoBox | None = None,
+    interval: Literal["native"] | Pair | None = None,
+    offset: Sequence[Numbers] = (0.0, 0.0),
+    noise: Names = (),
+    seed: int = 0,
+    noise_models: NoiseModel | Mapping[str, NoiseModel] | None = None,
+    quantise: bool = True,
+    scaling: Literal["detector", "product"] = "detector",
+    min_valid: float = MIN_VALID,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+) -> Image:
     """
     Image that an instrument records: regularized onto its pixels, with its noise, and digitised.
 
@@ -134,7 +143,7 @@ def sense(
     # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
-    image = recorded(radiance, description, bands, quantise, geometry if scaling == "product" else None)
+    image = digital_numbers.recorded(radiance, description, bands, quantise, geometry if scaling == "product" else None)
     image = directions.with_geometry(grids.place(image.copy(data=held(image.data)), pixels), geometry)
     return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise, scaling))
 
@@ -176,48 +185,6 @@ def _is_radiance(array):
     return str(array.attrs.get("units", "1")).strip() == cf.QUANTITIES["toa_radiance"].units
 
 
-def recorded(radiance, description, bands, quantise, product_geometry=None):
-    """
-    What an instrument records of a radiance, with the coordinates of its bands.
-
-    Parameters
-    ----------
-    radiance : xarray.DataArray
-        With a dimension band. [W m-2 sr-1 um-1]
-    description : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.band.InstrumentBand
-        One for each of the array.
-    quantise : bool
-        Whether as digital numbers.
-    product_geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
-        Sun by which the agency's product scales them; the detector's own counts without.
-
-    Returns
-    -------
-    image : xarray.DataArray
-        Digital numbers, or the radiance itself.
-    """
-    along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
-    if quantise:
-        gain, offset, bits = digital_numbers.scale(description, bands, product_geometry)
-        scales = [xr.DataArray(each, dims="band") for each in (gain, offset)]
-        # A product's numbers are linear, whatever the detector's are.
-        compression = [band.compressed_count(bits) if product_geometry is None else 0 for band in bands]
-        dtype = np.uint8 if bits <= 8 else np.uint16
-        kernel = calibration.radiance_to_dn if not any(compression) else _compressed
-        scales += [xr.DataArray(compression, dims="band")] if any(compression) else []
-        radiance = chunks.pointwise(kernel, radiance, *scales, dtype=dtype, bits=bits)
-        along_band |= {"gain": gain, "offset": offset}
-        along_band |= {"compression": compression} if any(compression) else {}
-    along_band["solar_irradiance"] = [band.solar_irradiance for band in bands]
-    return radiance.assign_coords(cf.band_coordinates(**along_band))
-
-
-def _compressed(radiance, gain, offset, compression, bits):
-    """Digital numbers of bands of which some have a scale of square roots."""
-    return calibration.radiance_to_dn(radiance, gain, offset, bits, compression)
-
-
 def labelled(image, toa, description, history):
     """
     Image with the labels of what it is: digital numbers where it holds whole numbers, else radiance.
@@ -225,7 +192,7 @@ def labelled(image, toa, description, history):
     Parameters
     ----------
     image : xarray.DataArray
-        From `recorded`.
+        From `digital_numbers.recorded`.
     toa : xarray.DataArray
         What it was sensed of.
     description : fifesim.sensor.description.instruments.Instrument
@@ -257,7 +224,7 @@ def _history(description, interval, offset, noise, seed, quantise, scaling):
 
 
 @by_date
-def to_radiance(image):
+def to_radiance(image: xr.DataArray) -> xr.DataArray:
     """
     Radiance of an image of digital numbers.
 
@@ -300,7 +267,7 @@ def to_radiance(image):
 
 
 @by_date
-def to_reflectance(image):
+def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     """
     Planetary reflectance of an image.
 

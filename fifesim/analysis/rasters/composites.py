@@ -1,6 +1,9 @@
 """Composites of labelled images of many dates."""
 
+from __future__ import annotations
+
 from functools import partial
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -16,7 +19,9 @@ _METHODS = {"maximum-value": date_of_maximum}
 _REFERENCE = "Holben (1986), doi:10.1080/01431168608948945"
 
 
-def composite(images, method="maximum-value", *, by=None):
+def composite(
+    images: xr.DataArray, method: Literal["maximum-value"] = "maximum-value", *, by: xr.DataArray | None = None
+) -> xr.DataArray:
     """
     One image of many dates: at each cell that of the date with the largest NDVI, which clouds and haze lower.
 

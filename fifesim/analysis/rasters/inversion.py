@@ -1,19 +1,25 @@
 """Maps of a variable from an image by a fitted line, and their error against the truth."""
 
+from __future__ import annotations
+
 import math
+from typing import Literal
 
 import xarray as xr
 
 from fifesim.analysis import uncertainty
 from fifesim.analysis.rasters.pairs import matched
-from fifesim.analysis.regression import totals
+from fifesim.analysis.regression import Regression, totals
+from fifesim.base.annotations import Pairing
 from fifesim.rasters import cf, chunks, swaths
 from fifesim.rasters.reductions import sums_by_row
 
 _LIMITS = ("low", "high")
 
 
-def invert(ndvi, fit, quantity="lai", *, level=0.95):
+def invert(
+    ndvi: xr.DataArray, fit: Regression, quantity: Literal["lai", "fpar"] = "lai", *, level: float = 0.95
+) -> xr.Dataset:
     """
     Map of a variable from an index by a regression, with its prediction interval.
 
@@ -72,7 +78,9 @@ def invert(ndvi, fit, quantity="lai", *, level=0.95):
     return xr.Dataset(found)
 
 
-def inversion_error(estimate, truth, *, pair="coordinates"):
+def inversion_error(
+    estimate: xr.Dataset | xr.DataArray, truth: xr.DataArray, *, pair: Pairing = "coordinates"
+) -> xr.Dataset:
     """
     Error of an estimated map against the truth; computes.
 

@@ -1,5 +1,7 @@
 """Variograms of labelled rasters, and the variance that regularization leaves."""
 
+from __future__ import annotations
+
 from functools import partial
 
 import numpy as np
@@ -8,7 +10,7 @@ import xarray as xr
 from fifesim.analysis import variogram as kernels
 from fifesim.analysis.rasters.means import aggregate
 from fifesim.analysis.rasters.pairs import check_no_counts, origins
-from fifesim.base.line_spread import Boxcar
+from fifesim.base.line_spread import Boxcar, LineSpread
 from fifesim.rasters import grid as grids
 from fifesim.rasters.reductions import extremes, sums_by_block
 from fifesim.rasters.regularization import operators
@@ -18,7 +20,7 @@ from fifesim.rasters.regularization import operators
 _BLOCK = 512
 
 
-def autocovariance(array, reach):
+def autocovariance(array: xr.DataArray, reach: float) -> xr.Dataset:
     """
     Covariance and semivariance of a raster by lag; computes.
 
@@ -83,7 +85,7 @@ def autocovariance(array, reach):
     return out
 
 
-def variogram(array, reach):
+def variogram(array: xr.DataArray, reach: float) -> xr.Dataset:
     """
     Variogram of a raster along rows and columns; computes.
 
@@ -132,7 +134,7 @@ def variogram(array, reach):
     return out
 
 
-def regularized_variance(array, pixel=30.0, lsf=None):
+def regularized_variance(array: xr.DataArray, pixel: float = 30.0, lsf: LineSpread | None = None) -> xr.Dataset:
     """
     Variance of pixels, predicted from that of cells and their variogram, beside the simulated; computes.
 

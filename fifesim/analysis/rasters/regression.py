@@ -1,11 +1,17 @@
 """Regression of labelled rasters."""
 
+from __future__ import annotations
+
+import xarray as xr
+
 from fifesim.analysis import regression
 from fifesim.analysis.rasters.pairs import matched, origins
+from fifesim.analysis.regression import Regression
+from fifesim.base.annotations import Pairing
 from fifesim.rasters.reductions import sums_by_row
 
 
-def regress(y, x, *, pair="coordinates"):
+def regress(y: xr.DataArray, x: xr.DataArray, *, pair: Pairing = "coordinates") -> Regression:
     """
     Least-squares line of one raster on another; computes.
 

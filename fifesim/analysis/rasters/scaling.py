@@ -1,6 +1,9 @@
 """Scale invariance of labelled rasters."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -26,7 +29,9 @@ _AT_LEAST_ZERO = {"lai", "fpar"} | {cf.QUANTITIES[name].standard_name for name i
 _BLOCK = 1024
 
 
-def scale_bias(algorithm, array, pixel=30.0):
+def scale_bias(
+    algorithm: Callable[[xr.DataArray], xr.DataArray], array: xr.DataArray, pixel: float = 30.0
+) -> xr.Dataset:
     """
     Mean over pixels of an algorithm, less the algorithm of the mean.
 
@@ -69,7 +74,7 @@ def scale_bias(algorithm, array, pixel=30.0):
     return out
 
 
-def ndvi_bias(reflectance, pixel=30.0):
+def ndvi_bias(reflectance: xr.DataArray, pixel: float = 30.0) -> xr.DataArray:
     """
     Mean NDVI less NDVI of the mean reflectance, predicted from variances and covariance within the pixels.
 
@@ -117,7 +122,7 @@ def ndvi_bias(reflectance, pixel=30.0):
     return cf.label(out, "ndvi_bias", source=reflectance, history=f"ndvi_bias: second order, {pixel:g} m")
 
 
-def fpar_bias(lai, extinction, fpar_inf=0.94, pixel=30.0):
+def fpar_bias(lai: xr.DataArray, extinction: float, fpar_inf: float = 0.94, pixel: float = 30.0) -> xr.DataArray:
     """
     Mean FPAR less FPAR of the mean LAI, predicted from the variance of LAI within the pixels.
 
@@ -165,7 +170,7 @@ def fpar_bias(lai, extinction, fpar_inf=0.94, pixel=30.0):
     return cf.label(out, "fpar_bias", source=lai, history=f"fpar_bias: second order, {pixel:g} m")
 
 
-def ndvi_linearity(reflectance):
+def ndvi_linearity(reflectance: xr.DataArray) -> float:
     """
     Correlation that must be zero for NDVI to be linear in reflectance; computes.
 
@@ -205,7 +210,7 @@ def ndvi_linearity(reflectance):
     return math.copysign(math.sqrt(fit.r2), fit.slope)
 
 
-def share_kept(pixels, cells):
+def share_kept(pixels: xr.DataArray, cells: xr.DataArray) -> xr.Dataset:
     """
     Share of the range and of the variance of cells that pixels keep.
 
@@ -245,7 +250,9 @@ def share_kept(pixels, cells):
     return xr.Dataset({name: value.drop_vars(list(value.coords)).drop_attrs() for name, value in kept.items()})
 
 
-def density(array, points=256, bandwidth=None, *, reflect=None):
+def density(
+    array: xr.DataArray, points: int = 256, bandwidth: float | None = None, *, reflect: bool | None = None
+) -> xr.DataArray:
     """
     Gaussian kernel density of the values of a raster; computes.
 

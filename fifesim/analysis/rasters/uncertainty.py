@@ -1,11 +1,14 @@
 """Relative equivalent noise of labelled rasters."""
 
+from __future__ import annotations
+
 import numpy as np
 import xarray as xr
 
 from fifesim.analysis import uncertainty
 from fifesim.analysis.rasters.pairs import matched, origins
 from fifesim.analysis.rasters.regression import regress
+from fifesim.base.annotations import Pairing
 from fifesim.rasters import cf
 from fifesim.rasters.reductions import extremes, sums_by_row
 
@@ -13,7 +16,15 @@ from fifesim.rasters.reductions import extremes, sums_by_row
 _MOST_INCREMENTS = 10_000
 
 
-def relative_equivalent_noise(variable, ndvi, increment=0.1, *, slope=None, min_count=3, pair="coordinates"):
+def relative_equivalent_noise(
+    variable: xr.DataArray,
+    ndvi: xr.DataArray,
+    increment: float = 0.1,
+    *,
+    slope: float | None = None,
+    min_count: int = 3,
+    pair: Pairing = "coordinates",
+) -> xr.Dataset:
     """
     Relative equivalent noise by increments of a variable; computes.
 

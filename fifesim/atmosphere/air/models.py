@@ -1,15 +1,28 @@
 """The state of the atmosphere: profile of the air, aerosol and how much there is of each."""
 
+from __future__ import annotations
+
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from typing import Self
 
 import numpy as np
 
 from fifesim.atmosphere.air import aerosols, mixtures, molecules
 from fifesim.atmosphere.air.own_aerosol import Aerosol, known_aerosol
-from fifesim.atmosphere.air.profiles import BOLTZMANN, MOLAR_MASS_OZONE, MOLAR_VOLUME, PROFILES, column, profile_above
+from fifesim.atmosphere.air.profiles import (
+    BOLTZMANN,
+    MOLAR_MASS_OZONE,
+    MOLAR_VOLUME,
+    PROFILES,
+    Levels,
+    column,
+    profile_above,
+)
 from fifesim.atmosphere.air.summary import atmosphere_in_words
+from fifesim.base.annotations import Numbers
 from fifesim.base.arguments import check_fields
 from fifesim.base.kinds import described
 
@@ -76,7 +89,7 @@ class Atmosphere:
     """
 
     profile: str = "midlatitude-summer"
-    aerosol: str | Aerosol = "continental"
+    aerosol: str | Mapping[str, float] | Aerosol = "continental"
     visibility: float | None = None
     altitude: float = 0.4
     aot: float | None = None
@@ -137,7 +150,7 @@ class Atmosphere:
         return atmosphere_in_words(self)
 
     @property
-    def text(self):
+    def text(self) -> str:
         """One line that says all, for `parse`."""
         by_aot = self.visibility is None
         amount = f"aot={_shortest(self.aot)}" if by_aot else f"visibility={_shortest(self.visibility)} km"
@@ -147,7 +160,7 @@ class Atmosphere:
         return text if self.engine == "5S" else f"{text} engine={self.engine}"
 
     @classmethod
-    def parse(cls, text):
+    def parse(cls, text: str) -> Self:
         """
         Atmosphere that a text describes.
 
@@ -175,13 +188,13 @@ class Atmosphere:
         return cls(profile, aerosol, visibility, altitude, aot, h2o, o3, engine or "5S")
 
     @property
-    def levels(self):
+    def levels(self) -> Levels:
         """Profile above the ground with the user's columns, as `profiles.Levels`."""
         levels = profile_above(self.profile, self.altitude)
         own = {name: getattr(levels, name) * column / measure(levels) for name, column, measure in self._own_columns()}
         return levels._replace(**own)
 
-    def above(self, altitude):
+    def above(self, altitude: float) -> Self:
         """
         The same air above other ground.
 
@@ -205,21 +218,21 @@ class Atmosphere:
         return [each for each in columns if each[1] is not None]
 
     @property
-    def pressure(self):
+    def pressure(self) -> float:
         """Pressure at the ground [hPa]."""
         return float(self.levels.pressure[0])
 
     @property
-    def water_vapour(self):
+    def water_vapour(self) -> float:
         """Column of water vapour above the ground [g cm-2]."""
         return water_vapour_column(self.levels)
 
     @property
-    def ozone(self):
+    def ozone(self) -> float:
         """Column of ozone above the ground [cm-atm]."""
         return ozone_column(self.levels)
 
-    def rayleigh_optical_depth(self, wavelength):
+    def rayleigh_optical_depth(self, wavelength: Numbers) -> np.ndarray:
         """
         Optical depth of the molecules.
 
@@ -236,7 +249,7 @@ class Atmosphere:
         number = self.levels.pressure * 100 / (BOLTZMANN * self.levels.temperature)
         return molecules.rayleigh_cross_section(wavelength) * np.trapezoid(number, self.levels.altitude * 1000)
 
-    def aerosol_optical_depth(self, wavelength):
+    def aerosol_optical_depth(self, wavelength: Numbers) -> np.ndarray:
         """
         Extinction optical depth of the aerosol.
 

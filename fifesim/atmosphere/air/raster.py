@@ -1,6 +1,9 @@
 """Aerosols of one's own from Datasets and files, and the package's as such."""
 
+from __future__ import annotations
+
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +12,7 @@ import xarray as xr
 
 from fifesim.atmosphere.air import aerosols, components
 from fifesim.atmosphere.air.own_aerosol import Aerosol, phase_of_moments
+from fifesim.base.annotations import FilePath
 
 # What may stand in the place of each name: Eradiate's, libRadtran's and AERONET's.
 _NAMES = {
@@ -33,7 +37,9 @@ _PER_STERADIAN = ("sr-1", "sr^-1", "1/sr", "1 / sr", "sr**-1", "1 / steradian", 
 _AERONET = re.compile(r"(.+)\[(\d+) ?nm\]")
 
 
-def read_aerosol(source, *, scale_height=None, layer=None):
+def read_aerosol(
+    source: FilePath | xr.Dataset, *, scale_height: float | None = None, layer: tuple[float, float] | None = None
+) -> Aerosol:
     """
     Aerosol of one's own, for `Atmosphere`.
 
@@ -103,7 +109,7 @@ def read_aerosol(source, *, scale_height=None, layer=None):
     )
 
 
-def aerosol_tables(aerosol):
+def aerosol_tables(aerosol: str | Mapping[str, float]) -> xr.Dataset:
     """
     Tables of an aerosol of the package, in the form that `read_aerosol` takes.
 

@@ -1,5 +1,7 @@
 """The spectral terms of an atmosphere, labelled."""
 
+from __future__ import annotations
+
 import numpy as np
 import xarray as xr
 
@@ -9,6 +11,7 @@ from fifesim.atmosphere.schemes import engines
 from fifesim.atmosphere.schemes.terms import on_wavelengths, spectral_nodes
 from fifesim.base.geometry import fife_geometry
 from fifesim.rasters import cf, directions
+from fifesim.rasters.annotations import Directions
 
 _LONG_NAMES = {
     "path_reflectance": "reflectance of molecules and aerosol over a black ground, without gases",
@@ -24,7 +27,7 @@ _LONG_NAMES = {
 }
 
 
-def spectrum(atmosphere=None, geometry=None):
+def spectrum(atmosphere: Atmosphere | None = None, geometry: Directions | None = None) -> xr.Dataset:
     """
     What an atmosphere does to light, wavelength by wavelength.
 

@@ -1,9 +1,12 @@
 """A page with sliders as a file."""
 
+from __future__ import annotations
+
 import os
 import tempfile
 from pathlib import Path
 
+from fifesim.base.annotations import FilePath
 from fifesim.experiments.explorer.outcomes import outcomes_of
 from fifesim.experiments.explorer.page import explorer_page
 from fifesim.experiments.explorer.settings import sweep_of
@@ -11,7 +14,7 @@ from fifesim.output.progress import steps
 from fifesim.scenario.scenario import Scenario
 
 
-def explore(scenario=None, path="explore.html", *, overwrite=False):
+def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *, overwrite: bool = False) -> Path:
     """
     A page to play with: sliders over simulations of a scenario; computes.
 

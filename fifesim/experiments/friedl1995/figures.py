@@ -1,6 +1,9 @@
 """Figures 3 to 9 of Friedl et al. (1995), from what `fifesim.reproduce` gives."""
 
+from __future__ import annotations
+
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -24,7 +27,7 @@ BY_READING = (5, 6, 7, 9)
 """Of those that differ with the reading of Table 1."""
 
 
-def plot_reproduction(number, found, *, reading=None):
+def plot_reproduction(number: int, found: xr.Dataset, *, reading: str | None = None) -> Figure:
     """
     A figure of Friedl et al. (1995), drawn from a repetition of the experiment.
 

@@ -1,10 +1,15 @@
 """The experiment of Friedl et al. (1995) as one call: its 54 numbers by realisation, and what its figures show."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from functools import partial
+from typing import Literal
 
 import numpy as np
 import xarray as xr
 
+from fifesim.base.annotations import Distribution, FilePath
 from fifesim.base.seeds import check_seed
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import shown
@@ -20,18 +25,18 @@ REALISATIONS = 20
 
 def reproduce(
     *,
-    reading="native",
-    dem="flat",
-    densities=None,
-    optics=None,
-    background=None,
-    sensor=TABLE_1,
-    realisations=REALISATIONS,
-    cells=None,
-    seed=SEED,
-    west=None,
-    north=None,
-):
+    reading: Literal["native", "aligned", "narrow", "offset", "blur-40.8", "blur-48.6"] = "native",
+    dem: FilePath = "flat",
+    densities: FilePath | Mapping[str, FilePath | Distribution] | None = None,
+    optics: FilePath | Mapping[str, tuple[float, float]] | None = None,
+    background: FilePath | Mapping[str, float] | None = None,
+    sensor: FilePath = TABLE_1,
+    realisations: int = REALISATIONS,
+    cells: int | None = None,
+    seed: int = SEED,
+    west: float | None = None,
+    north: float | None = None,
+) -> xr.Dataset:
     """
     Repeat the experiment of Friedl et al. (1995): Table 2 over realisations, and what Figures 3 to 9 show.
 

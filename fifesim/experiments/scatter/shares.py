@@ -1,5 +1,10 @@
 """Where the scatter between NDVI and LAI or FPAR comes from: the share of each stage of a scenario."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -24,7 +29,14 @@ _FEWEST = 10
 _FILLED = 0.5
 
 
-def budget(scenario=None, *, realisations=20, cells=333, seed=None, each=None):
+def budget(
+    scenario: Scenario | None = None,
+    *,
+    realisations: int = 20,
+    cells: int = 333,
+    seed: int | None = None,
+    each: Callable[[Sequence[Any]], Iterable[Any]] | None = None,
+) -> xr.Dataset:
     r"""
     Shares of the stages of a scenario in the scatter of LAI and FPAR about their lines on NDVI.
 

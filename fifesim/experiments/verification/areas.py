@@ -1,5 +1,7 @@
 """Every check of the package, area by area."""
 
+from __future__ import annotations
+
 from fifesim.experiments.verification import (
     adjacency,
     analysis,
@@ -14,6 +16,7 @@ from fifesim.experiments.verification import (
     sensor,
     terrain,
 )
+from fifesim.experiments.verification.deviations import Deviation
 from fifesim.output.progress import steps
 
 AREAS = {
@@ -26,7 +29,7 @@ AREAS = {
 }
 
 
-def verify():
+def verify() -> list[Deviation]:
     """
     Check this installation against independent results.
 

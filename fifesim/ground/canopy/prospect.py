@@ -1,5 +1,7 @@
 """PROSPECT-D: reflectance and transmittance of a leaf from its chemistry and structure."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -7,6 +9,7 @@ import numpy as np
 from scipy.special import exp1
 
 from fifesim.base import datasets
+from fifesim.base.annotations import Array, NumberOrArray
 from fifesim.base.kinds import described
 
 CONTENTS = {
@@ -66,13 +69,13 @@ class Leaf:
     ValueError: Leaf: water must be in [0, 0.2] cm, got 12: check its unit
     """
 
-    structure: float = 1.7
-    chlorophyll: float = 29.0
-    carotenoids: float = 7.25
-    anthocyanins: float = 0.0
-    brown: float = 0.0
-    water: float = 0.012
-    dry_matter: float = 0.0148
+    structure: NumberOrArray = 1.7
+    chlorophyll: NumberOrArray = 29.0
+    carotenoids: NumberOrArray = 7.25
+    anthocyanins: NumberOrArray = 0.0
+    brown: NumberOrArray = 0.0
+    water: NumberOrArray = 0.012
+    dry_matter: NumberOrArray = 0.0148
 
     def __post_init__(self):
         ranges = {"structure": ("1", 1.0, LARGEST_STRUCTURE)}
@@ -90,7 +93,7 @@ class Leaf:
                     raise ValueError(f"Leaf: {name} must be in [{low:g}, {high:g}]{unit}, got {got:g}: check its unit")
             object.__setattr__(self, name, value)
 
-    def varying(self):
+    def varying(self) -> dict[str, Array]:
         """What differs from leaf to leaf, a dict of str to array."""
         values = {name: getattr(self, name) for name in ("structure", *CONTENTS)}
         return {name: value for name, value in values.items() if not isinstance(value, float)}

@@ -1,5 +1,7 @@
 """Spectra of leaves and of what lies below them, mixed and averaged over bands."""
 
+from __future__ import annotations
+
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from fifesim.base import datasets
+from fifesim.base.annotations import NumberOrArray
 from fifesim.base.bands import solar_spectrum
 from fifesim.base.kinds import described
 
@@ -82,7 +85,7 @@ class Background:
     0.6
     """
 
-    fractions: Mapping
+    fractions: Mapping[str, NumberOrArray]
 
     def __post_init__(self):
         if not isinstance(self.fractions, Mapping):
@@ -100,7 +103,7 @@ class Background:
         check_shares(tuple(fractions), tuple(fractions.values()))
         object.__setattr__(self, "fractions", fractions)
 
-    def spectra(self):
+    def spectra(self) -> list[tuple[Spectrum, NumberOrArray]]:
         """Spectrum and share of each part that reflects, a list of (Spectrum, float)."""
         return [(_spectrum(name), value) for name, value in self.fractions.items() if name != SHADE and value > 0]
 

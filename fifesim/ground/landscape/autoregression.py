@@ -4,6 +4,8 @@ The simultaneous autoregressive process of the paper's landscapes (Friedl et al.
 It solves x = e + arp (sum of the four neighbours of x) for white Gaussian noise e.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from scipy import optimize, special
 
@@ -158,7 +160,7 @@ def autocorrelation(arp, lag):
     return covariance / np.mean(row_spectrum)
 
 
-def correlation_length(arp, cell=1.0):
+def correlation_length(arp: float, cell: float = 1.0) -> float:
     """
     Distance along a row or column at which the correlation has fallen to 0.05 (the practical range).
 
@@ -199,7 +201,7 @@ def correlation_length(arp, cell=1.0):
     return float(cell * (after - 1 + (upper - np.log(PRACTICAL_RANGE)) / (upper - lower)))
 
 
-def arp_for_length(length, cell=1.0):
+def arp_for_length(length: float, cell: float = 1.0) -> float:
     """
     Autoregressive parameter of a correlation length; the inverse of `correlation_length`.
 

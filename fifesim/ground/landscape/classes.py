@@ -1,12 +1,16 @@
 """What a landscape's classes of cover are: leaf area, leaves, what lies below, and how they stand."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from numbers import Number
 
 import numpy as np
 
+from fifesim.base.annotations import Distribution, FilePath
 from fifesim.base.kinds import LEAF, described
+from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.canopy.prospect import Leaf
@@ -74,12 +78,12 @@ class CoverClass:
     """
 
     name: str = ""
-    lai: object = None
+    lai: FilePath | Distribution | float | None = None
     arp: float | None = None
-    leaf: object = None
-    brown_leaf: object = None
-    background: object = None
-    leaf_angles: object = None
+    leaf: LeafOptics | None = None
+    brown_leaf: LeafOptics | None = None
+    background: BelowLeaves | None = None
+    leaf_angles: LeafAngles | None = None
     hotspot: float | None = None
     brown: float | None = None
     dissociation: float | None = None
@@ -192,7 +196,7 @@ def class_table(classes):
     return tuple(table)
 
 
-def fife_classes():
+def fife_classes() -> dict[str, CoverClass]:
     """
     The three treatments of the FIFE site, as classes 1 to 3.
 

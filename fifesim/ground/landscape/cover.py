@@ -5,7 +5,11 @@ All patterns are functions of northing and easting, so that a window is a slice 
 cells of another size show the same patches.
 """
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.stats import norm
@@ -48,9 +52,9 @@ class Patches:
     300.0
     """
 
-    pattern: str
+    pattern: Literal["voronoi", "levels", "pastures"]
     size: float
-    shares: object = None
+    shares: Sequence[float] | Mapping[str, float] | None = None
 
     def __post_init__(self):
         if self.pattern not in PATTERNS:
@@ -66,7 +70,7 @@ class Patches:
             shares = dict(zip(self.shares, values, strict=True)) if named else tuple(map(float, values))
             object.__setattr__(self, "shares", shares)
 
-    def shares_of(self, names):
+    def shares_of(self, names: Sequence[str]) -> tuple[float, ...]:
         """
         Share of each class.
 

@@ -1,5 +1,7 @@
 """Frequency distributions of leaf area index, and the mapping of a Gaussian field to them (Fig. 2, step 5)."""
 
+from __future__ import annotations
+
 from difflib import get_close_matches
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -10,6 +12,7 @@ import pandas as pd
 from scipy import optimize, stats
 
 from fifesim.base import datasets
+from fifesim.base.annotations import Distribution, FilePath
 
 # Quantiles are tabulated for normal deviates from -8.5 to 8.5, past which lie 2e-17 of all cells. The step leaves a
 # linear interpolation error of step**2 / 8 = 1.3e-7 times the curvature of the quantile function.
@@ -23,7 +26,7 @@ _FEW = 2**18
 _ROUNDING = 1e-12
 
 
-def treatments():
+def treatments() -> list[str]:
     """
     Names of the tabulated LAI distributions.
 
@@ -44,7 +47,7 @@ def _treatments():
     return tuple(datasets.table("lai_distributions.csv")["treatment"].tolist())
 
 
-def lai_distribution(source):
+def lai_distribution(source: FilePath | Distribution) -> Distribution:
     """
     A frequency distribution of leaf area index.
 

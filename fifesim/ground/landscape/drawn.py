@@ -1,11 +1,14 @@
 """Properties of the ground that vary in fields: what values they have, and how coarsely they vary."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import lru_cache
 from numbers import Real
 
 from scipy import stats
 
+from fifesim.base.annotations import Distribution
 from fifesim.base.kinds import described
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
 from fifesim.ground.landscape.coarse_lattice import check_coarser
@@ -63,7 +66,7 @@ class Field:
         if self.arp > LARGEST_STREAMING_ARP:
             raise ValueError(f"Field: arp must be at most {LARGEST_STREAMING_ARP}, got {self.arp:g}")
 
-    def distribution(self, name):
+    def distribution(self, name: str) -> Distribution:
         """
         Distribution of a share: the beta distribution of its mean and standard deviation.
 

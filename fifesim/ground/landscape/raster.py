@@ -1,11 +1,16 @@
 """Leaf area of the ground scene on labelled rasters: simulated, or a user's own map."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import psutil
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
+from fifesim.base.annotations import Chunks, Distribution, FilePath
 from fifesim.base.foreign import in_a_line
 from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.optics import check_map
@@ -24,7 +29,15 @@ FIELD_METHODS = ("streaming", "periodic")
 _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 
 
-def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="streaming", chunks=None):
+def lai_scene(
+    grid: GeoBox,
+    distribution: FilePath | Distribution = "burned-grazed",
+    *,
+    arp: float = 0.15,
+    seed: int = 0,
+    method: Literal["streaming", "periodic"] = "streaming",
+    chunks: Chunks | None = None,
+) -> xr.DataArray:
     """
     Leaf area index of a simulated landscape.
 
@@ -89,7 +102,9 @@ def lai_scene(grid, distribution="burned-grazed", *, arp=0.15, seed=0, method="s
     return cf.label(lai, "lai", history=said, **made, method=method, references=_REFERENCE)
 
 
-def open_lai(path_or_raster, grid, chunks=None, *, allow_remote=False):
+def open_lai(
+    path_or_raster: FilePath | xr.DataArray, grid: GeoBox, chunks: Chunks | None = None, *, allow_remote: bool = False
+) -> xr.DataArray:
     """
     A user's own map of leaf area index on a grid.
 

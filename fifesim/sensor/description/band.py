@@ -19,7 +19,7 @@ OPTIONAL_NUMBERS = (
 )  # fmt: skip
 
 # Publications by number.
-Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]
+Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]  # type: ignore[valid-type]
 
 # What a band tells of itself, as far as it is given.
 _TOLD = ("name", "srf", "full_scale_radiance", "min_radiance", "solar_irradiance", "limits", "gsd", "gain")
@@ -75,7 +75,7 @@ class InstrumentBand:
     gain: Name = "nominal"
     gains: dict[str, Gain] = field(default_factory=dict, repr=False, hash=False)
     compression: Literal["square-root"] | None = None
-    sources: Sources = field(default_factory=dict, repr=False, hash=False)
+    sources: Sources = field(default_factory=dict, repr=False, hash=False)  # type: ignore[valid-type]
 
     def __post_init__(self):
         Gain(self.full_scale_radiance, self.min_radiance)

@@ -1,6 +1,6 @@
 """What the fields of an instrument file may hold: numbers and names of one type, one for both axes or one for each."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
@@ -34,8 +34,8 @@ class AlongAcross(NamedTuple):
     along, across : float or line spread function
     """
 
-    along: object
-    across: object
+    along: Any
+    across: Any
 
 
 class TwoAxes:

@@ -7,13 +7,16 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from fifesim.base.annotations import Names
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
+from fifesim.base.line_spread import LineSpread
 from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
 from fifesim.sensor.description.band_names import band_called
 from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
 from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.performance import Product, Scan
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
+from fifesim.sensor.response.noise import NoiseModel
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -76,7 +79,7 @@ class Instrument:
     bits: Annotated[int, Field(strict=True, ge=2, le=16)]
     lsf: SpatialResponse
     bands: Annotated[tuple[InstrumentBand, ...], Field(min_length=1)] = field(repr=False)
-    sources: Sources = field(repr=False, hash=False)
+    sources: Sources = field(repr=False, hash=False)  # type: ignore[valid-type]
     references: dict[str, str] = field(repr=False, hash=False)
     ifov: Angle | None = None
     detectors: Count | None = None
@@ -103,21 +106,21 @@ class Instrument:
         )
 
     @property
-    def max_angle(self):
+    def max_angle(self) -> float:
         """Largest scan angle from nadir, infinite where the file has no scan [degree]."""
         return np.inf if self.scan is None else self.scan.max_angle
 
     @property
-    def line_spread(self):
+    def line_spread(self) -> LineSpread:
         """Line spread function on the ground of the first band, across the track."""
         return self.line_spreads(self.bands[0]).across
 
     @property
-    def ground_interval(self):
+    def ground_interval(self) -> float:
         """Distance on the ground between the samples of the first band at nadir, across the track [m]."""
         return self.ground_intervals(self.bands[0]).across
 
-    def pixel(self, band):
+    def pixel(self, band: InstrumentBand) -> float:
         """
         Pixel of a band in the gridded product.
 
@@ -132,7 +135,7 @@ class Instrument:
         """
         return self.gsd if band.gsd is None else band.gsd
 
-    def ground_intervals(self, band):
+    def ground_intervals(self, band: InstrumentBand) -> AlongAcross:
         """
         Distances on the ground between a band's own samples at nadir.
 
@@ -147,7 +150,7 @@ class Instrument:
         """
         return self._on_ground(band.interval or self.interval)
 
-    def ground_fields(self, band):
+    def ground_fields(self, band: InstrumentBand) -> AlongAcross:
         """
         Instantaneous field of view of a band on the ground at nadir.
 
@@ -166,7 +169,7 @@ class Instrument:
         along, across = by_axes(angle)
         return AlongAcross(along and self.altitude * along, across and self.altitude * across)
 
-    def line_spreads(self, band):
+    def line_spreads(self, band: InstrumentBand) -> AlongAcross:
         """
         Line spread functions of a band on the ground.
 
@@ -183,7 +186,7 @@ class Instrument:
         axes = zip(*map(by_axes, given), strict=True)
         return AlongAcross(*(lsf.spread(View(self.altitude, ifov, interval, band)) for lsf, ifov, interval in axes))
 
-    def noise_model(self, band):
+    def noise_model(self, band: InstrumentBand) -> NoiseModel:
         """
         Noise of a band at every radiance.
 
@@ -208,7 +211,7 @@ class Instrument:
         pushed = self.scan is not None and self.scan.kind == "pushbroom"
         return band.noise.model(band.detectors or self.detectors or 1, "columns" if pushed else "rows")
 
-    def with_gain(self, gain):
+    def with_gain(self, gain: str | dict[str, str]) -> "Instrument":
         """
         The instrument with those bands that have a gain state in that state.
 
@@ -234,7 +237,7 @@ class Instrument:
                 raise ValueError(f"no band of {self.name} has a gain state {gain!r}")
         return replace(self, bands=tuple(band.with_gain(chosen.get(band.name, band.gain)) for band in self.bands))
 
-    def select(self, bands=None):
+    def select(self, bands: Names | None = None) -> tuple[InstrumentBand, ...]:
         """
         Bands by name.
 
@@ -272,7 +275,7 @@ class Instrument:
             )
         return found
 
-    def red_and_near_infrared(self):
+    def red_and_near_infrared(self) -> tuple[InstrumentBand, InstrumentBand]:
         """
         The bands of vegetation indices.
 
@@ -305,7 +308,7 @@ class Instrument:
         number = nearest([band.wavelength for band in bands], window)
         return None if number is None else bands[number]
 
-    def source(self, number, band=None):
+    def source(self, number: str, band: InstrumentBand | None = None) -> str:
         """
         Publication that a number comes from.
 

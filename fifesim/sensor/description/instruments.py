@@ -4,12 +4,16 @@ Instruments by name, and from files of one's own.
 The descriptions are the files ``data/instruments/*.toml``; a further instrument is a further file.
 """
 
+from __future__ import annotations
+
 from functools import lru_cache
 from pathlib import Path
+from typing import Literal
 
 from pydantic import TypeAdapter, ValidationError
 
 from fifesim.base import datasets
+from fifesim.base.annotations import FilePath
 from fifesim.base.foreign import in_a_line, read_toml, shown
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import key, lookup
@@ -21,7 +25,9 @@ from fifesim.sensor.description.short_file import completed
 _FORMS = ("srf", "lsf", "interval", "ifov")
 
 
-def instrument(name, response=None):
+def instrument(
+    name: FilePath | Instrument, response: Literal["system", "detector", "paper"] | None = None
+) -> Instrument:
     """
     Description of an instrument by its name, or from a file.
 
@@ -86,7 +92,7 @@ def catalogued(name):
     return lookup(name, _catalogue(), "instrument")
 
 
-def instrument_names():
+def instrument_names() -> tuple[str, ...]:
     """
     Names of the instruments.
 
@@ -103,7 +109,7 @@ def instrument_names():
     return tuple(sorted({item.name for item in _catalogue().values()}))
 
 
-def read_instrument(path):
+def read_instrument(path: FilePath) -> Instrument:
     """
     Description of an instrument from a file, such as a copy of ``data/instruments/tm.toml``.
 

@@ -1,9 +1,13 @@
 """Noise of a detector: shot, thermal and fixed pattern, drawn by scan line from counters."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import Any, Literal, Self
 
 import numpy as np
 
+from fifesim.base.annotations import Names, Numbers
 from fifesim.base.arguments import check_fields
 from fifesim.base.seeds import generator
 
@@ -60,7 +64,7 @@ class NoiseModel:
     detectors: int = 1
     gain_spread: float = 0.0
     offset_spread: float = 0.0
-    along: str = "rows"
+    along: Literal["columns", "rows"] = "rows"
 
     def __post_init__(self):
         check_fields(self, "thermal", "shot", "detectors", "gain_spread", "offset_spread", "along")
@@ -74,7 +78,7 @@ class NoiseModel:
             raise ValueError(f"along must be 'rows' (scanner) or 'columns' (pushbroom), got {self.along!r}")
 
     @classmethod
-    def from_snr(cls, radiance, snr, shot_share=None, **fixed_pattern):
+    def from_snr(cls, radiance: Numbers, snr: Numbers, shot_share: float | None = None, **fixed_pattern: Any) -> Self:
         r"""
         The model that has published signal-to-noise ratios.
 
@@ -139,7 +143,7 @@ class NoiseModel:
                 )
         return cls(float(np.sqrt(thermal)), float(shot), **fixed_pattern)
 
-    def noise_equivalent_radiance(self, radiance, kinds=("shot", "thermal")):
+    def noise_equivalent_radiance(self, radiance: Numbers, kinds: Names = ("shot", "thermal")) -> np.ndarray:
         """
         Standard deviation of the noise of a detector.
 
@@ -159,7 +163,7 @@ class NoiseModel:
         constant = self.thermal**2 if "thermal" in kinds else 0.0
         return np.sqrt(constant + (self.shot if "shot" in kinds else 0.0) * np.maximum(radiance, 0.0))
 
-    def snr(self, radiance):
+    def snr(self, radiance: Numbers) -> np.ndarray:
         """
         Signal-to-noise ratio of a detector.
 

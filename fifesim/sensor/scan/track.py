@@ -5,7 +5,10 @@ The track is a great circle, and a ground point is seen when the instrument is a
 the right of the flight. Geodetic latitudes are taken as those of the sphere, which costs 0.3 % of a distance.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -55,7 +58,9 @@ class Track:
             raise ValueError(f"longitude and heading must be finite degrees, got {self.longitude} and {self.heading}")
 
     @classmethod
-    def from_inclination(cls, latitude, longitude, inclination, altitude, *, ascending=False):
+    def from_inclination(
+        cls, latitude: float, longitude: float, inclination: float, altitude: float, *, ascending: bool = False
+    ) -> Self:
         r"""
         The track of a circular orbit over the turning earth.
 
@@ -106,7 +111,7 @@ class Track:
         heading = np.degrees(np.arctan2(east, north if ascending else -north))
         return cls(latitude, longitude, float(heading % 360))
 
-    def axes(self):
+    def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Unit vectors to the point, along the flight and to its right, each of shape (3,)."""
         point, east, north = frame(self.latitude, self.longitude)
         along = np.cos(np.radians(self.heading)) * north + np.sin(np.radians(self.heading)) * east

@@ -1,12 +1,17 @@
 """A map of leaf area made a ground scene: cells within its pixels, on labelled rasters."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import dask.array as da
 import numpy as np
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
+from fifesim.base.annotations import Chunks, Distribution, FilePath
 from fifesim.base.lattice import assemble
 from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.optics import check_map
@@ -32,7 +37,16 @@ _REFERENCES = (
 
 
 @by_date
-def downscale(lai, grid, *, arp=0.15, distribution=None, cv=None, seed=0, chunks=None):
+def downscale(
+    lai: xr.DataArray,
+    grid: GeoBox,
+    *,
+    arp: float = 0.15,
+    distribution: FilePath | Distribution | None = None,
+    cv: float | Callable[[np.ndarray], np.ndarray] | None = None,
+    seed: int = 0,
+    chunks: Chunks | None = None,
+) -> xr.DataArray:
     """
     Leaf area index of the cells below the pixels of a map.
 

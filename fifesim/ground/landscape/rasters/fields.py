@@ -1,5 +1,7 @@
 """Fields that correlate, on labelled rasters."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from functools import partial
 
@@ -7,7 +9,9 @@ import dask
 import dask.array as da
 import numpy as np
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
+from fifesim.base.annotations import Chunks
 from fifesim.base.arguments import check
 from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
@@ -38,8 +42,16 @@ OF_ELEVATION = ("elevation", "wetness", "illumination", "slope")
 
 
 def correlated_fields(
-    grid, arps, correlations=None, *, coarser=None, seed=0, covariates=None, reference=None, chunks=None
-):
+    grid: GeoBox,
+    arps: Mapping[str, float],
+    correlations: Mapping | None = None,
+    *,
+    coarser: Mapping[str, int] | None = None,
+    seed: int = 0,
+    covariates: Mapping[str, xr.DataArray] | None = None,
+    reference: Mapping[str, xr.DataArray] | None = None,
+    chunks: Chunks | None = None,
+) -> dict[str, xr.DataArray]:
     """
     Standard normal fields that correlate with each other and with the ground.
 

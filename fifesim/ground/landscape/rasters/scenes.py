@@ -1,16 +1,21 @@
 """Landscapes: Datasets of what a ground scene is made of, on one grid."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from functools import partial
 from numbers import Number
 
 import numpy as np
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
+from fifesim.base.annotations import Chunks, FilePath
 from fifesim.base.kinds import described, is_path
 from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape.autoregression import check_arp
-from fifesim.ground.landscape.classes import class_table, fife_classes
+from fifesim.ground.landscape.classes import CoverClass, class_table, fife_classes
 from fifesim.ground.landscape.compression import cells_by_class
 from fifesim.ground.landscape.cover import Patches
 from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
@@ -22,6 +27,7 @@ from fifesim.ground.landscape.rasters.drawn import drawn_fields
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import Directions
 from fifesim.rasters.packed import unpacked
 from fifesim.rasters.sites import is_fife, made_on_site
 from fifesim.rasters.warp import file_onto_grid, raster_onto_grid
@@ -33,24 +39,24 @@ _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 
 
 def landscape(
-    grid,
+    grid: GeoBox,
     *,
-    cover=None,
-    classes=None,
-    lai=None,
-    arp=0.15,
-    brown=None,
-    crown_cover=None,
-    soil=None,
-    moisture=None,
-    covary=None,
-    dem=None,
-    reference=None,
-    geometry=None,
-    seed=0,
-    chunks=None,
-    allow_remote=False,
-):
+    cover: Patches | FilePath | xr.DataArray | None = None,
+    classes: CoverClass | Sequence[CoverClass] | Mapping[str, CoverClass] | None = None,
+    lai: FilePath | xr.DataArray | None = None,
+    arp: float = 0.15,
+    brown: FilePath | xr.DataArray | Field | float | None = None,
+    crown_cover: FilePath | xr.DataArray | Field | float | None = None,
+    soil: FilePath | xr.DataArray | Field | float | None = None,
+    moisture: FilePath | xr.DataArray | Field | float | None = None,
+    covary: Mapping[str, float] | None = None,
+    dem: xr.DataArray | None = None,
+    reference: Mapping[str, xr.DataArray] | None = None,
+    geometry: Directions | None = None,
+    seed: int = 0,
+    chunks: Chunks | None = None,
+    allow_remote: bool = False,
+) -> xr.Dataset:
     """
     A landscape: leaf area and classes of cover, and what else a ground scene is made of, on one grid.
 

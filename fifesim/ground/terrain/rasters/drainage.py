@@ -1,5 +1,7 @@
 """The topographic wetness index of labelled elevation, at the resolution of its source."""
 
+from __future__ import annotations
+
 import dask.array as da
 import numpy as np
 import xarray as xr
@@ -16,7 +18,7 @@ from fifesim.rasters.sampling import apart
 _REFERENCE = "Beven and Kirkby (1979), doi:10.1080/02626667909491834"
 
 
-def wetness(dem, *, resolution=None):
+def wetness(dem: xr.DataArray, *, resolution: float | None = None) -> xr.DataArray:
     """
     Topographic wetness index: where water gathers, at the resolution of the elevation's source.
 

@@ -1,5 +1,7 @@
 """Elevation on labelled rasters: a model of any resolution and CRS on the fine grid, or around it."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -10,6 +12,7 @@ import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
+from fifesim.base.annotations import Chunks, FilePath
 from fifesim.ground.terrain.rasters.cover import check_cover, known_cells, known_elevation, warn_of_terraces
 from fifesim.ground.terrain.rasters.model import TILE, Model, model_under
 from fifesim.ground.terrain.rasters.source import placement
@@ -19,7 +22,15 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters.whereabouts import lies_in_words
 
 
-def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=None, allow_remote=False):
+def fine_dem(
+    path_or_raster: FilePath | xr.DataArray,
+    grid: GeoBox,
+    *,
+    fill: float | None = None,
+    vertical_units: str | None = None,
+    chunks: Chunks | None = None,
+    allow_remote: bool = False,
+) -> xr.DataArray:
     """
     Elevation model on a grid, by low-pass interpolation.
 
@@ -80,7 +91,16 @@ def fine_dem(path_or_raster, grid, *, fill=None, vertical_units=None, chunks=Non
     return cf.label(out, "dem", history=history, source_resolution=model.resolution)
 
 
-def source_dem(path_or_raster, grid, margin, *, fill=None, vertical_units=None, chunks=None, allow_remote=False):
+def source_dem(
+    path_or_raster: FilePath | xr.DataArray,
+    grid: GeoBox,
+    margin: float,
+    *,
+    fill: float | None = None,
+    vertical_units: str | None = None,
+    chunks: Chunks | None = None,
+    allow_remote: bool = False,
+) -> tuple[xr.DataArray, dict[str, float]]:
     """
     Elevation model around a grid, at about its own resolution; for horizons.
 

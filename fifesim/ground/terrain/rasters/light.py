@@ -1,11 +1,14 @@
 """Terrain on labelled rasters: sky, horizon and the light on a slope, from an elevation model."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import xarray as xr
 
+from fifesim.base.annotations import Time
 from fifesim.base.geometry import fife_geometry
 from fifesim.ground.terrain import sky as skies
 from fifesim.ground.terrain.light import slope_light, slope_reflectance
@@ -15,11 +18,12 @@ from fifesim.ground.terrain.slope_factors import slope_factor
 from fifesim.rasters import cf, directions, projection
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import Directions
 from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.windows import lazy_together
 
 
-def sky_view(dem, horizon=None):
+def sky_view(dem: xr.DataArray, horizon: xr.DataArray | None = None) -> xr.DataArray:
     """
     Sky view factor Vd.
 
@@ -60,7 +64,7 @@ def sky_view(dem, horizon=None):
     return _light(dem, horizon, None, "sky_view", lambda light: light.sky_view)
 
 
-def terrain_view(dem, horizon=None):
+def terrain_view(dem: xr.DataArray, horizon: xr.DataArray | None = None) -> xr.DataArray:
     """
     Terrain configuration factor Ct.
 
@@ -93,7 +97,13 @@ def terrain_view(dem, horizon=None):
     return _light(dem, horizon, None, "terrain_view", lambda light: skies.terrain_view(light.sky_view, light.cosine))
 
 
-def illumination(dem, geometry=None, horizon=None, *, time=None):
+def illumination(
+    dem: xr.DataArray,
+    geometry: Directions | None = None,
+    horizon: xr.DataArray | None = None,
+    *,
+    time: Time | None = None,
+) -> xr.DataArray:
     """
     Cosine of the solar zenith angle on the slope, 0 where the slope or the land around hides the sun.
 
@@ -134,7 +144,13 @@ def illumination(dem, geometry=None, horizon=None, *, time=None):
     return _light(dem, horizon, _sun(dem, geometry, time), "illumination", lambda light: light.mu_s_local)
 
 
-def shadow(dem, geometry=None, horizon=None, *, time=None):
+def shadow(
+    dem: xr.DataArray,
+    geometry: Directions | None = None,
+    horizon: xr.DataArray | None = None,
+    *,
+    time: Time | None = None,
+) -> xr.DataArray:
     """
     Cast and self shadow.
 

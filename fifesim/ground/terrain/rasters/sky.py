@@ -1,5 +1,7 @@
 """The horizon of labelled elevation, and the part of the sky that it leaves, at the resolution of its source."""
 
+from __future__ import annotations
+
 from functools import partial
 
 import dask.array as da
@@ -20,7 +22,14 @@ DIRECTIONS = 32
 REACH = 5000.0  # [m]
 
 
-def horizon(dem, *, directions=DIRECTIONS, reach=REACH, resolution=None, beside=None):
+def horizon(
+    dem: xr.DataArray,
+    *,
+    directions: int = DIRECTIONS,
+    reach: float = REACH,
+    resolution: float | None = None,
+    beside: xr.DataArray | None = None,
+) -> xr.DataArray:
     """
     Horizon of the land around, at the resolution of the elevation's source.
 

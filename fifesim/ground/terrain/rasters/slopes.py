@@ -1,5 +1,9 @@
 """Slope and aspect of labelled elevation."""
 
+from __future__ import annotations
+
+import xarray as xr
+
 from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid
 from fifesim.ground.terrain.slope import angles, gradient, steepness
 from fifesim.rasters import cf
@@ -7,7 +11,7 @@ from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 
 
-def slope(dem):
+def slope(dem: xr.DataArray) -> xr.DataArray:
     """
     Slope of the ground.
 
@@ -41,7 +45,7 @@ def slope(dem):
     return _slope_or_aspect(dem, "slope", steepness)
 
 
-def aspect(dem):
+def aspect(dem: xr.DataArray) -> xr.DataArray:
     """
     Azimuth down the slope, clockwise from north.
 

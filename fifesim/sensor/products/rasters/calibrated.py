@@ -1,15 +1,20 @@
 """Digital numbers of one's own, with the calibration that makes an image of them."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
 import xarray as xr
 
+from fifesim.base.annotations import FilePath, Numbers, Time
 from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import Directions
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
 from fifesim.sensor.products.scaling import counts
@@ -18,7 +23,16 @@ from fifesim.sensor.response.rasters.pixels import matching_bands
 
 
 @by_date
-def calibrate(dn, instrument, *, time=None, geometry=None, gain=None, offset=None, nodata=0):
+def calibrate(
+    dn: xr.DataArray,
+    instrument: FilePath | Instrument,
+    *,
+    time: Time | None = None,
+    geometry: Directions | None = None,
+    gain: Numbers | Mapping[str, float] | None = None,
+    offset: Numbers | Mapping[str, float] | None = None,
+    nodata: int = 0,
+) -> xr.DataArray:
     """
     Make an image of digital numbers: with calibration, wavelengths and sun, as `sense` makes one.
 

@@ -1,13 +1,19 @@
 """A Landsat product as a labelled image."""
 
+from __future__ import annotations
+
+from typing import Literal
+
 import numpy as np
 import xarray as xr
 
+from fifesim.base.annotations import Chunks, FilePath, Names
 from fifesim.base.geometry import ANGLES, Geometry
 from fifesim.rasters import chunks as dask_chunks
 from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.band_names import band_called
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.products.landsat_metadata import landsat_scene, metadata_file, read_groups
 from fifesim.sensor.products.rasters.layers import (
@@ -26,7 +32,15 @@ _FILL = 1
 _QUALITY = {"long_name": "QA_PIXEL, quality of the pixel by bits", "units": "1"}
 
 
-def open_landsat(path, *, bands=None, angles="centre", quality=True, chunks="auto", instrument=None):
+def open_landsat(
+    path: FilePath,
+    *,
+    bands: Names | None = None,
+    angles: Literal["centre", "pixel"] = "centre",
+    quality: bool = True,
+    chunks: Chunks = "auto",
+    instrument: FilePath | Instrument | None = None,
+) -> xr.DataArray:
     """
     Open a Landsat Collection-2 product: Level 1 as reflectance at the top of the atmosphere, Level 2 of the surface.
 

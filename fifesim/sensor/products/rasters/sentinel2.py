@@ -1,16 +1,21 @@
 """A Sentinel-2 product as a labelled image."""
 
+from __future__ import annotations
+
 from functools import partial
+from typing import Literal
 
 import dask.array as da
 import numpy as np
 import xarray as xr
 
+from fifesim.base.annotations import Chunks, FilePath, Names
 from fifesim.base.geometry import Geometry
 from fifesim.rasters import chunks as chunks_of
 from fifesim.rasters import directions, places
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.band_names import band_called
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.products import scaling
 from fifesim.sensor.products.rasters.layers import (
@@ -42,7 +47,16 @@ _CLASSES = {
 }
 
 
-def open_sentinel2(path, resolution=None, *, bands=None, angles="centre", quality=True, chunks="auto", instrument=None):
+def open_sentinel2(
+    path: FilePath,
+    resolution: Literal[10, 20, 60] | None = None,
+    *,
+    bands: Names | None = None,
+    angles: Literal["centre", "pixel"] = "centre",
+    quality: bool = True,
+    chunks: Chunks = "auto",
+    instrument: FilePath | Instrument | None = None,
+) -> xr.DataArray:
     """
     Open a Sentinel-2 product: Level-1C as reflectance at the top of the atmosphere, Level-2A of the surface.
 

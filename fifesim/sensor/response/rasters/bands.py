@@ -1,12 +1,16 @@
 """Hyperspectral images and field spectra as the bands of an instrument."""
 
+from __future__ import annotations
+
 import numpy as np
 import xarray as xr
 
+from fifesim.base.annotations import FilePath, Names
 from fifesim.rasters import cf
 from fifesim.rasters.combination import combined
 from fifesim.rasters.own_rasters import check_reflectance
 from fifesim.rasters.packed import unpacked
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
 from fifesim.sensor.response.rasters.wavelengths import spectral_axis
@@ -19,7 +23,13 @@ MIN_COVERAGE = 0.99
 _NAMED = 3
 
 
-def to_bands(spectra, instrument, *, bands=None, min_coverage=MIN_COVERAGE):
+def to_bands(
+    spectra: xr.DataArray,
+    instrument: FilePath | Instrument,
+    *,
+    bands: Names | None = None,
+    min_coverage: float = MIN_COVERAGE,
+) -> xr.DataArray:
     """
     Spectra as the bands of an instrument: a hyperspectral image, or field spectra.
 

@@ -1,7 +1,10 @@
 """What a digital number of an image stands for: a count of the detector, or one of the agency's product."""
 
-from fifesim.rasters import directions
-from fifesim.sensor.response.calibration import gain_offset
+import numpy as np
+import xarray as xr
+
+from fifesim.rasters import cf, chunks, directions
+from fifesim.sensor.response.calibration import gain_offset, radiance_to_dn
 from fifesim.sensor.response.product_scaling import product_gain_offset
 
 
@@ -63,3 +66,45 @@ def scale(description, bands, product_geometry=None):
     irradiance = [band.solar_irradiance for band in bands]
     distance = float(product_geometry.earth_sun_distance)
     return *product_gain_offset(product.gain, product.offset, irradiance, mu_s, distance), product.bits
+
+
+def recorded(radiance, description, bands, quantise, product_geometry=None):
+    """
+    What an instrument records of a radiance, with the coordinates of its bands.
+
+    Parameters
+    ----------
+    radiance : xarray.DataArray
+        With a dimension band. [W m-2 sr-1 um-1]
+    description : fifesim.sensor.description.instruments.Instrument
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
+        One for each of the array.
+    quantise : bool
+        Whether as digital numbers.
+    product_geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
+        Sun by which the agency's product scales them; the detector's own counts without.
+
+    Returns
+    -------
+    image : xarray.DataArray
+        Digital numbers, or the radiance itself.
+    """
+    along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
+    if quantise:
+        gain, offset, bits = scale(description, bands, product_geometry)
+        scales = [xr.DataArray(each, dims="band") for each in (gain, offset)]
+        # A product's numbers are linear, whatever the detector's are.
+        compression = [band.compressed_count(bits) if product_geometry is None else 0 for band in bands]
+        dtype = np.uint8 if bits <= 8 else np.uint16
+        kernel = radiance_to_dn if not any(compression) else _compressed
+        scales += [xr.DataArray(compression, dims="band")] if any(compression) else []
+        radiance = chunks.pointwise(kernel, radiance, *scales, dtype=dtype, bits=bits)
+        along_band |= {"gain": gain, "offset": offset}
+        along_band |= {"compression": compression} if any(compression) else {}
+    along_band["solar_irradiance"] = [band.solar_irradiance for band in bands]
+    return radiance.assign_coords(cf.band_coordinates(**along_band))
+
+
+def _compressed(radiance, gain, offset, compression, bits):
+    """Digital numbers of bands of which some have a scale of square roots."""
+    return radiance_to_dn(radiance, gain, offset, bits, compression)

@@ -1,15 +1,21 @@
 """Point spread and modulation transfer of an instrument, to plot."""
 
+from __future__ import annotations
+
 import numpy as np
 import xarray as xr
 
+from fifesim.base.annotations import FilePath, Names, Numbers
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 # Samples of a point spread over the full width of its support, when no spacing is given.
 _SAMPLES = 121
 
 
-def psf(instrument="TM", band=None, *, spacing=None):
+def psf(
+    instrument: FilePath | Instrument = "TM", band: str | None = None, *, spacing: float | None = None
+) -> xr.DataArray:
     r"""
     Point spread function of an instrument on the ground at nadir.
 
@@ -67,7 +73,9 @@ def psf(instrument="TM", band=None, *, spacing=None):
     )
 
 
-def mtf(instrument="TM", bands=None, *, frequency=None):
+def mtf(
+    instrument: FilePath | Instrument = "TM", bands: Names | None = None, *, frequency: Numbers | None = None
+) -> xr.DataArray:
     """
     Modulation transfer function of an instrument on the ground at nadir.
 

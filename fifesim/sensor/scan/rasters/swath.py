@@ -1,5 +1,8 @@
 """The image of a scan over a labelled scene: lines and samples, each with a footprint of its own."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -7,16 +10,22 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from fifesim.base.annotations import FilePath, Names, Time
 from fifesim.rasters import cf, chunks, directions, projection
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import Directions
 from fifesim.rasters.dates import by_date
-from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled, recorded
+from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled
+from fifesim.sensor.response.noise import NoiseModel
+from fifesim.sensor.response.rasters.digital_numbers import recorded
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import by_line_spread, common_size
 from fifesim.sensor.scan import track as scan
 from fifesim.sensor.scan.rasters.light import at_pixels, seen_alike
 from fifesim.sensor.scan.rasters.view import find_track, scan_nodes, transformer
 from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_operator
+from fifesim.sensor.scan.track import Track
 
 # Pixels along each side of a block: the operator of a whole image would fill the memory.
 _BLOCK = 128
@@ -27,21 +36,21 @@ _STEP = 100.0
 
 @by_date
 def sense_swath(
-    toa,
-    instrument=None,
-    track=None,
+    toa: xr.DataArray,
+    instrument: FilePath | Instrument | None = None,
+    track: Track | None = None,
     *,
-    nadir_offset=0.0,
-    heading=180.0,
-    noise=(),
-    seed=0,
-    noise_models=None,
-    quantise=True,
-    min_valid=MIN_VALID,
-    geometry=None,
-    time=None,
-    view_tolerance=1.0,
-):
+    nadir_offset: float = 0.0,
+    heading: float = 180.0,
+    noise: Names = (),
+    seed: int = 0,
+    noise_models: NoiseModel | Mapping[str, NoiseModel] | None = None,
+    quantise: bool = True,
+    min_valid: float = MIN_VALID,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    view_tolerance: float = 1.0,
+) -> xr.DataArray:
     """
     Image of a scan as the instrument takes it: by line and sample, at its own interval, and never resampled.
 

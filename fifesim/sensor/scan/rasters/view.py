@@ -1,16 +1,22 @@
 """View angles of a scan over a grid."""
 
+from __future__ import annotations
+
 from functools import lru_cache, partial
 
 import numpy as np
 import pyproj
 import xarray as xr
+from odc.geo.geobox import GeoBox
 from scipy.interpolate import RectBivariateSpline
 
+from fifesim.base.annotations import Chunks, FilePath
 from fifesim.rasters import cf, places, projection
 from fifesim.rasters import grid as grids
+from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.scan import track as scan
+from fifesim.sensor.scan.track import Track
 
 # Nodes along each axis between which the direction to the sensor is a cubic spline.
 _NODES = 65
@@ -18,7 +24,15 @@ _NODES = 65
 _TILE = 512
 
 
-def scan_geometry(instrument, grid, track=None, *, nadir_offset=0.0, heading=180.0, chunks=None):
+def scan_geometry(
+    instrument: FilePath | Instrument,
+    grid: GeoBox,
+    track: Track | None = None,
+    *,
+    nadir_offset: float = 0.0,
+    heading: float = 180.0,
+    chunks: Chunks | None = None,
+) -> xr.Dataset:
     """
     View zenith and azimuth of an instrument over a grid.
 
