@@ -194,7 +194,7 @@ class Band:
         """
         return self.quadrature(wavelength, weight).mean(values)
 
-    def quadrature(self, wavelength, weight=1.0):
+    def quadrature(self, wavelength: Numbers, weight: Numbers = 1.0) -> Quadrature:
         """
         What `mean` takes of any spectrum at the same wavelengths.
 

@@ -1,5 +1,7 @@
 """The chips of a study: which landscape each lies in and where, and what is drawn for it."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -95,7 +97,7 @@ class Chips:
         return xr.Dataset(found, coords={"chip": np.arange(len(self))})
 
 
-def chips_of(study, n):
+def chips_of(study: Study, n: int) -> Chips:
     """
     Chips of a study.
 

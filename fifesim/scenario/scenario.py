@@ -131,7 +131,7 @@ class Scenario(Keys):
         """Date and time: as given, else that of FIFE on its site."""
         return self.geometry.time or (fife.TIME if on_fife_site(self.geobox()) else None)
 
-    def sun_place(self):
+    def sun_place(self) -> tuple[float, float]:
         """Latitude and longitude of the sun: as given, else FIFE's on its site, else those of the grid's middle."""
         longitude, latitude = whereabouts.middle(self.geobox())
         if on_fife_site(self.geobox()):

@@ -1,5 +1,7 @@
 """Studies: a scenario, and what of it is drawn anew for each of many chips."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Mapping
 from copy import deepcopy
@@ -7,7 +9,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any, Literal
 
+from fifesim.base.annotations import FilePath
 from fifesim.base.foreign import shown
 from fifesim.base.seeds import check_seed
 from fifesim.scenario.distributions import distribution_of
@@ -77,7 +81,7 @@ class Study:
 
     scenario: Scenario
     draws: Mapping[str, Mapping]
-    sequence: str = "sobol"
+    sequence: Literal["sobol", "latin-hypercube", "random"] = "sobol"
     seed: int = 0
     landscapes: int = 50
     split: Mapping[str, float] = field(default_factory=lambda: dict(_SPLIT))
@@ -94,11 +98,11 @@ class Study:
         _check_extremes(self)
 
     @cached_property
-    def values(self):
+    def values(self) -> dict[str, Any]:
         """What all chips share, nested as in a scenario; sun and altitude are those of the scenario's own place."""
         return _settled(self.scenario, {key.path for key in self.drawn})
 
-    def quotas(self):
+    def quotas(self) -> dict[str, int]:
         """Landscapes of each part of the split, a dict of int by name."""
         shares = {name: share * self.landscapes for name, share in self.split.items()}
         found = {name: max(int(share + 1e-9), 1) for name, share in shares.items()}
@@ -109,7 +113,7 @@ class Study:
             found[max(several, key=lambda name: found[name] - shares[name])] -= 1
         return found
 
-    def to_toml(self):
+    def to_toml(self) -> str:
         """The study as a TOML file has it, a str; reading it gives the same study."""
         plan = {"sequence": self.sequence, "seed": self.seed, "landscapes": self.landscapes, "split": dict(self.split)}
         tables = {("dataset",): plan, ("draw",): self.draws}
@@ -118,7 +122,7 @@ class Study:
         written = ("\n".join(plain_table(place, values)) for place, values in tables.items() if values)
         return "\n\n".join([_HEADING, *written]) + "\n"
 
-    def scenario_with(self, drawn):
+    def scenario_with(self, drawn: Mapping[tuple[str, ...], Any]) -> Scenario:
         """
         Scenario of values that are drawn, at the study's own place.
 
@@ -142,7 +146,7 @@ class Study:
         return parse_scenario(values)
 
 
-def read_study(path):
+def read_study(path: FilePath) -> Study:
     """
     Study of a TOML file: a scenario with the tables ``[draw]`` and ``[dataset]``.
 

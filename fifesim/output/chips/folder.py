@@ -1,13 +1,17 @@
 """A dataset: the chips of a study written into a folder shard by shard, which can be stopped and gone on with."""
 
+from __future__ import annotations
+
 import json
 import shutil
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fifesim.base.annotations import FilePath
 from fifesim.ground.landscape.field import TILE
 from fifesim.output.chips import datasheet
 from fifesim.output.chips.arrays import chip_arrays, layout_of, make_shard
@@ -32,7 +36,15 @@ _LOOKED_AT, _CLOSELY = 1000, 50
 _RETRIES = 3
 
 
-def dataset(study, folder, n=1000, *, overwrite=False, resume=False, client=None):
+def dataset(
+    study: FilePath | Study,
+    folder: FilePath,
+    n: int = 1000,
+    *,
+    overwrite: bool = False,
+    resume: bool = False,
+    client: Any = None,
+) -> xr.Dataset:
     """
     Make a training set: chips of a study in a folder, as sharded Zarr.
 
