@@ -25,7 +25,7 @@ def test_array_is_what_numpy_reads(array):
     assert all(hasattr(array, name) for name in MEMBERS[Array])
 
 
-@pytest.mark.parametrize("source", [stats.gamma(4, scale=0.4), "burned-grazed"], ids=str)
+@pytest.mark.parametrize("source", [stats.gamma(4, scale=0.4), "burned-grazed"], ids=["frozen", "name"])
 def test_distribution_is_a_frozen_one_of_scipy(source):
     found = fifesim.lai_distribution(source)
     assert all(callable(getattr(found, name)) for name in MEMBERS[Distribution])
