@@ -87,12 +87,16 @@ def percent(stage):
 
 side, windows = tm["cells"].iloc[0] / 300, tm["realisations"].iloc[0]
 sentences = [
-    f"In {windows} windows of {side:g} km of a simulated tallgrass landscape (fifesim, default scenario), a line of",
-    f"leaf area on the NDVI of the Thematic Mapper leaves {percent('total')} of the variance between pixels of 30 m.",
-    f"Soil adds {percent('soil')}, dead leaves {percent('dead leaves')}, leaves and litter that differ by",
-    f"treatment {percent('cover')}; pixels displaced by the product's stated error add {percent('registration')},",
-    f"blur {percent('point spread')}. That grass is denser where it is wet and the soil dark changes this by",
-    f"{percent('covariance')}: leaf area then varies more between pixels, and the same disturbances count for less.",
+    f"In {windows} windows of {side:g} km of a simulated tallgrass landscape",
+    "(fifesim, default scenario), a line of leaf area on the NDVI of the Thematic Mapper",
+    f"leaves {percent('total')} of the variance between pixels of 30 m.",
+    f"Soil adds {percent('soil')}, dead leaves {percent('dead leaves')},",
+    f"leaves and litter that differ by treatment {percent('cover')};",
+    f"pixels displaced by the product's stated error add {percent('registration')},",
+    f"blur {percent('point spread')}.",
+    "That grass is denser where it is wet and the soil dark changes this by",
+    f"{percent('covariance')}: leaf area then varies more between pixels,",
+    "and the same disturbances count for less.",
 ]
-print(textwrap.fill(" ".join(sentences), 110))
+print(textwrap.fill(" ".join(sentences), 90))
 plt.show()
