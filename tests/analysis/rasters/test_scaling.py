@@ -48,6 +48,13 @@ def test_predicted_bias_of_fpar_is_the_simulated_one(lai):
     np.testing.assert_allclose(predicted, simulated, rtol=0.2)
 
 
+def test_bias_of_fpar_is_that_of_the_same_asymptote_as_fpar(lai):
+    """An infinite canopy absorbs alike in both, .94: bare ground has none of the light, and LAI 100 all that there is."""
+    dense = fifesim.fpar(lai.copy(data=np.full(lai.shape, 100.0)), geometry=fifesim.fife_geometry())
+    ratio = fifesim.fpar_bias(lai, 0.5) / fifesim.fpar_bias(lai, 0.5, fpar_inf=1.0)
+    np.testing.assert_allclose(ratio, float(dense[0, 0]), rtol=1e-12)
+
+
 def test_white_noise_keeps_a_ninth_of_its_deviation():
     """Of 9 x 9 cells; 900 means, whose variance is known to sqrt(2 / 900) = 5 %, four of it."""
     grid = fifesim.fife_site(CELL, window=((0, 270), (0, 270)))
