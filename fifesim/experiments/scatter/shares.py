@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,11 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.analysis.attribution import by_itself, shapley, taken_away
 from fifesim.base.seeds import check_seed
+from fifesim.base.warned import warn
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
 from fifesim.output.progress import steps
 from fifesim.rasters import grid as grids
+from fifesim.rasters.opening import raster_file
 from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
 
@@ -93,6 +96,7 @@ def budget(
     scenario = default_scenario() if scenario is None else scenario
     if not isinstance(scenario, Scenario):
         raise TypeError(f"budget takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+    _check_map(scenario)
     cases = realise(scenario, realisations=realisations, cells=cells, seed=seed)
     found = [_one(case) for case in (_shown if each is None else each)(cases)]
     names = {"stage": list(STAGES), "variable": list(VARIABLES)}
@@ -100,6 +104,21 @@ def budget(
     dims = {3: ("realisation", "variable", "stage"), 2: ("realisation", "variable")}
     attrs = {"units": "1", "long_name": "share of the variance"}
     return xr.Dataset({name: (dims[values.ndim], values, attrs) for name, values in stacked.items()}, coords=names)
+
+
+def _check_map(scenario):
+    """A map of coarser pixels is smooth below them, where the budget looks for what varies."""
+    if not scenario.ground.lai_file:
+        return
+    cell = scenario.grid.cell
+    with raster_file(scenario.ground.lai_file).opened() as source:
+        size = float(np.sqrt(abs(source.transform.determinant)))
+    if source.crs and source.crs.is_projected and size > 1.5 * cell:
+        warn(
+            f"{Path(scenario.ground.lai_file).name} has pixels of {size:.3g} m, and cells of {cell:.3g} m "
+            "are interpolated between them: nothing varies below its pixels, so that non-linearity and NDVI scaling "
+            "come out as nothing. fifesim.downscale makes a map of cells that vary"
+        )
 
 
 def default_scenario():

@@ -1,5 +1,7 @@
 """Where the scatter comes from: images with stages at their ideal, their shares, and the command."""
 
+import warnings
+
 import numpy as np
 import pytest
 import rasterio
@@ -74,6 +76,11 @@ def test_map_has_as_many_realisations_as_it_has_filled_windows(tmp_path):
     with rasterio.open(tmp_path / "lai.tif", "w", **profile, transform=place) as sink:
         sink.write(lai, 1)
     case = parse_scenario({"grid": {"cell": 10.0}, "ground": {"lai_file": str(tmp_path / "lai.tif")}})
-    found = fifesim.budget(case, realisations=9, cells=50)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        found = fifesim.budget(case, realisations=9, cells=50)
     assert found.sizes["realisation"] == 6
     assert (found["total"].std("realisation") > 0).all()
+    finer = parse_scenario({"grid": {"cell": 5.0}, "ground": {"lai_file": str(tmp_path / "lai.tif")}})
+    with pytest.warns(UserWarning, match=r"lai\.tif has pixels of 10 m, and cells of 5 m.*fifesim\.downscale"):
+        fifesim.budget(finer, realisations=1, cells=70)
