@@ -276,8 +276,8 @@ def utc(time):
         raise ValueError(f"time = {time!r} is a date alone: add the time of day, such as {time.strip()}T17:10Z")
     if isinstance(time, str) and not _WRITTEN.fullmatch(time):
         raise ValueError(
-            f"time = {time!r} could be read in several ways: write year, month, day and time of day, such as "
-            "1987-06-06T16:35Z or 1987-06-06 11:35-05:00"
+            f"time must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}: the year first, "
+            "then month and day, for other orders are read in several ways"
         )
     try:
         # A number would be taken for nanoseconds since 1970.

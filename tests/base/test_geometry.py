@@ -58,7 +58,7 @@ def test_time_without_zone_is_utc_and_others_are_converted():
     "time", ["3.6.2022 10:00", "03/06/2022 10:00", "13.6.2022 10:00", "10:00", "June 3, 2022 9:00"]
 )
 def test_a_time_that_can_be_read_in_several_ways_is_refused(time):
-    with pytest.raises(ValueError, match=r"could be read in several ways.*1987-06-06T16:35Z"):
+    with pytest.raises(ValueError, match=r"such as 1987-06-06T16:35:00Z, got.*the year first"):
         sun_position(time, 39.06, -96.54)
 
 

@@ -27,13 +27,14 @@ def test_a_time_has_no_sixty_seconds_or_minutes(seconds, said):
 
 
 def test_the_logger_is_heard_within_a_context_only(capsys):
+    before = LOG.level
     with listening(logging.INFO):
         LOG.info("a name \x1b[31m")
         LOG.debug("a part")
     LOG.info("afterwards")
     (line,) = capsys.readouterr().err.splitlines()
     assert line.endswith("a name \\x1b[31m")
-    assert not LOG.handlers and LOG.level == logging.NOTSET
+    assert not LOG.handlers and LOG.level == before
 
 
 def test_names_from_elsewhere_cannot_steer_a_terminal(capsys):

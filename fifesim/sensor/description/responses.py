@@ -72,6 +72,5 @@ def _sharp(instrument, band):
     number = "ifov" if band.ifov or instrument.ifov else "interval"
     width = getattr(band, number) or getattr(instrument, number)
     sources = {key: value for key, value in band.sources.items() if key != "lsf"}
-    return replace(
-        band, lsf=None, ifov=width, sources=sources | {"ifov": sources.get(number, instrument.sources[number])}
-    )
+    source = sources[number] if number in sources else instrument.sources[number]
+    return replace(band, lsf=None, ifov=width, sources=sources | {"ifov": source})
