@@ -122,6 +122,10 @@ def chips_of(study: Study, n: int) -> Chips:
     Every round of as many chips as there are landscapes has one chip of each, in a drawn order: points of a sequence
     that a landscape took in turn would lie in one part of the space.
 
+    References
+    ----------
+    [Sobol1967]_, scrambled after [Matousek1998]_; [McKay1979]_
+
     Examples
     --------
     >>> import fifesim
