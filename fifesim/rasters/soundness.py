@@ -82,8 +82,11 @@ def _check_place(source, name, north_up):
         raise ValueError(f"{name} {lacks}: bring it onto a grid with gdalwarp -t_srs EPSG:26914")
     said = f"its geotransform is {tuple(float(f'{each:.6g}') for each in a[:6])}"
     columns, rows = np.meshgrid([0, source.width], [0, source.height])
-    farthest = np.abs(projection.transform_points(a, columns, rows)).max()
-    if not (farthest < _FARTHEST and _has_area(a, farthest)):
+    # What overflows is no place.
+    with np.errstate(all="ignore"):
+        farthest = np.abs(projection.transform_points(a, columns, rows)).max()
+        placed = farthest < _FARTHEST and _has_area(a, farthest)
+    if not placed:
         raise ValueError(f"the cells of {name} have no place on the Earth, {said}: mend it with gdal_edit.py -a_ullr")
     if north_up and (a.b or a.d or a.a < 0 or a.e > 0):
         raise ValueError(f"{name} is rotated or not north up, {said}: bring it onto a grid with gdalwarp")
