@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -12,7 +11,8 @@ import pvlib
 
 from fifesim.base import fife
 from fifesim.base.arguments import check_fields
-from fifesim.base.kinds import described, is_a
+from fifesim.base.kinds import is_a
+from fifesim.base.times import utc
 
 ANGLES = ("sza", "saa", "vza", "vaa")
 
@@ -248,45 +248,6 @@ def earth_sun_distance(time):
 @lru_cache(maxsize=256)
 def _distance(time):
     return float(pvlib.solarposition.nrel_earthsun_distance(utc(time)).iloc[0])
-
-
-# Day and month in another order are another season, and a time alone is today's.
-_WRITTEN = re.compile(r"\s*\d{4}-?\d{2}-?\d{2}[T ]\d{2}(:?\d{2}.*)?\s*")
-
-
-def utc(time):
-    """
-    A time in UTC.
-
-    Parameters
-    ----------
-    time : str or datetime
-        Taken as UTC where it names no time zone; a text after ISO 8601, with the time of day.
-
-    Returns
-    -------
-    time : pandas.DatetimeIndex, shape (1,)
-
-    Raises
-    ------
-    ValueError
-        If it is no time, a date alone, for midnight is another sun, or a text in another order.
-    """
-    if isinstance(time, str) and re.fullmatch(r"\s*\d{4}-?\d{2}-?\d{2}\s*", time):
-        raise ValueError(f"time = {time!r} is a date alone: add the time of day, such as {time.strip()}T17:10Z")
-    if isinstance(time, str) and not _WRITTEN.fullmatch(time):
-        raise ValueError(
-            f"time must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}: the year first, "
-            "then month and day, for other orders are read in several ways"
-        )
-    try:
-        # A number would be taken for nanoseconds since 1970.
-        stamp = pd.NaT if isinstance(time, int | float | np.number) else pd.Timestamp(time)
-    except (TypeError, ValueError):
-        stamp = pd.NaT
-    if stamp is pd.NaT:
-        raise ValueError(f"time must be a date and time such as 1987-06-06T16:35:00Z, got {described(time)}")
-    return pd.DatetimeIndex([stamp.tz_localize("UTC") if stamp.tzinfo is None else stamp.tz_convert("UTC")])
 
 
 @lru_cache

@@ -3,7 +3,8 @@
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_position, utc
+from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_position
+from fifesim.base.times import utc
 from fifesim.base.warned import warn
 from fifesim.rasters import cf, whereabouts
 from fifesim.rasters import grid as grids

@@ -76,7 +76,7 @@ def test_optical_thickness_stands_in_the_place_of_visibility():
 )
 def test_what_is_no_date_and_time_is_refused(time):
     """It would be another sun tomorrow, or another date to another reader."""
-    with pytest.raises(ValidationError, match=r"must be a date and a time of day .* such as '1987-06-06T16:35:00Z'"):
+    with pytest.raises(ValidationError, match=r"must be a date and time|is a date alone"):
         SunAndViewKeys(time=time)
 
 

@@ -7,7 +7,6 @@ import xarray as xr
 
 from fifesim.analysis.rasters.means import aggregate
 from fifesim.chain import steps as chain
-from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.ground.canopy import raster as canopy
 from fifesim.ground.landscape.raster import lai_scene
@@ -126,19 +125,3 @@ def paired(*arrays):
     rows, columns = (min(sizes) for sizes in zip(*(each.shape for each in arrays), strict=True))
     values = np.stack([each[:rows, :columns].ravel() for each in arrays])
     return values[:, np.isfinite(values).all(axis=0)]
-
-
-def cell_limits(ground):
-    """
-    Least and largest of the cells of a scene.
-
-    Parameters
-    ----------
-    ground : Ground
-
-    Returns
-    -------
-    limits : array, shape (3, 2)
-        Of LAI, FPAR, and NDVI at the top of the atmosphere.
-    """
-    return np.array([(float(each.min()), float(each.max())) for each in (ground.lai, ground.fpar, ndvi(ground.toa))])

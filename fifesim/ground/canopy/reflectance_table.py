@@ -100,8 +100,7 @@ def canopy_reflectance(
     uniform = background.ndim < 2
     if uniform:
         bands = np.broadcast_shapes(bands, background.shape)
-    optics = tuple(_per_band(v, bands) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction))
-    scene = Scene(*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
+    scene = _even((leaf_reflectance, leaf_transmittance, diffuse_fraction), bands, sza, vza, raa, leaf_angles, hotspot)
     dead = brown_reflectance, brown_transmittance
     scene = scene._replace(**_kinds(lai, brown, dissociation, dead, bands), **_crowns(lai, crown_cover, crown_shape))
     if exact or scene.varies():
@@ -151,8 +150,7 @@ def even_table(
     check_leaf_optics(leaf_reflectance, leaf_transmittance)
     check_background(background)
     bands = np.shape(leaf_reflectance)
-    optics = tuple(_per_band(v, bands) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction))
-    scene = Scene(*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
+    scene = _even((leaf_reflectance, leaf_transmittance, diffuse_fraction), bands, sza, vza, raa, leaf_angles, hotspot)
     return _surface_table(_per_band(background, bands), scene)
 
 
@@ -231,6 +229,12 @@ def directional_reflectance(
     out = cell_by_cell(lai, ground, scene)
     out[:, np.broadcast_to(missing, lai.shape)] = np.nan
     return out.reshape(bands, *cells)
+
+
+def _even(optics, bands, sza, vza, raa, leaf_angles, hotspot):
+    """Scene of green leaves whose optics, directions and angles are the same in all cells."""
+    optics = (_per_band(each, bands) for each in optics)
+    return Scene(*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
 
 
 def _leaves_by_cell(reflectance, transmittance, cells):

@@ -7,7 +7,7 @@ import pytest
 
 from fifesim.chain.setup import image_of
 from fifesim.experiments.friedl1995.case import Case
-from fifesim.experiments.friedl1995.pixels import block_means, cell_limits, ground_of, pixel_values, scene_image
+from fifesim.experiments.friedl1995.pixels import block_means, ground_of, pixel_values, scene_image
 from fifesim.experiments.friedl1995.readings import READINGS
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.rasters import grid as grids
@@ -48,12 +48,6 @@ def test_scene_has_exactly_the_density():
     expected = lai_distribution("burned-ungrazed").ppf(ranks)
     np.testing.assert_allclose(np.sort(ground.lai.values.ravel()), expected, rtol=1e-12)
     assert (ground.fpar > 0).all() and (ground.fpar < 0.94).all()
-
-
-def test_limits_are_those_of_the_cells(ground):
-    limits = cell_limits(ground)
-    assert limits[0].tolist() == [float(ground.lai.min()), float(ground.lai.max())]
-    assert (limits[:, 0] < limits[:, 1]).all() and limits[2, 1] < 1
 
 
 def test_pixels_pair_by_row_and_column_without_what_lacks_data(ground):
