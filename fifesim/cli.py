@@ -248,8 +248,11 @@ def explore(
     output: Annotated[Path, typer.Option("-o", "--output", help="The page.")] = Path("explore.html"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier page.")] = False,
     allow_remote: _AllowRemote = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
 ):
     """Make a page to play with: sliders for ground, air, sun, instrument and registration; about a minute."""
+    start = time.monotonic()
     _check_spelling(scenario)
 
     with _importing():
@@ -259,7 +262,8 @@ def explore(
     if allow_remote:
         _open_remote(context)
     found = None if scenario is None else read_scenario(scenario)
-    _say(write_page(found, output, overwrite=overwrite))
+    page = write_page(found, output, overwrite=overwrite)
+    report([page], time.monotonic() - start, f"{page} in a browser")
 
 
 @app.command()

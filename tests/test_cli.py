@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 import rasterio
+import typer
 from typer.testing import CliRunner
 
 from fifesim.base import datasets
@@ -95,6 +96,18 @@ def test_quiet_says_nothing_and_verbose_each_step(invoke, small, monkeypatch):
     assert "saved block (" not in told.stderr
     assert "saved block (" in invoke("simulate", small, "-o", "all", "-vv").stderr
     assert invoke("simulate", small, "-o", "quiet", "--quiet").exit_code == 2
+
+
+@pytest.mark.parametrize(("name", "command"), typer.main.get_command(app).commands.items())
+def test_what_writes_can_be_quiet(name, command):
+    options = {each for known in command.params for each in known.opts}
+    assert "--output" not in options or {"--quiet", "--verbose"} <= options
+
+
+def test_explore_says_what_to_open_unless_it_is_quiet(invoke, monkeypatch):
+    monkeypatch.setattr("fifesim.experiments.explorer.writing.explore", lambda scenario, page, overwrite: page)
+    assert "open page.html in a browser" in invoke("explore", "-o", "page.html").stdout
+    assert invoke("explore", "-o", "page.html", "--quiet").stdout == ""
 
 
 def test_image_lies_where_the_scenario_says(first):
