@@ -143,7 +143,9 @@ def _cropped(source, size=(400, 280)):
 def _link_identifiers(app, docname, source):
     """Identifiers of publications in the list of references lead to them."""
     if docname == "references":
-        source[0] = re.sub(r"doi:(10\.\S*[^\s.])", r"`doi:\1 <https://doi.org/\1>`__", source[0])
+        source[0] = re.sub(
+            r"doi:(10\.\S*[^\s.])", r"`doi:\1 <https://doi.org/\1>`__", source[0]
+        )
 
 
 def setup(app):

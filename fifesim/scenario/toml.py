@@ -62,13 +62,34 @@ def with_folder(values, folder):
         The same, changed.
     """
     folder = Path(folder).absolute()
+    # A link stays one: what it leads to may have another suffix.
+    for _, table, key in list(named_files(values)):
+        table[key] = str(folder / table[key])
+    return values
+
+
+def named_files(values):
+    """
+    Keys of a scenario that name files.
+
+    Parameters
+    ----------
+    values : dict
+        As TOML gives it.
+
+    Yields
+    ------
+    place : tuple of str
+        Of the table.
+    table : dict
+    key : str
+        Of the path in the table.
+    """
     for place, table in _tables(values):
         section = Keys.section(place)
         for key, value in table.items() if section else ():
-            # A link stays one: what it leads to may have another suffix.
             if section.names_a_file(key, value) and value:
-                table[key] = str(folder / value)
-    return values
+                yield place, table, key
 
 
 def _tables(values):

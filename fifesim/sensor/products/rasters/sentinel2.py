@@ -82,8 +82,8 @@ def open_sentinel2(
     chunks : mapping or int or "auto", optional
         The image is lazy; "auto" are 2048 x 2048 pixels of a band. None reads all of it at once.
     instrument : str or Instrument, optional
-        Whose responses the bands have, instead of the spacecraft's; of Sentinel-2C none were found, and "MSI-C" takes those of
-        Sentinel-2A.
+        Whose responses the bands have, instead of the spacecraft's; of Sentinel-2C none were found, and "MSI-C" takes
+        those of Sentinel-2A.
 
     Returns
     -------
