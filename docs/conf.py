@@ -148,7 +148,15 @@ def _link_identifiers(app, docname, source):
         )
 
 
+def _signature(app, what, name, obj, options, signature, returns):
+    """The sections of a scenario by name: their defaults, all keys with their values, fill a page."""
+    if name == "fifesim.Scenario":
+        return f"(*, {', '.join(obj.model_fields)})", returns
+    return None
+
+
 def setup(app):
+    app.connect("autodoc-process-signature", _signature)
     app.connect("source-read", _link_identifiers)
     app.connect("autodoc-process-docstring", _cite_tables)
     app.connect("builder-inited", _thumbnails, priority=900)  # after the gallery is drawn

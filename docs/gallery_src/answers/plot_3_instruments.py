@@ -68,7 +68,7 @@ for axis, arp in zip(axes, arps, strict=True):
         ecolor="#222222",
         elinewidth=1,
     )
-    axis.set(title=f"arp {arp:g}", xlim=(0, 1.05), xlabel="share of the variance of LAI left")
+    axis.set(title=f"arp {arp:g}", xlim=(0, 1.05), xticks=[0, 0.5, 1])
     axis.spines[["top", "right"]].set_visible(False)
 axes[0].set_ylim(len(names) - 0.4, -0.6)
 known = table.drop_duplicates("instrument").set_index("instrument")
@@ -80,6 +80,7 @@ for name in names:
         + (f"\n(no {', '.join(unknown)})" if unknown else "")
     )
 axes[0].set_yticks(range(len(names)), labels, fontsize=8)
+figure.supxlabel("share of the variance of leaf area left", fontsize=10)
 figure.legend(
     *axes[0].get_legend_handles_labels(),
     loc="outside lower center",
