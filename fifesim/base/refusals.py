@@ -20,8 +20,8 @@ _WORDS = {
     "string_too_long": "must have at most {max_length} characters",
     "string_too_short": "must have at least {min_length} characters",
     "string_type": "must be text, in quotes",
-    "too_long": "must have at most {max_length} values",
-    "too_short": "must have at least {min_length} values",
+    "too_long": "takes {max_length} of them at most",
+    "too_short": "needs {min_length} of them or more",
     "tuple_type": "must be a list, in brackets",
 }
 

@@ -35,8 +35,8 @@ class Table(BaseModel):
         (str, 3, "must be text, in quotes"),
         (Annotated[str, Field(max_length=2)], "abc", "must have at most 2 characters"),
         (Annotated[str, Field(min_length=2)], "a", "must have at least 2 characters"),
-        (Annotated[list[float], Field(min_length=2)], [1.0], "must have at least 2 values"),
-        (Annotated[list[float], Field(max_length=1)], [1.0, 2.0], "must have at most 1 values"),
+        (Annotated[list[float], Field(min_length=2)], [1.0], "needs 2 of them or more"),
+        (Annotated[list[float], Field(max_length=1)], [1.0, 2.0], "takes 1 of them at most"),
     ],
 )
 def test_each_refusal_says_what_the_value_must_be(kind, value, said):
