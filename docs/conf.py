@@ -140,7 +140,24 @@ def _cropped(source, size=(400, 280)):
     return picture.resize(size, Image.Resampling.LANCZOS)
 
 
+def _link_identifiers(app, docname, source):
+    """Identifiers of publications in the list of references lead to them."""
+    if docname == "references":
+        source[0] = re.sub(
+            r"doi:(10\.\S*[^\s.])", r"`doi:\1 <https://doi.org/\1>`__", source[0]
+        )
+
+
+def _signature(app, what, name, obj, options, signature, returns):
+    """The sections of a scenario by name: their defaults, all keys with their values, fill a page."""
+    if name == "fifesim.Scenario":
+        return f"(*, {', '.join(obj.model_fields)})", returns
+    return None
+
+
 def setup(app):
+    app.connect("autodoc-process-signature", _signature)
+    app.connect("source-read", _link_identifiers)
     app.connect("autodoc-process-docstring", _cite_tables)
     app.connect("builder-inited", _thumbnails, priority=900)  # after the gallery is drawn
     app.add_role("cite", _cite)

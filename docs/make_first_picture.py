@@ -64,7 +64,7 @@ axes[4].plot(
     ndvi.values.ravel(), truth.values.ravel(), ".", color="#1a9850", markersize=2, alpha=0.5
 )
 axes[4].plot(line, fit.predict(line), color="#b2182b", linewidth=2)
-axes[4].set(xlabel="NDVI of the image", ylabel="true leaf area index")
+axes[4].set(xlabel="NDVI of the image", ylabel="true leaf area index", ylim=(0, None))
 
 budget = pd.read_csv(DOCS / "landscape_budget.csv")
 budget = budget[(budget.instrument == "TM") & (budget.variable == "lai")].set_index("stage")

@@ -10,6 +10,7 @@ from importlib import import_module
 from importlib.metadata import version
 
 from fifesim.accessor import PUBLIC, find
+from fifesim.base.spelling import nearest
 
 __version__ = version("fifesim")
 
@@ -20,7 +21,7 @@ def __getattr__(name):
     if name == "atmosphere":
         return import_module("fifesim.atmosphere")
     if name not in PUBLIC:
-        raise AttributeError(f"module 'fifesim' has no attribute {name!r}")
+        raise AttributeError(f"module 'fifesim' has no attribute {name!r}: {nearest(name, PUBLIC)}dir(fifesim) has all")
     globals()[name] = find(name)
     return globals()[name]
 

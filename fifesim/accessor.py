@@ -1,6 +1,7 @@
 """Public names, found when they are first used, and the ``.fifesim`` accessor, whose methods are some of them."""
 
 import re
+from dataclasses import is_dataclass
 from functools import cache
 from importlib import import_module
 from inspect import isfunction
@@ -12,6 +13,7 @@ import xarray as xr
 
 from fifesim.base.arguments import checked
 from fifesim.base.methods import Method
+from fifesim.base.spelling import nearest, spelled
 
 # One line of the table: where a name lives, and whether it is a method of a DataArray, of a Dataset too, or of a
 # DataTree instead.
@@ -46,7 +48,7 @@ PUBLIC = _table()
 @cache
 def find(name):
     """
-    A public name; a function looks at its arguments first.
+    A public name; a function looks at its arguments first, a description at their names.
 
     Parameters
     ----------
@@ -59,7 +61,9 @@ def find(name):
     """
     found = getattr(import_module(PUBLIC[name].module), name)
     if not isfunction(found):
-        return found
+        # What pydantic makes has messages of its own.
+        plain = is_dataclass(found) and not hasattr(found, "__pydantic_validator__")
+        return spelled(found) if plain else found
     function = checked(found, PUBLIC[name].methods_of)
     # Pickle looks a function up where it says that it lives.
     function.__module__, function.__qualname__ = "fifesim", name
@@ -84,6 +88,9 @@ class _Accessor:
     def __repr__(self):
         return _summary(type(self).kind)
 
+    def __getattr__(self, name):
+        raise AttributeError(_unknown(type(self).kind, name), obj=self)
+
 
 def _summary(kind):
     """The methods of a kind of object by their group, a line for each."""
@@ -97,6 +104,16 @@ def _summary(kind):
         for group, names in groups.items()
     ]
     return "\n".join([f"fifesim on a {kind}, its methods:", *lines])
+
+
+def _unknown(kind, name):
+    """What is wrong with the name of a method."""
+    if name in PUBLIC:
+        kinds = " or ".join(f"an xarray.{each}" for each in PUBLIC[name].methods_of)
+        what = f"a method of {kinds}" if kinds else "no method of a raster"
+        return f"{name} is {what}, this is an xarray.{kind}; fifesim.{name} is the function"
+    known = [each for each, public in PUBLIC.items() if kind in public.methods_of]
+    return f"fifesim has no method {name!r} of an xarray.{kind}: {nearest(name, known)}print(raster.fifesim) lists them"
 
 
 def _accessor(kind):

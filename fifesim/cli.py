@@ -70,7 +70,7 @@ def simulate(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Simulate a scenario: image.tif, truth.tif, quicklook.png, report.html, scenario.toml, item.json (STAC)."""
+    """Simulate a scenario. Writes image.tif, truth.tif, quicklook.png, report.html, scenario.toml, item.json (STAC)."""
     start = time.monotonic()
     _check_spelling(scenario)
 
@@ -111,7 +111,7 @@ def rerun(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Make a file of a run again from its own tags; exit code 1 where its bits are not the same."""
+    """Make a file of a run again from its own tags. Exit code 1 where its bits are not the same."""
     with _importing():
         from fifesim.output.run.again import in_words
         from fifesim.output.run.again import rerun as make_again
@@ -137,7 +137,7 @@ def dataset(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Make a training set: images and truth of many chips, as sharded Zarr with a datasheet."""
+    """Make a training set. Images and truth of many chips, as sharded Zarr with a datasheet."""
     start = time.monotonic()
     with _importing():
         from fifesim.output.chips.folder import dataset_to_folder, study_to_resume
@@ -185,7 +185,7 @@ def reproduce(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Repeat the paper: table2.csv, figures 3 to 9, the nine scenarios, report.html."""
+    """Repeat the paper. Writes table2.csv, figures 3 to 9, the nine scenarios, report.html."""
     start = time.monotonic()
 
     with _importing():
@@ -218,7 +218,7 @@ def budget(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Find where the scatter comes from, stage by stage: budget.csv, budget.png, report.html, scenario.toml."""
+    """Find where the scatter comes from, stage by stage. Writes budget.csv, budget.png, report.html, scenario.toml."""
     start = time.monotonic()
     _check_spelling(scenario)
     if sensor and scenario:
@@ -251,7 +251,7 @@ def explore(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
-    """Make a page to play with: sliders for ground, air, sun, instrument and registration; about a minute."""
+    """Make a page to play with. Sliders for ground, air, sun, instrument and registration; takes about a minute."""
     start = time.monotonic()
     _check_spelling(scenario)
 
@@ -279,7 +279,7 @@ def sensors(
     name: Annotated[str | None, typer.Argument(help="Name or alias of one, or its file; all by default.")] = None,
     check: Annotated[Path | None, typer.Option("--check", help="Check a file of your own, and say what it is.")] = None,
 ):
-    """List the instruments, or one in detail: bands, sampling, point spread, radiometry, noise, sources."""
+    """List the instruments, or one in detail. Its bands, sampling, point spread, radiometry, noise and sources."""
     from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
     from fifesim.sensor.description.listing import instrument_in_words, list_instruments
 
@@ -294,7 +294,7 @@ def sensors(
 
 @app.command()
 def verify():
-    """Check this installation against independent results; exit code 1 where one deviates more than it may."""
+    """Check this installation against independent results. Exit code 1 where one deviates more than it may."""
     # The matrices are small: threads of BLAS, loaded only now, would wait for each other longer than they work.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 

@@ -190,8 +190,8 @@ def test_sensors_of_no_such_instrument_is_a_mistake(invoke, name, said):
     [
         ("[atmosphere]\nvisibilty = 23\n", "did you mean 'visibility'"),
         ('[atmosphere]\nvisibility = "23 mi"\n', "visibility is in km"),
-        ("[atmosphere]\nvisibility = 2\n", "greater than or equal to 5"),
-        ("[ground]\narp = 0.3\n", "less than 0.25"),
+        ("[atmosphere]\nvisibility = 2\n", "must be at least 5"),
+        ("[ground]\narp = 0.3\n", "must be below 0.25"),
         ('[ground]\ndistribution = "burnt-grazed"\n', "burned-grazed"),
         ('[sensor]\ninstrument = "TN"\n', "did you mean TM"),
         ('[sensor]\nbands = ["TM8"]\n', "TM7"),

@@ -29,6 +29,7 @@ from fifesim.base.kinds import (
     MAPPING,
     METRES,
     NAMES,
+    NOISE,
     NUMBER,
     NUMBER_OR_RASTER,
     NUMBERS,
@@ -53,6 +54,7 @@ from fifesim.base.kinds import (
     described,
     is_a,
 )
+from fifesim.base.spelling import unknown_argument
 
 
 def _of(kind, names):
@@ -79,7 +81,8 @@ KINDS = (
     | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality reflect")
     | _of(FLAG, "resume")
     | _of(TEXT, "angles scaling pair quantity method datum vertical_units engine profile along band leaves")
-    | _of(NAMES, "bands noise engines")
+    | _of(NAMES, "bands engines")
+    | _of(NOISE, "noise")
     | _of(MAPPING, "arps correlations covariates reference tags")
     | _of(PATH, "path folder")
     | _of(STUDY, "study")
@@ -194,7 +197,8 @@ def checked(function, methods_of=()):
         try:
             given = signature.bind(*args, **options).arguments
         except TypeError as error:
-            raise TypeError(f"{function.__name__}: {error}") from None
+            wrong = unknown_argument(function.__name__, signature, options)
+            raise TypeError(wrong or f"{function.__name__}: {error}") from None
         for name, kind in kinds.items():
             if name in given and given[name] is not signature.parameters[name].default:
                 check(name, given[name], kind)

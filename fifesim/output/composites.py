@@ -144,7 +144,8 @@ def composite_bands(image, composite="false colour"):
             f"composite must be {' or '.join(map(repr, COMPOSITES))}, or the names of three bands, got {composite!r}"
         )
     if "wavelength" not in image.coords:
-        raise ValueError("the image has no wavelength [um] along band: name three bands, composite=('B5', 'B4', 'B3')")
+        three = tuple(have[-1:-4:-1]) if len(have) > 2 else ("B5", "B4", "B3")
+        raise ValueError(f"the image has no wavelength [um] along band: name three bands, composite={three}")
     numbers = [nearest(image["wavelength"].values, window) for window in COMPOSITES[composite]]
     if composite == "false colour" and numbers[2] is None:
         numbers[2] = numbers[1]

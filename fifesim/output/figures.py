@@ -55,9 +55,9 @@ def fit_figure(image, truth, name, fit):
     title = f"{fit.intercept:.3f} {sign} {abs(fit.slope):.3f} NDVI,  R² = {fit.r2:.3f},  n = {fit.n}"
     axis.set(xlabel="NDVI at the top of the atmosphere", ylabel=f"True {NAMES[name]}")
     axis.set_title(title.replace("-", "−"), fontsize=10)
-    # Above all that is drawn, whichever way the line goes.
+    # Above all that is drawn, whichever way the line goes; not below the least that leaf area can be.
     low, high = axis.get_ylim()
-    axis.set_ylim(low, high + 0.16 * (high - low))
+    axis.set_ylim(max(low, 0), high + 0.16 * (high - max(low, 0)))
     axis.legend(frameon=False, loc="upper left", fontsize=8.5, ncols=2, columnspacing=1.2)
     return figure
 

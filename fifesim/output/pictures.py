@@ -194,8 +194,9 @@ def plot_fit(
     title = title.replace("-", "−")
     axes.set(xlabel=labels[1], ylabel=labels[0])
     axes.set_title(title, fontsize="medium")
-    # Above what the line and its interval reach, whichever way they go.
+    # Above what the line and its interval reach, whichever way they go; below 0 only where pixels are.
     low, high = axes.get_ylim()
+    low = low if y is None or ordinate[both].min() < 0 else max(low, 0)
     axes.set_ylim(low, high + 0.22 * (high - low))
     axes.legend(frameon=False, loc="upper center", ncols=2, fontsize="small")
     return axes

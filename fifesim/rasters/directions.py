@@ -98,7 +98,8 @@ def given_geometry(given, array, time=None):
     if geometry is None:
         raise ValueError(
             f"nothing says where the sun stands over {array.name or 'the raster'}, which has no sza and no time: type "
-            "time='2022-06-03T17:10Z', or geometry=fifesim.Geometry(sza, saa)"
+            "time='2022-06-03T17:10Z', or geometry=fifesim.Geometry(sza, saa) or fifesim.sun_position(time, latitude, "
+            "longitude)"
         )
     return geometry
 

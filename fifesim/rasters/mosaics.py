@@ -50,6 +50,28 @@ def is_description(path):
     return _head(path).lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"<", b"{")
 
 
+def text_of(path):
+    """
+    The first line of a file of plain text, which no raster is but a grid of numbers.
+
+    Parameters
+    ----------
+    path : str
+
+    Returns
+    -------
+    line : str
+        Empty of a file that is none, of one that may lead elsewhere, and of an archive's.
+    """
+    if not os.path.isfile(path) or is_description(path):
+        return ""
+    try:
+        lines = _head(path).decode("utf-8").splitlines()
+    except UnicodeDecodeError:
+        return ""
+    return lines[0] if lines and all(line.replace("\t", " ").isprintable() for line in lines) else ""
+
+
 def named_files(path):
     """
     Files that a mosaic is made of.

@@ -16,7 +16,7 @@ import rioxarray
 import xarray as xr
 from rasterio.windows import Window
 
-from fifesim.base.foreign import check_regular, in_a_line
+from fifesim.base.foreign import check_regular, in_a_line, shown
 from fifesim.rasters import mosaics
 
 # Formats of one raster that hold its cells themselves. GDAL has others that describe servers or name other files.
@@ -138,7 +138,10 @@ def _first_that_opens(path, formats):
     # What is wrong with a format says more than that it is not another.
     reason = min(reasons, key=lambda said: "not recognized" in said)
     if "not recognized" in reason and formats == FORMATS:
-        reason = f"cannot read {in_a_line(path, _PATH)} as a raster of {', '.join(FORMATS)}; {_CURE}"
+        cure = _CURE
+        if begins := mosaics.text_of(path):
+            cure = f"it is text that begins {shown(begins)}: is it another file? gdal_translate makes GeoTIFF of grids"
+        reason = f"cannot read {in_a_line(path, _PATH)} as a raster of {', '.join(FORMATS)}; {cure}"
     raise ValueError(reason)
 
 

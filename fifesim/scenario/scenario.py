@@ -37,7 +37,7 @@ class Scenario(Keys):
     Parameters
     ----------
     grid, ground, landscape, classes, terrain, geometry, atmosphere, sensor : mapping
-        Their keys are those of `keys`, and their meaning is in `sections`.
+        Of keys; ``fifesim scenario`` prints all of them, with their units, meanings and defaults.
 
     Raises
     ------
@@ -46,8 +46,8 @@ class Scenario(Keys):
 
     Examples
     --------
-    >>> from fifesim.scenario.scenario import Scenario
-    >>> scenario = Scenario(grid={"width": 900, "height": 900}, ground={"arp": 0.24})
+    >>> import fifesim
+    >>> scenario = fifesim.Scenario(grid={"width": 900, "height": 900}, ground={"arp": 0.24})
     >>> scenario.ground.arp, scenario.atmosphere.visibility
     (0.24, 45.0)
     """

@@ -1,13 +1,13 @@
 """Sections of a scenario: tables whose keys know their units, and which of them name files."""
 
 import re
-from difflib import get_close_matches
 from pathlib import Path
 from typing import get_args
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from fifesim.base.foreign import check_regular, shown
+from fifesim.base.spelling import nearest as nearest
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
@@ -219,21 +219,3 @@ def _in_length(value, given, wanted):
     """A length in another unit; a power of ten is divided by where that is exact."""
     shift = _LENGTHS[given] - _LENGTHS[wanted]
     return value * 10**shift if shift > 0 else value / 10**-shift
-
-
-def nearest(value, allowed):
-    """
-    The beginning of a message that names the nearest of what is allowed.
-
-    Parameters
-    ----------
-    value : str
-    allowed : sequence of str
-
-    Returns
-    -------
-    hint : str
-        Empty where none is near.
-    """
-    near = get_close_matches(value, allowed, n=1)
-    return f"did you mean {near[0]!r}? " if near else ""

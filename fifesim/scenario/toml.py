@@ -8,12 +8,15 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from fifesim.base.foreign import in_a_line, read_toml, shown
+from fifesim.base.refusals import in_own_words
+from fifesim.base.spelling import nearest
 from fifesim.scenario.keys import Keys
-from fifesim.scenario.section import nearest
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 # The longest that is said of the mistakes of a scenario; a line of one is shorter.
 _LONGEST = 500
+# A value of another kind than its key takes is told what the key says.
+_OTHER_KINDS = ("dict_type", "list_type", "string_type")
 
 
 def load_values(path):
@@ -59,13 +62,34 @@ def with_folder(values, folder):
         The same, changed.
     """
     folder = Path(folder).absolute()
+    # A link stays one: what it leads to may have another suffix.
+    for _, table, key in list(named_files(values)):
+        table[key] = str(folder / table[key])
+    return values
+
+
+def named_files(values):
+    """
+    Keys of a scenario that name files.
+
+    Parameters
+    ----------
+    values : dict
+        As TOML gives it.
+
+    Yields
+    ------
+    place : tuple of str
+        Of the table.
+    table : dict
+    key : str
+        Of the path in the table.
+    """
     for place, table in _tables(values):
         section = Keys.section(place)
         for key, value in table.items() if section else ():
-            # A link stays one: what it leads to may have another suffix.
             if section.names_a_file(key, value) and value:
-                table[key] = str(folder / value)
-    return values
+                yield place, table, key
 
 
 def _tables(values):
@@ -221,6 +245,13 @@ def _toml_key(name):
     return name if _BARE_KEY.fullmatch(name) else _toml(name)
 
 
+def _meaning(place):
+    """What a key says, in brackets; nothing of one that is not known."""
+    section = Keys.section(place[:-1])
+    known = section.model_fields.get(place[-1]) if section else None
+    return f" ({known.description})" if known else ""
+
+
 def _explain(error):
     """One line that names the key, the value and what is allowed."""
     place, value = [str(part) for part in error["loc"]], error["input"]
@@ -230,7 +261,9 @@ def _explain(error):
         known = list((section or Keys).model_fields)
         hint = nearest(place[-1], known)
         return in_a_line(f"unknown key {key} = {shown(value)}: {hint}allowed are {', '.join(known)}")
-    message = str(error["ctx"]["error"]) if error["type"] == "value_error" else error["msg"]
+    message = str(error["ctx"]["error"]) if error["type"] == "value_error" else in_own_words(error)
+    if error["type"] in _OTHER_KINDS and len(place) > 1:
+        message += _meaning(place)
     if isinstance(value, str):
         # What others say of a value repeats it whole.
         message = message.replace(repr(value), shown(value))

@@ -208,6 +208,7 @@ def test_what_a_user_typed(calls):
         (lambda: lai[:0].fifesim.fpar(), "lai has no cells, its sizes are y: 0, x: 12"),
         (lambda: rho.fifesim.to_toa(surroundings="lake", adjacency=True), "surroundings must be a reflectance.*'lake'"),
         (lambda: lai.fifesim.fpar(leaf_angles={30: 0.5, 60: 0.5}), "leaf_angles must be a name .*got a dict of 2"),
+        (lambda: rho.fifesim.sense("TM", noise=True), r"noise must .*such as \['shot', 'thermal'\].*got True"),
         (lambda: fifesim.psf("TM", ["TM3"]), "band must be a name, got a list of 1"),
         (lambda: fifesim.regress(np.ones(3), lai), "y must be an xarray.DataArray over"),
         (lambda: lai.fifesim.regress(np.ones(3)), "x must be an xarray.DataArray over"),
@@ -217,7 +218,7 @@ def test_what_a_user_typed(calls):
         (lambda: fifesim.to_geotiff(lai, "lai.tif", overwrite="no"), "overwrite must be True or False, got 'no'"),
         (lambda: fifesim.open_landsat("x_MTL.txt", quality="yes"), "quality must be True or False, got 'yes'"),
         (lambda: fifesim.open_sentinel2("x.SAFE", quality=1), "quality must be True or False, got 1"),
-        (lambda: lai.fifesim.surface_reflectance("TM", dems=1), r"surface_reflectance: .*'dems'"),
+        (lambda: lai.fifesim.surface_reflectance("TM", dems=1), r"no argument 'dems': did you mean 'dem'"),
         (lambda: rho.drop_vars(["band", "wavelength"]).drop_attrs(deep=False).fifesim.to_toa(), "neither.*wavelength"),
     ]
     for call, message in typed:

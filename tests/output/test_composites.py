@@ -70,7 +70,7 @@ def test_other_mistakes_are_named():
         rgb(image(), stretch=(98, 2))
     with pytest.raises(ValueError, match="along a dimension band"):
         rgb(image().isel(band=0))
-    with pytest.raises(ValueError, match="has no wavelength"):
+    with pytest.raises(ValueError, match=r"has no wavelength .*composite=\('\w+', '\w+', '\w+'\)"):
         rgb(image().drop_vars("wavelength"))
 
 

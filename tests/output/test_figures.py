@@ -1,5 +1,7 @@
 """Figures hold the numbers that they are of."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,15 @@ def test_regression_is_written_above_its_line(run):
     assert f"R² = {fit.r2:.3f},  n = {fit.n}" in axis.get_title()
     (line,) = axis.lines
     np.testing.assert_allclose(line.get_ydata(), fit.intercept + fit.slope * line.get_xdata())
+
+
+def test_leaf_area_is_not_drawn_below_zero(run):
+    """The line of a steep relation goes below it where few leaves are."""
+    image, truth, _ = run
+    fit = regress(truth["lai"], image["ndvi"], pair="index")
+    steep = dataclasses.replace(fit, slope=4 * fit.slope, intercept=fit.intercept - 3 * fit.slope * fit.x_mean)
+    axis = fit_figure(image, truth, "lai", steep).axes[0]
+    assert axis.lines[0].get_ydata().min() < 0 == axis.get_ylim()[0]
 
 
 def test_every_pixel_is_counted_where_it_lies(run):

@@ -1,5 +1,6 @@
 """Pictures: what they draw, in which colours, where and under which title."""
 
+import dataclasses
 import subprocess
 import sys
 
@@ -131,6 +132,12 @@ def test_a_fit_is_drawn_with_its_pixels(whole):
     assert f"n = {fit.n}" in axes.get_title() and "R² = " in axes.get_title()
     pixels = axes.collections[0].get_array()
     assert pixels.sum() == fit.n
+
+
+def test_the_axis_of_a_fit_begins_below_zero_only_where_pixels_are(whole):
+    steep = dataclasses.replace(fifesim.regress(whole["truth"], whole["ndvi"]), intercept=-3.0)
+    assert steep.plot(whole["truth"], whole["ndvi"]).get_ylim()[0] == 0
+    assert steep.plot(whole["truth"] - 2, whole["ndvi"]).get_ylim()[0] < 0
 
 
 def test_a_fit_is_drawn_of_a_part_of_many_pixels():

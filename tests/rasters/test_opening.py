@@ -166,3 +166,18 @@ def test_a_cut_file_names_itself(tmp_path):
         fifesim.open_lai(tmp_path / "cut.tif", GRID)
     with pytest.raises(OSError, match=r"cannot read .*cut\.tif"):
         fifesim.fine_dem(tmp_path / "cut.tif", GRID)
+
+
+@pytest.mark.parametrize(("name", "text"), [("points.xyz", "x;y;lai"), ("lai.txt", "plot,lai"), ("lai.tif", "sorry")])
+def test_plain_text_is_told_as_such_and_not_as_a_matter_of_trust(tmp_path, name, text):
+    (tmp_path / name).write_text(f"{text}\n1 2\n")
+    with pytest.raises(ValueError, match=f"{name} as a raster of GTiff.*; it is text that begins '{text}'") as caught:
+        opening.raster_file(tmp_path / name)
+    assert "allow_remote" not in str(caught.value) and len(str(caught.value)) <= 500
+
+
+def test_other_formats_stay_a_matter_of_trust(tmp_path):
+    for name, content in (("a.nc", b"CDF\x01\0\0\0\0"), ("b.xml", b"<Service/>"), ("c.json", b"{}")):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(ValueError, match="allow_remote=True"):
+            opening.raster_file(tmp_path / name)

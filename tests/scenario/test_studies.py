@@ -95,7 +95,7 @@ def test_one_band_may_be_drawn_beside_the_others():
         ({}, r"a study draws something: give a table \[draw\]"),
         ({"visibilty": {"uniform": [10, 60]}}, "draw: 'visibilty' is no key of a scenario: did you mean 'visibility'"),
         ({"visibility": {"unifrom": [10, 60]}}, r"draw\.atmosphere\.visibility: needs .* did you mean 'uniform'"),
-        ({"visibility": {"uniform": [1, 60]}}, r"draw\.atmosphere\.visibility = .* at 1\.0: .*greater than"),
+        ({"visibility": {"uniform": [1, 60]}}, r"draw\.atmosphere\.visibility = .* at 1\.0: .*must be at least 5"),
         ({"visibility": {"uniform": ["10 m", "60 miles"]}}, r"visibility is in km"),
         ({"visibility": 5}, r"draw\.atmosphere\.visibility: a distribution is a table"),
         ({"ground.seed": {"integers": [1, 9]}}, r"draw\.ground\.seed: landscapes and noise have seeds of their own"),

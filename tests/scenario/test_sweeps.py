@@ -70,7 +70,7 @@ def test_axis_may_be_a_function(small):
         ({}, "needs an axis"),
         ({"seed": [1, 2]}, r"several sections: write ground\.seed or terrain\.seed"),
         ({"visibilty": [10]}, "'visibilty' is no key of a scenario"),
-        ({"arp": [0.3]}, "less than 0.25"),
+        ({"arp": [0.3]}, "must be below 0.25"),
         ({"arp": 0.15}, "needs a list of values, got 0.15"),
         ({"instrument": "TM"}, "needs a list of values, got 'TM'"),
         ({"arp": []}, "needs a list of values"),

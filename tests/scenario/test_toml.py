@@ -40,6 +40,21 @@ def test_spelling_tells_each_mistake_in_a_line(tmp_path):
     ]
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[sensor]\nnoise = true", "sensor.noise = True: must be a list, in brackets (of the detectors: shot, thermal"),
+        ("[sensor]\nbands = [3]", "sensor.bands.0 = 3: must be text, in quotes"),
+        ("[ground]\narp = 0.3", "ground.arp = 0.3: must be below 0.25"),
+        ("[terrain]\nupwelling = 'x'", "terrain.upwelling = 'x': must be true or false"),
+    ],
+)
+def test_a_mistake_is_told_in_words_of_the_package(tmp_path, text, said):
+    with pytest.raises(ValueError) as caught:
+        check_spelling(written(tmp_path, text))
+    assert str(caught.value).startswith(said)
+
+
 def test_what_physics_alone_knows_passes_spelling(tmp_path):
     check_spelling(written(tmp_path, "[sensor]\ninstrument = 'TN'\n[ground]\nleaf_angles = 'sphere'\n"))
 

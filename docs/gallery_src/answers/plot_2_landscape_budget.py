@@ -67,7 +67,8 @@ for instrument in instruments:
     shares = 100 * table.loc[instrument]["share"]
     errors = 100 * table.loc[instrument]["share_error"]
     ground, sensor = shares[GROUND[:3]].sum(), shares[SENSOR].sum()
-    said = ", ".join(f"{stage} {shares[stage]:.1f} ± {errors[stage]:.1f}" for stage in GROUND)
+    shown = shares.round(1) + 0.0  # no -0.0
+    said = ", ".join(f"{stage} {shown[stage]:.1f} ± {errors[stage]:.1f}" for stage in GROUND)
     print(f"{instrument}: {said} % of the variance.")
     print(
         f"    Soil, dead leaves and cover add {ground:.1f} % together,"

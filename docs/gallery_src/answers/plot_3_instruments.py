@@ -39,7 +39,7 @@ STAGES = {
 names = list(dict.fromkeys(table.sort_values("pixel", kind="stable")["instrument"]))
 arps = sorted(table["arp"].unique())
 figure, axes = plt.subplots(
-    1, 3, figsize=(11.5, 0.42 * len(names) + 1.6), sharey=True, layout="constrained"
+    1, 3, figsize=(9.5, 0.42 * len(names) + 1.6), sharey=True, layout="constrained"
 )
 for axis, arp in zip(axes, arps, strict=True):
     of_ground = table[table["arp"] == arp].set_index(["instrument", "stage"])
@@ -68,7 +68,7 @@ for axis, arp in zip(axes, arps, strict=True):
         ecolor="#222222",
         elinewidth=1,
     )
-    axis.set(title=f"arp {arp:g}", xlim=(0, 1.05), xlabel="share of the variance of LAI left")
+    axis.set(title=f"arp {arp:g}", xlim=(0, 1.05), xticks=[0, 0.5, 1])
     axis.spines[["top", "right"]].set_visible(False)
 axes[0].set_ylim(len(names) - 0.4, -0.6)
 known = table.drop_duplicates("instrument").set_index("instrument")
@@ -79,7 +79,8 @@ for name in names:
         f"{name}, {known.loc[name, 'pixel']:g} m"
         + (f"\n(no {', '.join(unknown)})" if unknown else "")
     )
-axes[0].set_yticks(range(len(names)), labels, fontsize=7.5)
+axes[0].set_yticks(range(len(names)), labels, fontsize=8)
+figure.supxlabel("share of the variance of leaf area left", fontsize=10)
 figure.legend(
     *axes[0].get_legend_handles_labels(),
     loc="outside lower center",

@@ -8,6 +8,7 @@ were inferred from Table 2 itself. :doc:`/paper` says what of the agreement is f
 what is drawn here over more realisations.
 """
 
+# sphinx_gallery_thumbnail_number = 6
 import json
 from pathlib import Path
 
@@ -40,7 +41,7 @@ rows = [
 ]
 labels = [f"{name.replace('-', ', ')}, {arp:g}" for name, arp in rows]
 
-figure, axes = plt.subplots(2, 3, figsize=(11, 7), layout="constrained", sharey=True)
+figure, axes = plt.subplots(2, 3, figsize=(9.5, 6.6), layout="constrained", sharey=True)
 for line, variable in zip(axes, ("lai", "fpar"), strict=True):
     for axis, name in zip(line, ("intercept", "slope", "r2"), strict=True):
         one = found.sel(variable=variable)
@@ -73,7 +74,7 @@ numbers = json.loads(
 )
 
 figure, axes = plt.subplots(
-    2, 2, figsize=(11, 7), layout="constrained", sharex="col", sharey=True
+    2, 2, figsize=(9.5, 6.6), layout="constrained", sharex="col", sharey=True
 )
 for line, dem, words in zip(
     axes, ("flat", "flint-hills"), ("level ground", "synthetic hills"), strict=True
@@ -107,13 +108,13 @@ panels = {
     "lai_slope": ("slope [%]", 100),
     "lai_intercept": ("intercept", 1),
 }
-figure, axes = plt.subplots(1, 3, figsize=(11, 3.8), layout="constrained", sharey=True)
+figure, axes = plt.subplots(1, 3, figsize=(9.5, 4.2), layout="constrained", sharey=True)
 for axis, (key, (title, scale)) in zip(axes, panels.items(), strict=True):
     axis.barh(names, [scale * one[key] for one in changes], color="#0072B2")
     axis.axvline(0, color="#222222", linewidth=0.8)
     axis.set(title=f"change of {title}", xlim=(-0.12, 0.12) if scale == 1 else None)
     axis.spines[["top", "right", "left"]].set_visible(False)
-    axis.tick_params(axis="y", labelsize=7.5, length=0)
+    axis.tick_params(axis="y", labelsize=8, length=0)
 axes[0].invert_yaxis()
 
 # %%
@@ -158,7 +159,11 @@ show(7)
 show(8)
 
 # %%
-# Figure 9, reflectance of the image against that of the ground below it: with the drift, and without.
+# Figure 9, reflectance of the image against that of the ground below it, with the drift.
 
 show(9)
+
+# %%
+# The same with pixels on their blocks.
+
 show(9, "aligned")

@@ -25,7 +25,7 @@ for axis, arp in zip(axes, (0.05, 0.15, 0.24), strict=True):
     axis.set(
         title=f"arp {arp}: correlated over {length:.0f} m",
         xlabel="easting [m]",
-        xticks=range(0, 481, 120),
+        xticks=range(0, 480, 120),
     )
 axes[0].set(ylabel="northing [m]", yticks=range(0, 481, 120))
 figure.colorbar(drawn, ax=axes, shrink=0.8, pad=0.02, label="leaf area index [m² m⁻²]")

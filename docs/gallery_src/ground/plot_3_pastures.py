@@ -33,7 +33,7 @@ light = (
     .fifesim.illumination(geometry=fifesim.Geometry(sza=60, saa=315, vza=0, vaa=0))
 )
 colours = ListedColormap(["#e2c48d", "#4e8a6b", "#a9c08a"])
-figure, axes = plt.subplots(1, 3, figsize=(15, 6), layout="compressed", sharey=True)
+figure, axes = plt.subplots(1, 3, figsize=(11, 4.8), layout="compressed", sharey=True)
 classes = draw(axes[0], land.cover[::3, ::3], "treatments", cmap=colours, vmin=0.5, vmax=3.5)
 draw(axes[0], light, "treatments", cmap="gray", alpha=0.4)
 draw(
@@ -45,7 +45,8 @@ seen = draw(axes[2], ndvi, "TM: NDVI", cmap="YlGn", vmin=0.15, vmax=0.65)
 axes[0].set(ylabel="northing [km]")
 below = {"orientation": "horizontal", "pad": 0.02}
 legend = figure.colorbar(classes, ax=axes[0], ticks=[1, 2, 3], **below)
-legend.ax.set_xticklabels(land.cover.attrs["flag_meanings"].split())
+names = land.cover.attrs["flag_meanings"].replace("-", "-\n").split(" ")
+legend.ax.set_xticklabels(names)
 figure.colorbar(seen, ax=axes[2], **below)
 
 # %%
@@ -84,7 +85,7 @@ table = {
 }
 shares = {"wood": 0.3, "meadow": 0.4, "field": 0.25, "pond": 0.05}
 small = fifesim.fife_site(cell=10, window=((0, 400), (0, 400)))
-figure, axes = plt.subplots(1, 3, figsize=(13, 4.8), layout="constrained", sharey=True)
+figure, axes = plt.subplots(1, 3, figsize=(10, 3.8), layout="constrained", sharey=True)
 for axis, pattern in zip(axes, ("voronoi", "levels", "pastures"), strict=True):
     land = fifesim.landscape(
         small, cover=fifesim.Patches(pattern, 400, shares), classes=table, seed=3

@@ -93,7 +93,7 @@ axes[0].set_ylabel("northing [km]")
 # More variance of the soil, more scatter. A bright soil looks like fewer leaves, where there are few leaves to hide it.
 
 figure, axes = plt.subplots(
-    1, 4, figsize=(13, 3.6), layout="constrained", sharex=True, sharey=True
+    1, 4, figsize=(10.5, 3.2), layout="constrained", sharex=True, sharey=True
 )
 for axis, (deviation, ndvi) in zip(axes, images.items(), strict=True):
     fit = fifesim.regress(truth, ndvi)

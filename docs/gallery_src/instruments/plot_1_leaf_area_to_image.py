@@ -81,6 +81,7 @@ for axis, (name, true) in zip(axes, truth.items(), strict=True):
         xlabel="NDVI at the top of the atmosphere",
         ylabel=f"true {name}",
         title=f"R² = {fit.r2:.2f}, n = {fit.n}",
+        ylim=(0, None),
     )
     axis.legend(frameon=False, loc="upper left")
 

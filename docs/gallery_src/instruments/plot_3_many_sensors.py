@@ -18,7 +18,7 @@ names = ["MSI", "TM", "OLI", "MODIS", "AVHRR"]
 images = fifesim.compare(land["lai"], names).compute()
 
 ground = site.boundingbox
-figure, axes = plt.subplots(1, 5, figsize=(13, 3.5), layout="constrained")
+figure, axes = plt.subplots(1, 5, figsize=(10, 3), layout="constrained")
 for axis, name in zip(axes, names, strict=True):
     ndvi = images[name]["dn"].fifesim.ndvi()
     left, bottom, right, top = ndvi.odc.geobox.boundingbox
@@ -27,7 +27,7 @@ for axis, name in zip(axes, names, strict=True):
         ndvi, extent=(left, right, bottom, top), vmin=0.15, vmax=0.6, cmap="YlGn"
     )
     axis.set_title(
-        f"{name}, {spacing:.0f} m\nstandard deviation {float(ndvi.std()):.3f}",
+        f"{name}, {spacing:.0f} m\nsd {float(ndvi.std()):.3f}",
         fontsize="medium",
     )
     axis.set(

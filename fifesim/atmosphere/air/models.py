@@ -43,10 +43,11 @@ class Atmosphere:
     Parameters
     ----------
     profile : str, optional
-        Pressure, temperature, water vapour and ozone by altitude, one of `PROFILES`.
+        Pressure, temperature, water vapour and ozone by altitude: "tropical", "midlatitude-summer",
+        "midlatitude-winter", "subarctic-summer", "subarctic-winter" or "us-1962".
     aerosol : str, mapping or Aerosol, optional
-        Optical properties of the aerosol: one of `mixtures.MODELS`, "none", or a mixture of
-        `components.COMPONENTS` by volume, such as ``{"dust": 0.5, "water_soluble": 0.5}``; or one's own, of
+        Optical properties of the aerosol: "continental", "maritime", "urban", "none", or a mixture by volume of dust,
+        water_soluble, oceanic and soot, such as ``{"dust": 0.5, "water_soluble": 0.5}``; or one's own, of
         `fifesim.read_aerosol`, which needs an ``aot``.
     visibility : float, optional
         Meteorological range at the ground, 5 to 100; 45 where there is no ``aot``. [km]
@@ -59,8 +60,8 @@ class Atmosphere:
     o3 : float, optional
         Column of ozone, 0 to 1; by default that of the profile. [cm-atm]
     engine : str, optional
-        One of `ENGINES`: the closed forms of 5S, successive orders of scattering with or without polarization, or
-        6SV itself, which is an extra.
+        "5S", its closed forms; "successive-orders" of scattering, with polarization, or "successive-orders-scalar"
+        without; or "6S", 6SV itself, which is an extra.
 
     Raises
     ------

@@ -62,13 +62,20 @@ function outline(pen, x, y, width, height, dashed) {
   pen.setLineDash([]);
 }
 
+function multiples(step, low, high) {
+  const found = [];
+  for (let k = Math.ceil(low / step); k * step <= high + 1e-9; k += 1) found.push(k * step);
+  return found;
+}
+
+// Round numbers between two: about `count` of them, and three at least, without which no scale can be read.
 function ticks(low, high, count) {
   const rough = (high - low) / count;
   const size = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((each) => each * size).find((each) => each >= rough);
-  const found = [];
-  for (let k = Math.ceil(low / step); k * step <= high + 1e-9; k += 1) found.push(k * step);
-  return { found, digits: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
+  const steps = [1, 2, 5, 10].map((each) => each * size);
+  let at = steps.findIndex((each) => each >= rough);
+  while (at > 0 && multiples(steps[at], low, high).length < 3) at -= 1;
+  return { found: multiples(steps[at], low, high), digits: Math.max(0, -Math.floor(Math.log10(steps[at]) + 1e-9)) };
 }
 
 // Points of NDVI and truth with their line, that of the start, and the pixel that is marked.

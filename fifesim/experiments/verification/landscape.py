@@ -127,10 +127,10 @@ def _quantiles():
         worst = np.maximum(worst, largest(found, exact))
     evenly = quantile_map(deviates, np.linspace(0, 1, 2**14 + 1))
     worst = np.maximum(worst, largest(evenly, np.clip((deviates + 8.5) / 17, 0, 1)))
-    yield _deviation("leaf area at quantiles", worst, 3e-7, "m2 m-2", "quantile functions of scipy")
+    yield _deviation("leaf area at quantiles", worst, 3e-7, "m²/m²", "quantile functions of scipy")
     ranked = rank_map(deviates[0], density)[np.argsort(deviates[0])]
     exact = density.ppf((np.arange(ranked.size) + 0.5) / ranked.size)
-    yield _deviation("leaf area by ranks", largest(ranked, exact), 0.0, "m2 m-2", "quantile functions of scipy")
+    yield _deviation("leaf area by ranks", largest(ranked, exact), 0.0, "m²/m²", "quantile functions of scipy")
 
 
 def _tiles():

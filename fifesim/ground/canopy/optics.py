@@ -17,6 +17,9 @@ LARGEST_LAI = 100.0
 LARGEST_OF_MAPS = 20.0
 """Of measured canopies, and a little more: a map beyond is in another scale [m2 m-2]."""
 
+# Hardly a cell of a map has more. [m2 m-2]
+_COMMON = 10.0
+
 DEAD_LEAF = Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001)
 """Dead tallgrass: the default leaf without green pigments and with little water; see ``data/README.md``."""
 
@@ -278,8 +281,8 @@ def check_lai(lai):
         wrong = (cells < 0) | (cells > LARGEST_LAI)
         raise ValueError(
             f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
-            f"{wrong.sum()} of {cells.size} cells: set cells without data to NaN, such as lai.where(lai >= 0), and "
-            "multiply scaled numbers by their scale"
+            f"{wrong.sum()} of {cells.size} cells: {_of_another_scale(cells)}set cells without data to NaN, such as "
+            "lai.where(lai >= 0)"
         )
     return lai
 
@@ -322,8 +325,17 @@ def check_map(lai):
     if largest > LARGEST_OF_MAPS or np.fmin.reduce(cells, axis=None, initial=0.0) < 0:
         check_lai(lai)
         raise ValueError(
-            f"leaf area index up to {largest:g}, canopies have at most {LARGEST_OF_MAPS:g}: where the numbers are "
-            "scaled, as MODIS by 0.1, type lai * 0.1, or gdal_edit.py -a_scale 0.1 for a file; set cells without data "
-            "to NaN"
+            f"leaf area index up to {largest:g}, canopies have at most {LARGEST_OF_MAPS:g}: {_of_another_scale(cells)}"
+            "set cells without data to NaN"
         )
     return lai
+
+
+def _of_another_scale(cells):
+    """What to type where numbers are scaled: by the power of ten that brings nearly all of them below 10."""
+    positive = cells[(cells > 0) & np.isfinite(cells)]
+    most = np.quantile(positive, 0.98) if positive.size else 0.0
+    if most <= _COMMON:
+        return ""
+    scale = f"{10.0 ** -np.ceil(np.log10(most / _COMMON)):g}"
+    return f"where the numbers are scaled, type lai * {scale}, or gdal_edit.py -a_scale {scale} for a file; "

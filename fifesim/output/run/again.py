@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 import rasterio
 
-from fifesim.base.foreign import in_a_line
+from fifesim.base.foreign import in_a_line, shown
 from fifesim.output.provenance import versions
 from fifesim.output.run.folder import simulate_to_folder
 from fifesim.output.run.origin import PRODUCT, SCENARIO, VERSIONS
 from fifesim.rasters.opening import ErrorsOfGdal, raster_file
 from fifesim.scenario.scenario import parse_scenario
-from fifesim.scenario.toml import with_folder
+from fifesim.scenario.toml import named_files, with_folder
 
 # A tag that is longer was not written here. [character]
 _LONGEST = 1_000_000
@@ -123,11 +123,13 @@ def read_origin(path):
             raise ValueError("a product that no run has")
         if not isinstance(before, dict) or not all(isinstance(each, str) for each in before.values()):
             raise ValueError("no versions")
-        values = with_folder(tomllib.loads(tags[SCENARIO]), Path(path).absolute().parent)
+        values = tomllib.loads(tags[SCENARIO])
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{file.name} has tags that fifesim did not write: {in_a_line(error, 100)}") from None
+    folder = Path(path).absolute().parent
+    _check_inputs(values, folder, file.name)
     try:
-        return parse_scenario(values), product, before
+        return parse_scenario(with_folder(values, folder)), product, before
     except ValueError as error:
         maker, here = before.get("fifesim", "unknown"), versions()["fifesim"]
         if maker == here:
@@ -136,6 +138,18 @@ def read_origin(path):
             f"{file.name} was made by fifesim {in_a_line(maker, 20)}, here is {here}, which refuses its scenario: "
             f"{in_a_line(str(error).splitlines()[0], 200)}"
         ) from None
+
+
+def _check_inputs(values, folder, name):
+    """Files that a scenario names lie where they lay, seen from the file that was made of them."""
+    for place, table, key in named_files(values):
+        there = os.path.normpath(folder / table[key])
+        if not os.path.exists(there) and not there.startswith("/vsi"):
+            raise ValueError(
+                f"{name} was made of {'.'.join((*place, key))} = {shown(table[key])}, seen from the folder that it lies"
+                f" in, and there is no such file {in_a_line(there, 150)}: rerun it where the run wrote it, or put that "
+                "file there"
+            )
 
 
 def in_words(path, found):

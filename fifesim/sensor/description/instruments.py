@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from fifesim.base import datasets
 from fifesim.base.annotations import FilePath
 from fifesim.base.foreign import in_a_line, read_toml, shown
+from fifesim.base.refusals import in_own_words
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.plausibility import check_units
@@ -241,7 +242,7 @@ def _explain(error):
         return f"the key {key}.kind is missing"
     if error["type"] == "value_error":
         return ": ".join(filter(None, (key, str(error["ctx"]["error"]))))
-    return f"{key} = {shown(error['input'])}: {error['msg']}"
+    return f"{key} = {shown(error['input'])}: {in_own_words(error)}"
 
 
 def _key_parts(places):

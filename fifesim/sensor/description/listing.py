@@ -89,8 +89,6 @@ def _sampling(instrument):
         groups.setdefault(seen, []).append(band)
     lines = []
     for (pixel, intervals, fields, response), bands in groups.items():
-        spreads = instrument.line_spreads(bands[0])
-        mtf = tuple(float(lsf.mtf(0.5 / step)) for lsf, step in zip(spreads, intervals, strict=True))
         kinds = by_axes(response) if isinstance(response, TwoAxes) else [response]
         which = ", ".join(band.name for band in bands) if len(groups) > 1 else "all bands"
         lines += [
@@ -98,8 +96,9 @@ def _sampling(instrument):
             f"    own interval {_pair(intervals, '.3f')} m at nadir"
             + (f", instantaneous field of view {_pair(fields, '.2f')} m" if fields.along else ""),
             f"    line spread {' x '.join(part.kind for part in kinds)}, modulation transfer at the Nyquist frequency "
-            f"of the own interval {_pair(mtf, '.2f')}",
+            f"of the own interval {_pair(_transfer(instrument, bands[0]), '.2f')}",
         ]
+        lines += [f"    {text}: images are sharper" for text in _detector(instrument, bands[0])]
         if not knows_blur(instrument, bands[0]):
             lines.append(
                 "    that of the detector alone: images are sharper than the instrument's, whose blur is not known"
@@ -168,13 +167,9 @@ def blur_in_words(instrument, bands):
     if unknown:
         text += f"; of {', '.join(unknown)} the detector alone is known: the image is sharper than the instrument's"
         text += _published(instrument, "blur")
-    detector = with_response(instrument, "detector")
-    alone = [_transfer(detector, band) for band in detector.select([band.name for band in chosen])]
-    # To the two digits that are shown.
-    sharper = [k for k, each in enumerate(passed) if max(each) > max(alone[k]) + 0.005]
-    if sharper:
-        text += f"; the detector alone has {_pair(alone[sharper[0]], '.2f')}: the image of "
-        text += f"{', '.join(chosen[k].name for k in sharper)} is sharper"
+    alone = {band.name: text for band in chosen for text in _detector(instrument, band)}
+    if alone:
+        text += f"; {next(iter(alone.values()))}: the image of {', '.join(alone)} is sharper"
     return text
 
 
@@ -182,6 +177,15 @@ def _transfer(instrument, band):
     """Modulation transfer at the Nyquist frequency of the own interval, along and across the track."""
     pairs = zip(instrument.line_spreads(band), instrument.ground_intervals(band), strict=True)
     return [float(spread.mtf(0.5 / step)) for spread, step in pairs]
+
+
+def _detector(instrument, band):
+    """What the detector alone transfers, in a list of one line, or of none where it is no less than the band does."""
+    passed = _transfer(instrument, band)
+    detector = with_response(instrument, "detector")
+    alone = _transfer(detector, *detector.select([band.name]))
+    # To the two digits that are shown.
+    return [f"the detector alone has {_pair(alone, '.2f')}"] if max(passed) > max(alone) + 0.005 else []
 
 
 def noise_in_words(instrument, bands, kinds=()):

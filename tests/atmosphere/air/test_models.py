@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from fifesim.atmosphere.air import components, mixtures, models
 from fifesim.atmosphere.air.models import Atmosphere
 
 
@@ -130,3 +131,9 @@ def test_amounts_out_of_range_are_named(arguments, message):
 def test_text_tells_everything(arguments):
     atmosphere = Atmosphere(**arguments)
     assert Atmosphere.parse(atmosphere.text) == atmosphere
+
+
+def test_documentation_names_all_that_may_be_asked_for():
+    said = Atmosphere.__doc__
+    names = (*models.PROFILES, *mixtures.MODELS, *components.COMPONENTS, *models.ENGINES)
+    assert [name for name in names if name not in said] == []

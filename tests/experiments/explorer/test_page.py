@@ -5,12 +5,14 @@ import json
 import re
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from browser import CHROMIUM, opened
 
 import fifesim
+from fifesim.experiments import explorer
 from fifesim.experiments.explorer.page import explorer_page, page_data
 from fifesim.scenario.scenario import parse_scenario
 
@@ -171,3 +173,17 @@ def test_page_fits_its_width_by_mouse_and_keyboard(page, tmp_path):
         return await browser.printed()
 
     assert looked_at(page, tmp_path, look).startswith(b"%PDF")
+
+
+@in_a_browser
+def test_a_scale_has_three_numbers_and_room_for_them(page, tmp_path):
+    """With one number an axis cannot be read."""
+    drawing = Path(explorer.__file__).with_name("explore_drawing.js").read_text(encoding="utf-8")
+    cases = [(0.41, 0.56, 3), (0.2, 0.47, 3), (0.0, 2.3, 5), (-0.01, 0.3, 5)]
+
+    async def look(browser):
+        calls = ", ".join(f"ticks{case}.found" for case in cases)
+        return await browser.evaluate(f"(() => {{ {drawing}\nreturn [{calls}]; }})()")
+
+    for (low, high, _), found in zip(cases, looked_at(page, tmp_path, look), strict=True):
+        assert 3 <= len(found) <= 7 and low <= min(found) and max(found) < high + 1e-6

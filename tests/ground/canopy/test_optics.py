@@ -54,6 +54,8 @@ def test_unknown_bands_are_told_what_to_pass(function):
         (lambda: check_background([0.1, np.nan, 15]), r"background reflectance must be in \[0, 1\], got 15"),
         (lambda: check_lai([1, np.nan, -9999, -1]), "nor above 100, got -9999 in 2 of 4 cells: set cells without data"),
         (lambda: check_lai(255), "nor above 100, got 255"),
+        (lambda: check_lai([90, 240, np.nan]), r"got 240 in 1 of 3 cells: .* scaled, type lai \* 0.01, or gdal_edit"),
+        (lambda: check_lai([900, 2400]), r"type lai \* 0.001, or gdal_edit.py -a_scale 0.001 for a file"),
         (lambda: check_lai(np.inf), "got inf"),
     ],
 )

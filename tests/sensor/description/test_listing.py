@@ -19,6 +19,8 @@ def test_thematic_mapper_in_words():
     assert "  all bands: pixels of 30 m in the gridded product" in lines
     assert "    own interval 30.315 m at nadir" in lines
     assert "    line spread cosine, modulation transfer at the Nyquist frequency of the own interval 0.69" in lines
+    # The cosine passes more than a detector as wide as the field of view does.
+    assert "    the detector alone has 0.64: images are sharper" in lines
     (red,) = [line.split() for line in lines if line.startswith("  TM3")]
     assert red[5:8] == ["-1.20", "204.30", "0.8059"]
 
@@ -34,6 +36,7 @@ def test_transfer_at_the_nyquist_frequency_is_that_of_each_axis():
 
 def test_bands_that_share_their_pixels_share_a_line():
     text = instrument_in_words(instrument("MODIS"))
+    assert "the detector alone has" not in text
     assert "  MODIS1, MODIS2: pixels of 250 m" in text
     assert "  MODIS3, MODIS4, MODIS5, MODIS6, MODIS7: pixels of 500 m" in text
 

@@ -82,7 +82,8 @@ def open_sentinel2(
     chunks : mapping or int or "auto", optional
         The image is lazy; "auto" are 2048 x 2048 pixels of a band. None reads all of it at once.
     instrument : str or Instrument, optional
-        Whose responses the bands have, instead of the spacecraft's; of Sentinel-2C fifesim has none of its own.
+        Whose responses the bands have, instead of the spacecraft's; of Sentinel-2C none were found, and "MSI-C" takes
+        those of Sentinel-2A.
 
     Returns
     -------
@@ -121,8 +122,8 @@ def open_sentinel2(
         raise ValueError(f"angles must be 'centre' or 'pixel', got {angles!r}")
     if product.instrument is None and instrument is None:
         raise ValueError(
-            f"the product is of {product.spacecraft}, whose responses fifesim does not have: give instrument='MSI', "
-            "'MSI-B' or your own, and its responses are taken"
+            f"the product is of {product.spacecraft}, whose responses fifesim does not have: give instrument='MSI-C', "
+            "which takes those of Sentinel-2A, 'MSI', 'MSI-B' or your own"
         )
     description = find_instrument(product.instrument if instrument is None else instrument)
     if resolution is None:

@@ -212,7 +212,7 @@ def test_a_band_whose_view_is_not_known_is_refused(tmp_path):
 def test_another_spacecraft_takes_the_responses_that_are_given(tmp_path):
     path, _ = products.sentinel2(tmp_path, 1, "05.11", spacecraft="Sentinel-2C")
     with pytest.raises(
-        ValueError, match="is of Sentinel-2C, whose responses fifesim does not have: give instrument='MSI'"
+        ValueError, match="is of Sentinel-2C, whose responses fifesim does not have: give instrument='MSI-C'"
     ):
         fifesim.open_sentinel2(path, 10)
     assert fifesim.open_sentinel2(path, 10, instrument="MSI-B").attrs["instrument"] == "MSI-B"
