@@ -62,7 +62,7 @@ def changes(tree):
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.Not):
             yield node, "op", ast.UAdd() if isinstance(node.op, ast.USub) else None
         if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-            yield node, "value", node.value * 1.01 if isinstance(node.value, float) else node.value + 1
+            yield node, "value", (node.value * 1.01 or 0.01) if isinstance(node.value, float) else node.value + 1
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             yield node, "value", ast.Constant(None)
 
