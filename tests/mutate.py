@@ -4,7 +4,7 @@ Turn one operator, comparison, constant or call of the package at a time, and li
     pytest -n auto --cov=fifesim --cov-context=test --cov-report=      # once: which test runs which line
     python tests/mutate.py 300 --seed 1 --log mutations.txt            # half an hour; goes on where the log ends
     python tests/mutate.py 20 --only fifesim/ground                    # part of the package
-    python tests/mutate.py 40 --only fifesim/atmosphere --verify       # what `fifesim verify` alone notices
+    python tests/mutate.py 40 --verify                                 # what `fifesim verify` notices in its kernels
 
 Each change is made in a copy of the checkout. The module's own tests and examples come first, then some of each other
 file that run the line, then those of the modules that import it and some that run any line of it, the nearest first and
@@ -15,11 +15,9 @@ by a hundredth, whole numbers by one. Each run of tests is a fork of a process t
 import argparse
 import ast
 import contextlib
-import copy
 import importlib
 import multiprocessing
 import os
-import random
 import shutil
 import signal
 import sys
@@ -30,19 +28,8 @@ from itertools import takewhile
 from pathlib import Path
 
 import pytest
+from mutations import ROOT, changed, draw, imported
 
-ROOT = Path(__file__).parents[1]
-TURNED = {
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-    ast.Mult: ast.Div,
-    ast.Div: ast.Mult,
-    ast.Pow: ast.Mult,
-    ast.Mod: ast.Mult,
-}
-TURNED |= {ast.FloorDiv: ast.Mult, ast.And: ast.Or, ast.Or: ast.And, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd}
-TURNED |= {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
-SHIFTED = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
 LONGEST = 200  # of a module's own tests [s]; none takes so long
 LONG = 100  # of tests of others [s]
 ENDLESS = "it does not end"
@@ -50,66 +37,13 @@ FEW = 3  # tests of each other file
 TIMED = ("tests/test_faults.py",)  # processes that are killed at a moment
 
 
-def changes(tree):
-    """Every change of a module: node, field, what takes its place."""
-    for node in _code(tree):
-        if isinstance(node, ast.BinOp | ast.AugAssign | ast.BoolOp) and type(node.op) in TURNED:
-            yield node, "op", TURNED[type(node.op)]()
-        if isinstance(node, ast.Compare) and len(node.ops) == 1:
-            for table in (TURNED, SHIFTED):
-                if type(node.ops[0]) in table:
-                    yield node, "ops", [table[type(node.ops[0])]()]
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.Not):
-            yield node, "op", ast.UAdd() if isinstance(node.op, ast.USub) else None
-        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-            yield node, "value", (node.value * 1.01 or 0.01) if isinstance(node.value, float) else node.value + 1
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
-            yield node, "value", ast.Constant(None)
-
-
-def _code(node):
-    """Nodes that compute: no annotations, decorators, messages or texts."""
-    for name, value in ast.iter_fields(node):
-        for child in value if isinstance(value, list) else [value]:
-            skipped = name in ("annotation", "returns", "decorator_list") or isinstance(
-                child, ast.Raise | ast.JoinedStr
-            )
-            if isinstance(child, ast.AST) and not skipped:
-                yield child
-                yield from _code(child)
-
-
-def changed(source, number):
-    """Source with one change, its line, and the change in words."""
-    tree = ast.parse(source)
-    node, field, new = list(changes(tree))[number]
-    before = ast.unparse(copy.deepcopy(node))
-    if new is None:
-        node.op, node.operand = ast.Not(), ast.UnaryOp(ast.Not(), node.operand)
-    else:
-        setattr(node, field, new)
-    ast.fix_missing_locations(tree)
-    return ast.unparse(tree), node.lineno, f"line {node.lineno}: {before[:90]}  ->  {ast.unparse(node)[:90]}"
-
-
-def draw(count, seed, only):
-    """Places of changes, drawn from all with equal weight."""
-    files = sorted(each.relative_to(ROOT) for each in (ROOT / only).rglob("*.py"))
-    places = [(each, n) for each in files for n, _ in enumerate(changes(ast.parse((ROOT / each).read_text())))]
-    return random.Random(seed).sample(places, min(count, len(places)))
-
-
 @cache
 def importers():
     """By module, those that import it."""
     direct = {}
     for path in (ROOT / "fifesim").rglob("*.py"):
-        one = path.relative_to(ROOT)
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("fifesim"):
-                found = [node.module, *(f"{node.module}.{each.name}" for each in node.names)]
-                for name in found:
-                    direct.setdefault(Path(*name.split(".")).with_suffix(".py"), set()).add(one)
+        for each in imported(ast.parse(path.read_text())):
+            direct.setdefault(each, set()).add(path.relative_to(ROOT))
     return direct
 
 
@@ -324,26 +258,20 @@ def main():
     given = parser.parse_args()
     part, parts = map(int, given.part.split("/"))
     known = given.log.read_text() if given.log.exists() else ""
-    ahead = [
-        each for each in draw(given.draws, given.seed, given.only)[part - 1 :: parts] if f"{_name(*each)}:" not in known
-    ]
+    drawn = draw(given.draws, given.seed, given.only, given.verify)[part - 1 :: parts]
     # Threads that wait for each other cost more than they bring in products so small.
     os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with tempfile.TemporaryDirectory() as scratch:
         checkout = Checkout(scratch)
         checkout.import_others()
-        for path, number in ahead:
+        for path, number in drawn:
+            if f"{path} {number}:" in known:
+                continue
             began = time.monotonic()
             words, found = checkout.tried(path, number, given.verify)
             with given.log.open("a") as log:
-                print(
-                    f"{_name(path, number)}: {words} | {found or 'SURVIVES'} | {time.monotonic() - began:.0f} s",
-                    file=log,
-                )
-
-
-def _name(path, number):
-    return f"{path} {number}"
+                spent = f"{time.monotonic() - began:.0f} s"
+                print(f"{path} {number}: {words} | {found or 'SURVIVES'} | {spent}", file=log)
 
 
 if __name__ == "__main__":
