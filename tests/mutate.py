@@ -31,7 +31,8 @@ import pytest
 from mutations import ROOT, changed, draw, imported
 
 LONGEST = 200  # of a module's own tests [s]; none takes so long
-LONG = 100  # of tests of others [s]
+LONG = 100  # of tests of others that run the line [s]
+SHORT = 40  # of those that run the module [s]
 ENDLESS = "it does not end"
 FEW = 3  # tests of each other file
 TIMED = ("tests/test_faults.py",)  # processes that are killed at a moment
@@ -105,7 +106,7 @@ def tests_of(path, line):
     yield _few(lines_of(path).get(line, ()), path, own), LONG
     neighbours = [test for each in sorted(importers().get(path, ())) for test in own_tests(each)[:1]]
     around = set().union(*lines_of(path).values())
-    yield list(dict.fromkeys(neighbours + _few(around, path, own + neighbours))), LONG
+    yield list(dict.fromkeys(neighbours + _few(around, path, own + neighbours))), SHORT
 
 
 class Watch:
