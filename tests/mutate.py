@@ -31,8 +31,8 @@ import pytest
 from mutations import ROOT, changed, draw, imported
 
 LONGEST = 200  # of a module's own tests [s]; none takes so long
-LONG = 100  # of tests of others that run the line [s]
-SHORT = 40  # of those that run the module [s]
+LONG = 60  # of tests of others that run the line [s]
+SHORT = 30  # of those that run the module [s]
 ENDLESS = "it does not end"
 FEW = 3  # tests of each other file
 TIMED = ("tests/test_faults.py",)  # processes that are killed at a moment
