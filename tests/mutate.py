@@ -151,6 +151,7 @@ def apart(folder, function, *given):
     here, there = fork.Pipe(duplex=False)
     process = fork.Process(target=_apart, args=(folder, function, given, there))
     process.start()
+    there.close()
     try:
         return here.recv() if here.poll(2 * LONGEST) else ENDLESS
     except EOFError:
