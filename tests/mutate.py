@@ -27,6 +27,7 @@ from functools import cache
 from itertools import takewhile
 from pathlib import Path
 
+import hypothesis
 import pytest
 from mutations import ROOT, changed, draw, imported
 
@@ -133,7 +134,10 @@ class Watch:
 def failing(tests, seconds=LONGEST):
     """The first test that fails, or None."""
     watch = Watch(seconds)
-    options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=1"]
+    options = ["-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=1"]
+    # The first example that fails is enough.
+    hypothesis.settings.register_profile("first", phases=[hypothesis.Phase.explicit, hypothesis.Phase.generate])
+    hypothesis.settings.load_profile("first")
     code = pytest.main([*options, *tests], plugins=[watch])
     return watch.failed or (None if code in (0, 2, 5) else f"exit {code}")
 
