@@ -24,3 +24,8 @@ def notices(check, monkeypatch, owner, kernel):
     before = all(each.within for each in check())
     monkeypatch.setattr(owner, kernel, broken(getattr(owner, kernel)))
     return before and not all(each.within for each in check())
+
+
+def exceeded(*checks):
+    """What lies beyond its bound."""
+    return [deviation.what for check in checks for deviation in check() if not deviation.within]

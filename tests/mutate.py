@@ -2,106 +2,54 @@
 Turn one operator, comparison, constant or call of the package at a time, and list what no test notices.
 
     pytest -n auto --cov=fifesim --cov-context=test --cov-report=      # once: which test runs which line
-    python tests/mutate.py 300 --seed 1 --log mutations.txt            # hours; goes on where the log ends
+    python tests/mutate.py 300 --seed 1 --log mutations.txt            # half an hour; goes on where the log ends
     python tests/mutate.py 20 --only fifesim/ground                    # part of the package
-    python tests/mutate.py 40 --only fifesim/atmosphere --verify       # what `fifesim verify` alone notices
+    python tests/mutate.py 40 --verify                                 # what `fifesim verify` notices in its kernels
 
-Each change is made in a copy of the checkout. The module's own tests come first, then those of other files that run
-the line, then all that run any line of the module or of one that imports it, until one fails. Numbers with a point
-change by a hundredth, whole numbers by one.
+Each change is made in a copy of the checkout. The module's own tests and examples come first, then some of each other
+file that run the line, then those of the modules that import it and some that run any line of it, the nearest first and
+as long as there is time. What fails must fail again alone, and pass without the change. Numbers with a point change
+by a hundredth, whole numbers by one. Each run of tests is a fork of a process that has imported all but the package.
 """
 
 import argparse
 import ast
-import copy
+import contextlib
+import importlib
+import multiprocessing
 import os
-import random
 import shutil
-import subprocess
+import signal
 import sys
 import tempfile
+import time
 from functools import cache
+from itertools import takewhile
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
-TURNED = {
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-    ast.Mult: ast.Div,
-    ast.Div: ast.Mult,
-    ast.Pow: ast.Mult,
-    ast.Mod: ast.Mult,
-}
-TURNED |= {ast.FloorDiv: ast.Mult, ast.And: ast.Or, ast.Or: ast.And, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd}
-TURNED |= {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
-SHIFTED = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
-LONGEST = 1200  # of one run of tests [s]
-FEW = 3  # tests of each other file that runs a line
+import hypothesis
+import pytest
+from mutations import ROOT, changed, draw, imported
 
-
-def changes(tree):
-    """Every change of a module: node, field, what takes its place."""
-    for node in _code(tree):
-        if isinstance(node, ast.BinOp | ast.AugAssign | ast.BoolOp) and type(node.op) in TURNED:
-            yield node, "op", TURNED[type(node.op)]()
-        if isinstance(node, ast.Compare) and len(node.ops) == 1:
-            for table in (TURNED, SHIFTED):
-                if type(node.ops[0]) in table:
-                    yield node, "ops", [table[type(node.ops[0])]()]
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.Not):
-            yield node, "op", ast.UAdd() if isinstance(node.op, ast.USub) else None
-        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-            yield node, "value", node.value * 1.01 if isinstance(node.value, float) else node.value + 1
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
-            yield node, "value", ast.Constant(None)
-
-
-def _code(node):
-    """Nodes that compute: no annotations, decorators, messages or texts."""
-    for name, value in ast.iter_fields(node):
-        for child in value if isinstance(value, list) else [value]:
-            skipped = name in ("annotation", "returns", "decorator_list") or isinstance(
-                child, ast.Raise | ast.JoinedStr
-            )
-            if isinstance(child, ast.AST) and not skipped:
-                yield child
-                yield from _code(child)
-
-
-def changed(source, number):
-    """Source with one change, its line, and the change in words."""
-    tree = ast.parse(source)
-    node, field, new = list(changes(tree))[number]
-    before = ast.unparse(copy.deepcopy(node))
-    if new is None:
-        node.op, node.operand = ast.Not(), ast.UnaryOp(ast.Not(), node.operand)
-    else:
-        setattr(node, field, new)
-    ast.fix_missing_locations(tree)
-    return ast.unparse(tree), node.lineno, f"line {node.lineno}: {before[:90]}  ->  {ast.unparse(node)[:90]}"
-
-
-def draw(count, seed, only):
-    """Places of changes, drawn from all with equal weight."""
-    files = sorted(each.relative_to(ROOT) for each in (ROOT / only).rglob("*.py"))
-    places = [(each, n) for each in files for n, _ in enumerate(changes(ast.parse((ROOT / each).read_text())))]
-    return random.Random(seed).sample(places, min(count, len(places)))
+LONGEST = 200  # of a module's own tests [s]; none takes so long
+LONG = 60  # of tests of others that run the line [s]
+SHORT = 30  # of those that run the module [s]
+ENDLESS = "it does not end"
+FEW = 3  # tests of each other file
+TIMED = ("tests/test_faults.py",)  # processes that are killed at a moment
 
 
 @cache
 def importers():
-    """By module, those that import it, through others too."""
+    """By module, those that import it."""
     direct = {}
     for path in (ROOT / "fifesim").rglob("*.py"):
-        one = path.relative_to(ROOT)
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("fifesim"):
-                found = [node.module, *(f"{node.module}.{each.name}" for each in node.names)]
-                for name in found:
-                    direct.setdefault(Path(*name.split(".")).with_suffix(".py"), set()).add(one)
+        for each in imported(ast.parse(path.read_text())):
+            direct.setdefault(each, set()).add(path.relative_to(ROOT))
     return direct
 
 
+@cache
 def compiled_with(path):
     """A module and all that may have compiled its functions into theirs."""
     found, ahead = {path}, [path]
@@ -124,85 +72,212 @@ def lines_of(path):
 
     known = CoverageData(str(ROOT / ".coverage"))
     known.read()
-    found = known.contexts_by_lineno(str(ROOT / path))
-    return {line: {each.rsplit("|", 1)[0] for each in tests if "|" in each} for line, tests in found.items()}
+    measured = next((each for each in known.measured_files() if each.endswith(f"/{path}")), None)
+    found = known.contexts_by_lineno(measured) if measured else {}
+    return {line: {each.split("|")[0].split("[")[0] for each in tests if "|" in each} for line, tests in found.items()}
+
+
+def own_tests(path):
+    """The test file of a module, and its examples."""
+    inside = path.relative_to("fifesim")
+    own = [Path("tests") / inside.parent / f"test_{inside.name}", path]
+    return [str(each) for each in own if (ROOT / each).exists()]
+
+
+def _few(tests, path, without):
+    """Some of each test file, those of the nearest folders first."""
+    by_file = {}
+    for test in sorted(tests):
+        by_file.setdefault(test.split("::")[0], []).append(test)
+    files = sorted(by_file, key=lambda file: _apart_by(path, file.replace("fifesim", "tests", 1)))
+    return [test for file in files if file not in without for test in by_file[file][:FEW]]
+
+
+def _apart_by(path, file):
+    """Folders between a module and a test file."""
+    one, other = path.parent.parts[1:], Path(file).parent.parts[1:]
+    shared = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False)))
+    return len(one) + len(other) - 2 * shared
 
 
 def tests_of(path, line):
-    """What may notice a change of a line, the quickest first."""
-    inside = path.relative_to("fifesim")
-    own = [Path("tests") / inside.parent / f"test_{inside.name}", path]
-    own = [str(each) for each in own if (ROOT / each).exists()]
-    yield own
-    elsewhere = {}
-    for test in sorted(lines_of(path).get(line, ())):
-        elsewhere.setdefault(test.split("::")[0], []).append(test)
-    yield [test for file, tests in elsewhere.items() if file not in own for test in tests[:FEW]]
-    seen = {test for each in (path, *importers().get(path, ())) for tests in lines_of(each).values() for test in tests}
-    yield sorted(seen)
+    """What may notice a change of a line, the quickest first, and for how long it is asked. [s]"""
+    own = own_tests(path)
+    yield own, LONGEST
+    yield _few(lines_of(path).get(line, ()), path, own), LONG
+    neighbours = [test for each in sorted(importers().get(path, ())) for test in own_tests(each)[:1]]
+    around = set().union(*lines_of(path).values())
+    yield list(dict.fromkeys(neighbours + _few(around, path, own + neighbours))), SHORT
 
 
-def noticed(folder, tests):
+class Watch:
+    """Ends a run of tests when its time is over, leaves out those that hang on a clock, and keeps what failed first."""
+
+    def __init__(self, seconds):
+        self.end, self.failed = time.monotonic() + seconds, None
+
+    def pytest_collection_modifyitems(self, items):
+        items[:] = [each for each in items if not each.nodeid.startswith(TIMED)]
+
+    def pytest_runtest_logreport(self, report):
+        if report.failed:
+            self.failed = self.failed or report.nodeid
+
+    pytest_collectreport = pytest_runtest_logreport
+
+    def pytest_runtest_setup(self, item):
+        if time.monotonic() > self.end:
+            item.session.shouldstop = "time is over"
+            pytest.skip("time is over")
+
+
+def failing(tests, seconds=LONGEST):
     """The first test that fails, or None."""
-    listed = folder / "tests.txt"
-    listed.write_text("\n".join(tests))
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", f"@{listed}"]
-    environment = os.environ | {"PYTHONPATH": str(folder)}
-    try:
-        run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=LONGEST)
-    except subprocess.TimeoutExpired:
-        return "it does not end"
-    if run.returncode in (0, 5):
-        return None
-    failed = [line for line in run.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-    return failed[0][:150] if failed else f"exit {run.returncode}"
+    watch = Watch(seconds)
+    options = ["-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=1"]
+    # The first example that fails is enough.
+    hypothesis.settings.register_profile("first", phases=[hypothesis.Phase.explicit, hypothesis.Phase.generate])
+    hypothesis.settings.load_profile("first")
+    code = pytest.main([*options, *tests], plugins=[watch])
+    return watch.failed or (None if code in (0, 2, 5) else f"exit {code}")
 
 
-def verified(folder):
+def verified():
     """Whether the checks of an installation pass."""
-    environment = os.environ | {"PYTHONPATH": str(folder)}
-    run = subprocess.run(
-        [sys.executable, "-m", "fifesim.cli", "verify"], cwd=folder, env=environment, capture_output=True, text=True
-    )
-    return None if run.returncode == 0 else "fifesim verify"
+    from fifesim.experiments.verification.areas import deviations
+
+    return next((f"{each.area}: {each.what}" for each in deviations() if not each.within), None)
 
 
-def tried(folder, path, number, verify):
-    """A change in words, and what noticed it."""
-    source = (ROOT / path).read_text()
-    text, line, words = changed(source, number)
-    (folder / path).write_text(text)
-    for each in compiled_with(path):
-        for kept in (folder / each.parent / "__pycache__").glob(f"{each.stem}.*.nb[ic]"):
-            kept.unlink()
+def apart(folder, function, *given):
+    """What a function returns in a fork that imports the package from a folder."""
+    fork = multiprocessing.get_context("fork")
+    here, there = fork.Pipe(duplex=False)
+    process = fork.Process(target=_apart, args=(folder, function, given, there))
+    process.start()
+    there.close()
     try:
-        if verify:
-            return words, verified(folder)
-        return words, next(filter(None, (noticed(folder, tests) for tests in tests_of(path, line) if tests)), None)
+        return here.recv() if here.poll(2 * LONGEST) else ENDLESS
+    except EOFError:
+        return "it dies"
     finally:
-        (folder / path).write_text(source)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.join()
+
+
+def _apart(folder, function, given, there):
+    os.setsid()
+    os.chdir(folder)
+    os.environ |= {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    sys.path[0] = str(folder)
+    silent = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(silent, stream)
+    try:
+        there.send(function(*given))
+    except Exception as error:
+        there.send(f"{type(error).__name__}: {error}"[:150])
+    os._exit(0)
+
+
+def _imported():
+    """Modules of others that the tests import; what is compiled of the package and its tests is kept."""
+    sys.dont_write_bytecode = False
+    pytest.main(["-q", "--collect-only", "-p", "no:cacheprovider"])
+    here = os.getcwd()
+    return [
+        name
+        for name, each in list(sys.modules.items())
+        if not (getattr(each, "__file__", None) or here).startswith(here)
+    ]
+
+
+class Checkout:
+    """Two copies of the checkout: one to change, one to stay."""
+
+    def __init__(self, scratch):
+        self.folder, self.kept = (Path(scratch) / name for name in ("checkout", "kept"))
+        shutil.copytree(
+            ROOT, self.kept, ignore=shutil.ignore_patterns(".git", ".venv", "gallery", "_build", ".coverage*")
+        )
+        self.others = apart(self.kept, _imported)
+        shutil.copytree(self.kept, self.folder)
+        self.passing = {}
+
+    def import_others(self):
+        """Import here, once, what every fork needs but the package itself, and start the compiler."""
+        for name in self.others:
+            with contextlib.suppress(Exception):
+                importlib.import_module(name)
+        importlib.import_module("numba").njit(lambda x: x + 1)(1.0)
+
+    def passes(self, test):
+        """Whether a test passes without a change."""
+        if test not in self.passing:
+            self.passing[test] = apart(self.kept, failing, [test]) is None
+        return self.passing[test]
+
+    def noticed(self, path, line):
+        """The test that fails with a change, fails again alone, and passes without it; or None."""
+        for tests, seconds in tests_of(path, line):
+            tests = [each for each in tests if not each.startswith(TIMED)]
+            failed = apart(self.folder, failing, tests, seconds) if tests else None
+            if failed and "::" in failed:
+                again = apart(self.folder, failing, [failed])
+                failed = failed if again and self.passes(failed) else None
+            if failed:
+                return failed
+        return None
+
+    def tried(self, path, number, verify):
+        """A change in words, and what noticed it."""
+        text, line, words = changed((self.kept / path).read_text(), number)
+        self.restore(path)
+        (self.folder / path).write_text(text)
+        try:
+            if verify:
+                return words, apart(self.folder, verified)
+            return words, self.noticed(path, line)
+        finally:
+            self.restore(path, caches=True)
+
+    def restore(self, path, caches=False):
+        """Put a module back with what was compiled of it, as long as it is not to change."""
+        shutil.copy2(self.kept / path, self.folder / path)
+        for each in compiled_with(path):
+            compiled = f"__pycache__/{each.stem}.*.nb[ic]"
+            for one in (self.folder / each.parent).glob(compiled):
+                one.unlink()
+            for one in (self.kept / each.parent).glob(compiled) if caches else ():
+                shutil.copy2(one, self.folder / one.relative_to(self.kept))
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument("draws", type=int)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", default="fifesim", help="folder of the package")
+    parser.add_argument("--only", default="fifesim", help="folder or module of the package")
     parser.add_argument("--verify", action="store_true", help="ask `fifesim verify` instead of the tests")
     parser.add_argument("--log", type=Path, default=Path("mutations.txt"))
     parser.add_argument("--part", default="1/1", help="such as 2/2: every second, to run two at once")
     given = parser.parse_args()
-    known = given.log.read_text() if given.log.exists() else ""
     part, parts = map(int, given.part.split("/"))
+    known = given.log.read_text() if given.log.exists() else ""
+    drawn = draw(given.draws, given.seed, given.only, given.verify)[part - 1 :: parts]
+    # Threads that wait for each other cost more than they bring in products so small.
+    os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch) / "checkout"
-        shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(".git", ".venv", "gallery", "_build"))
-        for path, number in draw(given.draws, given.seed, given.only)[part - 1 :: parts]:
-            name = f"{path} {number}:"
-            if name not in known:
-                words, found = tried(folder, path, number, given.verify)
-                with given.log.open("a") as log:
-                    print(name, words, "|", found or "SURVIVES", file=log)
+        checkout = Checkout(scratch)
+        checkout.import_others()
+        for path, number in drawn:
+            if f"{path} {number}:" in known:
+                continue
+            began = time.monotonic()
+            words, found = checkout.tried(path, number, given.verify)
+            with given.log.open("a") as log:
+                spent = f"{time.monotonic() - began:.0f} s"
+                print(f"{path} {number}: {words} | {found or 'SURVIVES'} | {spent}", file=log)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,23 @@ from fifesim.output.folders import UNFINISHED
 from fifesim.output.run.folder import FILES
 
 COMMAND = [sys.executable, "-c", "from fifesim.cli import app; app()", "simulate"]
+# A run that gets a signal as soon as the first block of its image is saved, however quick the rest is.
+SIGNALLED = """
+import os
+from fifesim.cli import app
+from fifesim.output.run import folder
+
+save = folder.save_block
+
+def and_signal(blocks, name, *given):
+    save(blocks, name, *given)
+    if name == "image":
+        folder.save_block = save
+        os.kill(os.getpid(), {:d})
+
+folder.save_block = and_signal
+app()
+"""
 SCENARIO = """
 [grid]
 width = 7200
@@ -56,6 +73,12 @@ def wait_for_a_block(folder, process):
         time.sleep(0.01)
 
 
+def signalled(signal_number, *arguments):
+    """A run that a signal ended after its first block."""
+    command = [sys.executable, "-c", SIGNALLED.format(signal_number), "simulate", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+
+
 def contents(folder):
     return {name: (folder / name).read_bytes() for name in FILES}
 
@@ -85,10 +108,7 @@ def resumed(scenario, folder):
 
 def test_a_killed_run_goes_on_to_the_same_files(scenario, whole, tmp_path):
     out = tmp_path / "out"
-    process = start(scenario, "-o", out, "--threads", 1)
-    wait_for_a_block(out, process)
-    process.kill()
-    process.wait()
+    assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
     assert [path.name for path in out.iterdir()] == [UNFINISHED]
     files, lines = resumed(scenario, out)
     assert files == whole
@@ -161,10 +181,7 @@ def test_processes_that_fill_an_empty_cache_of_kernels_together_give_the_same_fi
 @pytest.mark.slow
 def test_a_half_written_block_is_made_again(scenario, whole, tmp_path):
     out = tmp_path / "out"
-    process = start(scenario, "-o", out, "--threads", 1)
-    wait_for_a_block(out, process)
-    process.kill()
-    process.wait()
+    assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
     block = saved(out)[0]
     os.truncate(block, block.stat().st_size - 100)
     assert resumed(scenario, out)[0] == whole
@@ -190,12 +207,9 @@ def test_a_killed_worker_changes_nothing(scenario, whole, tmp_path):
 @pytest.mark.parametrize("options", [["--threads", 2], pytest.param(["--workers", 1], marks=pytest.mark.slow)])
 def test_ctrl_c_ends_a_run_that_can_go_on(scenario, whole, tmp_path, options):
     out = tmp_path / "out"
-    process = start(scenario, "-o", out, *options)
-    wait_for_a_block(out, process)
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=PATIENCE)
+    process = signalled(signal.SIGINT, scenario, "-o", out, *options)
     assert process.returncode == 130
-    assert "--resume" in errors and "Traceback" not in errors
+    assert "--resume" in process.stderr and "Traceback" not in process.stderr
     assert [path.name for path in out.iterdir()] == [UNFINISHED]
     assert resumed(scenario, out)[0] == whole
 
@@ -276,10 +290,7 @@ def test_a_dem_that_cannot_be_read_is_named(scenario, broken_dem, tmp_path):
 @pytest.mark.slow
 def test_another_scenario_does_not_resume_a_run(scenario, tmp_path):
     out = tmp_path / "out"
-    process = start(scenario, "-o", out, "--threads", 1)
-    wait_for_a_block(out, process)
-    process.kill()
-    process.wait()
+    assert signalled(signal.SIGKILL, scenario, "-o", out, "--threads", 1).returncode == -signal.SIGKILL
     other = tmp_path / "other.toml"
     other.write_text(SCENARIO.replace("seed = 3", "seed = 4"))
     done = run(other, "-o", out, "--resume")

@@ -245,8 +245,6 @@ def _plan(array, edges, window, graph, held):
 def _overlaps(edges, part):
     """Chunks along an axis that a slice touches, where their cells go, and which they are."""
     start, stop = max(part.start, 0), min(part.stop, int(edges[-1]))
-    if stop <= start:
-        return
     for index in range(int(np.searchsorted(edges, start, side="right")) - 1, int(np.searchsorted(edges, stop))):
         first, last = max(start, int(edges[index])), min(stop, int(edges[index + 1]))
         if last > first:

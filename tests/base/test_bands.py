@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 from pyrsr.rsr import RSR_reader
 
+import fifesim
 from fifesim.base.bands import (
+    COMMON_NAMES,
     GREEN,
     NEAR_INFRARED,
     RED,
@@ -103,3 +105,20 @@ def test_a_quadrature_is_the_mean_of_any_spectrum_on_its_wavelengths():
     for spectrum in spectra:
         assert found.mean(spectrum) == band.mean(spectrum, wavelength, weight)
     assert found.mean(np.ones(31)) == pytest.approx(1, rel=1e-14)
+
+
+def test_common_names_are_those_of_catalogues():
+    """Pystac has the table of an earlier version, whose blue is narrower."""
+    eo = pytest.importorskip("pystac.extensions.eo")
+    known = {name: eo.Band.band_range(name) for name in COMMON_NAMES if name != "blue"}
+    found = {name: COMMON_NAMES[name][1:3] for name, limits in known.items() if limits}
+    assert len(found) == 10 and found == {name: known[name] for name in found}
+
+
+def test_common_names_have_their_middle_where_landsat_and_sentinel_2_have_a_band():
+    """Within 3 nm; neither has yellow."""
+    centres = np.array(
+        [band.response.center for name in ("MSI", "OLI", "TM") for band in fifesim.instrument(name).bands]
+    )
+    for name in set(COMMON_NAMES) - {"yellow"}:
+        assert np.abs(centres - COMMON_NAMES[name].best).min() < 3e-3

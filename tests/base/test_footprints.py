@@ -277,16 +277,10 @@ def test_operators_survive_pickling():
 def test_mistakes_are_named():
     with pytest.raises(ValueError, match="width"):
         CosineSpread(-30.0)
-    with pytest.raises(ValueError, match="same sign"):
-        axis_operator(
-            CosineSpread(30.0),
-            cell_origin=0,
-            cell_size=-3,
-            n_cells=9,
-            pixel_origin=0,
-            pixel_size=9,
-            n_pixels=3,
-        )
+    for cell, pixel in ((-3, 9), (0, 9), (3, 0)):
+        places = {"cell_origin": 0, "cell_size": cell, "n_cells": 9, "pixel_origin": 0, "pixel_size": pixel}
+        with pytest.raises(ValueError, match="same sign"):
+            axis_operator(CosineSpread(30.0), **places, n_pixels=3)
     with pytest.raises(ValueError, match="at least 1"):
         operator(0, 3)
     rows = operator(90, 9)

@@ -55,6 +55,7 @@ def test_frequencies_are_of_all_pixels(run):
     axis = histogram_figures(image, truth, detail)[2].axes[0]
     shares = {line.get_label(): line.get_ydata().sum() for line in axis.lines}
     assert shares == pytest.approx(dict.fromkeys(map(str, image["band"].values), 1.0))
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == list(shares)
 
 
 def test_change_is_in_reflectance(run):

@@ -85,8 +85,9 @@ def test_what_can_be_a_reflectance():
 
 def test_a_dark_scene_in_percent_is_a_warning():
     """Below 5 % everywhere, so that no value is impossible; a few bright cells are none."""
-    with pytest.warns(UserWarning, match=r"reflectances above 1.*divide them by\s+100"):
-        check_reflectance(np.linspace(0.9, 4.5, 100))
+    for percent in (np.linspace(0.9, 4.5, 100), np.append(np.full(40, 0.2), np.full(60, 1.2))):
+        with pytest.warns(UserWarning, match=r"reflectances above 1.*divide them by\s+100"):
+            check_reflectance(percent)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_reflectance(np.append(np.full(60, 0.2), np.full(40, 1.2)))

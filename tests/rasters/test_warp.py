@@ -8,6 +8,7 @@ import rioxarray
 import xarray as xr
 from affine import Affine
 from lazy import check_place, no_compute
+from odc.geo.geobox import GeoBox
 from scipy.interpolate import RegularGridInterpolator
 
 import fifesim
@@ -172,6 +173,14 @@ def test_files_that_cannot_be_used_are_named(tmp_path):
     away = write(tmp_path / "away.tif", hills(40, 40), Affine(10, 0, 600000, 0, -10, 4332000), "EPSG:26914")
     with pytest.raises(ValueError, match=r"away\.tif does not overlap the grid, which spans"):
         fifesim.open_lai(away, GRID)
+
+
+def test_grids_whose_cells_are_no_metres_are_refused(tmp_path):
+    path = write(tmp_path / "hills.tif", hills(40, 40), GRID.affine, "EPSG:26914")
+    degrees = GeoBox((9, 9), Affine(0.001, 0, -97, 0, -0.001, 39), "EPSG:4326")
+    for bring, raster in ((warp.file_onto_grid, path), (warp.raster_onto_grid, fifesim.open_lai(path, GRID))):
+        with pytest.raises(ValueError, match="the grid is in a geographic CRS"):
+            bring(raster, degrees)
 
 
 @pytest.mark.parametrize("times", [8, 40])

@@ -45,6 +45,17 @@ def test_a_block_reads_its_own_window_only():
     assert read == [(0, 0)]
 
 
+@pytest.mark.parametrize(("columns", "cut"), [(4, True), (6, False)])
+def test_little_of_a_chunk_is_cut_out_of_it_first(columns, cut):
+    """So that the chunk need not wait in memory for others; a copy of most of it would be a second one."""
+    source = da.ones((10, 10), chunks=10)
+    found = array_from_windows(
+        lambda window: window, [source], ((10,), (columns,)), lambda *at: ((), [at]), token="little"
+    )
+    assert any(str(key[0]).startswith("cut-") for key in found.dask if isinstance(key, tuple)) is cut
+    assert found.compute().sum() == 10 * columns
+
+
 def test_the_kernel_is_told_its_place():
     found = array_from_windows(
         lambda row, column: np.full((2, 3), 10.0 * row + column),

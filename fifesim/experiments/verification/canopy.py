@@ -1,10 +1,12 @@
 """Checks of the canopy: limits that any canopy keeps, theory, and other codes."""
 
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import quad
 from scipy.linalg import expm
+from scipy.optimize import brentq
 
 from fifesim.base import datasets
 from fifesim.experiments.verification.deviations import Deviation, largest
@@ -74,6 +76,23 @@ def _spherical_leaves():
         ross = np.sin(between) - between * np.cos(between)
         worst = np.maximum(worst, largest(found, np.array([ross + np.pi * np.cos(between), ross]) / (3 * np.pi)))
     yield _deviation("single scattering by spherical leaves", worst, 1e-5, "1", "Ross (1981), closed form")
+
+
+def _ellipsoidal_leaves():
+    """Normals of a spheroid, whose axes go by their mean."""
+
+    def share(log_ratio, low, high, power=0):
+        """Of normals between two inclinations, times a power of these, but for a factor. [radian]"""
+        ratio = np.exp(2 * log_ratio)
+        return quad(lambda t: t**power * np.sin(t) / (np.cos(t) ** 2 + ratio * np.sin(t) ** 2) ** 2, low, high)[0]
+
+    edges, worst = np.radians(np.linspace(0, 90, 19)), 0.0
+    for mean in (30.0, 57.0, 75.0):
+        found = leaf_angle_classes(("campbell", mean), classes=18).fraction
+        ratio = brentq(lambda r: share(r, 0, np.pi / 2, 1) / share(r, 0, np.pi / 2) - np.radians(mean), -3, 3)  # noqa: B023
+        expected = [share(ratio, low, high) / share(ratio, 0, np.pi / 2) for low, high in pairwise(edges)]
+        worst = np.maximum(worst, largest(found, expected))
+    yield _deviation("leaves as on ellipsoids", worst, 1e-9, "1", "Campbell (1990), density by quadrature")
 
 
 def _hot_spot():
@@ -191,6 +210,7 @@ CHECKS = (
     _reciprocity,
     _half_space,
     _spherical_leaves,
+    _ellipsoidal_leaves,
     _hot_spot,
     _other_sail,
     _exact_transfer,

@@ -1,6 +1,7 @@
 """Checks of the sensor: images by the quadrature of a line spread, calibration, bands and noise."""
 
 from functools import partial
+from itertools import product
 
 import numpy as np
 import xarray as xr
@@ -117,13 +118,13 @@ def _blocks():
 
 
 def _counts():
-    """Rounding to the nearest count."""
+    """Rounding to the nearest count, of 8 bits as TM's and of 12."""
     worst = 0.0
-    for band in instrument("TM").bands:
-        gain, offset = calibration.gain_offset(band.full_scale_radiance, band.min_radiance, 8)
+    for band, bits in product(instrument("TM").bands, (8, 12)):
+        gain, offset = calibration.gain_offset(band.full_scale_radiance, band.min_radiance, bits)
         radiance = np.linspace(band.min_radiance + gain, band.full_scale_radiance, 1001)
-        counts = calibration.radiance_to_dn(radiance, gain, offset, bits=8).astype(float)
-        step = (band.full_scale_radiance - band.min_radiance) / 255
+        counts = calibration.radiance_to_dn(radiance, gain, offset, bits=bits).astype(float)
+        step = (band.full_scale_radiance - band.min_radiance) / (2**bits - 1)
         worst = np.maximum(worst, largest(counts * step + band.min_radiance, radiance) / step)
     yield _deviation("counts of TM's radiances", worst, 0.5 + 1e-9, "count", "Friedl et al. (1995), Table 1")
 

@@ -114,6 +114,12 @@ def test_what_cannot_be_is_refused(case):
         Aerosol(**{**fine, "angle": ANGLE, "phase": PHASE, "name": "mine", **wrong})
 
 
+@pytest.mark.parametrize("albedo", [0.0, 1.0])
+def test_particles_may_absorb_all_or_nothing(albedo):
+    black_or_white = Aerosol(WAVELENGTH, WAVELENGTH**-1.3, np.full(4, albedo), angle=ANGLE, phase=PHASE)
+    assert black_or_white.single_scattering_albedo.tolist() == [[albedo] * 4]
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -47,6 +47,12 @@ def optics(aerosol, wavelength=0.6, cosine=-0.4):
     ]
 
 
+@pytest.mark.parametrize(("unit", "micrometre"), [("m", 1e-6), ("um", 1.0), ("micrometre", 1.0), ("nanometer", 1e3)])
+def test_wavelengths_may_be_in_other_units(totals, unit, micrometre):
+    other = totals.assign_coords(w=("w", totals["w"].values / 1000 * micrometre, {"units": unit}))
+    np.testing.assert_allclose(read_aerosol(other).wavelength, [0.44, 0.55, 0.67, 0.87, 1.02], rtol=1e-12)
+
+
 def test_tables_of_the_continental_model_give_5s_what_it_gives(tables):
     """In all TM bands, by components that meet at angles between those of the tables."""
     mine = fifesim.Atmosphere(aerosol=read_aerosol(tables), aot=0.3)

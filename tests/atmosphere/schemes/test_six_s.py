@@ -75,6 +75,8 @@ def test_fife_case_is_that_of_a_build_with_more_digits(band):
     # Means over the band, there without gases, here with them.
     assert terms.gas_transmittance == pytest.approx(first.gas_transmittance, abs=2e-3)
     assert terms.direct_transmittance_down == pytest.approx(first.direct_transmittance_down, abs=1e-3)
+    skylight = 1 - first.direct_transmittance_down / first.transmittance_down
+    assert terms.diffuse_fraction == pytest.approx(skylight, abs=1e-3)
 
 
 def test_fife_case_from_published_responses_is_that_of_the_engine_s_own_filters():

@@ -2,13 +2,10 @@
 
 import numpy as np
 import pytest
+from broken import exceeded
 
 from fifesim.atmosphere.adjacency import blocks, environment, environment_grid
 from fifesim.experiments.verification import adjacency
-
-
-def exceeded(*checks):
-    return [deviation.what for check in checks for deviation in check() if not deviation.within]
 
 
 @pytest.mark.parametrize("check", adjacency.CHECKS)

@@ -1,10 +1,15 @@
 """Checks of the analysis see the kernels that production calls."""
 
 import pytest
-from broken import notices
+from broken import exceeded, notices
 
 from fifesim.analysis import attribution, density, scaling, uncertainty, variogram
 from fifesim.experiments.verification import analysis
+
+
+@pytest.mark.parametrize("check", analysis.CHECKS)
+def test_all_is_well(check):
+    assert exceeded(check) == []
 
 
 @pytest.mark.parametrize(

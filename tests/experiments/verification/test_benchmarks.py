@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from broken import exceeded
 from typer.testing import CliRunner
 
 from fifesim.atmosphere.air import molecules
@@ -9,10 +10,6 @@ from fifesim.atmosphere.schemes import orders, phase_expansion, stokes
 from fifesim.base import datasets
 from fifesim.cli import app
 from fifesim.experiments.verification import areas, benchmarks
-
-
-def exceeded(check):
-    return [deviation.what for deviation in check() if not deviation.within]
 
 
 @pytest.mark.parametrize("check", [*benchmarks.CHECKS, *benchmarks.CANOPY])

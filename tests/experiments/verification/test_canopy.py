@@ -1,10 +1,15 @@
 """Checks of the canopy see the kernels that make images."""
 
 import pytest
-from broken import notices
+from broken import exceeded, notices
 
 from fifesim.experiments.verification import canopy
 from fifesim.ground.canopy import divided_differences, lai_table
+
+
+@pytest.mark.parametrize("check", canopy.CHECKS)
+def test_all_is_well(check):
+    assert exceeded(check) == []
 
 
 @pytest.mark.parametrize(

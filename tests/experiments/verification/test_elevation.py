@@ -1,10 +1,15 @@
 """Checks of elevation see the kernels that make it."""
 
 import pytest
-from broken import notices
+from broken import exceeded, notices
 
 from fifesim.experiments.verification import elevation
 from fifesim.ground.terrain import flint_hills, gaps, spline, streams
+
+
+@pytest.mark.parametrize("check", elevation.CHECKS)
+def test_all_is_well(check):
+    assert exceeded(check) == []
 
 
 @pytest.mark.parametrize(

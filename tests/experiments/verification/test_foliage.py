@@ -1,10 +1,15 @@
 """Checks of two kinds of leaf and of crowns see the kernels that make images."""
 
 import pytest
-from broken import notices
+from broken import exceeded, notices
 
 from fifesim.experiments.verification import foliage
 from fifesim.ground.canopy import foliage_table, layers
+
+
+@pytest.mark.parametrize("check", [each for each in foliage.CHECKS if each is not foliage._tables])
+def test_all_is_well(check):
+    assert exceeded(check) == []
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,15 @@
 """Checks of the random field see the kernels that make landscapes."""
 
 import pytest
-from broken import notices
+from broken import exceeded, notices
 
 from fifesim.experiments.verification import landscape
 from fifesim.ground.landscape import noise
+
+
+@pytest.mark.parametrize("check", landscape.CHECKS)
+def test_all_is_well(check):
+    assert exceeded(check) == []
 
 
 @pytest.mark.parametrize(

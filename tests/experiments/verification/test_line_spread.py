@@ -1,11 +1,16 @@
 """Checks of line spread functions see the kernels that production calls."""
 
 import pytest
-from broken import notices
+from broken import exceeded, notices
 
 from fifesim.base.line_spread import Boxcar
 from fifesim.experiments.verification import line_spread
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
+
+
+@pytest.mark.parametrize("check", line_spread.CHECKS)
+def test_all_is_well(check):
+    assert exceeded(check) == []
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,15 @@
 """Checks of scans see the kernels that production calls."""
 
 import pytest
-from broken import notices
+from broken import exceeded, notices
 
 from fifesim.experiments.verification import scan
 from fifesim.sensor.scan import track
+
+
+@pytest.mark.parametrize("check", scan.CHECKS)
+def test_all_is_well(check):
+    assert exceeded(check) == []
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,10 @@
 
 import numpy as np
 import pytest
+from broken import exceeded
 
 from fifesim.atmosphere.schemes import orders, phase_expansion, successive_orders
 from fifesim.experiments.verification import scattering
-
-
-def exceeded(check):
-    return [deviation.what for deviation in check() if not deviation.within]
 
 
 @pytest.mark.parametrize("check", scattering.CHECKS)

@@ -1,10 +1,15 @@
 """Checks of the sensor see the kernels that production calls."""
 
 import pytest
-from broken import notices
+from broken import exceeded, notices
 
 from fifesim.experiments.verification import sensor
 from fifesim.sensor.response import calibration
+
+
+@pytest.mark.parametrize("check", sensor.CHECKS)
+def test_all_is_well(check):
+    assert exceeded(check) == []
 
 
 @pytest.mark.parametrize(

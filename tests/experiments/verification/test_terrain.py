@@ -1,10 +1,15 @@
 """Checks of the terrain see the kernels that light real slopes."""
 
 import pytest
-from broken import notices
+from broken import exceeded, notices
 
-from fifesim.experiments.verification import terrain
+from fifesim.experiments.verification import elevation, terrain
 from fifesim.ground.terrain import horizon, light, sky, slope
+
+
+@pytest.mark.parametrize("check", terrain.CHECKS[: -len(elevation.CHECKS)])
+def test_all_is_well(check):
+    assert exceeded(check) == []
 
 
 @pytest.mark.parametrize(

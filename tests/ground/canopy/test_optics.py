@@ -52,7 +52,10 @@ def test_unknown_bands_are_told_what_to_pass(function):
         (lambda: check_leaf_optics(0.1, -0.1), "leaf transmittance must be in"),
         (lambda: check_leaf_optics(np.nan, 0.1), "got nan"),
         (lambda: check_background([0.1, np.nan, 15]), r"background reflectance must be in \[0, 1\], got 15"),
-        (lambda: check_lai([1, np.nan, -9999, -1]), "nor above 100, got -9999 in 2 of 4 cells: set cells without data"),
+        (
+            lambda: check_lai([0, 100, np.nan, -9999, -1]),
+            "nor above 100, got -9999 in 2 of 5 cells: set cells without data",
+        ),
         (lambda: check_lai(255), "nor above 100, got 255"),
         (lambda: check_lai([90, 240, np.nan]), r"got 240 in 1 of 3 cells: .* scaled, type lai \* 0.01, or gdal_edit"),
         (lambda: check_lai([900, 2400]), r"type lai \* 0.001, or gdal_edit.py -a_scale 0.001 for a file"),

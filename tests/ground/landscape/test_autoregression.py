@@ -1,12 +1,20 @@
 """The autoregressive process: its spectrum, its variance and its lengths by other routes."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from oracles_field import covariances
 from scipy import special
 
 import fifesim
-from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, autocorrelation, field_variance, margin
+from fifesim.ground.landscape.autoregression import (
+    LARGEST_STREAMING_ARP,
+    autocorrelation,
+    correlation_length,
+    field_variance,
+    margin,
+)
 
 ARPS = [0.05, 0.1, 0.15, 0.2, 0.24]
 
@@ -44,6 +52,13 @@ def test_margin_holds_the_response():
         cells = margin(arp)
         impulse = np.fft.ifft(1 / (1 - 2 * arp * (1 + np.cos(2 * np.pi * np.fft.fftfreq(4096))))).real
         assert impulse[cells] < 2e-8 * impulse[0]
+
+
+@pytest.mark.parametrize("function", [field_variance, correlation_length, partial(autocorrelation, lag=0)])
+@pytest.mark.parametrize("arp", [-0.01, 0.25, 0.3, np.nan])
+def test_what_is_not_stationary_is_refused(function, arp):
+    with pytest.raises(ValueError, match="the four-neighbour process is not stationary"):
+        function(arp)
 
 
 def test_length_beyond_streaming_is_refused():

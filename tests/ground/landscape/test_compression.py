@@ -47,3 +47,9 @@ def test_fractions_and_many_codes_are_told_in_a_line():
     with pytest.raises(ValueError, match=r"1, 2, 3, 4, 5, 6, 7, 8, \.\.\., in") as told:
         check_codes(np.arange(1, 1001), tuple(range(2000, 3000)))
     assert len(str(told.value)) < 500
+
+
+def test_of_many_other_codes_those_of_most_cells_are_named():
+    codes = np.repeat(np.arange(1, 11), np.arange(1, 11))
+    with pytest.raises(ValueError, match=r"without a class: 3, 4, 5, 6, 7, 8, 9, 10, \.\.\., in 55 of 55 cells"):
+        check_codes(codes, (40,))

@@ -53,6 +53,12 @@ def test_cross_correlation_of_nearly_equal_arps_is_nearly_one():
     assert cross_correlation(0.2, 0.2 + 2e-7) == pytest.approx(1, abs=1e-6)
 
 
+@pytest.mark.parametrize("arps", [(0.3, 0.1), (0.1, 0.3), (0.3, 0.3)])
+def test_fields_that_are_not_stationary_have_no_correlation(arps):
+    with pytest.raises(ValueError, match="the four-neighbour process is not stationary"):
+        cross_correlation(*arps)
+
+
 def test_ground_that_is_level_is_followed_by_nothing():
     with pytest.raises(ValueError, match="elevation is the same everywhere"):
         copula({"lai": 0.1}, {("lai", "elevation"): 0.3}, {"elevation": np.ones(50)})

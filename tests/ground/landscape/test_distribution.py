@@ -14,6 +14,7 @@ from fifesim.ground.landscape.distribution import (
     quantile_map,
     quantile_table,
     rank_map,
+    rank_quantiles,
     truncated_normal,
 )
 
@@ -210,3 +211,10 @@ def test_whole_site_has_the_distribution_within_a_thousandth():
 def test_periodic_scene_has_the_distribution_exactly(arp):
     lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 300), (0, 200))), arp=arp, method="periodic")
     assert kolmogorov_distance(lai.values, lai_distribution("burned-grazed")) == pytest.approx(0.5 / lai.size, rel=1e-6)
+
+
+def test_quantiles_of_few_ranks_are_kept_and_of_many_let_go():
+    """Pieces of a large scene ask again for the same; those of a whole one would stay in memory."""
+    distribution = stats.uniform(0, 3)
+    assert rank_quantiles(distribution, 1000) is rank_quantiles(distribution, 1000)
+    assert rank_quantiles(distribution, 2**20) is not rank_quantiles(distribution, 2**20)

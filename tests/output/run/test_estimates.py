@@ -3,9 +3,11 @@
 import json
 import time
 
+import numpy as np
 import pytest
 
 from fifesim.output import pages
+from fifesim.output.run import estimates
 from fifesim.output.run.estimates import estimate, estimate_in_words
 from fifesim.output.run.folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
@@ -20,6 +22,16 @@ def test_cells_and_pixels_are_those_of_the_scenario(monkeypatch):
     assert found["cells"] == 90 * 90 and found["pixels"] == 100
     assert with_scene["disk"] - found["disk"] >= found["cells"] * 8
     assert found["threads"] == 1 and found["seconds"] > 0 and found["memory"] > 0
+
+
+def test_piece_that_is_timed_is_part_of_the_scene():
+    """Of whole pixels in its middle, and no more cells than a tile has."""
+    scenario = parse_scenario({"grid": {"width": 24000, "height": 300}, "terrain": {"dem": "flat"}}).complete()
+    piece, whole = estimates._piece(scenario), scenario.geobox()
+    box = piece.geobox()
+    assert box.shape.y == whole.shape.y and 1900 < box.shape.x <= estimates._PIECE
+    assert np.hypot(*np.subtract(box.center_pixel.boundingbox[:2], whole.center_pixel.boundingbox[:2])) <= 30
+    assert (box.affine.c - whole.affine.c) % 30 == pytest.approx(0, abs=1e-6)
 
 
 @pytest.mark.slow

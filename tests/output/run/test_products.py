@@ -1,5 +1,6 @@
 """What a run computes, and in which order."""
 
+import numpy as np
 import pytest
 import xarray as xr
 import zarr
@@ -24,9 +25,20 @@ def test_every_block_is_wanted_once(tree):
 
 
 def test_blocks_are_wanted_by_the_chunk_of_the_scene_below_them(tree):
+    """Chunk after chunk of the scene, each found by the coordinates of the middles of blocks and cells."""
     found, lai = products_of(tree), tree["scene"]["lai"]
-    image = [index[-2:] for name, index in wanted_blocks(found, lai.chunks, grids.geobox(lai)) if name == "image"]
-    assert image == sorted(image) and len(image) > 1
+    places = []
+    for name, index in wanted_blocks(found, lai.chunks, grids.geobox(lai)):
+        raster, place = found.rasters[name], []
+        for axis, cells, north_up in (("y", lai.chunks[0], -1), ("x", lai.chunks[1], 1)):
+            sizes = raster.chunksizes[axis]
+            start = sum(sizes[: index[raster.dims.index(axis)]])
+            block = raster[axis].values[start : start + sizes[index[raster.dims.index(axis)]]]
+            before = np.sum(north_up * lai[axis].values < north_up * block.mean())
+            place.append(int(np.searchsorted(np.cumsum(cells), before, side="right")))
+        places.append(tuple(place))
+    assert places == sorted(places)
+    assert len(set(places)) == lai.data.npartitions == 4
 
 
 def test_cells_of_the_detail_are_those_below_pixels_in_the_middle(tree):

@@ -1,5 +1,7 @@
 """Spatial responses that may be asked for, and what is known of an instrument's own."""
 
+from dataclasses import replace
+
 import pytest
 
 from fifesim.sensor.description.instruments import instrument
@@ -18,6 +20,13 @@ def test_responses_that_can_be_asked_for():
             assert [spread.width for spread in sharp.line_spreads(band)] == list(widths)
             assert not knows_blur(sharp, band)
     assert [band.name for band in msi.bands if not knows_blur(msi, band)] == ["MSI10"]
+
+
+def test_a_sharp_band_has_the_sources_of_what_it_keeps():
+    tm = instrument("TM")
+    own = replace(tm.bands[0], sources={"lsf": "Markham1985", "bits": "Chander2009"})
+    sharp = with_response(replace(tm, bands=(own, *tm.bands[1:])), "detector").bands[0]
+    assert sharp.sources == {"bits": "Chander2009", "ifov": tm.sources["interval"]}
 
 
 @pytest.mark.parametrize(

@@ -37,12 +37,12 @@ def test_system_response_is_the_product_of_its_parts(changed):
     At half a cycle per interval: detector and smear sinc(1/2) each, the electronics 1/sqrt(2) at their cutoff, the
     aperture's diffraction at nu = wavelength / (2 interval aperture), that of a circle.
     """
-    parts = 'kind = "system"\nsmear = 1.0\nelectronics = 0.5\naperture = 0.4\n'
+    parts = 'kind = "system"\nsmear = 1.0\nelectronics = 0.5\naperture = 0.02\ntruncation = 3e-4\n'
     mine = changed(LSF, parts, *IFOV)
-    nu = 1e-6 * mine.bands[0].wavelength / (2 * 43e-6 * 0.4)
+    nu = 1e-6 * mine.bands[0].wavelength / (2 * 43e-6 * 0.02)
     circle = 2 / np.pi * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
-    # What is cut off, 1e-3 of the response, is missing.
-    np.testing.assert_allclose(nyquist(mine), (2 / np.pi) ** 2 / np.sqrt(2) * circle, atol=2e-3)
+    # What is cut off, 3e-4 of the response, is missing.
+    np.testing.assert_allclose(nyquist(mine), (2 / np.pi) ** 2 / np.sqrt(2) * circle, atol=5e-4)
 
 
 def test_responses_may_differ_by_axis_and_by_band(changed):

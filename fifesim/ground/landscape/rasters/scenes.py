@@ -134,7 +134,7 @@ def landscape(
     >>> land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).dims
     ('band', 'y', 'x')
     """
-    grids.check_grid(grid)
+    grid = grids.check_grid(grid)
     check_arp(arp)
     seed = check_seed(seed)
     given = {"brown": brown, "crown_cover": crown_cover, "soil": soil, "moisture": moisture}

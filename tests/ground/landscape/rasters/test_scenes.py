@@ -1,11 +1,13 @@
 """Landscapes: variables, their places, and leaf area of each class from its own distribution."""
 
 import numpy as np
+import pyproj
 import pytest
 import rioxarray
 import xarray as xr
 from elevations import write
 from lazy import ODD_CHUNKS, check_place, no_compute
+from odc.geo.geobox import GeoBox
 from scipy import stats
 
 import fifesim
@@ -150,3 +152,10 @@ def test_cover_that_carries_its_classes_needs_no_others(site, land):
 def test_impossible_landscape_is_refused_before_it_computes(site, options, error, message):
     with pytest.raises(error, match=message), no_compute():
         fifesim.landscape(site, **options)
+
+
+def test_heights_of_a_grid_s_crs_are_left_out(site):
+    """Whatever the variables are made of, they lie on one grid."""
+    above = GeoBox(site.shape, site.affine, pyproj.CRS("EPSG:26914+5703").to_wkt())
+    made = [fifesim.landscape(grid, soil=fifesim.Field(sd=0.03), brown=0.2, seed=7) for grid in (above, site)]
+    xr.testing.assert_equal(*made)

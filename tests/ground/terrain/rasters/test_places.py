@@ -19,6 +19,18 @@ def test_horizon_that_does_not_cover_is_refused(lai, dem, around):
         fifesim.sky_view(dem, fifesim.horizon(around).isel(direction=slice(0, 20)))
 
 
+@pytest.mark.parametrize(
+    "cut", [{"x": slice(1, None)}, {"x": slice(None, -1)}, {"y": slice(1, None)}, {"y": slice(None, -1)}], ids=str
+)
+def test_horizon_may_lack_less_than_a_place_on_each_side(cut):
+    """Of ten places of 30 m, nine lack a whole one, and less where the elevation ends within."""
+    dem = labelled(fifesim.fife_site(30 / 9, window=((0, 90), (0, 90))), np.full((90, 90), 7.0))
+    horizon = fifesim.horizon(dem).isel(cut)
+    with pytest.raises(ValueError, match="does not cover the dem's"):
+        fifesim.sky_view(dem, horizon)
+    np.testing.assert_allclose(fifesim.sky_view(dem.isel(cut), horizon), 1, rtol=1e-12)
+
+
 def test_small_and_coarse_rasters_have_horizons_too():
     """Fewer cells than one of the source, and cells larger than the reach."""
     tiny = labelled(fifesim.grid_at("EPSG:26914", 700000, 4330000, 12, 9, 3), np.full((3, 4), 7.0))
