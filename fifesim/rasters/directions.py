@@ -1,11 +1,13 @@
 """Directions of sun and sensor on labelled rasters: numbers, or angles that differ from cell to cell."""
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_position, utc
 from fifesim.base.warned import warn
-from fifesim.rasters import cf, whereabouts
+from fifesim.rasters import cf, projection, whereabouts
 from fifesim.rasters import grid as grids
 from fifesim.rasters.sites import is_fife
 
@@ -279,6 +281,23 @@ def uniform_geometry(geometry, what):
             "give their means as geometry=fifesim.Geometry(sza, saa, vza, vaa)"
         )
     return geometry
+
+
+def from_grid_north(geometry, grid):
+    """
+    Directions whose azimuths count from the north of a grid, as aspects and horizons do.
+
+    Parameters
+    ----------
+    geometry : fifesim.base.geometry.Geometry
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    geometry : fifesim.base.geometry.Geometry
+    """
+    turn = projection.convergence(grid)
+    return replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
 
 
 def angles(geometry):
