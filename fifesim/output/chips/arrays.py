@@ -120,7 +120,7 @@ def _fullest(study):
     return realise(study.scenario_with(drawn | small), ("truth",))["truth"].data_vars
 
 
-def chip_arrays(chips, numbers, layout, each=lambda count: None):
+def chip_arrays(chips, numbers, layout):
     """
     Chips as stacked arrays.
 
@@ -130,8 +130,6 @@ def chip_arrays(chips, numbers, layout, each=lambda count: None):
     numbers : sequence of int, shape (n,)
         Of those that are made.
     layout : Layout
-    each : callable, optional
-        ``each(1)`` is called when a chip is done.
 
     Returns
     -------
@@ -153,7 +151,6 @@ def chip_arrays(chips, numbers, layout, each=lambda count: None):
             _put(found, at, *realise_arrays(scenario), layout)
         except ValueError as error:
             raise ValueError(f"chip {chip}: {error}") from error
-        each(1)
     for start in range(0, count, _AT_ONCE):
         part = {name: values[start : start + _AT_ONCE] for name, values in found.items()}
         part["toa_reflectance"][:] = _reflectance(part, layout)

@@ -197,10 +197,9 @@ def _remove_partial(folder):
 
 
 def _together(study):
-    """Chips of all landscapes that fill a tile of their fields each, or four where they see the hills around."""
+    """Chips of all landscapes that fill a tile of their fields each."""
     rows, columns = study.scenario.geobox().shape
-    tiles = 1 if study.scenario.terrain.dem == "flat" else 4
-    return tiles * max(TILE // rows, 1) * max(TILE // columns, 1) * study.landscapes
+    return max(TILE // rows, 1) * max(TILE // columns, 1) * study.landscapes
 
 
 def _identity_of(chips):

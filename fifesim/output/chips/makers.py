@@ -23,6 +23,9 @@ if _FORKS:
 # Landscapes of a process in so many groups: when others are done they take over some of them.
 _GROUPS = 4
 
+# The hills around a landscape take longer to make than one chip after the other: of so many shards they are made once.
+_SHARDS_ON_HILLS = 4
+
 # So many jobs a process has at hand: it does not wait for an answer to what it sent. [1]
 _AT_HAND = 2
 
@@ -31,9 +34,8 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Job(NamedTuple):
-    """Some chips of a shard, and whose landscapes they lie in."""
+    """Some chips, and the group of landscapes that they lie in."""
 
-    shard: int
     chips: np.ndarray
     group: int
 
@@ -65,11 +67,14 @@ def jobs_of(chips, shards, wanted, makers):
     jobs : list of Job
         Each chip of the shards once.
     """
+    on_hills = chips.study.scenario.terrain.dem != "flat"
+    step, groups = (_SHARDS_ON_HILLS, chips.study.landscapes) if on_hills else (1, makers * _GROUPS)
     jobs = []
-    for shard in wanted:
-        numbers = np.arange(*shards.range_of(shard))
-        groups = chips.landscape[numbers] % (makers * _GROUPS)
-        jobs += [Job(shard, numbers[groups == group], int(group)) for group in np.unique(groups)]
+    for first in range(0, len(wanted), step):
+        ranges = [np.arange(*shards.range_of(shard)) for shard in wanted[first : first + step]]
+        numbers = np.concatenate(ranges)
+        group = chips.landscape[numbers] % groups
+        jobs += [Job(numbers[group == each], int(each)) for each in np.unique(group)]
     return jobs
 
 

@@ -1,7 +1,5 @@
 """Shards of chips as they come: made in this process, by processes of this machine, or on a cluster."""
 
-from functools import partial
-
 import numpy as np
 
 from fifesim.output.chips.arrays import chip_arrays, empty_arrays, make_shard
@@ -40,31 +38,33 @@ def made_shards(chips, layout, shards, wanted, advance, *, makers=None, client=N
     RuntimeError
         If a process or a worker ends by itself.
     """
-    if makers is not None:
-        way = partial(_by_makers, makers)
-    else:
-        way = _here if client is None else partial(_on_client, client)
-    yield from way(chips, layout, shards, wanted, advance)
-
-
-def _here(chips, layout, shards, wanted, advance):
-    for shard in wanted:
-        yield shard, chip_arrays(chips, range(*shards.range_of(shard)), layout, advance)
-
-
-def _by_makers(makers, chips, layout, shards, wanted, advance):
-    begun = {}
-    for job, arrays in makers.made(jobs_of(chips, shards, wanted, makers.number), layout):
-        first, last = shards.range_of(job.shard)
-        whole, left = begun.pop(job.shard, None) or (empty_arrays(last - first, layout), last - first)
-        for name, values in arrays.items():
-            whole[name][job.chips - first] = values
-        left -= len(job.chips)
+    if makers is None and client is not None:
+        yield from _on_client(client, chips, layout, shards, wanted, advance)
+        return
+    jobs, begun = jobs_of(chips, shards, wanted, 1 if makers is None else makers.number), {}
+    for job, arrays in _here(chips, jobs, layout) if makers is None else makers.made(jobs, layout):
+        for shard, own in _by_shard(job.chips, shards):
+            first, last = shards.range_of(shard)
+            whole, left = begun.pop(shard, None) or (empty_arrays(last - first, layout), last - first)
+            for name, values in arrays.items():
+                whole[name][job.chips[own] - first] = values[own]
+            left -= np.count_nonzero(own)
+            if left:
+                begun[shard] = whole, left
+            else:
+                yield shard, whole
         advance(len(job.chips))
-        if left:
-            begun[job.shard] = whole, left
-        else:
-            yield job.shard, whole
+
+
+def _here(chips, jobs, layout):
+    for job in jobs:
+        yield job, chip_arrays(chips, job.chips, layout)
+
+
+def _by_shard(numbers, shards):
+    """The shards that some chips lie in, and which of them do."""
+    of = shards.shard_of(numbers)
+    return [(shard, of == shard) for shard in np.unique(of).tolist()]
 
 
 def _on_client(client, chips, layout, shards, wanted, advance):

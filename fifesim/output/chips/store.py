@@ -59,6 +59,21 @@ class Shards:
         """
         return shard * self.length, min((shard + 1) * self.length, self._count)
 
+    def shard_of(self, chips):
+        """
+        Shards that chips lie in.
+
+        Parameters
+        ----------
+        chips : array of int
+            Their numbers.
+
+        Returns
+        -------
+        shards : array of int
+        """
+        return np.asarray(chips) // self.length
+
 
 def make_store(folder, chips, layout, shards):
     """

@@ -66,12 +66,6 @@ def test_a_part_of_the_chips_is_a_slice(chips, layout, arrays):
         np.testing.assert_array_equal(values, arrays[name][2:4])
 
 
-def test_each_chip_is_told(chips, layout):
-    told = []
-    chip_arrays(chips, range(0, 3), layout, told.append)
-    assert told == [1, 1, 1]
-
-
 def test_a_truth_that_others_have_not_names_its_chip(chips, layout):
     without = layout._replace(truth=("lai", "fpar"))
     with pytest.raises(ValueError, match=r"chip \d: has a truth that others have not, green_fpar"):

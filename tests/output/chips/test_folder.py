@@ -205,8 +205,13 @@ def test_the_loader_of_the_page_reads_each_chip_of_a_part_once(whole, monkeypatc
     assert {(x.tobytes(), y.tobytes()) for x, y in found} == expected
 
 
+def test_processes_make_the_same_bits(study, whole, tmp_path):
+    dataset_to_folder(study, tmp_path / "chips.zarr", COUNT, workers=2)
+    assert contents(tmp_path / "chips.zarr") == contents(whole)
+
+
 @pytest.mark.slow
-def test_workers_make_the_same_bits(study, whole, tmp_path):
+def test_workers_of_a_cluster_make_the_same_bits(study, whole, tmp_path):
     from fifesim.output.run.workers import cluster
 
     with cluster(workers=2) as client:

@@ -30,7 +30,7 @@ def made(tmp_path_factory):
     arrays = {}
     for shard in range(2):
         first, last = shards.range_of(shard)
-        arrays[first] = chip_arrays(chips, first, last, layout)
+        arrays[first] = chip_arrays(chips, range(first, last), layout)
         write_shard(folder, first, arrays[first])
     return folder, chips, layout, shards, arrays
 
