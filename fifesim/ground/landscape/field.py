@@ -164,19 +164,6 @@ def _filtered_tile(size, weights, arp, tile_row, tile_column):
 _small_tile = lru_cache(maxsize=64)(_filtered_tile)
 
 
-def keep_tiles(count):
-    """
-    Keep more tiles than a large scene needs, for many small ones that share them; those that are kept go.
-
-    Parameters
-    ----------
-    count : int
-        Each takes 4 MB of memory.
-    """
-    global _tile
-    _tile = lru_cache(maxsize=count)(_tile.__wrapped__)
-
-
 def window_field(seed, arp, row, column, shape):
     """
     Window of the streaming field, filtered by itself instead of by its tiles.

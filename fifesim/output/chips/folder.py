@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.annotations import FilePath
+from fifesim.base.warned import warn
 from fifesim.ground.landscape.field import TILE
 from fifesim.output.chips import datasheet
 from fifesim.output.chips.arrays import layout_of
@@ -126,6 +127,7 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, wo
         way = {"makers": makers, "client": client or found_client()}
         chips = chips_of(study, count)
         _look_at(chips)
+        _warn_of_empty_parts(chips)
         layout = layout_of(chips)
         # By its root a store is one: it comes last.
         names = [*stored_names(chips, layout), *_FILES, ROOT]
@@ -187,6 +189,16 @@ def _look_at(chips):
         scenario.geobox()
     except ValueError as error:
         raise ValueError(f"chip {last}: {error}; with more landscapes chips lie nearer to each other") from None
+
+
+def _warn_of_empty_parts(chips):
+    """The first chips lie in as many landscapes, each of which belongs to one part of the split."""
+    empty, count = sorted(set(chips.study.split) - set(chips.split)), chips.study.landscapes
+    if empty:
+        warn(
+            f"no chip for {' and '.join(empty)}: {len(chips)} chips lie in as many of {count} landscapes, and each "
+            f"of these belongs to one part of the split. Make {count} chips or more (-n), or give fewer landscapes"
+        )
 
 
 def _remove_partial(folder):

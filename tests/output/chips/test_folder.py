@@ -171,6 +171,18 @@ def test_what_a_study_cannot_be_is_told_before_anything_is_written(study, tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(("count", "none"), [(1, "test and (train|validation)"), (2, "(test|train|validation)")])
+def test_a_part_that_gets_no_chip_is_told(count, none, study):
+    chips = fifesim.chips_of(study, count)
+    with pytest.warns(UserWarning, match=rf"no chip for {none}: {count} chips lie in as many of 3 landscapes.*-n"):
+        chips_folder._warn_of_empty_parts(chips)
+
+
+def test_parts_that_have_chips_are_not_told_of(study, recwarn):
+    chips_folder._warn_of_empty_parts(fifesim.chips_of(study, 3))
+    assert not recwarn.list
+
+
 def test_a_file_that_is_chosen_is_an_input(tmp_path, study):
     samples = tmp_path / "mine.csv"
     samples.write_text("lai\n0.5\n0.7\n0.9\n1.1\n1.4\n")
