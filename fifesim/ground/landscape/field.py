@@ -18,6 +18,9 @@ from fifesim.ground.landscape.noise import white_noise
 # Field tile. [cell]
 TILE = 1008
 
+# Rows of a response that are made together.
+_ROWS = 32
+
 # Stream of the periodic field's noise.
 _PERIODIC = 1
 
@@ -214,4 +217,9 @@ def _half_response(arp, shape, dtype):
     """Response on the half plane of a real transform, scaled so that the field has unit variance."""
     u = 2.0 * np.pi * fft.fftfreq(shape[0])[:, None]
     v = 2.0 * np.pi * fft.rfftfreq(shape[1])[None, :]
-    return (response(arp, u, v) / np.sqrt(field_variance(arp))).astype(dtype)
+    out, deviation = np.empty((u.size, v.size), dtype), np.sqrt(field_variance(arp))
+    # A few rows at a time stay in the processor's cache.
+    for first in range(0, u.size, _ROWS):
+        rows = slice(first, first + _ROWS)
+        out[rows] = response(arp, u[rows], v) / deviation
+    return out
