@@ -59,6 +59,12 @@ def test_what_it_holds_says_its_units(made):
     assert np.diff(dataset.y.values).tolist() == [-30.0] * 5 and dataset.x.values[0] == 15
 
 
+def test_chips_lie_in_the_shards_of_their_ranges():
+    shards = Shards(50, 30_000, 12)
+    for shard in range(len(shards)):
+        assert set(shards.shard_of(np.arange(*shards.range_of(shard)))) == {shard}
+
+
 def test_a_shard_is_a_file(made):
     folder = made[0]
     files = sorted(path.relative_to(folder / "dn").as_posix() for path in (folder / "dn").rglob("0") if path.is_file())
