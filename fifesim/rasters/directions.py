@@ -253,7 +253,7 @@ def varying(geometry):
     -------
     names : tuple of str
     """
-    return tuple(name for name in _GEOMETRY if _angle(geometry, name).ndim)
+    return tuple(name for name in _GEOMETRY if np.ndim(getattr(geometry, name)))
 
 
 def uniform_geometry(geometry, what):
