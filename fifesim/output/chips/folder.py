@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.annotations import FilePath
+from fifesim.base.kinds import described
 from fifesim.base.warned import warn
 from fifesim.ground.landscape.field import TILE
 from fifesim.output.chips import datasheet
@@ -44,6 +45,7 @@ def dataset(
     *,
     overwrite: bool = False,
     resume: bool = False,
+    workers: int = 1,
     client: Any = None,
 ) -> xr.Dataset:
     """
@@ -60,6 +62,9 @@ def dataset(
         Replace an earlier dataset where the folder holds one.
     resume : bool, optional
         Go on with a run of the same study that was stopped in this folder; begin where there is none.
+    workers : int, optional
+        Make chips in so many processes of this machine. In a script, call it below ``if __name__ == "__main__":``, as
+        the processes import it.
     client : distributed.Client, optional
         Make shards on the workers of a cluster, by default on those of the current client where there is one.
 
@@ -73,7 +78,8 @@ def dataset(
     Raises
     ------
     ValueError
-        If the study cannot be, or the folder holds something; nothing is written then.
+        If the study cannot be, the folder holds something, or both workers and a client are given; nothing is written
+        then.
     OSError
         If a file cannot be read or written. Shards that are finished are kept.
 
@@ -88,7 +94,13 @@ def dataset(
     >>> train = chips.sel(chip=chips.split == "train")  # doctest: +SKIP
     """
     study = study if isinstance(study, Study) else read_study(study)
-    dataset_to_folder(study, folder, n, overwrite=overwrite, resume=resume, client=client)
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise ValueError(f"workers must be a whole number of processes from 1 up, got {described(workers)}")
+    if workers > 1 and client is not None:
+        raise ValueError("workers starts processes and client is of a cluster that runs: give one of them")
+    # One by itself is this process.
+    workers = workers if workers > 1 else None
+    dataset_to_folder(study, folder, n, overwrite=overwrite, resume=resume, workers=workers, client=client)
     return xr.open_zarr(folder)
 
 

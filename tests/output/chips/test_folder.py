@@ -150,7 +150,7 @@ def test_another_run_is_not_gone_on_with(count, draws, message, study, tmp_path,
 def test_an_earlier_dataset_is_replaced_with_all_its_arrays(whole, study, tmp_path):
     folder = tmp_path / "chips.zarr"
     sun = Study(study.scenario, {"vza": {"uniform": [0, 20]}}, landscapes=3)
-    dataset_to_folder(sun, folder, 2)
+    dataset_to_folder(sun, folder, 3)
     assert (folder / "geometry.vza").is_dir()
     (folder / "notes.txt").write_text("mine")
     with pytest.raises(ValueError, match="is not empty"):
@@ -218,8 +218,18 @@ def test_the_loader_of_the_page_reads_each_chip_of_a_part_once(whole, monkeypatc
 
 
 def test_processes_make_the_same_bits(study, whole, tmp_path):
-    dataset_to_folder(study, tmp_path / "chips.zarr", COUNT, workers=2)
+    fifesim.dataset(study, tmp_path / "chips.zarr", COUNT, workers=2)
     assert contents(tmp_path / "chips.zarr") == contents(whole)
+
+
+@pytest.mark.parametrize(
+    ("workers", "client", "said"),
+    [(0, None, "from 1 up, got 0"), (2.0, None, "from 1 up, got 2.0"), (2, "mine", "give one of them")],
+)
+def test_processes_are_a_number_or_a_cluster(workers, client, said, study, tmp_path):
+    with pytest.raises(ValueError, match=said):
+        fifesim.dataset(study, tmp_path / "chips.zarr", 2, workers=workers, client=client)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
@@ -232,14 +242,15 @@ def test_workers_of_a_cluster_make_the_same_bits(study, whole, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_run_killed_at_any_moment_goes_on_to_the_same_bits(study, whole, tmp_path):
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_run_killed_at_any_moment_goes_on_to_the_same_bits(workers, study, whole, tmp_path):
     """Five times, at moments drawn over the time that a run takes."""
     (tmp_path / "study.toml").write_text(study.to_toml())
     code = (
         "import sys; from matplotlib.figure import Figure; from fifesim.output.chips import datasheet, store; "
         "store._FEWEST = 2; datasheet.contact_sheet = lambda dataset, parts: Figure((1, 1)); "
         "from fifesim.cli import app; "
-        f"app(['dataset', 'study.toml', '-n', '{COUNT}', '--workers', '1', *sys.argv[1:]])"
+        f"app(['dataset', 'study.toml', '-n', '{COUNT}', '--workers', '{workers}', *sys.argv[1:]])"
     )
     run = [sys.executable, "-c", code]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
