@@ -152,8 +152,10 @@ def dataset(
         workers = workers or usable_cores()
         # One by itself is this process.
         workers = workers if workers > 1 else None
-    with kept(output), cluster(workers, scheduler) as client:
-        options = {"overwrite": overwrite, "resume": resume, "client": client, "as_json": as_json}
+    elif workers is not None:
+        raise ValueError("--workers starts processes and --scheduler uses a cluster that runs: give one of them")
+    with kept(output), cluster(scheduler=scheduler) as client:
+        options = {"overwrite": overwrite, "resume": resume, "workers": workers, "client": client, "as_json": as_json}
         files = dataset_to_folder(found, output, chips or count or 1000, **options)
     report(files, time.monotonic() - start, f"{output / 'datasheet.html'} in a browser", as_json)
 

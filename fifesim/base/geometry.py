@@ -242,9 +242,10 @@ def earth_sun_distance(time):
     >>> round(earth_sun_distance("1987-06-06T16:35:00Z"), 3)
     1.015
     """
-    return _distance(utc(time)[0])
+    return _distance(time) if isinstance(time, str) else _distance(utc(time)[0])
 
 
+# Of one time it is asked by each of many scenes.
 @lru_cache(maxsize=256)
 def _distance(time):
     return float(pvlib.solarposition.nrel_earthsun_distance(utc(time)).iloc[0])

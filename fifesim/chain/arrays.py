@@ -11,6 +11,7 @@ from fifesim.base.footprints import regularize
 from fifesim.chain.kernels import Kernels
 from fifesim.chain.setup import Setup
 from fifesim.rasters import grid as grids
+from fifesim.rasters.carried_grid import as_carried
 from fifesim.rasters.regularization import areas, operators
 from fifesim.sensor.response.rasters.footprints import check_scene, shifts_of
 from fifesim.sensor.response.rasters.noise import noisy
@@ -126,22 +127,6 @@ class ArrayChain:
             along = shared_operators(spreads, self.grid, self.pixels, shifts)
             means[numbers] = regularize(toa[numbers], *along, min_valid=self.setup.min_valid)
         return means
-
-
-@lru_cache(maxsize=64)
-def as_carried(grid):
-    """
-    A grid as a raster that lies on it tells it, by its coordinates.
-
-    Parameters
-    ----------
-    grid : odc.geo.geobox.GeoBox
-
-    Returns
-    -------
-    grid : odc.geo.geobox.GeoBox
-    """
-    return grids.geobox(grids.place(xr.DataArray(np.broadcast_to(0.0, grid.shape), dims=("y", "x")), grid))
 
 
 def shared_operators(spreads, cells, pixels, shifts=(0.0, 0.0)):

@@ -17,7 +17,6 @@ from fifesim.chain.setup import Setup
 from fifesim.ground.canopy.raster import fpar_kernel
 from fifesim.ground.canopy.rasters.evaluation import canopy_kernel
 from fifesim.ground.terrain.light import slope_reflectance
-from fifesim.rasters import directions
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters import digital_numbers
@@ -284,7 +283,7 @@ class Kernels:
 
     @cached_property
     def _mu_s(self):
-        return directions.mu_s(self.setup.geometry).values
+        return np.cos(np.radians(self.setup.geometry.sza))
 
     @cached_property
     def _compressions(self):

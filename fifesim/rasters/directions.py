@@ -1,12 +1,14 @@
 """Directions of sun and sensor on labelled rasters: numbers, or angles that differ from cell to cell."""
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_position
 from fifesim.base.times import utc
 from fifesim.base.warned import warn
-from fifesim.rasters import cf, whereabouts
+from fifesim.rasters import cf, projection, whereabouts
 from fifesim.rasters import grid as grids
 from fifesim.rasters.sites import is_fife
 
@@ -253,7 +255,7 @@ def varying(geometry):
     -------
     names : tuple of str
     """
-    return tuple(name for name in _GEOMETRY if _angle(geometry, name).ndim)
+    return tuple(name for name in _GEOMETRY if np.ndim(getattr(geometry, name)))
 
 
 def uniform_geometry(geometry, what):
@@ -281,6 +283,23 @@ def uniform_geometry(geometry, what):
             "give their means as geometry=fifesim.Geometry(sza, saa, vza, vaa)"
         )
     return geometry
+
+
+def from_grid_north(geometry, grid):
+    """
+    Directions whose azimuths count from the north of a grid, as aspects and horizons do.
+
+    Parameters
+    ----------
+    geometry : fifesim.base.geometry.Geometry
+    grid : odc.geo.geobox.GeoBox
+
+    Returns
+    -------
+    geometry : fifesim.base.geometry.Geometry
+    """
+    turn = projection.convergence(grid)
+    return replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
 
 
 def angles(geometry):

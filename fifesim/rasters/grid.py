@@ -13,9 +13,10 @@ from odc.geo.crs import MaybeCRS
 from odc.geo.geobox import GeoBox
 
 from fifesim.base.annotations import Pair
-from fifesim.base.lattice import centres, whole_cells
+from fifesim.base.lattice import whole_cells
 from fifesim.rasters import projection
 from fifesim.rasters.axes import check_axes
+from fifesim.rasters.carried_grid import centres_of, on_lattice
 from fifesim.rasters.references import reference_of
 from fifesim.rasters.spacing import along_axis, exact_cell
 
@@ -144,7 +145,7 @@ def geobox(array):
     a = found.affine
     (west, cell_x), (north, cell_y) = along_axis(array, "x", a.c, a.a), along_axis(array, "y", a.f, a.e)
     cell_x, cell_y = exact_cell(array, cell_x, cell_y)
-    return check_grid(_snapped(GeoBox(found.shape, Affine(cell_x, a.b, west, a.d, cell_y, north), found.crs)))
+    return check_grid(on_lattice(GeoBox(found.shape, Affine(cell_x, a.b, west, a.d, cell_y, north), found.crs)))
 
 
 def coordinates(grid):
@@ -160,14 +161,12 @@ def coordinates(grid):
     coordinates : dict of str to xarray.DataArray
         ``y``, ``x`` [m] and ``spatial_ref`` with a GeoTransform that fits.
     """
-    a = grid.affine
-    places = {"y": centres(a.f, a.e, np.arange(grid.shape.y)), "x": centres(a.c, a.a, np.arange(grid.shape.x))}
     out = {}
-    for axis, values in places.items():
+    for axis, values in zip(("y", "x"), centres_of(grid), strict=True):
         attrs = {"standard_name": f"projection_{axis}_coordinate", "long_name": f"{axis} coordinate of projection"}
         attrs |= {"units": "m", "axis": axis.upper()}
         out[axis] = xr.DataArray(values, dims=axis, attrs=attrs)
-    out["spatial_ref"] = reference_of(_snapped(grid))
+    out["spatial_ref"] = reference_of(on_lattice(grid))
     return out
 
 
@@ -334,12 +333,3 @@ def in_words(grid):
         f"{grid.shape.y} x {grid.shape.x} cells of {-a.e:g} x {a.a:g} m from {a.c:.3f} E {a.f:.3f} N "
         f"in {projection.name_of(grid.crs.proj)}"
     )
-
-
-def _snapped(grid):
-    """The grid with its origin on the lattice, and its CRS by authority where that says the same."""
-    a = grid.affine
-    (column, x_offset), (row, y_offset) = whole_cells(a.c, a.a), whole_cells(a.f, a.e)
-    west, north = column * a.a + x_offset, row * a.e + y_offset
-    crs = f"EPSG:{grid.crs.epsg}" if grid.crs and grid.crs.epsg else grid.crs
-    return GeoBox(grid.shape, Affine(a.a, a.b, west, a.d, a.e, north), crs)

@@ -18,7 +18,7 @@ from fifesim.ground.terrain.rasters.light import light_on_slopes
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
 from fifesim.scenario.ground import fpar_kinds, ground_scene, truth_of
-from fifesim.scenario.land import elevation, in_memory
+from fifesim.scenario.land import elevation, in_memory, light_on_hills
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of, simulate
 from fifesim.sensor.description.rasters.carried import attributes_of
@@ -125,22 +125,23 @@ def _of_arrays(scenario, grid, setup, keep):
 def _scene(scenario, grid, setup, lit):
     """A chain, the ground, and if it is lit the reflectance; of one stand as arrays."""
     chain, own = ArrayChain(setup, grid, _kernels(scenario, setup)), scenario.ground
-    dem, horizon, reflectance = None, None, None
-    if scenario.terrain.dem != "flat":
+    is_one, dem, horizon = scenario.landscape.is_one() and not own.lai_file, None, None
+    light = light_on_hills(scenario, grid, setup.geometry) if is_one and lit else None
+    if light is None and scenario.terrain.dem != "flat" and (lit or not is_one):
         # Threads take longer to start than so few cells to make.
         with dask.config.set(scheduler="synchronous"):
             dem, horizon = in_memory(*elevation(scenario, grid)[:2])
-    if scenario.landscape.is_one() and not own.lai_file:
-        land = scene_cells(grid, own.distribution, own.arp, own.seed, own.method)
-    else:
+    if not is_one:
         land = ground_scene(scenario, grid, dem=dem)
-    if lit and isinstance(land, np.ndarray):
+        lit = lit and reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
+        return chain, land, lit
+    land, reflectance = scene_cells(grid, own.distribution, own.arp, own.seed, own.method), None
+    if lit:
         reflectance = chain.kernels.reflectance(land)
         if dem is not None:
-            light = beside_altitude(dem, chain.kernels.air.altitude), chain.grid, setup.geometry, horizon
-            reflectance = chain.kernels.on_slopes(reflectance, light_on_slopes(*light))
-    elif lit:
-        reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
+            on_cells = beside_altitude(dem, chain.kernels.air.altitude), chain.grid, setup.geometry, horizon
+            light = light_on_slopes(*on_cells)
+        reflectance = reflectance if light is None else chain.kernels.on_slopes(reflectance, light)
     return chain, land, reflectance
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from fifesim.ground.terrain.rasters import hills_light, slopes
 from fifesim.ground.terrain.rasters import light as terrain_raster
 from fifesim.ground.terrain.rasters import sky as sky_raster
-from fifesim.ground.terrain.rasters import slopes
 from fifesim.ground.terrain.rasters.dem import elevation_grid
 from fifesim.ground.terrain.rasters.elevation import fine_dem, source_dem
 from fifesim.ground.terrain.rasters.hills import flint_hills
@@ -63,6 +63,38 @@ def elevation(scenario, grid, chunks=None):
     horizon = sky_raster.horizon(around, reach=terrain.horizon_reach, beside=dem)
     _check_sun(middle, around, horizon, scenario.sun_and_view())
     return dem, horizon, reach
+
+
+def light_on_hills(scenario, grid, geometry):
+    """
+    What slopes of the synthetic hills make their light of, in memory: the bits of `elevation` and of what follows it.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells.
+    geometry : fifesim.base.geometry.Geometry
+
+    Returns
+    -------
+    light : tuple or None
+        The last arguments of `fifesim.ground.terrain.light.slope_reflectance` but the air's. None where the sun is so
+        low that all of the land around has to be asked whether it shines, or the ground is none of these hills.
+
+    Raises
+    ------
+    ValueError
+        If the sun reaches no slope.
+    """
+    terrain = scenario.terrain
+    if terrain.dem != "flint-hills":
+        return None
+    around = _padded(grid, terrain.horizon_reach)
+    if not hills_light.steepest(around[_middle(around.shape)], terrain.seed) < 90 - geometry.sza:
+        return None
+    told = terrain.seed, terrain.horizon_reach, geometry, scenario.atmosphere.altitude
+    return hills_light.light_on_hills(grid, around, *told)
 
 
 def in_memory(dem, horizon):

@@ -164,8 +164,10 @@ class Section(BaseModel):
         -------
         answer : bool
         """
-        kind = (cls.model_fields[key].json_schema_extra or {}).get("file") if key in cls.model_fields else None
-        if kind is None or not isinstance(value, str) or value in kind["names"]:
+        if not isinstance(value, str) or key not in cls.model_fields:
+            return False
+        kind = (cls.model_fields[key].json_schema_extra or {}).get("file")
+        if kind is None or value in kind["names"]:
             return False
         found, suffix = Path(value).suffix.lower(), kind["suffix"]
         if suffix in (None, "*"):

@@ -7,7 +7,7 @@ import pytest
 
 import fifesim
 from fifesim.base.line_spread import Boxcar
-from fifesim.chain.arrays import ArrayChain, as_carried, shared_operators
+from fifesim.chain.arrays import ArrayChain, shared_operators
 from fifesim.chain.kernels import Kernels
 from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.rasters import grid as grids
@@ -48,10 +48,6 @@ def test_shared_kernels_give_each_setup_its_own_seed(scene):
     images = [ArrayChain(replace(setup, seed=seed), GRID, kernels).image(toa) for seed in (1, 2)]
     assert (images[0] != images[1]).any()
     np.testing.assert_array_equal(images[1], ArrayChain(replace(setup, seed=2), GRID).image(toa))
-
-
-def test_a_grid_is_carried_as_a_raster_tells_it(scene):
-    assert as_carried(GRID) == grids.geobox(scene)
 
 
 def test_operators_are_kept_for_grids_of_one_place():

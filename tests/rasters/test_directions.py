@@ -25,6 +25,15 @@ def test_directions_travel_as_scalar_coordinates():
     assert directions.geometry_of(raster()) is None
 
 
+def test_azimuths_count_from_the_north_of_a_grid():
+    """East of the central meridian grid north lies east of true north, and toward the north pole more so."""
+    east, west = (grids.grid_at("EPSG:26914", x, 4.33e6, 900, 900, 30) for x in (708000, 292000))
+    turned = [directions.from_grid_north(SUN, grid) for grid in (east, west)]
+    assert 1 < SUN.saa - turned[0].saa < 2 and 1 < turned[1].saa - SUN.saa < 2
+    assert SUN.vaa - turned[0].vaa == pytest.approx(SUN.saa - turned[0].saa, abs=1e-12)
+    assert (turned[0].sza, turned[0].vza, turned[0].earth_sun_distance) == (28.5, 3.0, 1.0147)
+
+
 def test_a_sun_without_azimuth_is_refused():
     """It would light the slopes from the north."""
     for given in (raster().assign_coords(sza=30.0), raster().assign_coords(sza=(("y", "x"), np.full((2, 3), 30.0)))):

@@ -23,6 +23,11 @@ CASES = {
     "canopy": {"ground": {"brown": 0.2, "crown_cover": 0.7, "hotspot": 0.05, "leaf_angles": "planophile"}},
     "leaf": {"ground": {"leaf": {"chlorophyll": 30.0}, "background_spectra": {"soil_dry": 0.6, "shade": 0.4}}},
     "hills": {"terrain": {"dem": "flint-hills"}},
+    "low sun on hills": {
+        "terrain": {"dem": "flint-hills", "seed": 7, "horizon_reach": 600},
+        "geometry": {"sza": 73.0, "saa": 95.0},
+    },
+    "classes on hills": {"terrain": {"dem": "flint-hills", "horizon_reach": 300}, "landscape": {"cover": "pastures"}},
     "classes": {"landscape": {"cover": "pastures"}},
     "varying": {"landscape": {"deviations": {"soil": 0.03, "brown": 0.05}}, "ground": {"brown": 0.2}},
     "adjacency": {"atmosphere": {"adjacency": True}},

@@ -18,6 +18,9 @@ from fifesim.ground.landscape.noise import white_noise
 # Field tile. [cell]
 TILE = 1008
 
+# Rows of a response that are made together.
+_ROWS = 32
+
 # Stream of the periodic field's noise.
 _PERIODIC = 1
 
@@ -164,19 +167,6 @@ def _filtered_tile(size, weights, arp, tile_row, tile_column):
 _small_tile = lru_cache(maxsize=64)(_filtered_tile)
 
 
-def keep_tiles(count):
-    """
-    Keep more tiles than a large scene needs, for many small ones that share them; those that are kept go.
-
-    Parameters
-    ----------
-    count : int
-        Each takes 4 MB of memory.
-    """
-    global _tile
-    _tile = lru_cache(maxsize=count)(_tile.__wrapped__)
-
-
 def window_field(seed, arp, row, column, shape):
     """
     Window of the streaming field, filtered by itself instead of by its tiles.
@@ -227,4 +217,9 @@ def _half_response(arp, shape, dtype):
     """Response on the half plane of a real transform, scaled so that the field has unit variance."""
     u = 2.0 * np.pi * fft.fftfreq(shape[0])[:, None]
     v = 2.0 * np.pi * fft.rfftfreq(shape[1])[None, :]
-    return (response(arp, u, v) / np.sqrt(field_variance(arp))).astype(dtype)
+    out, deviation = np.empty((u.size, v.size), dtype), np.sqrt(field_variance(arp))
+    # A few rows at a time stay in the processor's cache.
+    for first in range(0, u.size, _ROWS):
+        rows = slice(first, first + _ROWS)
+        out[rows] = response(arp, u[rows], v) / deviation
+    return out

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import PchipInterpolator
 
+from fifesim.base.lattice import assemble, centres
 from fifesim.base.seeds import generator
 from fifesim.ground.terrain.spline import REACH, spline_grid, spline_of_tiles, spline_points
 from fifesim.ground.terrain.spline_noise import smooth_noise
@@ -24,6 +25,9 @@ from fifesim.ground.terrain.uplands import NODES, UPLAND, upland
 STEP = 10.0
 BENT_STEP = 20.0
 TILE = 252
+
+# Cells of 30 m that span a tile.
+_COARSE_TILE = 84
 
 # Noise that bends the axes, in base level, and of the roughness: standard deviation and lattice step. [m]
 BENDING = ((450.0, 3000.0), (130.0, 700.0), (28.0, 200.0))
@@ -85,6 +89,36 @@ def elevation(seed, northing, easting):
     # Places in steps of 2**-30 of a node, 1e-8 m, from which whole nodes are taken off without rounding.
     rows, columns = (np.rint(axis / STEP * 2**30) / 2**30 for axis in (-np.asarray(northing), np.asarray(easting)))
     return spline_of_tiles(partial(_tile, int(seed)), TILE, rows, columns)
+
+
+def elevation_around(seed, cell, row, column, shape):
+    """
+    Elevation of the synthetic hills on a window of a lattice of coarse cells, which is kept for windows that share it.
+
+    Parameters
+    ----------
+    seed : int
+        In [0, 2**63).
+    cell : (float, float)
+        Down and across. [m]
+    row, column : int
+        Of the first cell, counted from the origin of the CRS; rows count southward.
+    shape : (int, int)
+        Rows and columns.
+
+    Returns
+    -------
+    elevation : array, shape (rows, columns)
+        The bits of `elevation`. [m]
+    """
+    return assemble(partial(_coarse_tile, int(seed), *cell), _COARSE_TILE, row, column, shape)
+
+
+# So many of 84 cells are 170 MB: what fifty landscapes of chips see around them.
+@lru_cache(maxsize=3072)
+def _coarse_tile(seed, down, across, tile_row, tile_column):
+    rows, columns = (tile * _COARSE_TILE + np.arange(_COARSE_TILE) for tile in (tile_row, tile_column))
+    return elevation(seed, centres(0.0, -down, rows), centres(0.0, across, columns))
 
 
 # The tiles of 29 km x 29 km, in 65 MB.

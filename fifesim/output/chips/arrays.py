@@ -120,43 +120,58 @@ def _fullest(study):
     return realise(study.scenario_with(drawn | small), ("truth",))["truth"].data_vars
 
 
-def chip_arrays(chips, first, last, layout, each=lambda count: None):
+def chip_arrays(chips, numbers, layout):
     """
     Chips as stacked arrays.
 
     Parameters
     ----------
     chips : fifesim.scenario.chips.Chips
-    first, last : int
-        The first of them, and that behind the last.
+    numbers : sequence of int, shape (n,)
+        Of those that are made.
     layout : Layout
-    each : callable, optional
-        ``each(1)`` is called when a chip is done.
 
     Returns
     -------
-    arrays : dict of str to array, shape (last - first, ...)
-        As the layout has them.
+    arrays : dict of str to array, shape (n, ...)
+        As the layout has them, in the order of the numbers.
 
     Raises
     ------
     ValueError
         If a chip cannot be simulated, or has another truth than the layout.
     """
-    count = last - first
-    found = {name: np.empty((count, *layout.shape(dims)), dtype) for name, (dims, dtype) in layout.variables.items()}
+    count, numbers = len(numbers), np.asarray(numbers)
+    found = empty_arrays(count, layout)
     # Neighbours of a landscape are cut from one tile of its field.
-    for chip in sorted(range(first, last), key=lambda chip: (chips.landscape[chip], chip)):
+    for at in np.lexsort((numbers, chips.landscape[numbers])).tolist():
+        chip = int(numbers[at])
         scenario = chips.scenario(chip)
         try:
-            _put(found, chip - first, *realise_arrays(scenario), layout)
+            _put(found, at, *realise_arrays(scenario), layout)
         except ValueError as error:
             raise ValueError(f"chip {chip}: {error}") from error
-        each(1)
     for start in range(0, count, _AT_ONCE):
         part = {name: values[start : start + _AT_ONCE] for name, values in found.items()}
         part["toa_reflectance"][:] = _reflectance(part, layout)
     return found
+
+
+def empty_arrays(count, layout):
+    """
+    Arrays of chips before they are made.
+
+    Parameters
+    ----------
+    count : int
+        Chips.
+    layout : Layout
+
+    Returns
+    -------
+    arrays : dict of str to array, shape (count, ...)
+    """
+    return {name: np.empty((count, *layout.shape(dims)), dtype) for name, (dims, dtype) in layout.variables.items()}
 
 
 def make_shard(study, count, first, last, layout):
@@ -174,7 +189,7 @@ def make_shard(study, count, first, last, layout):
     -------
     arrays : dict of str to array
     """
-    return chip_arrays(chips_of(study, count), first, last, layout)
+    return chip_arrays(chips_of(study, count), range(first, last), layout)
 
 
 def _put(found, at, image, truth, layout):

@@ -104,6 +104,7 @@ def datasheet_page(dataset, chips, ranges, sheet):
     by, prefix = _SEQUENCES[chips.study.sequence]
     about = {
         "chips": len(chips),
+        "landscapes": chips.study.landscapes,
         "rows": dataset.sizes["y"],
         "columns": dataset.sizes["x"],
         "pixel": f"{scenario.sensor.size:g}",
@@ -117,10 +118,10 @@ def datasheet_page(dataset, chips, ranges, sheet):
         "digest": hashlib.sha256(study.encode()).hexdigest()[:12],
     }
     parts = [_part(chips, name) for name in chips.study.split]
-    shown = [part["name"] for part in parts if part["chips"]]
+    shown, empty = ([part["name"] for part in parts if bool(part["chips"]) is has] for has in (True, False))
     variables = [_variable(dataset[name], found) for name, found in ranges.items()]
     drawn = [_drawn(chips, key) for key in chips.columns]
-    values = {"about": about, "parts": parts, "names": shown, "variables": variables, "drawn": drawn}
+    values = {"about": about, "parts": parts, "names": shown, "empty": empty, "variables": variables, "drawn": drawn}
     return pages.html(_TEMPLATE, title=dataset.attrs["title"], study=study, sheet=sheet, **values)
 
 

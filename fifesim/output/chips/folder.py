@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,13 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.annotations import FilePath
+from fifesim.base.kinds import described
+from fifesim.base.warned import warn
 from fifesim.ground.landscape.field import TILE
 from fifesim.output.chips import datasheet
-from fifesim.output.chips.arrays import chip_arrays, layout_of, make_shard
+from fifesim.output.chips.arrays import layout_of
+from fifesim.output.chips.makers import makers_of
+from fifesim.output.chips.making import made_shards
 from fifesim.output.chips.store import ROOT, Shards, checksums, make_store, stored_names, write_shard
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
 from fifesim.output.progress import ChipProgress
@@ -25,15 +29,13 @@ from fifesim.rasters.clients import found_client
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.studies import Study, read_study
 
-DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.toml"
+_FILES = DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.toml"
 
 # Of shards that are written, what their files' checksums are saved by.
 _SAVED = "chips"
 
 # So many chips are looked at before the first is made, and so many closely: what cannot be is told early. [1]
 _LOOKED_AT, _CLOSELY = 1000, 50
-
-_RETRIES = 3
 
 
 def dataset(
@@ -43,6 +45,7 @@ def dataset(
     *,
     overwrite: bool = False,
     resume: bool = False,
+    workers: int = 1,
     client: Any = None,
 ) -> xr.Dataset:
     """
@@ -59,6 +62,9 @@ def dataset(
         Replace an earlier dataset where the folder holds one.
     resume : bool, optional
         Go on with a run of the same study that was stopped in this folder; begin where there is none.
+    workers : int, optional
+        Make chips in so many processes of this machine. In a script, call it below ``if __name__ == "__main__":``, as
+        the processes import it.
     client : distributed.Client, optional
         Make shards on the workers of a cluster, by default on those of the current client where there is one.
 
@@ -72,7 +78,8 @@ def dataset(
     Raises
     ------
     ValueError
-        If the study cannot be, or the folder holds something; nothing is written then.
+        If the study cannot be, the folder holds something, or both workers and a client are given; nothing is written
+        then.
     OSError
         If a file cannot be read or written. Shards that are finished are kept.
 
@@ -87,11 +94,17 @@ def dataset(
     >>> train = chips.sel(chip=chips.split == "train")  # doctest: +SKIP
     """
     study = study if isinstance(study, Study) else read_study(study)
-    dataset_to_folder(study, folder, n, overwrite=overwrite, resume=resume, client=client)
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise ValueError(f"workers must be a whole number of processes from 1 up, got {described(workers)}")
+    if workers > 1 and client is not None:
+        raise ValueError("workers starts processes and client is of a cluster that runs: give one of them")
+    # One by itself is this process.
+    workers = workers if workers > 1 else None
+    dataset_to_folder(study, folder, n, overwrite=overwrite, resume=resume, workers=workers, client=client)
     return xr.open_zarr(folder)
 
 
-def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, client=None, as_json=False):
+def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, workers=None, client=None, as_json=False):
     """
     Make the chips of a study in a folder.
 
@@ -103,6 +116,8 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, cl
         Chips.
     overwrite, resume, client
         As in `dataset`.
+    workers : int, optional
+        Make them in so many processes of this machine.
     as_json : bool, optional
         Print progress as lines of JSON.
 
@@ -120,27 +135,33 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, cl
     """
     folder = Path(folder)
     check_folder(folder, overwrite, resume)
-    chips = chips_of(study, count)
-    _look_at(chips)
-    layout = layout_of(chips)
-    shards = Shards(count, layout.size, _together(study))
-    identity = _identity_of(chips)
-    files = [DATASHEET, CONTACT_SHEET, STUDY]
-    # By its root a store is one: it comes last.
-    names = [*stored_names(chips, layout), *files, ROOT]
-    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks)
-    with errors_with_their_file(folder), kept as unfinished:
-        begin(unfinished, identity)
-        _remove_partial(unfinished)
-        make_store(unfinished, chips, layout, shards)
-        _compute(chips, layout, shards, unfinished, client or found_client(), as_json)
-        datasheet.write(unfinished, chips, shards, DATASHEET, CONTACT_SHEET)
-        (unfinished / STUDY).write_text(study.to_toml(), encoding="utf-8")
-        if _inputs(chips) != json.loads(identity[STATE])["inputs"]:
-            raise ValueError("a file that the study names changed while it was read: begin again when it is whole")
-        if overwrite:
-            _remove_other_arrays(folder, names)
-    return [folder, *(folder / name for name in files)]
+    with makers_of(study, count, workers) if workers else nullcontext() as makers:
+        way = {"makers": makers, "client": client or found_client()}
+        chips = chips_of(study, count)
+        _look_at(chips)
+        _warn_of_empty_parts(chips)
+        layout = layout_of(chips)
+        # By its root a store is one: it comes last.
+        names = [*stored_names(chips, layout), *_FILES, ROOT]
+        kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks)
+        with errors_with_their_file(folder), kept as unfinished:
+            _make(chips, layout, unfinished, as_json, way)
+            if overwrite:
+                _remove_other_arrays(folder, names)
+    return [folder, *(folder / name for name in _FILES)]
+
+
+def _make(chips, layout, folder, as_json, way):
+    """The whole dataset, in a folder that may hold a part of it."""
+    identity, shards = _identity_of(chips), Shards(len(chips), layout.size, _together(chips.study))
+    begin(folder, identity)
+    _remove_partial(folder)
+    make_store(folder, chips, layout, shards)
+    _compute(chips, layout, shards, folder, as_json, way)
+    datasheet.write(folder, chips, shards, DATASHEET, CONTACT_SHEET)
+    (folder / STUDY).write_text(chips.study.to_toml(), encoding="utf-8")
+    if _inputs(chips) != json.loads(identity[STATE])["inputs"]:
+        raise ValueError("a file that the study names changed while it was read: begin again when it is whole")
 
 
 def study_to_resume(folder):
@@ -182,6 +203,16 @@ def _look_at(chips):
         raise ValueError(f"chip {last}: {error}; with more landscapes chips lie nearer to each other") from None
 
 
+def _warn_of_empty_parts(chips):
+    """The first chips lie in as many landscapes, each of which belongs to one part of the split."""
+    empty, count = sorted(set(chips.study.split) - set(chips.split)), chips.study.landscapes
+    if empty:
+        warn(
+            f"no chip for {' and '.join(empty)}: {len(chips)} chips lie in as many of {count} landscapes, and each "
+            f"of these belongs to one part of the split. Make {count} chips or more (-n), or give fewer landscapes"
+        )
+
+
 def _remove_partial(folder):
     """What a run that was killed was writing."""
     for path in folder.rglob("*.partial"):
@@ -190,10 +221,9 @@ def _remove_partial(folder):
 
 
 def _together(study):
-    """Chips of all landscapes that fill a tile of their fields each, or four where they see the hills around."""
+    """Chips of all landscapes that fill a tile of their fields each."""
     rows, columns = study.scenario.geobox().shape
-    tiles = 1 if study.scenario.terrain.dem == "flat" else 4
-    return tiles * max(TILE // rows, 1) * max(TILE // columns, 1) * study.landscapes
+    return max(TILE // rows, 1) * max(TILE // columns, 1) * study.landscapes
 
 
 def _identity_of(chips):
@@ -212,24 +242,15 @@ def _inputs(chips):
     return found
 
 
-def _compute(chips, layout, shards, folder, client, as_json):
+def _compute(chips, layout, shards, folder, as_json, way):
     """Make and write the shards that are not written yet."""
     blocks, names = folder / "blocks", list(layout.variables)
     wanted = [shard for shard in range(len(shards)) if not _is_written(folder, blocks, names, shard)]
     done = len(chips) - sum(np.diff(shards.range_of(shard)).item() for shard in wanted)
     with ChipProgress(len(chips), done, as_json) as progress:
-
-        def deliver(shard, arrays):
+        for shard, arrays in made_shards(chips, layout, shards, wanted, progress.advance, **way):
             write_shard(folder, shards.range_of(shard)[0], arrays)
             save_block(blocks, _SAVED, (shard,), checksums(folder, names, shard))
-
-        if client is None:
-            for shard in wanted:
-                deliver(shard, chip_arrays(chips, *shards.range_of(shard), layout, progress.advance))
-        else:
-            for shard, arrays in _on_client(chips, layout, shards, wanted, client):
-                deliver(shard, arrays)
-                progress.advance(np.diff(shards.range_of(shard)).item())
 
 
 def _is_written(folder, blocks, names, shard):
@@ -238,25 +259,6 @@ def _is_written(folder, blocks, names, shard):
         return np.array_equal(saved_block(blocks, _SAVED, (shard,)), checksums(folder, names, shard))
     except (OSError, ValueError):
         return False
-
-
-def _on_client(chips, layout, shards, wanted, client):
-    """Shards and their arrays, made on the workers of a cluster, as they come."""
-    from distributed import KilledWorker, as_completed  # there already, where a client is
-
-    options = {"pure": False, "retries": _RETRIES}
-    futures = {
-        client.submit(make_shard, chips.study, len(chips), *shards.range_of(shard), layout, **options): shard
-        for shard in wanted
-    }
-    try:
-        for future, arrays in as_completed(list(futures), loop=client.loop, with_results=True):
-            yield futures.pop(future), arrays
-            future.release()
-    except KilledWorker as error:
-        raise RuntimeError(f"{error}: has a worker too little memory? What is finished is kept, use --resume") from None
-    finally:
-        client.cancel(list(futures), force=True)
 
 
 def _remove_other_arrays(folder, names):

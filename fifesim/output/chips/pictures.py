@@ -1,10 +1,11 @@
-"""A contact sheet: a few chips of each part of a dataset, their image above their truth."""
+"""A contact sheet: a few chips of each part of a dataset, their image above their truth, in the report's colours."""
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from fifesim.base.bands import GREEN, NEAR_INFRARED, RED, nearest
+from fifesim.output.composites import dark_and_bright
 from fifesim.output.figures import NAMES
+from fifesim.output.maps import false_colour_names
 
 _NO_DATA = (0.85, 0.85, 0.85)
 
@@ -45,14 +46,16 @@ def contact_sheet(dataset, parts):
     names = [name for name in _TRUTH if name in chosen][:_ROWS]
     figure = Figure(figsize=(1.15 * chosen.sizes["chip"] + 1.4, 1.25 * (len(names) + 1) + 0.9), layout="constrained")
     axes = figure.subplots(len(names) + 1, chosen.sizes["chip"], squeeze=False)
-    colours, said = _composite(chosen)
-    for axis, picture in zip(axes[0], colours, strict=True):
-        axis.imshow(picture, interpolation="nearest")
-    axes[0, 0].set_ylabel(said, fontsize=8)
-    for row, name in zip(axes[1:], names, strict=True):
-        drawn = _row(row, chosen[name].values, _TRUTH[name])
-        row[0].set_ylabel(NAMES.get(name, name).replace(" of ", "\nof "), fontsize=8)
-        figure.colorbar(drawn, ax=row, fraction=0.01, pad=0.005).ax.tick_params(labelsize=7)
+    said, drawn = _image_row(axes[0], chosen)
+    rows = [(said, drawn)]
+    rows += [
+        (NAMES.get(name, name), _row(row, chosen[name].values, _TRUTH[name]))
+        for row, name in zip(axes[1:], names, strict=True)
+    ]
+    for row, (said, drawn) in zip(axes, rows, strict=True):
+        row[0].set_ylabel(said.replace(" of ", "\nof "), fontsize=8)
+        if drawn is not None:
+            figure.colorbar(drawn, ax=row, fraction=0.01, pad=0.005).ax.tick_params(labelsize=7)
     for axis in axes.flat:
         axis.set(xticks=[], yticks=[], facecolor=_NO_DATA)
     shown = [(name, chip, not at) for name, chips in parts.items() for at, chip in enumerate(chips)]
@@ -62,7 +65,7 @@ def contact_sheet(dataset, parts):
 
 
 def _row(axes, values, colours):
-    """One truth of all chips."""
+    """One quantity of all chips."""
     finite = values[np.isfinite(values)]
     low, high = np.percentile(finite, (0.5, 99.5)) if finite.size else (0.0, 1.0)
     high = max(high, low + 1e-6)
@@ -71,25 +74,18 @@ def _row(axes, values, colours):
     return drawn[0]
 
 
-def _composite(chosen):
-    """
-    False colours, and which bands they are.
-
-    All three span the same range about their own middle: stretched each by itself, bands that vary against each other
-    leave nothing but pure colours.
-    """
-    wavelengths = chosen["wavelength"].values
-    numbers = [nearest(wavelengths, window) for window in (NEAR_INFRARED, RED, GREEN)]
-    numbers = [number for number in numbers if number is not None] or [0]
-    numbers = [*numbers, *numbers[-1:] * 2][:3]
-    layers = chosen["toa_reflectance"].values[:, numbers]
-    spans = []
-    for each in range(3):
-        values = layers[:, each][np.isfinite(layers[:, each])]
-        spans.append(np.percentile(values, (1, 50, 99)) if values.size else np.array([0.0, 0.5, 1.0]))
-    half = max(*(max(high - middle, middle - low) for low, middle, high in spans), 1e-3)
-    middles = np.array([middle for _, middle, _ in spans])[:, None, None]
-    stretched = np.clip((layers - middles + half) / (2 * half), 0, 1)
+def _image_row(axes, chosen):
+    """Images in false colours; without the bands for these their NDVI; without that one band. What it is, and a bar."""
+    names = false_colour_names(chosen["toa_reflectance"])
+    if not names and "ndvi" in chosen:
+        return "NDVI of the image", _row(axes, chosen["ndvi"].values, "YlGn")
+    said, names = ",\n".join(names or chosen["band"].values[-1:]), names or [chosen["band"].values[-1]] * 3
+    layers = chosen["toa_reflectance"].sel(band=names).values
+    limits = [dark_and_bright(each[np.isfinite(each)]) for each in layers.swapaxes(0, 1)]
+    dark, bright = np.array(limits).T[:, :, None, None]
+    stretched = np.clip((layers - dark) / np.maximum(bright - dark, 1e-6), 0, 1)
     valid = np.isfinite(layers).all(axis=1, keepdims=True)
     pictures = np.concatenate([np.nan_to_num(stretched), valid], axis=1).transpose(0, 2, 3, 1)
-    return pictures, "image: " + ",\n".join(dict.fromkeys(str(chosen["band"].values[number]) for number in numbers))
+    for axis, picture in zip(axes, pictures, strict=True):
+        axis.imshow(picture, interpolation="nearest")
+    return f"image: {said}", None

@@ -8,7 +8,6 @@ from scipy.sparse.linalg import spsolve
 
 import fifesim
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
-from fifesim.ground.landscape import field as field_module
 from fifesim.ground.landscape.autoregression import (
     LARGEST_STREAMING_ARP,
     autocorrelation,
@@ -199,17 +198,3 @@ def test_window_filtered_by_itself_has_the_cells_of_the_tiles(arp):
     """Across the corner of four tiles."""
     found = window_field(20, arp, -50, TILE - 40, (90, 70))
     np.testing.assert_allclose(found, streaming_field(20, arp, -50, TILE - 40, (90, 70)), rtol=0, atol=1e-5)
-
-
-def test_kept_tiles_are_made_once(monkeypatch):
-    made = []
-    original = field_module._window
-    monkeypatch.setattr(field_module, "_window", lambda *args: made.append(args) or original(*args))
-    field_module.keep_tiles(13)
-    first = [streaming_field(seed, 0.1, 0, 0, (3, 3)) for seed in range(13)]
-    again = [streaming_field(seed, 0.1, 0, 0, (3, 3)) for seed in range(13)]
-    np.testing.assert_array_equal(first, again)
-    assert len(made) == 13
-    field_module.keep_tiles(12)
-    streaming_field(0, 0.1, 0, 0, (3, 3))
-    assert len(made) == 14

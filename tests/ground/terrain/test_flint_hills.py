@@ -168,3 +168,12 @@ def test_benches_are_sines_of_the_ground(height, share):
     flint_hills._add_bench(found, clear, height, share)
     turn = 2 * np.pi / height
     np.testing.assert_allclose(found, ground + share / turn * clear * np.sin(turn * ground), rtol=0, atol=1e-12)
+
+
+def test_the_land_around_has_the_elevation_of_its_cells():
+    """In a window across the corner of four kept tiles."""
+    rows, columns = -144370 + np.arange(20), 23600 + np.arange(30)
+    row, column = 84 * (rows[0] // 84) - 7, 84 * (columns[0] // 84) - 11
+    found = flint_hills.elevation_around(5, (30.0, 29.6), row, column, (20, 30))
+    northing, easting = -30.0 * (row + np.arange(20) + 0.5), 29.6 * (column + np.arange(30) + 0.5)
+    np.testing.assert_array_equal(found, flint_hills.elevation(5, northing, easting))

@@ -77,6 +77,16 @@ def test_page_counts_chips_and_landscapes(page, chips):
         assert numbers == [len(set(chips.landscape[own].tolist())), int(own.sum())]
 
 
+@pytest.mark.parametrize(("count", "said"), [(1, "<b>{} have none</b>"), (2, "<b>{} has none</b>"), (3, None)])
+def test_page_says_why_a_part_has_no_chips(count, said, dataset):
+    chips = chips_of(Study(parse_scenario(SMALL), DRAWS, landscapes=3), count)
+    part = dataset.isel(chip=range(count))
+    page = datasheet.datasheet_page(part, chips, datasheet.ranges_of(part, Shards(count, 1, 4)), b"")
+    empty = [name for name in ("train", "validation", "test") if name not in chips.split]
+    assert ("fewer chips than landscapes" in page) is bool(said)
+    assert "none</b>" not in page if said is None else said.format(" and ".join(empty)) in page
+
+
 def test_page_is_self_contained_and_has_the_study(page, chips):
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
     assert chips.study.to_toml() in html.unescape(page)

@@ -150,7 +150,7 @@ def test_another_run_is_not_gone_on_with(count, draws, message, study, tmp_path,
 def test_an_earlier_dataset_is_replaced_with_all_its_arrays(whole, study, tmp_path):
     folder = tmp_path / "chips.zarr"
     sun = Study(study.scenario, {"vza": {"uniform": [0, 20]}}, landscapes=3)
-    dataset_to_folder(sun, folder, 2)
+    dataset_to_folder(sun, folder, 3)
     assert (folder / "geometry.vza").is_dir()
     (folder / "notes.txt").write_text("mine")
     with pytest.raises(ValueError, match="is not empty"):
@@ -169,6 +169,18 @@ def test_what_a_study_cannot_be_is_told_before_anything_is_written(study, tmp_pa
     with pytest.raises(ValueError, match=r"chip 59999: .*with more landscapes chips lie nearer"):
         chips_folder._look_at(far)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("count", "none"), [(1, "test and (train|validation)"), (2, "(test|train|validation)")])
+def test_a_part_that_gets_no_chip_is_told(count, none, study):
+    chips = fifesim.chips_of(study, count)
+    with pytest.warns(UserWarning, match=rf"no chip for {none}: {count} chips lie in as many of 3 landscapes.*-n"):
+        chips_folder._warn_of_empty_parts(chips)
+
+
+def test_parts_that_have_chips_are_not_told_of(study, recwarn):
+    chips_folder._warn_of_empty_parts(fifesim.chips_of(study, 3))
+    assert not recwarn.list
 
 
 def test_a_file_that_is_chosen_is_an_input(tmp_path, study):
@@ -205,8 +217,23 @@ def test_the_loader_of_the_page_reads_each_chip_of_a_part_once(whole, monkeypatc
     assert {(x.tobytes(), y.tobytes()) for x, y in found} == expected
 
 
+def test_processes_make_the_same_bits(study, whole, tmp_path):
+    fifesim.dataset(study, tmp_path / "chips.zarr", COUNT, workers=2)
+    assert contents(tmp_path / "chips.zarr") == contents(whole)
+
+
+@pytest.mark.parametrize(
+    ("workers", "client", "said"),
+    [(0, None, "from 1 up, got 0"), (2.0, None, "from 1 up, got 2.0"), (2, "mine", "give one of them")],
+)
+def test_processes_are_a_number_or_a_cluster(workers, client, said, study, tmp_path):
+    with pytest.raises(ValueError, match=said):
+        fifesim.dataset(study, tmp_path / "chips.zarr", 2, workers=workers, client=client)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.slow
-def test_workers_make_the_same_bits(study, whole, tmp_path):
+def test_workers_of_a_cluster_make_the_same_bits(study, whole, tmp_path):
     from fifesim.output.run.workers import cluster
 
     with cluster(workers=2) as client:
@@ -215,14 +242,15 @@ def test_workers_make_the_same_bits(study, whole, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_run_killed_at_any_moment_goes_on_to_the_same_bits(study, whole, tmp_path):
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_run_killed_at_any_moment_goes_on_to_the_same_bits(workers, study, whole, tmp_path):
     """Five times, at moments drawn over the time that a run takes."""
     (tmp_path / "study.toml").write_text(study.to_toml())
     code = (
         "import sys; from matplotlib.figure import Figure; from fifesim.output.chips import datasheet, store; "
         "store._FEWEST = 2; datasheet.contact_sheet = lambda dataset, parts: Figure((1, 1)); "
         "from fifesim.cli import app; "
-        f"app(['dataset', 'study.toml', '-n', '{COUNT}', '--workers', '1', *sys.argv[1:]])"
+        f"app(['dataset', 'study.toml', '-n', '{COUNT}', '--workers', '{workers}', *sys.argv[1:]])"
     )
     run = [sys.executable, "-c", code]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

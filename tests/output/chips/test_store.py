@@ -30,7 +30,7 @@ def made(tmp_path_factory):
     arrays = {}
     for shard in range(2):
         first, last = shards.range_of(shard)
-        arrays[first] = chip_arrays(chips, first, last, layout)
+        arrays[first] = chip_arrays(chips, range(first, last), layout)
         write_shard(folder, first, arrays[first])
     return folder, chips, layout, shards, arrays
 
@@ -57,6 +57,12 @@ def test_what_it_holds_says_its_units(made):
     assert dataset.rio.crs.to_epsg() == 26914
     assert dataset.lai.attrs["standard_name"] == "leaf_area_index"
     assert np.diff(dataset.y.values).tolist() == [-30.0] * 5 and dataset.x.values[0] == 15
+
+
+def test_chips_lie_in_the_shards_of_their_ranges():
+    shards = Shards(50, 30_000, 12)
+    for shard in range(len(shards)):
+        assert set(shards.shard_of(np.arange(*shards.range_of(shard)))) == {shard}
 
 
 def test_a_shard_is_a_file(made):

@@ -79,15 +79,36 @@ def beside_altitude(dem, altitude):
         not.
     """
     if dem.chunks is None:
-        _look(dem.values, altitude)
+        look_at_altitude(dem.values, altitude)
         return dem
     told = []
-    data = dem.data.map_blocks(_look, altitude, told, dtype=dem.dtype, meta=np.empty((0, 0), dem.dtype))
+    data = dem.data.map_blocks(look_at_altitude, altitude, told, dtype=dem.dtype, meta=np.empty((0, 0), dem.dtype))
     return dem.copy(data=data)
 
 
-def _look(cells, altitude, told=()):
-    """The cells, after a warning where they lie elsewhere: one of all blocks in a process."""
+def look_at_altitude(cells, altitude, told=()):
+    """
+    Elevation after a warning where it lies elsewhere than the atmosphere.
+
+    Parameters
+    ----------
+    cells : array
+        [m]
+    altitude : float
+        [km]
+    told : list, optional
+        Empty as long as nobody has been warned: one block in a process warns for all.
+
+    Returns
+    -------
+    cells : array
+        The same. [m]
+
+    Warns
+    -----
+    UserWarning
+        As in `beside_altitude`.
+    """
     low, high, at = np.fmin.reduce(cells, axis=None), np.fmax.reduce(cells, axis=None), 1000 * altitude
     in_feet = low > at + _NOT_FEET and _FOOT * low - _APART / 5 < at < _FOOT * high + _APART / 5
     if not told and (in_feet or low > at + _APART or high < at - _APART):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -13,9 +12,10 @@ from fifesim.base.geometry import fife_geometry
 from fifesim.ground.terrain import sky as skies
 from fifesim.ground.terrain.light import slope_light, slope_reflectance
 from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid, source_resolution
+from fifesim.ground.terrain.rasters.places import between_places
 from fifesim.ground.terrain.rasters.sky import sky_above
 from fifesim.ground.terrain.slope_factors import slope_factor
-from fifesim.rasters import cf, directions, projection
+from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.annotations import Directions
@@ -348,18 +348,10 @@ def light_on_slopes(dem, grid, geometry, horizon=None):
 
 def _light_on(grid, dem, data, horizon, geometry, check):
     """What gives a block of a kernel on slopes, and what that reads of elevation and sky."""
-    dem_grid = elevation_grid(dem)
-    offset, shape = _offset(dem_grid, grid), tuple(grid.shape)
-    # Aspects and horizons count from the north of the grid.
-    turn, cell = projection.convergence(grid), grids.cell_size(grid)
-    geometry = replace(geometry, saa=geometry.saa - turn, vaa=geometry.vaa - turn)
-    layers, places = sky_above(data, dem_grid, source_resolution(dem), horizon, geometry, check)
-    between = places.between(offset, shape)
-
-    def of_block(kernel, rows, columns, elevation, layers, *rho):
-        return kernel(*rho, elevation, between.sky(layers, rows, columns), cell, geometry)
-
-    return of_block, [chunking.margin_reads(data, 1, offset=offset, shape=shape), between.reads(layers)]
+    dem_grid, turned = elevation_grid(dem), directions.from_grid_north(geometry, grid)
+    offset = _offset(dem_grid, grid)
+    layers, places = sky_above(data, dem_grid, source_resolution(dem), horizon, turned, check)
+    return between_places(grid, offset, data, layers, places, turned)
 
 
 def _offset(dem_grid, grid):

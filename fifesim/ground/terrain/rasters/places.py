@@ -170,10 +170,62 @@ def horizon_places(grid, horizon):
         If the horizon does not cover the elevation, or its directions are few or uneven.
     """
     _check_horizon(grid, horizon)
-    coarse = grids.geobox(horizon)
+    return places_on(grid, grids.geobox(horizon))
+
+
+def places_on(grid, coarse):
+    """
+    Places of a coarse grid that lie on an elevation model, and one more on each side.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of the elevation.
+    coarse : odc.geo.geobox.GeoBox
+        Whose cells have places as centres; it reaches further.
+
+    Returns
+    -------
+    places : Places
+    cut : (slice, slice)
+        Rows and columns of the coarse grid.
+    """
     positions, cut = _positions(grid, coarse), _around(grid, coarse)
     step = tuple(size / cell for size, cell in zip(grids.cell_size(coarse), grids.cell_size(grid), strict=True))
     return Places(grid, *(at[part] for at, part in zip(positions, cut, strict=True)), step), cut
+
+
+def between_places(grid, offset, data, layers, places, geometry):
+    """
+    What gives a block of a kernel on slopes, and what that reads.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of the result.
+    offset : (int, int)
+        Rows and columns of the elevation before it.
+    data, layers : numpy.ndarray or dask.array.Array
+        Elevation, and the sky at places of it as `fifesim.ground.terrain.rasters.sky.sky_above` has it.
+    places : fifesim.ground.terrain.rasters.places.Places
+    geometry : fifesim.base.geometry.Geometry
+        Of sun and sensor, from grid north.
+
+    Returns
+    -------
+    of_block : callable
+        ``of_block(kernel, rows, columns, elevation, layers, *others)`` calls ``kernel(*others, elevation, sky, cell,
+        geometry)`` for two slices of the result.
+    reads : list
+        As `fifesim.rasters.chunks.windows` takes them, of elevation and layers.
+    """
+    cell, shape = grids.cell_size(grid), tuple(grid.shape)
+    between = places.between(offset, shape)
+
+    def of_block(kernel, rows, columns, elevation, layers, *rho):
+        return kernel(*rho, elevation, between.sky(layers, rows, columns), cell, geometry)
+
+    return of_block, [chunking.margin_reads(data, 1, offset=offset, shape=shape), between.reads(layers)]
 
 
 def chunks_beside(dem, coarse):

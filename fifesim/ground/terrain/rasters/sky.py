@@ -74,7 +74,7 @@ def horizon(
     azimuths = horizons.azimuths(directions)
     samples, chunks = _samples(dem.transpose("y", "x").data, places)
     horizons.horizon_margin(*places.cell, reach)
-    useful = _useful_reach(reach, places)
+    useful = useful_reach(reach, places)
     reads = chunking.margin_reads(samples[0], *horizons.horizon_margin(*places.cell, useful))
     if chunks is not None and beside is not None:
         chunks = chunks_beside(beside.transpose("y", "x"), places.coarse)
@@ -123,7 +123,7 @@ def sky_above(data, grid, resolution, horizon, geometry, check=True):
     places, cut = (places_of(grid, resolution), None) if horizon is None else horizon_places(grid, horizon)
     samples, chunks = _samples(data, places)
     if horizon is None:
-        directions, reach = horizons.azimuths(DIRECTIONS), _useful_reach(REACH, places)
+        directions, reach = horizons.azimuths(DIRECTIONS), useful_reach(REACH, places)
         known = chunking.margin_reads(samples[0], *horizons.horizon_margin(*places.cell, reach))
         cell_y, cell_x = places.cell
         find = partial(horizons.horizon_tangent, cell_y=cell_y, cell_x=cell_x, directions=directions, reach=reach)
@@ -132,15 +132,49 @@ def sky_above(data, grid, resolution, horizon, geometry, check=True):
         known = chunking.margin_reads(horizon.transpose("direction", "y", "x").data[(slice(None), *cut)], 0)
 
     def kernel(rows, columns, own, block):
-        tangents = find(block)
-        vector = sky_vector(tangents, directions, *own)
-        return np.concatenate([vector, horizon_toward(tangents, directions, geometry.saa)[None]])
+        return _layers(find(block), directions, own, geometry)
 
     reads = [chunking.margin_reads(samples[1:], 0), known]
     layers = chunking.windows(kernel, reads, (4, *samples.shape[1:]), chunks)
     if check and not isinstance(layers, da.Array):
         _check_sun(samples[1:], layers[3], geometry)
     return layers, places
+
+
+def sky_under(zenith, data, places, geometry):
+    """
+    The part of the sky that is seen from places of an elevation model in memory, under a known horizon.
+
+    Parameters
+    ----------
+    zenith : array, shape (direction, y, x)
+        Of the horizon at the places. [degree]
+    data : array, shape (y, x)
+        Elevation. [m]
+    places : fifesim.ground.terrain.rasters.places.Places
+    geometry : fifesim.base.geometry.Geometry
+        Of the sun.
+
+    Returns
+    -------
+    layers : array, shape (4, y, x)
+        As of `sky_above`. [1]
+
+    Raises
+    ------
+    ValueError
+        If the sun reaches no slope.
+    """
+    samples, _ = _samples(data, places)
+    layers = _layers(horizons.tangent(zenith), horizons.azimuths(len(zenith)), samples[1:], geometry)
+    _check_sun(samples[1:], layers[3], geometry)
+    return layers
+
+
+def _layers(tangents, directions, own, geometry):
+    """Vector of the sky, and tangent of the horizon toward the sun."""
+    vector = sky_vector(tangents, directions, *own)
+    return np.concatenate([vector, horizon_toward(tangents, directions, geometry.saa)[None]])
 
 
 def _samples(data, places):
@@ -159,8 +193,22 @@ def _samples(data, places):
     return chunking.windows(kernel, [reads], (3, *map(len, cells)), chunks), chunks
 
 
-def _useful_reach(reach, places):
-    """No further than the raster's diagonal, beyond which all is open, and no less than a cell."""
+def useful_reach(reach, places):
+    """
+    Distance of terrain that counts: no further than the raster's diagonal, beyond which all is open, nor less than a
+    cell.
+
+    Parameters
+    ----------
+    reach : float
+        Asked for. [m]
+    places : fifesim.ground.terrain.rasters.places.Places
+
+    Returns
+    -------
+    reach : float
+        [m]
+    """
     (down, across), rows, columns = places.cell, places.rows.size, places.columns.size
     return max(min(reach, float(np.hypot(rows * down, columns * across))), down, across)
 
