@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.landscape.compression import cells_by_class, check_codes
+from fifesim.ground.landscape.compression import cells_by_class, check_codes, numbers_of
 
 TABLE = (40, 0, 32764)
 
@@ -47,3 +47,10 @@ def test_fractions_and_many_codes_are_told_in_a_line():
     with pytest.raises(ValueError, match=r"1, 2, 3, 4, 5, 6, 7, 8, \.\.\., in") as told:
         check_codes(np.arange(1, 1001), tuple(range(2000, 3000)))
     assert len(str(told.value)) < 500
+
+
+def test_numbers_are_places_in_the_table():
+    codes = np.random.default_rng(1).choice([-1, 3, 9, 700], (30, 40)).astype(np.int16)
+    numbers, present = numbers_of(codes, (9, 5, 3))
+    assert (np.array([9, 5, 3, -2])[numbers] == np.where(np.isin(codes, [3, 9]), codes, -2)).all()
+    assert present.tolist() == [True, False, True]
