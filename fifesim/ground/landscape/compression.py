@@ -92,19 +92,19 @@ def numbers_of(codes, table):
     -------
     numbers : array of int16, shape (...)
         From 0 on, n where a code is in no table.
-    present : array of bool, shape (n,)
-        Which of the classes there are.
+    present : array of bool, shape (n + 1,)
+        Which of the classes there are, and whether cells of none.
 
     Examples
     --------
     >>> numbers, present = numbers_of(np.array([2, 5, 2, -1], np.int16), (5, 2, 7))
     >>> numbers.tolist(), present.tolist()
-    ([1, 0, 1, 3], [True, True, False])
+    ([1, 0, 1, 3], [True, True, False, True])
     """
     codes, present = np.ascontiguousarray(codes, np.int16), np.zeros(len(table) + 1, bool)
     numbers = np.empty(codes.shape, np.int16)
     _look_up(codes.reshape(-1), _numbers(table), numbers.reshape(-1), present)
-    return numbers, present[:-1]
+    return numbers, present
 
 
 def _numbers(table):

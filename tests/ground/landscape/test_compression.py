@@ -53,4 +53,4 @@ def test_numbers_are_places_in_the_table():
     codes = np.random.default_rng(1).choice([-1, 3, 9, 700], (30, 40)).astype(np.int16)
     numbers, present = numbers_of(codes, (9, 5, 3))
     assert (np.array([9, 5, 3, -2])[numbers] == np.where(np.isin(codes, [3, 9]), codes, -2)).all()
-    assert present.tolist() == [True, False, True]
+    assert present.tolist() == [True, False, True, True]

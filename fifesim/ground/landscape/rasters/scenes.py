@@ -242,13 +242,13 @@ def _leaf_area_of_scores(codes, tables, arps, scored, cover, *scores):
 
 
 def _of_fields(codes, tables, arps, cover, field_of):
-    """Leaf area of cells; ``field_of(arp)`` gives their standard normal deviates, asked for where a class needs them."""
+    """Leaf area of cells; ``field_of(arp)`` gives standard normal deviates, and is asked where a class needs them."""
     out = np.full(cover.shape, np.nan)
     numbers, present = numbers_of(cover, codes)
     needed = [arp if table[0] != table[-1] else None for arp, table in zip(arps, tables, strict=True)]
     for arp in dict.fromkeys(needed):
         mine = np.array([each == arp for each in needed])
-        if (mine & present).any():
+        if (mine & present[:-1]).any():
             field = np.zeros(cover.shape) if arp is None else field_of(arp)
             of_arp = numbers if mine.all() else np.where(np.append(mine, False)[numbers], numbers, -1)
             quantile_map_of_classes(field, of_arp, tables, out)
