@@ -96,29 +96,30 @@ def quantile_map_of_classes(field, numbers, tables, out):
 @register_jitable
 def _places(field, size, at, share):
     """Nodes of a table below deviates, and shares of the steps to the next."""
-    per_deviate, last = (size - 1) / (2.0 * _REACH), np.int32(size - 2)
+    per_deviate, last = (size - 1) / (2.0 * _REACH), np.uint32(size - 2)
     # Without branches, so that the loop is done for several cells at once.
     for i in range(field.size):
         position = (field[i] + _REACH) * per_deviate
         known = position == position
         inside = min(max(position, 0.0), last + 1.0) if known else 0.0
-        at[i] = min(np.int32(inside), last)
+        at[i] = min(np.uint32(inside), last)
         share[i] = inside - at[i] if known else np.nan
 
 
 @njit(nogil=True, cache=True)
 def _map(field, table, out):
-    at, share = np.empty(_RUN, np.int32), np.empty(_RUN)
+    at, share = np.empty(_RUN, np.uint32), np.empty(_RUN)
     for first in range(0, field.size, _RUN):
         cells, values = field[first : first + _RUN], out[first : first + _RUN]
         _places(cells, table.size, at, share)
         for i in range(cells.size):
-            values[i] = table[at[i]] * (1.0 - share[i]) + table[at[i] + 1] * share[i]
+            k = np.uint64(at[i])
+            values[i] = table[k] * (1.0 - share[i]) + table[k + np.uint64(1)] * share[i]
 
 
 @njit(nogil=True, cache=True)
 def _map_classes(field, numbers, tables, same, out):
-    at, share, known = np.empty(_RUN, np.int32), np.empty(_RUN), np.empty(_RUN, np.bool_)
+    at, share, known = np.empty(_RUN, np.uint32), np.empty(_RUN), np.empty(_RUN, np.bool_)
     flat, size = tables.reshape(-1), tables.shape[1]
     for first in range(0, field.size, _RUN):
         cells, of_cells = field[first : first + _RUN], numbers[first : first + _RUN]
@@ -126,11 +127,12 @@ def _map_classes(field, numbers, tables, same, out):
         _places(cells, size, at, share)
         for i in range(cells.size):
             known[i] = (of_cells[i] >= 0) & (of_cells[i] < len(tables))
-            number = of_cells[i] if known[i] else 0
+            number = np.uint32(of_cells[i] if known[i] else 0)
             share[i] = 0.0 if same[number] else share[i]
-            at[i] += np.int32(number * size)
+            at[i] += number * np.uint32(size)
         for i in range(cells.size):
-            value = flat[at[i]] * (1.0 - share[i]) + flat[at[i] + 1] * share[i]
+            k = np.uint64(at[i])
+            value = flat[k] * (1.0 - share[i]) + flat[k + np.uint64(1)] * share[i]
             values[i] = value if known[i] else values[i]
 
 
