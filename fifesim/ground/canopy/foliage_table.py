@@ -277,8 +277,8 @@ def _rooms(crowns, cover, at, share):
         at[i], share[i] = _place(np.sqrt(np.sqrt(1 - known)) * (len(crowns) - 3), len(crowns))
 
 
-# Two loops over flat arrays with places that have no sign, which is how the compiler makes them short: views of rows, and
-# places that may count from the end, take longer than the work.
+# Two loops over flat arrays, by places that have no sign: views of rows, and places that may count from the end, take
+# longer than the work.
 @register_jitable
 def _along(table, rows, shares, out):
     """Values of all columns of a table, shape (n, column), from splines of one variable."""
@@ -295,7 +295,7 @@ def _along(table, rows, shares, out):
 @register_jitable
 def _across(table, starts, leaves, dead, wide, out):
     """
-    Values of all columns of a table from splines of two variables; ``wide`` is for those at four neighbours in the second.
+    Values of all columns of a table from splines of two variables; ``wide`` is for those at four dead shares.
 
     These lie in a row, so that most of the work is one long loop.
     """
