@@ -321,7 +321,7 @@ def check_map(lai):
         check_lai(lai)
         raise ValueError(
             f"leaf area index up to {np.nanmax(cells):g}, canopies have at most {LARGEST_OF_MAPS:g}: where the numbers "
-            "are scaled, as MODIS by 0.1, type lai * 0.1, or gdal_edit.py -a_scale 0.1 for a file; set cells without data "
-            "to NaN"
+            "are scaled, as MODIS by 0.1, type lai * 0.1, or gdal_edit.py -a_scale 0.1 for a file; set cells without "
+            "data to NaN"
         )
     return lai
