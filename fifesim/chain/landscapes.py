@@ -280,7 +280,8 @@ def fpar(
     told = {each.code: _told(each, canopy, land.cells) for each in land.classes}
     # Of classes with the same canopy once.
     made = {repr(each): ground.fpar(land.lai, **said, **each) for each in {repr(v): v for v in told.values()}.values()}
-    kernels = {code: (np.positive, [made[repr(each)]]) for code, each in told.items()}
+    taken = {text: (np.positive, [each]) for text, each in made.items()}
+    kernels = {code: taken[repr(each)] for code, each in told.items()}
     out = grids.place(by_class(kernels, land.cover), grids.geobox(land.lai))
     history = next(iter(made.values())).attrs["history"].splitlines()[-1] if len(made) == 1 else "fpar: by class"
     return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=land.lai, history=history)

@@ -9,7 +9,8 @@ import pytest
 from distributed import Client, LocalCluster
 from lazy import no_compute
 
-from fifesim.rasters.sampling import apart
+from fifesim.rasters import sampling
+from fifesim.rasters.sampling import all_apart, apart
 
 
 def counted(calls):
@@ -102,3 +103,34 @@ def test_what_fails_in_it_is_told():
     array = da.ones((4, 4), chunks=2).map_blocks(refuse, dtype=float, meta=np.empty((0, 0)))
     with pytest.raises(ValueError, match="brightness must be in"):
         apart(array).compute()
+
+
+def test_what_several_need_is_made_once():
+    calls = []
+    array = counted(calls)
+    found = dask.compute(*all_apart([array[::4, ::4], array.sum(axis=0)]), scheduler="synchronous")
+    assert len(calls) == 9
+    np.testing.assert_array_equal(found[0], array.compute()[::4, ::4])
+    np.testing.assert_array_equal(found[1], array.compute().sum(axis=0))
+
+
+def test_samples_of_samples_are_made_once_by_all_threads():
+    """And each who asks has values of its own."""
+    calls = []
+    few = apart(counted(calls)[::3, ::3])
+    many = [apart(few + number) for number in range(6)]
+    with dask.config.set(scheduler="threads", num_workers=3):
+        dask.compute(few, *many)
+    assert len(calls) == 9
+    first = few.compute(scheduler="synchronous")
+    first += 1
+    np.testing.assert_array_equal(few.compute(scheduler="synchronous"), first - 1)
+
+
+def test_large_samples_are_not_kept(monkeypatch):
+    monkeypatch.setattr(sampling, "_FEW", 100)
+    calls = []
+    few = apart(counted(calls)[::3, ::3])
+    for times in (1, 2):
+        few.compute(scheduler="synchronous")
+        assert len(calls) == 9 * times

@@ -7,8 +7,9 @@ import numpy as np
 
 from fifesim.chain.kernels import Kernels
 from fifesim.experiments.friedl1995.pixels import ground_of
-from fifesim.ground.landscape.distribution import lai_distribution, rank_quantiles
+from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.field import periodic_field
+from fifesim.ground.landscape.quantiles import rank_quantiles
 
 # Larger fields are not kept. [cell]
 _FEW = 2**18

@@ -7,9 +7,10 @@ from scipy.stats import norm
 
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.landscape.autoregression import autocorrelation, field_variance
-from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map, treatments
+from fifesim.ground.landscape.distribution import lai_distribution, treatments
 from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
 from fifesim.ground.landscape.noise import philox, white_noise
+from fifesim.ground.landscape.quantiles import quantile_map, quantile_table, rank_map
 
 _deviation = partial(Deviation, "random field")
 

@@ -118,6 +118,8 @@ def green_fpar(lai, extinction, brown, dissociation=0.0, fpar_inf=FPAR_INF):
     >>> bool(np.isclose(green_fpar(2.0, 0.57, 0.25), 0.75 * fpar(2.0, 0.57)))
     True
     """
+    if not np.ndim(dissociation) and dissociation == 0:
+        return (1 - np.asarray(brown, float)) * fpar(lai, extinction, fpar_inf)
     layers, k = layers_of(lai, brown, dissociation), np.asarray(extinction, float)
     above, below = fpar(layers.lai, k, fpar_inf), np.exp(-k * layers.lai) * fpar(layers.lai_below, k, fpar_inf)
     return (1 - layers.brown) * above + (1 - layers.brown_below) * below

@@ -14,7 +14,7 @@ LIMIT = 50.0
 """Largest leaf area index in a table [m2 m-2]; canopies beyond are evaluated one by one."""
 
 TOLERANCE = 4e-7
-"""Of each of two axes; together within 1e-6 [1]."""
+"""Of each of two axes; together, and with the rounding of single precision, within 1e-6 [1]."""
 
 _COARSEST = 33, 33
 _FINEST = 2**20  # nodes in all
@@ -38,7 +38,7 @@ class FoliageTable(NamedTuple):
     steps: np.ndarray
     """Intervals per unit of each axis."""
     coefficients: np.ndarray
-    """Shape (L, fB, column)."""
+    """Shape (L, fB, column), in single precision."""
 
 
 def tabulate_foliage(function, rate, by_brown=True, combine=None, tolerance=TOLERANCE):
@@ -102,7 +102,7 @@ def tabulate_foliage(function, rate, by_brown=True, combine=None, tolerance=TOLE
     for axis in range(2):
         values = _uniform_splines(values, axis)
     steps = np.array([(len(axes[0]) - 1) / _length(rate), len(axes[1]) - 1])
-    return FoliageTable(rate, steps, np.ascontiguousarray(values))
+    return FoliageTable(rate, steps, np.ascontiguousarray(values, np.float32))
 
 
 def _lai(position, rate):
@@ -174,8 +174,10 @@ def interpolate_foliage(table, lai, brown, background):
     ----------
     table : FoliageTable
         Four columns for each band, the terms of `over_background`.
-    lai, brown : array, shape (n,)
-        Leaf area within crowns, and its dead share; NaN gives NaN. [m2 m-2], [1]
+    lai : array, shape (n,)
+        Leaf area within crowns; NaN gives NaN. [m2 m-2]
+    brown : array, shape (n,) or (1,)
+        Its dead share. [1]
     background : array, shape (band, n) or (band, 1)
         [1]
 
@@ -245,39 +247,90 @@ def _place_brown(table, brown):
     return _place(dead / (dead + np.sqrt(1 - brown)) * table.steps[1], table.coefficients.shape[1])
 
 
+# The three below are loops without branches, so that cells are done several at once.
 @register_jitable
-def _blend(flat, start, length, leaves, browns, wide, out):
-    """
-    Values of all columns at one cell; ``wide`` is for them at four neighbours in the dead share.
+def _places(table, lai, brown, starts, leaves, dead):
+    """First coefficients of cells in rows of columns, -1 where the table has none, and shares of intervals."""
+    browns = table.coefficients.shape[1]
+    for i in range(lai.size):
+        known = (lai[i] >= 0) & (lai[i] <= LIMIT) & (brown[i] >= 0) & (brown[i] <= 1)
+        row, leaves[i] = _place_leaves(table, lai[i] if known else 0.0)
+        at = 0
+        if browns > 1:
+            at, dead[i] = _place_brown(table, brown[i] if known else 0.0)
+        starts[i] = row * browns + at if known else -1
 
-    These lie in a row, so that most of the work is one long loop, which the compiler makes short.
+
+@register_jitable
+def _within(lai, cover, inside):
+    """Leaf area within crowns, NaN where the cover is no share."""
+    for i in range(lai.size):
+        crowned = lai[i] / cover[i] if cover[i] > 0 else 0 * lai[i]
+        inside[i] = crowned if (cover[i] >= 0) & (cover[i] <= 1) else np.nan
+
+
+@register_jitable
+def _rooms(crowns, cover, at, share):
+    """Intervals of covers in a table of crowns, and shares of these."""
+    for i in range(cover.size):
+        known = cover[i] if (cover[i] >= 0) & (cover[i] <= 1) else 0.0
+        at[i], share[i] = _place(np.sqrt(np.sqrt(1 - known)) * (len(crowns) - 3), len(crowns))
+
+
+# Two loops over flat arrays, by places that have no sign: views of rows, and places that may count from the end, take
+# longer than the work.
+@register_jitable
+def _along(table, rows, shares, out):
+    """Values of all columns of a table, shape (n, column), from splines of one variable."""
+    flat, values, columns = table.reshape(-1), out.reshape(-1), np.uint64(out.shape[1])
+    for i in range(rows.size):
+        if rows[i] >= 0:
+            w0, w1, w2, w3 = _weights(shares[i])
+            to, k0 = np.uint64(i) * columns, np.uint64(rows[i]) * columns
+            k1, k2, k3 = k0 + columns, k0 + columns + columns, k0 + columns + columns + columns
+            for c in range(columns):
+                values[to + c] = w0 * flat[k0 + c] + w1 * flat[k1 + c] + w2 * flat[k2 + c] + w3 * flat[k3 + c]
+
+
+@register_jitable
+def _across(table, starts, leaves, dead, wide, out):
     """
-    a0, a1, a2, a3 = leaves
-    b0, b1, b2, b3 = browns
-    width, columns = wide.size, out.size
-    r0, r1 = flat[start : start + width], flat[start + length : start + length + width]
-    start += 2 * length
-    r2, r3 = flat[start : start + width], flat[start + length : start + length + width]
-    for c in range(width):
-        wide[c] = a0 * r0[c] + a1 * r1[c] + a2 * r2[c] + a3 * r3[c]
-    for c in range(columns):
-        out[c] = b0 * wide[c] + b1 * wide[c + columns] + b2 * wide[c + 2 * columns] + b3 * wide[c + 3 * columns]
+    Values of all columns of a table from splines of two variables; ``wide`` is for those at four dead shares.
+
+    These lie in a row, so that most of the work is one long loop.
+    """
+    flat, values, columns = table.reshape(-1), out.reshape(-1), np.uint64(table.shape[2])
+    length, n2 = np.uint64(table.shape[1]) * columns, columns + columns
+    n3, width = n2 + columns, n2 + n2
+    for i in range(starts.size):
+        if starts[i] >= 0:
+            a0, a1, a2, a3 = _single(_weights(leaves[i]))
+            b0, b1, b2, b3 = _single(_weights(dead[i]))
+            to, k0 = np.uint64(i) * columns, np.uint64(starts[i]) * columns
+            k1, k2, k3 = k0 + length, k0 + length + length, k0 + length + length + length
+            for c in range(width):
+                wide[c] = a0 * flat[k0 + c] + a1 * flat[k1 + c] + a2 * flat[k2 + c] + a3 * flat[k3 + c]
+            for c in range(columns):
+                values[to + c] = b0 * wide[c] + b1 * wide[columns + c] + b2 * wide[n2 + c] + b3 * wide[n3 + c]
+
+
+@register_jitable
+def _single(weights):
+    w0, w1, w2, w3 = weights
+    return np.float32(w0), np.float32(w1), np.float32(w2), np.float32(w3)
 
 
 # No divisor is 0: without that being asked, cells are done several at once.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _foliage(lai, brown, background, table, values):
-    _, browns, columns = table.coefficients.shape
-    flat, wide, terms = table.coefficients.reshape(-1), np.zeros(4 * columns), np.zeros((_RUN, columns))
+    columns = table.coefficients.shape[2]
+    wide, terms = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns))
     starts, leaves, dead = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN)
-    of_ground = background.shape[1] > 1
+    of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
     for first in range(0, lai.size, _RUN):
-        cells, shares = lai[first : first + _RUN], brown[first : first + _RUN]
+        cells, shares = lai[first : first + _RUN], brown[first : first + _RUN] if of_brown else alike
         _places(table, cells, shares, starts, leaves, dead)
-        for i in range(cells.size):
-            if starts[i] >= 0:
-                of_leaves, of_dead = _weights(leaves[i]), _weights(dead[i])
-                _blend(flat, starts[i] * columns, browns * columns, of_leaves, of_dead, wide, terms[i])
+        _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
@@ -287,51 +340,29 @@ def _foliage(lai, brown, background, table, values):
                 out[i] = seen if starts[i] >= 0 else np.inf if cells[i] > LIMIT else np.nan
 
 
-@register_jitable
-def _places(table, lai, brown, starts, leaves, dead):
-    """First coefficients of cells in rows of columns, -1 beyond the table, and shares of intervals."""
-    browns = table.coefficients.shape[1]
-    for i in range(lai.size):
-        known = (lai[i] >= 0) & (lai[i] <= LIMIT) & (brown[i] >= 0) & (brown[i] <= 1)
-        row, leaves[i] = _place_leaves(table, lai[i] if known else 0.0)
-        at, dead[i] = _place_brown(table, brown[i] if known else 0.0)
-        starts[i] = row * browns + at if known else -1
-
-
 @njit(nogil=True, cache=True, error_model="numpy")
 def _crowned(lai, brown, cover, background, table, crowns, values):
-    _, browns, columns = table.coefficients.shape
-    flat, rooms = table.coefficients.reshape(-1), crowns.reshape(-1)
-    wide, terms, parts = np.zeros(4 * columns), np.zeros(columns), np.zeros(4)
-    of_brown, of_ground = int(brown.size > 1), int(background.shape[1] > 1)
-    for i in range(lai.size):
-        dead = brown[i * of_brown]
-        inside = lai[i] / cover[i] if cover[i] > 0 else 0 * lai[i]
-        if not (0 <= inside <= LIMIT and 0 <= dead <= 1 and 0 <= cover[i] <= 1):
-            for band in range(values.shape[0]):
-                values[band, i] = np.inf if inside > LIMIT else np.nan
-            continue
-        row, share = _place_leaves(table, inside)
-        leaves = _weights(share)
-        if browns > 1:
-            at, share = _place_brown(table, dead)
-            _blend(flat, (row * browns + at) * columns, browns * columns, leaves, _weights(share), wide, terms)
+    columns = table.coefficients.shape[2]
+    wide, terms, parts = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns)), np.zeros((_RUN, 4))
+    starts, leaves, dead, inside = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN), np.zeros(_RUN)
+    places, shares = np.zeros(_RUN, np.int64), np.zeros(_RUN)
+    of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
+    for first in range(0, lai.size, _RUN):
+        cells, crowned = lai[first : first + _RUN], cover[first : first + _RUN]
+        _within(cells, crowned, inside)
+        of_cells = inside[: cells.size]
+        _places(table, of_cells, brown[first : first + _RUN] if of_brown else alike, starts, leaves, dead)
+        if table.coefficients.shape[1] > 1:
+            _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
         else:
-            _line(flat, row * columns, leaves, terms)
-        at, share = _place(np.sqrt(np.sqrt(1 - cover[i])) * (len(crowns) - 3), len(crowns))
-        _line(rooms, 4 * at, _weights(share), parts)
-        shares = cover[i], parts[0], parts[1], parts[2], parts[3]
+            _along(table.coefficients, starts[: cells.size], leaves, terms)
+        _rooms(crowns, crowned, places, shares)
+        _along(crowns, places[: cells.size], shares, parts)
         for band in range(values.shape[0]):
-            t = terms[TERMS * band : TERMS * (band + 1)]
-            of_band = t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]
-            values[band, i] = crowns_over_background(of_band, shares, background[band, i * of_ground])
-
-
-@register_jitable
-def _line(flat, start, weights, out):
-    """Values of all columns from splines of one variable."""
-    w0, w1, w2, w3 = weights
-    columns = out.size
-    rows = flat[start : start + 4 * columns]
-    for c in range(columns):
-        out[c] = w0 * rows[c] + w1 * rows[c + columns] + w2 * rows[c + 2 * columns] + w3 * rows[c + 3 * columns]
+            out = values[band, first : first + _RUN]
+            below = background[band, first : first + _RUN] if of_ground else background[band]
+            for i in range(cells.size):
+                t, p, ground = terms[i, TERMS * band : TERMS * (band + 1)], parts[i], below[i if of_ground else 0]
+                of_band = t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]
+                seen = crowns_over_background(of_band, (crowned[i], p[0], p[1], p[2], p[3]), ground)
+                out[i] = seen if starts[i] >= 0 else np.inf if of_cells[i] > LIMIT else np.nan

@@ -8,7 +8,7 @@ import numpy as np
 from fifesim.base import datasets
 from fifesim.base.bands import Band
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
-from fifesim.ground.canopy.ranges import check_fraction, within_one
+from fifesim.ground.canopy.ranges import check_fraction, within
 from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, did_you_mean, is_mixture
 
 LARGEST_LAI = 100.0
@@ -247,7 +247,7 @@ def check_background(reflectance):
     >>> check_background(0.15)
     """
     values = np.asarray(reflectance, float)
-    if not within_one(values):
+    if not within(values, 0.0, 1.0):
         check_fraction("background reflectance", values[~np.isnan(values)])
 
 
@@ -276,8 +276,7 @@ def check_lai(lai):
     2.5
     """
     cells = np.asarray(lai, float)
-    # Two passes without a temporary; NaN is passed over.
-    if np.fmin.reduce(cells, axis=None, initial=0.0) < 0 or np.fmax.reduce(cells, axis=None, initial=0.0) > LARGEST_LAI:
+    if not within(cells, 0.0, LARGEST_LAI):
         wrong = (cells < 0) | (cells > LARGEST_LAI)
         raise ValueError(
             f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
@@ -321,12 +320,11 @@ def check_map(lai):
     2.5
     """
     cells = np.asarray(lai, float)
-    largest = np.fmax.reduce(cells, axis=None, initial=0.0)
-    if largest > LARGEST_OF_MAPS or np.fmin.reduce(cells, axis=None, initial=0.0) < 0:
+    if not within(cells, 0.0, LARGEST_OF_MAPS):
         check_lai(lai)
         raise ValueError(
-            f"leaf area index up to {largest:g}, canopies have at most {LARGEST_OF_MAPS:g}: {_of_another_scale(cells)}"
-            "set cells without data to NaN"
+            f"leaf area index up to {np.nanmax(cells):g}, canopies have at most {LARGEST_OF_MAPS:g}: "
+            f"{_of_another_scale(cells)}set cells without data to NaN"
         )
     return lai
 

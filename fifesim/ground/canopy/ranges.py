@@ -1,15 +1,17 @@
 """Fractions that a canopy is given: in 0 to 1, or refused."""
 
 import numpy as np
+from numba import njit
 
 
-def within_one(values):
+def within(values, lowest, highest):
     """
-    Whether all values are in 0 to 1; NaN is passed over.
+    Whether all values are in a range; NaN is passed over.
 
     Parameters
     ----------
     values : array
+    lowest, highest : float
 
     Returns
     -------
@@ -17,12 +19,24 @@ def within_one(values):
 
     Examples
     --------
-    >>> within_one(np.array([0.2, np.nan])), within_one(np.array([0.2, 1.5]))
+    >>> within(np.array([0.2, np.nan]), 0, 1), within(np.array([0.2, 1.5]), 0, 1)
     (True, False)
     """
-    # Two passes without a temporary.
-    low, high = np.fmin.reduce(values, axis=None, initial=0.0), np.fmax.reduce(values, axis=None, initial=1.0)
-    return bool(low >= 0 and high <= 1)
+    values = np.asarray(values, float)
+    if values.flags.c_contiguous or values.flags.f_contiguous:
+        return not _outside(values.ravel(order="K"), float(lowest), float(highest))
+    # Two passes without a copy.
+    low, high = (np.fmin.reduce(values, axis=None, initial=lowest), np.fmax.reduce(values, axis=None, initial=highest))
+    return bool(low >= lowest and high <= highest)
+
+
+@njit(nogil=True, cache=True)
+def _outside(values, lowest, highest):
+    """How many values are outside: a sum, so that several are looked at at once."""
+    count = 0
+    for i in range(values.size):
+        count += (values[i] < lowest) | (values[i] > highest)
+    return count
 
 
 def check_fraction(name, values):
@@ -80,6 +94,6 @@ def check_share(name, values):
     0.4
     """
     cells = np.asarray(values, float)
-    if not within_one(cells):
+    if not within(cells, 0.0, 1.0):
         check_fraction(name, cells[~np.isnan(cells)])
     return values

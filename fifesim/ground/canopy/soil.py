@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 
 from fifesim.base import datasets
+from fifesim.ground.canopy.ranges import within
 from fifesim.ground.canopy.spectra import band_means
 
 # Where the reflectance of a soil is its brightness: in the midst of visible light, as for aerosol and visibility. [um]
@@ -159,10 +160,9 @@ def check_span(values, lowest, meaning, such_as):
         If one is.
     """
     values = np.asarray(values, float)
-    low, high = (np.fmin.reduce(values, axis=None, initial=0.0), np.fmax.reduce(values, axis=None, initial=0.0))
-    if low < lowest or high > 1:
+    if not within(values, lowest, 1.0):
         name = meaning.partition(" ")[0]
-        wrong = low if low < lowest else high
+        wrong = np.nanmin(values) if np.nanmin(values) < lowest else np.nanmax(values)
         raise ValueError(f"{name} must be in [{lowest:g}, 1], got {wrong:g}: {meaning}; give for instance {such_as}")
 
 

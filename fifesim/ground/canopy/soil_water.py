@@ -23,11 +23,14 @@ SOIL_INDEX = 2.0
 # Half opening of the cone from which light falls on a film, as on a leaf in PROSPECT. [degree]
 _CONE = 40.0
 
+# Films on average of a soil that is saturated.
+_PER_MOISTURE = (WETTEST - DRIEST) / CAPACITY
+
 # Deeper than so many films is less than 2 % of the wettest soil, which counts as so many.
 _FILMS = 6
 
-# Cells that are done together, so that they stay in the nearest cache.
-_RUN = 512
+# Cells that are done together, so that they stay in the nearest cache, and in the next.
+_RUN, _AT_ONCE = 512, 2**14
 
 
 class WaterFilms(NamedTuple):
@@ -105,8 +108,27 @@ def wet_soil(below, passed, surface, inside):
     >>> round(wet_soil(1.0, 1.0, 0.02, 0.47), 12)
     1.0
     """
+    up, kept = below_film(below, passed, inside)
+    return surface + (1 - surface) * (1 - inside) * up / kept
+
+
+@register_jitable
+def below_film(below, passed, inside):
+    """
+    Light below a film of water after one way down and up, and what of it does not go round again.
+
+    Parameters
+    ----------
+    below, passed, inside : array
+        As in `wet_soil`. [1]
+
+    Returns
+    -------
+    up, kept : array
+        Whose quotient is the sum over all ways. [1]
+    """
     up = passed * below
-    return surface + (1 - surface) * (1 - inside) * up / (1 - inside * up)
+    return up, 1 - inside * up
 
 
 @register_jitable
@@ -186,36 +208,49 @@ def moistened(dry, moisture, films):
     return in_cells(_moisten, dry, moisture, *films)
 
 
+def _moisten(dry, moisture, surface, inside, entrance, passed, out):
+    for start in range(0, moisture.size, _AT_ONCE):
+        bare = np.exp(moisture[start : start + _AT_ONCE] * -_PER_MOISTURE)
+        _films(dry, moisture, start, bare, surface, inside, entrance, passed, out)
+
+
 # No divisor is 0: without that being asked, cells are done several at once.
 @njit(nogil=True, cache=True, error_model="numpy")
-def _moisten(dry, moisture, surface, inside, entrance, passed, out):
-    covered, below, total = np.empty((_FILMS + 1, _RUN)), np.empty(_RUN), np.empty(_RUN)
-    for first in range(0, out.shape[1], _RUN):
-        water = moisture[first : first + _RUN]
-        _covered(water, covered)
+def _films(dry, moisture, start, bare, surface, inside, entrance, passed, out):
+    covered, below = np.empty((_FILMS, _RUN)), np.empty(_RUN)
+    above, under = np.empty(_RUN), np.empty(_RUN)
+    for begin in range(0, bare.size, _RUN):
+        free, first = bare[begin : begin + _RUN], start + begin
+        cells, n = slice(first, first + free.size), free.size
+        _covered(moisture[cells], free, covered)
         for band in range(out.shape[0]):
-            soil = dry[first : first + _RUN, band]
-            for i in range(water.size):
-                below[i] = grains_in_water(soil[i], entrance[band])
-                total[i] = covered[0, i] * soil[i]
+            soil, wet, above_all, back = dry[cells, band], out[band, cells], surface[band], inside[band]
+            entering, through = entrance[band], (1 - above_all) * (1 - back)
+            for i in range(n):
+                below[i] = grains_in_water(soil[i], entering)
+                above[i], under[i] = 0.0, 1.0
+            # The sum of the quotients of all films as one of two products: a division takes longer than the rest.
             for k in range(_FILMS):
-                film, share = passed[band, k], covered[k + 1]
-                for i in range(water.size):
-                    total[i] += share[i] * wet_soil(below[i], film, surface[band], inside[band])
-            out[band, first : first + _RUN] = total[: water.size]
+                film, share = passed[band, k], covered[k]
+                for i in range(n):
+                    up, kept = below_film(below[i], film, back)
+                    above[i] = above[i] * kept + share[i] * up * under[i]
+                    under[i] *= kept
+            for i in range(n):
+                wet[i] = free[i] * soil[i] + (1 - free[i]) * above_all + through * above[i] / under[i]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _covered(moisture, covered):
-    """Shares of a soil below no film, one, two and more."""
+@register_jitable
+def _covered(moisture, bare, covered):
+    """Shares of a soil below one film, two and more."""
     for i in range(moisture.size):
-        mean = moisture[i] * ((WETTEST - DRIEST) / CAPACITY)
-        share, rest = np.exp(-mean), 1.0
-        for k in range(_FILMS):
-            covered[k, i] = share
+        mean = moisture[i] * _PER_MOISTURE
+        share, rest = bare[i], 1.0 - bare[i]
+        for k in range(1, _FILMS):
+            share *= mean * (1.0 / k)
+            covered[k - 1, i] = share
             rest -= share
-            share *= mean / (k + 1)
-        covered[_FILMS, i] = rest
+        covered[_FILMS - 1, i] = rest
 
 
 def check_moisture(moisture):

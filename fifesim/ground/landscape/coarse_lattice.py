@@ -11,6 +11,7 @@ from numbers import Integral
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from fifesim.base.kinds import described
 from fifesim.ground.landscape.dispersion import pair_correlations
@@ -166,14 +167,28 @@ def _knots(first, size, coarser):
 
 @njit(nogil=True, cache=True)
 def _interpolate(lattice, rows, columns, down, across, along, factor, out):
-    line = np.empty(lattice.shape[1])
+    """Along rows of the lattice first, of which there are few; then cells of the ground are done several at once."""
+    lines, scaled = np.empty((_TAPS, columns.size)), np.empty((factor.shape[0], columns.size))
+    for p in range(factor.shape[0]):
+        for j in range(columns.size):
+            scaled[p, j] = factor[p, across[j]]
+    made = rows[0] if rows.size else 0
     for i in range(rows.size):
         r, p = rows[i], down[i]
+        while made < r + _TAPS:
+            _expand(lattice[made], columns, across, along, lines[made % _TAPS])
+            made += 1
         w0, w1, w2, w3 = along[p, 0], along[p, 1], along[p, 2], along[p, 3]
-        for m in range(line.size):
-            line[m] = w0 * lattice[r, m] + w1 * lattice[r + 1, m] + w2 * lattice[r + 2, m] + w3 * lattice[r + 3, m]
+        l0, l1, l2, l3 = lines[r % _TAPS], lines[(r + 1) % _TAPS], lines[(r + 2) % _TAPS], lines[(r + 3) % _TAPS]
+        scale, cells = scaled[p], out[i]
         for j in range(columns.size):
-            c, q = columns[j], across[j]
-            value = along[q, 0] * line[c] + along[q, 1] * line[c + 1]
-            value += along[q, 2] * line[c + 2] + along[q, 3] * line[c + 3]
-            out[i, j] = factor[p, q] * value
+            cells[j] = scale[j] * (w0 * l0[j] + w1 * l1[j] + w2 * l2[j] + w3 * l3[j])
+
+
+@register_jitable
+def _expand(line, columns, across, along, out):
+    """A row of the lattice at the columns of the ground."""
+    for j in range(columns.size):
+        c, q = columns[j], across[j]
+        value = along[q, 0] * line[c] + along[q, 1] * line[c + 1]
+        out[j] = value + along[q, 2] * line[c + 2] + along[q, 3] * line[c + 3]

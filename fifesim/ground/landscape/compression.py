@@ -78,6 +78,35 @@ def cells_by_class(codes, table):
     return np.split(order[: ends[-1]], ends[:-1]) if len(table) else []
 
 
+def numbers_of(codes, table):
+    """
+    Places of the codes of cells in a table.
+
+    Parameters
+    ----------
+    codes : array of int16, shape (...)
+    table : sequence of int, length n
+        Codes of the classes.
+
+    Returns
+    -------
+    numbers : array of int16, shape (...)
+        From 0 on, n where a code is in no table.
+    present : array of bool, shape (n + 1,)
+        Which of the classes there are, and whether cells of none.
+
+    Examples
+    --------
+    >>> numbers, present = numbers_of(np.array([2, 5, 2, -1], np.int16), (5, 2, 7))
+    >>> numbers.tolist(), present.tolist()
+    ([1, 0, 1, 3], [True, True, False, True])
+    """
+    codes, present = np.ascontiguousarray(codes, np.int16), np.zeros(len(table) + 1, bool)
+    numbers = np.empty(codes.shape, np.int16)
+    _look_up(codes.reshape(-1), _numbers(table), numbers.reshape(-1), present)
+    return numbers, present
+
+
 def _numbers(table):
     """Place of each code in a table, the number of its codes for all others; -1 is the last, beyond the codes."""
     numbers = np.full(2**15 + 1, len(table), np.int16)
@@ -92,6 +121,13 @@ def _others(codes, numbers):
     for i in range(codes.size):
         count += (codes[i] < NO_CLASS) | ((codes[i] >= 0) & (numbers[codes[i]] == none))
     return count
+
+
+@njit(nogil=True, cache=True)
+def _look_up(codes, numbers, out, present):
+    for i in range(codes.size):
+        out[i] = numbers[codes[i]]
+        present[out[i]] = True
 
 
 @njit(nogil=True, cache=True)

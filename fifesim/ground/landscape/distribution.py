@@ -1,4 +1,4 @@
-"""Frequency distributions of leaf area index, and the mapping of a Gaussian field to them (Fig. 2, step 5)."""
+"""Frequency distributions of leaf area index."""
 
 from __future__ import annotations
 
@@ -6,21 +6,12 @@ from difflib import get_close_matches
 from functools import cached_property, lru_cache
 from pathlib import Path
 
-import numba
 import numpy as np
 import pandas as pd
 from scipy import optimize, stats
 
 from fifesim.base import datasets
 from fifesim.base.annotations import Distribution, FilePath
-
-# Quantiles are tabulated for normal deviates from -8.5 to 8.5, past which lie 2e-17 of all cells. The step leaves a
-# linear interpolation error of step**2 / 8 = 1.3e-7 times the curvature of the quantile function.
-_REACH = 8.5
-_NODES = 2**14 + 1
-
-# Of so many the quantiles of ranks are kept, 2 MB.
-_FEW = 2**18
 
 # A support that starts at zero may start this far below it.
 _ROUNDING = 1e-12
@@ -254,113 +245,3 @@ def truncated_normal(mean, standard_deviation, lower, upper):
             f"no normal truncated to [{lower:g}, {upper:g}] has mean {mean:g} and deviation {standard_deviation:g}"
         )
     return frozen(solution.x)
-
-
-# Some hundredths of a second each; treatments and the distributions of drawn shares are the same objects each time.
-@lru_cache(maxsize=64)
-def quantile_table(distribution):
-    """
-    Quantiles of a distribution at evenly spaced standard normal deviates.
-
-    Parameters
-    ----------
-    distribution : frozen scipy distribution
-        Whose table is kept.
-
-    Returns
-    -------
-    table : array, shape (16385,)
-        For deviates from -8.5 to 8.5; increasing, not negative. Kept for who asks again.
-    """
-    deviates = np.linspace(-_REACH, _REACH, _NODES)
-    lower = distribution.ppf(stats.norm.cdf(deviates[deviates <= 0]))
-    # The upper half goes by survival functions, which keep their digits in the tail.
-    upper = distribution.isf(stats.norm.sf(deviates[deviates > 0]))
-    return np.maximum.accumulate(np.concatenate([[0.0], lower, upper]))[1:]
-
-
-@numba.njit(nogil=True, cache=True)
-def quantile_map(field, table):
-    """
-    Map a standard normal field to the distribution of a quantile table.
-
-    Parameters
-    ----------
-    field : array, shape (y, x)
-        Standard normal deviates; NaN stays NaN.
-    table : array, shape (16385,)
-        From `quantile_table`.
-
-    Returns
-    -------
-    values : array, shape (y, x)
-
-    References
-    ----------
-    [Friedl1995]_, Fig. 2, step 5, for a field without end: ranks are those of the ensemble
-    """
-    out = np.empty(field.shape)
-    per_deviate = (table.size - 1) / (2.0 * _REACH)
-    last = table.size - 2
-    for i in range(field.shape[0]):
-        for j in range(field.shape[1]):
-            position = (field[i, j] + _REACH) * per_deviate
-            if position != position:
-                out[i, j] = np.nan
-                continue
-            position = min(max(position, 0.0), last + 1.0)
-            k = min(int(position), last)
-            share = position - k
-            out[i, j] = table[k] * (1.0 - share) + table[k + 1] * share
-    return out
-
-
-def rank_map(field, distribution):
-    """
-    Map a field to a distribution by its ranks, exactly.
-
-    Parameters
-    ----------
-    field : array, any shape
-        Values without NaN.
-    distribution : frozen scipy distribution
-
-    Returns
-    -------
-    values : array, shape of the field
-        The quantiles (rank + 1/2) / n, each once.
-
-    References
-    ----------
-    [Friedl1995]_, Fig. 2, step 5
-
-    Examples
-    --------
-    >>> rank_map(np.array([3.0, -1.0]), stats.uniform()).tolist()
-    [0.75, 0.25]
-    """
-    values = np.empty(field.size)
-    values[np.argsort(field, axis=None, kind="stable")] = rank_quantiles(distribution, field.size)
-    return values.reshape(field.shape)
-
-
-def rank_quantiles(distribution, count):
-    """
-    Quantiles of a distribution that ranks stand for.
-
-    Parameters
-    ----------
-    distribution : frozen scipy distribution
-    count : int
-
-    Returns
-    -------
-    quantiles : array, shape (count,)
-        At (rank + 1/2) / count. Those of few are kept for who asks again.
-    """
-    return (_kept_quantiles if count <= _FEW else _kept_quantiles.__wrapped__)(distribution, count)
-
-
-@lru_cache(maxsize=16)
-def _kept_quantiles(distribution, count):
-    return distribution.ppf((np.arange(count) + 0.5) / count)

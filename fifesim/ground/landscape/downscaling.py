@@ -12,7 +12,7 @@ import numpy as np
 from scipy import ndimage
 
 from fifesim.ground.landscape.block_kriging import block_means, by_pixel, kriged
-from fifesim.ground.landscape.distribution import quantile_map, quantile_table
+from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
 
 # Each step makes what is left of the misfit five times smaller or more.
 STEPS = 4
@@ -108,7 +108,7 @@ class Marginal:
     Parameters
     ----------
     table : array, shape (16385,)
-        From `ground.landscape.distribution.quantile_table`.
+        From `ground.landscape.quantiles.quantile_table`.
     levels, means : array, shape (n,)
         Mean of pixels by the level of their field.
     """

@@ -15,8 +15,9 @@ from fifesim.base.foreign import in_a_line
 from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.landscape.autoregression import check_arp
-from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
+from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
+from fifesim.ground.landscape.quantiles import quantile_map, quantile_table, rank_map
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids

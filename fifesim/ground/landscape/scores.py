@@ -12,6 +12,12 @@ _NODES = 2049
 # Where searches begin; with so many they mostly end there, and the table stays in a processor's cache.
 _STARTS = 32768
 
+# Of the distance of two starts.
+_ROUNDING = 1e-6
+
+# Values that are done together, so that they stay in the nearest cache.
+_RUN = 1024
+
 
 class Scores(NamedTuple):
     """Standard normal scores of values: what ranks among all of a sample make of them."""
@@ -22,6 +28,8 @@ class Scores(NamedTuple):
     """Of the lines between them."""
     starts: np.ndarray
     """Which of the values is the last below each of evenly spaced ones, from which a search goes on."""
+    steps: int
+    """The most that a search goes on."""
 
 
 def score_table(sample):
@@ -59,9 +67,13 @@ def score_table(sample):
 
 
 def _table(values, scores):
-    even = np.linspace(values[0], values[-1], _STARTS)
-    starts = np.clip(np.searchsorted(values, even, side="right") - 1, 0, values.size - 2)
-    return Scores(values, scores, np.diff(scores) / np.diff(values), starts.astype(np.int32))
+    even, rounding = np.linspace(values[0], values[-1], _STARTS, retstep=True)
+    # A value that lies on one of the even ones may by rounding be taken for one beside.
+    first, last = (
+        np.clip(np.searchsorted(values, even + aside * rounding, side="right") - 1, 0, values.size - 2)
+        for aside in (-_ROUNDING, 1 + _ROUNDING)
+    )
+    return Scores(values, scores, np.diff(scores) / np.diff(values), first.astype(np.int32), int(np.max(last - first)))
 
 
 def normal_scores(values, scores):
@@ -107,20 +119,22 @@ def add_scores(values, scores, weight, out):
 
 
 @njit(nogil=True, cache=True)
-def _lookup(values, nodes, scores, slopes, starts, weight, out):
+def _lookup(values, nodes, scores, slopes, starts, steps, weight, out):
     """Add the weighted scores of values, linear between nodes."""
-    lowest, highest, last = nodes[0], nodes[-1], nodes.size - 2
+    lowest, highest, last = nodes[0], nodes[-1], np.uint32(nodes.size - 2)
     per_start = (starts.size - 1) / (highest - lowest)
-    for i in range(values.size):
-        value = values[i]
-        if value != value:
-            out[i] = np.nan
-            continue
-        value = min(max(value, lowest), highest)
-        k = starts[int((value - lowest) * per_start)]
-        while k < last and nodes[k + 1] <= value:
-            k += 1
-        # Rounding may have led one too far.
-        while k > 0 and nodes[k] > value:
-            k -= 1
-        out[i] += weight * (scores[k] + (value - nodes[k]) * slopes[k])
+    inside, at = np.empty(_RUN), np.empty(_RUN, np.uint32)
+    for first in range(0, values.size, _RUN):
+        cells, to = values[first : first + _RUN], out[first : first + _RUN]
+        # Without branches, so that the loops are done for several values at once.
+        for i in range(cells.size):
+            inside[i] = min(max(cells[i], lowest), highest) if cells[i] == cells[i] else lowest
+            at[i] = starts[np.uint32((inside[i] - lowest) * per_start)]
+        for _ in range(steps):
+            for i in range(cells.size):
+                up = np.uint32(at[i] + 1)
+                at[i] = min(up, last) if inside[i] >= nodes[up] else at[i]
+        for i in range(cells.size):
+            k = at[i]
+            score = scores[k] + (inside[i] - nodes[k]) * slopes[k]
+            to[i] = to[i] + weight * score if cells[i] == cells[i] else np.nan

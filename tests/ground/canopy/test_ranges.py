@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy.ranges import check_fraction, check_share, within_one
+from fifesim.ground.canopy.ranges import check_fraction, check_share, within
 
 
 def test_fractions_are_told_from_others():
-    assert within_one(np.array([0.0, 1.0, np.nan]))
+    assert within(np.array([0.0, 1.0, np.nan]), 0, 1) and within(0.5, 0, 1) and within(np.empty(0), 0, 1)
     for wrong in (-1e-9, 1 + 1e-9, np.inf, -np.inf):
-        assert not within_one(np.array([0.5, wrong]))
+        for cells in (np.array([0.5, wrong]), np.array([[0.5, wrong]] * 4).T, np.array([[0.5, wrong]] * 4)[::2, ::-1]):
+            assert not within(cells, 0, 1)
     assert check_share("brown", 0.3) == 0.3
 
 

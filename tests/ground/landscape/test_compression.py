@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.landscape.compression import cells_by_class, check_codes
+from fifesim.ground.landscape.compression import cells_by_class, check_codes, numbers_of
 
 TABLE = (40, 0, 32764)
 
@@ -53,3 +53,10 @@ def test_of_many_other_codes_those_of_most_cells_are_named():
     codes = np.repeat(np.arange(1, 11), np.arange(1, 11))
     with pytest.raises(ValueError, match=r"without a class: 3, 4, 5, 6, 7, 8, 9, 10, \.\.\., in 55 of 55 cells"):
         check_codes(codes, (40,))
+
+
+def test_numbers_are_places_in_the_table():
+    codes = np.random.default_rng(1).choice([-1, 3, 9, 700], (30, 40)).astype(np.int16)
+    numbers, present = numbers_of(codes, (9, 5, 3))
+    assert (np.array([9, 5, 3, -2])[numbers] == np.where(np.isin(codes, [3, 9]), codes, -2)).all()
+    assert present.tolist() == [True, False, True, True]

@@ -9,10 +9,11 @@ from scipy import stats
 
 from fifesim.ground.landscape.block_kriging import block_means, by_pixel, kriging_filter
 from fifesim.ground.landscape.dispersion import deviation_table, kept_variance, marginal_deviation, pair_correlations
-from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.downscaling import LogNormal, Marginal, downscaled, fife_variation
 from fifesim.ground.landscape.field import periodic_field
 from fifesim.ground.landscape.map_trends import map_trend
+from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
 
 RATIO, SHAPE = (3, 3), (60, 60)
 CELLS = (180, 180)

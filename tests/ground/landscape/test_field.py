@@ -15,9 +15,10 @@ from fifesim.ground.landscape.autoregression import (
     margin,
     response,
 )
-from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.field import TILE, mixed_field, periodic_field, streaming_field, window_field
 from fifesim.ground.landscape.noise import white_noise
+from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
 
 ARPS = [0.05, 0.1, 0.15, 0.2, 0.24]
 SIZE = 4 * TILE

@@ -8,8 +8,9 @@ from elevations import write
 from lazy import ODD_CHUNKS, check_place, no_compute
 
 import fifesim
-from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.field import streaming_field
+from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 

@@ -1,11 +1,12 @@
 """What differs by class of cover, on labelled rasters: each class is evaluated on its own cells alone."""
 
+import math
 from functools import partial
 
 import numpy as np
 
 from fifesim.base.geometry import ANGLES
-from fifesim.ground.landscape.compression import NO_CLASS, cells_by_class, check_codes
+from fifesim.ground.landscape.compression import cells_by_class, check_codes, numbers_of
 from fifesim.rasters import chunks as chunking
 
 # Cells that are put together at once: 1 MB of each raster.
@@ -20,7 +21,8 @@ def by_class(kernels, cover, *scene, bands=None):
     ----------
     kernels : dict of int to (callable, sequence of xarray.DataArray)
         Of each code: ``kernel(*cells)`` gives values of shape ([band], n) from n cells of the scene and of the rasters
-        beside it. What has bands has them as last axis; what is no raster is given as it is.
+        beside it. What has bands has them as last axis; what is no raster is given as it is. Classes that have the same
+        one, of the same identity, are evaluated together.
     cover : xarray.DataArray, dims (y, x)
         Codes; -1 and NaN give NaN.
     *scene : xarray.DataArray, dims (y, x)
@@ -39,14 +41,16 @@ def by_class(kernels, cover, *scene, bands=None):
         If the rasters lie on different grids; when computed, if a cell has another code.
     """
     found, parts = {}, []
-    for kernel, taken in kernels.values():
+    distinct = list({id(each): each for each in kernels.values()}.values())
+    groups = [next(i for i, one in enumerate(distinct) if one is each) for each in kernels.values()]
+    for kernel, taken in distinct:
         keys = [_identity(each) for each in taken]
         found |= {key: each for key, each in zip(keys, taken, strict=True) if key not in found}
         parts.append((kernel, tuple(list(found).index(key) for key in keys)))
     rasters = list(found.values())
     banded = tuple("band" in each.dims for each in (*scene, *rasters))
     plain = [each.drop_vars(ANGLES, errors="ignore") for each in (cover, *scene, *rasters)]
-    kernel = partial(_of_classes, tuple(kernels), tuple(parts), banded, bands, len(scene))
+    kernel = partial(_of_classes, (tuple(kernels), groups), tuple(parts), banded, bands, len(scene))
     return chunking.pointwise(kernel, *plain, bands=bands)
 
 
@@ -59,22 +63,25 @@ def _identity(raster):
     return raster.dims, raster.shape, raster.data.strides, raster.data.__array_interface__["data"]
 
 
-def _of_classes(codes, parts, banded, bands, first, cover, *blocks):
-    """A block of cells: those of each class are put together, evaluated and put back."""
+def _of_classes(table, parts, banded, bands, first, cover, *blocks):
+    """A block of cells: those of each kernel are put together, evaluated and put back."""
     shape = np.broadcast_shapes(cover.shape, *(block.shape[:2] for block in blocks[:first]))
-    cover = np.broadcast_to(cover, shape).ravel()
     blocks = [_flat(block, has_bands, shape) for block, has_bands in zip(blocks, banded, strict=True)]
     scene, rasters = blocks[:first], blocks[first:]
-    codes_of_cells = check_codes(cover, codes)
-    if codes_of_cells.size and (alone := codes_of_cells[0]) != NO_CLASS and (codes_of_cells == alone).all():
-        kernel, taken = parts[codes.index(alone)]
+    codes, groups = table
+    numbers, present = numbers_of(check_codes(cover, codes), codes)
+    needed = {group for group, there in zip(groups, present, strict=False) if there}
+    if len(needed) == 1 and not present[-1]:
+        kernel, taken = parts[needed.pop()]
         found = kernel(*(block for block, _ in (*scene, *(rasters[index] for index in taken))))
         return np.reshape(found, ((bands,) if bands else ()) + shape)
-    out = np.full((bands or 1, cover.size), np.nan)
-    for of_class, (kernel, taken) in zip(cells_by_class(codes_of_cells, codes), parts, strict=True):
+    if len(parts) < len(codes):
+        numbers = np.array([*groups, -1], np.int16)[numbers]
+    numbers, out = np.broadcast_to(numbers, shape).ravel(), np.full((bands or 1, math.prod(shape)), np.nan)
+    for mine, (kernel, taken) in zip(cells_by_class(numbers, range(len(parts))), parts, strict=True):
         read = (*scene, *(rasters[index] for index in taken))
-        for start in range(0, of_class.size, _AT_ONCE):
-            cells = of_class[start : start + _AT_ONCE]
+        for start in range(0, mine.size, _AT_ONCE):
+            cells = mine[start : start + _AT_ONCE]
             found = kernel(*(block[cells] if varies else block for block, varies in read))
             # Band by band: numpy puts cells of several rows at once back at half the speed.
             for band, values in zip(out, found if bands else [found], strict=True):

@@ -26,7 +26,7 @@ from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.crs import with_crs_of
-from fifesim.rasters.sampling import apart
+from fifesim.rasters.sampling import all_apart
 from fifesim.rasters.sites import made_on_site
 
 # The ground is known by at most so many rows and columns of it, evenly spaced.
@@ -318,7 +318,10 @@ def _copula(arps, pairs, covariates, reference, coarser):
         return out
 
     arrays = [each.data for each in known.values()]
-    samples = [apart(_evenly(each)) if isinstance(each, da.Array) else _evenly(each) for each in arrays]
+    samples = [_evenly(each) for each in arrays]
+    lazy = [each for each in samples if isinstance(each, da.Array)]
+    found_apart = dict(zip(map(id, lazy), all_apart(lazy) if lazy else [], strict=True))
+    samples = [found_apart.get(id(each), each) for each in samples]
     if not any(isinstance(each, da.Array) for each in arrays):
         return found(*samples)
     return xr.DataArray(da.from_delayed(dask.delayed(boxed)(*samples), (), dtype=object))

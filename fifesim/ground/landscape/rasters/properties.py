@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from fifesim.ground.landscape.distribution import quantile_map, quantile_table
+from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
 from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -35,7 +35,7 @@ def with_distribution(field, quantity, distribution):
 
     See Also
     --------
-    fifesim.ground.landscape.distribution.quantile_map
+    fifesim.ground.landscape.quantiles.quantile_map
     """
     if distribution.support()[0] < -1e-12:
         raise ValueError(

@@ -16,11 +16,12 @@ from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape.autoregression import check_arp
 from fifesim.ground.landscape.classes import CoverClass, class_table, fife_classes
-from fifesim.ground.landscape.compression import cells_by_class
+from fifesim.ground.landscape.compression import numbers_of
 from fifesim.ground.landscape.cover import Patches
-from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.drawn import Field
 from fifesim.ground.landscape.field import streaming_field
+from fifesim.ground.landscape.quantiles import NODES, quantile_map_of_classes, quantile_table
 from fifesim.ground.landscape.raster import lai_window
 from fifesim.ground.landscape.rasters.cover import classes_of, cover_map, drawn_cover
 from fifesim.ground.landscape.rasters.drawn import drawn_fields
@@ -204,15 +205,18 @@ def _lai(grid, cover, table, arp, seed, scores):
             "where it is uniform, or give landscape(lai=) a raster"
         )
     codes = tuple(each.code for each in table)
-    kinds = tuple((_quantiles(each.lai), arp if each.arp is None else each.arp) for each in table)
+    tables, arps = (
+        np.stack([_quantiles(each.lai) for each in table]),
+        [arp if each.arp is None else each.arp for each in table],
+    )
     # What streaming_field refuses is known before anything lazy is built.
-    for _, of_class in kinds:
+    for of_class in arps:
         streaming_field(seed, of_class, 0, 0, (0, 0))
     if scores:
-        kernel = partial(_leaf_area_of_scores, codes, kinds, tuple(scores))
+        kernel = partial(_leaf_area_of_scores, codes, tables, arps, tuple(scores))
         lai = grids.place(chunking.pointwise(kernel, cover.drop_attrs(), *scores.values()), grid)
     else:
-        kernel = partial(_leaf_area, codes, kinds, seed, grids.lattice_position(grid))
+        kernel = partial(_leaf_area, codes, tables, arps, seed, grids.lattice_position(grid))
         lai = grids.place(places.located(kernel, cover.drop_attrs()), grid)
     history = "\n".join([cover.attrs["history"], f"landscape: leaf area of {len(table)} classes, seed {seed}"])
     made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": "by class"} | made_on_site(grid)
@@ -220,33 +224,35 @@ def _lai(grid, cover, table, arp, seed, scores):
 
 
 def _quantiles(lai):
-    """Quantiles of a distribution, or the number that all cells have."""
-    return float(lai) if isinstance(lai, Number) else quantile_table(lai_distribution(lai))
+    """Quantiles of a distribution; of a number that all cells have, it alone."""
+    if isinstance(lai, Number):
+        return np.full(NODES, float(lai))
+    return quantile_table(lai_distribution(lai))
 
 
-def _leaf_area(codes, kinds, seed, lattice, cover, starts):
+def _leaf_area(codes, tables, arps, seed, lattice, cover, starts):
     """Leaf area of a block of codes that begins at some row and column of the grid."""
-    out = np.full(cover.size, np.nan)
     row, column = (first + start for first, start in zip(lattice, starts, strict=True))
-    fields = {}
-    for cells, (quantiles, arp) in zip(cells_by_class(cover.ravel(), codes), kinds, strict=True):
-        if isinstance(quantiles, float) or not cells.size:
-            out[cells] = quantiles if cells.size else np.nan
-            continue
-        if arp not in fields:
-            fields[arp] = streaming_field(seed, arp, row, column, cover.shape).ravel()
-        out[cells] = quantile_map(fields[arp][None, cells], quantiles)[0]
-    return out.reshape(cover.shape)
+    return _of_fields(codes, tables, arps, cover, lambda arp: streaming_field(seed, arp, row, column, cover.shape))
 
 
-def _leaf_area_of_scores(codes, kinds, arps, cover, *scores):
+def _leaf_area_of_scores(codes, tables, arps, scored, cover, *scores):
     """Leaf area of cells from the standard normal scores of each arp."""
-    out, fields = np.full(cover.size, np.nan), dict(zip(arps, scores, strict=True))
-    for cells, (quantiles, arp) in zip(cells_by_class(cover.ravel(), codes), kinds, strict=True):
-        uniform = isinstance(quantiles, float)
-        if cells.size:
-            out[cells] = quantiles if uniform else quantile_map(fields[arp].ravel()[None, cells], quantiles)[0]
-    return out.reshape(cover.shape)
+    return _of_fields(codes, tables, arps, cover, dict(zip(scored, scores, strict=True)).__getitem__)
+
+
+def _of_fields(codes, tables, arps, cover, field_of):
+    """Leaf area of cells; ``field_of(arp)`` gives standard normal deviates, and is asked where a class needs them."""
+    out = np.full(cover.shape, np.nan)
+    numbers, present = numbers_of(cover, codes)
+    needed = [arp if table[0] != table[-1] else None for arp, table in zip(arps, tables, strict=True)]
+    for arp in dict.fromkeys(needed):
+        mine = np.array([each == arp for each in needed])
+        if (mine & present[:-1]).any():
+            field = np.zeros(cover.shape) if arp is None else field_of(arp)
+            of_arp = numbers if mine.all() else np.where(np.append(mine, False)[numbers], numbers, -1)
+            quantile_map_of_classes(field, of_arp, tables, out)
+    return out
 
 
 def _property(name, given, grid, chunks, allow_remote):

@@ -5,6 +5,7 @@ import pytest
 
 from fifesim.base.geometry import Geometry
 from fifesim.ground.canopy.raster import level_reflectance
+from fifesim.ground.canopy.rasters import classes
 from fifesim.ground.canopy.rasters.classes import reflectance_of_classes
 
 SCENE = {
@@ -32,6 +33,22 @@ def test_each_class_is_its_canopy_alone(lai, cover):
         np.testing.assert_array_equal(made.values[:, cover == code], alone.values[:, cover == code])
     assert made.name == "surface_reflectance" and made.attrs["atmosphere"] == "none"
     assert made.attrs["leaf_angles"] == alone.attrs["leaf_angles"] and made.attrs["background"] == "by class"
+
+
+def test_classes_of_one_canopy_are_evaluated_together(lai, cover, monkeypatch):
+    """What differs by a number, or by another raster of the same values, is not."""
+    asked = []
+    real = classes.canopy_kernel
+    monkeypatch.setattr(classes, "canopy_kernel", lambda *args, **given: asked.append(given) or real(*args, **given))
+    share = lai.drop_attrs(deep=False) / 10
+    alike = CANOPIES[3] | {"leaf_reflectance": np.array([0.07, 0.46]), "crown_cover": share, "hotspot": 0.1}
+    for other, kinds in (({}, 1), ({"hotspot": 0.2}, 2), ({"crown_cover": share.copy()}, 2), ({"crown_cover": 0.5}, 2)):
+        asked.clear()
+        pair = {3: alike, 8: alike | {"leaf_reflectance": np.array([0.07, 0.46])} | other}
+        made = reflectance_of_classes(lai, cover, pair, **SCENE)
+        assert len(asked) == kinds
+        alone = level_reflectance(lai, **pair[8], **SCENE)
+        np.testing.assert_array_equal(made.values[:, cover == 8], alone.values[:, cover == 8])
 
 
 def test_leaf_angles_of_classes_are_told_once_each(lai, cover):

@@ -46,6 +46,17 @@ def test_block_of_one_class_is_handed_over_as_it_is(lai, cover):
     np.testing.assert_array_equal(one, np.sqrt(lai))
 
 
+@pytest.mark.parametrize("codes", [[1, 5], [1, 5, 9], [-1, 1, 5, 9]], ids=str)
+def test_classes_of_one_kernel_are_evaluated_together(lai, codes):
+    calls = []
+    both = (lambda cells: calls.append(cells.size) or np.sqrt(cells), [])
+    cover = lai.copy(data=np.random.default_rng(3).choice(codes, lai.shape).astype(np.int16))
+    made = by_class({1: both, 5: both, 9: (np.negative, [])}, cover, lai)
+    known = np.where(cover == 9, -lai, np.where(cover == -1, np.nan, np.sqrt(lai)))
+    np.testing.assert_array_equal(made, known)
+    assert calls == [int(cover.isin([1, 5]).sum())]
+
+
 def test_raster_that_classes_share_is_taken_once(lai):
     for raster in (lai, in_chunks(lai, CHUNKS), xr.DataArray([1.0, 2.0], dims="band")):
         again = raster.copy() if raster.ndim < 2 else raster.drop_vars("spatial_ref")
