@@ -80,7 +80,7 @@ for name in names:
         + (f"\n(no {', '.join(unknown)})" if unknown else "")
     )
 axes[0].set_yticks(range(len(names)), labels, fontsize=8)
-figure.supxlabel("share of the variance of leaf area left", fontsize=10)
+axes[1].set_xlabel("share of the variance of leaf area left")
 figure.legend(
     *axes[0].get_legend_handles_labels(),
     loc="outside lower center",

@@ -147,7 +147,7 @@ def _check_inputs(values, folder, name):
         if not os.path.exists(there) and not there.startswith("/vsi"):
             raise ValueError(
                 f"{name} was made of {'.'.join((*place, key))} = {shown(table[key])}, seen from the folder that it lies"
-                f" in, and there is no such file {in_a_line(there, 150)}: rerun it where the run wrote it, or put that "
+                f" in, and there is no such file {in_a_line(there, 120)}: rerun it where the run wrote it, or put that "
                 "file there"
             )
 

@@ -6,6 +6,7 @@ The descriptions are the files ``data/instruments/*.toml``; a further instrument
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -16,14 +17,22 @@ from fifesim.base import datasets
 from fifesim.base.annotations import FilePath
 from fifesim.base.foreign import in_a_line, read_toml, shown
 from fifesim.base.refusals import in_own_words
+from fifesim.base.spelling import nearest
+from fifesim.sensor.description.band import InstrumentBand
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import key, lookup
+from fifesim.sensor.description.performance import Noise, Product, Scan
 from fifesim.sensor.description.plausibility import check_units
 from fifesim.sensor.description.responses import with_response
 from fifesim.sensor.description.short_file import completed
 
 # Keys whose value has several forms: what follows them in the place of an error is the form's name.
 _FORMS = ("srf", "lsf", "interval", "ifov")
+
+# What a misspelt key may be; those of short files among them.
+_KEYS = {each.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan) for each in fields(kind)} | {
+    "center", "width", "shape", "snr", "snr_radiance", "snr_shot",
+}  # fmt: skip
 
 
 def instrument(
@@ -233,7 +242,8 @@ def _explain(error):
     """One line that names the key, its value and what is allowed; bands count from 1."""
     key = ".".join(_key_parts(error["loc"]))
     if error["type"] == "unexpected_keyword_argument":
-        return f"unknown key {key}"
+        hint = nearest(str(error["loc"][-1]), _KEYS).removesuffix("? ")
+        return f"unknown key {key}, {hint}" if hint else f"unknown key {key}"
     if error["type"] == "missing":
         return f"the key {key} is missing"
     if error["type"] == "union_tag_invalid":

@@ -43,7 +43,7 @@ def test_a_file_of_ones_own_is_read(changed):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("bits = 8 ", "bitz = 8 ", "mine.toml: .*bits is missing; unknown key bitz"),
+        ("bits = 8 ", "bitz = 8 ", "mine.toml: .*bits is missing; unknown key bitz, did you mean 'bits'"),
         ("bits = 8 ", "bits = 8.5 ", "mine.toml: bits = 8.5: must be a whole number"),
         ("bits = 8 ", "bits = 32 ", "mine.toml: bits = 32: .*16"),
         ("= 705000.0", "= '705 km'", "mine.toml: altitude = '705 km': .*number"),

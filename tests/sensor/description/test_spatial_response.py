@@ -60,7 +60,7 @@ def test_responses_may_differ_by_axis_and_by_band(changed):
         ((LSF, 'kind = "boxcar"\n'), "bands.1.lsf: kind 'boxcar' needs the instantaneous field of view: add ifov"),
         ((LSF, 'kind = "gaussian"\n'), "lsf: give one of fwhm, mtf_at_nyquist and eifov, got none"),
         ((LSF, 'kind = "gaussian"\nmtf_at_nyquist = 30.0\n'), "lsf.mtf_at_nyquist = 30.0: must be below 1"),
-        ((LSF, 'kind = "table"\nangles = [0.0, 1e-5]\nvalues = [1.0]\n'), "lsf.values = .*at least 2"),
+        ((LSF, 'kind = "table"\nangles = [0.0, 1e-5]\nvalues = [1.0]\n'), "lsf.values = .*needs 2 of them or more"),
         (("[lsf] ", "#", LSF, '[lsf.along]\nkind = "boxcar"\n'), "the key lsf.across is missing"),
     ],
 )
