@@ -2,7 +2,7 @@
 Turn one operator, comparison, constant or call of the package at a time, and list what no test notices.
 
     pytest -n auto --cov=fifesim --cov-context=test --cov-report=      # once: which test runs which line
-    python tests/mutate.py 300 --seed 1 --log mutations.txt            # half an hour; goes on where the log ends
+    python tests/mutate.py 300 --seed 1 --log mutations.txt            # an hour; goes on where the log ends
     python tests/mutate.py 20 --only fifesim/ground                    # part of the package
     python tests/mutate.py 40 --verify                                 # what `fifesim verify` notices in its kernels
 

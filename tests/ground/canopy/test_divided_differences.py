@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from fifesim.ground.canopy import divided_differences
 from fifesim.ground.canopy.divided_differences import exponential_chain
 
 
@@ -13,6 +14,14 @@ def test_chain_matches_a_triangular_matrix_exponential(gap):
     rates = np.array([0.3, 0.3 + gap, 0.1, 0.3, 0.2 + 2 * gap])
     corner = expm(3.0 * (np.diag(-rates) + np.diag(np.ones(4), 1)))[0, -1]
     np.testing.assert_allclose(exponential_chain(3.0, *rates), corner, rtol=1e-11)
+
+
+@pytest.mark.parametrize("gap", [0, 0.01, 10])
+def test_compiled_chains_stay_within_their_arrays(gap):
+    """Beside the same in plain Python, which would notice a place beyond."""
+    x, difference, homogeneous = np.sort([-0.9, -0.9 - 3 * gap, -0.3, -0.9]), np.empty(4), np.empty(4)
+    divided_differences._recursion.py_func(x, difference, homogeneous)
+    assert 3.0**3 * difference[0] == pytest.approx(exponential_chain(3.0, *(-x / 3)), rel=1e-12)
 
 
 def test_arrays_broadcast_and_cells_do_not_touch_each_other():

@@ -126,3 +126,22 @@ def test_directions_of_each_cell_are_those_of_the_whole_scene_at_them():
         directional_reflectance(
             lai, background=background, diffuse_fraction=sky, **(angles | {"sza": 90.0}), **leaf, **shape
         )
+
+
+def test_dead_leaves_are_mixed_evenly_unless_said_otherwise():
+    """By cell as in the whole scene."""
+    lai, leaf = np.array([0.5, 2.0, 4.0]), {"leaf_reflectance": RHO[:2], "leaf_transmittance": TAU[:2]}
+    options = leaf | {
+        "background": GROUND[:2],
+        "diffuse_fraction": SKY[:2],
+        "leaf_angles": "spherical",
+        "hotspot": 0.05,
+    }
+    options |= {"brown": 0.4, "brown_reflectance": np.array([0.3, 0.4]), "brown_transmittance": np.array([0.05, 0.3])}
+    whole, mixed = (
+        canopy_reflectance(lai, sza=40.0, vza=20.0, raa=60.0, exact=True, **options, **more)
+        for more in ({}, {"dissociation": 0.0})
+    )
+    angles = {name: np.full(3, angle) for name, angle in (("sza", 40.0), ("vza", 20.0), ("raa", 60.0))}
+    np.testing.assert_array_equal(whole, mixed)
+    np.testing.assert_allclose(directional_reflectance(lai, **angles, **options), whole, rtol=0, atol=1e-12)

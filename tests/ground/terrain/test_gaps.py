@@ -43,6 +43,22 @@ def test_least_bending_is_smooth_across_a_hole():
     np.testing.assert_allclose(gaps.fill_gaps(known, (4, 4)), values, rtol=0, atol=0.02)
 
 
+def test_a_hole_is_a_hole_wherever_it_lies():
+    """With one known cell between it and the border, on any side, as in the middle."""
+    rows, columns = np.mgrid[:40, :50]
+    values = np.sin(rows / 5) + np.cos(columns / 7)
+    for corner in ((1, 20), (36, 20), (18, 1), (18, 46), (18, 20)):
+        known = values.copy()
+        known[corner[0] : corner[0] + 3, corner[1] : corner[1] + 3] = np.nan
+        by_bending = values.copy()
+        hole = np.isnan(known)
+        by_bending[hole] = gaps._least_bending(known, hole)
+        np.testing.assert_allclose(gaps.fill_gaps(known, (2, 2)), by_bending, rtol=0, atol=1e-9)
+        for axis in (0, 1):
+            turned = np.flip(gaps.fill_gaps(np.flip(known, axis), (2, 2)), axis)
+            np.testing.assert_allclose(turned, by_bending, rtol=0, atol=1e-9)
+
+
 def test_larger_holes_are_left_but_for_their_edge():
     known = plane()
     known[20:60, 20:60] = np.nan

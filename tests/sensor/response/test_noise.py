@@ -119,6 +119,8 @@ def test_nothing_is_noisy_by_default_and_nan_stays():
         (lambda: NoiseModel.from_snr([20.0, 20.0], [20.0, 30.0]), "two radiances"),
         (lambda: NoiseModel.from_snr([20.0, 40.0], [20.0, 30.0], 0.5), "leave it out"),
         (lambda: NoiseModel.from_snr([20.0, -40.0], [20.0, 30.0]), "positive radiance"),
+        (lambda: NoiseModel.from_snr(0.0, 200.0, 0.5), "positive radiance"),
+        (lambda: NoiseModel.from_snr(80.0, 0.0, 0.5), "positive radiance"),
         (lambda: check_kinds(["shot", "speckle"]), "unknown noise speckle: there are shot, thermal, fixed-pattern"),
     ],
 )
