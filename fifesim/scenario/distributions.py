@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from fifesim.base.foreign import in_a_line, shown
-from fifesim.scenario.section import nearest
+from fifesim.base.spelling import nearest
 
 # What each kind is given, in words, and what stands beside it.
 _KINDS = {

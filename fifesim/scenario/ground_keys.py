@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 
 from fifesim.base.foreign import shown
-from fifesim.scenario.section import Section, file, nearest, number, seed, text
+from fifesim.base.spelling import nearest
+from fifesim.scenario.section import Section, file, number, seed, text
 
 COVERS = ("none", "pastures", "voronoi", "levels")
 VARYING = ("soil", "moisture", "brown", "crown_cover")

@@ -8,9 +8,10 @@ from pydantic import Field, field_validator, model_validator
 
 from fifesim.base import fife
 from fifesim.base.foreign import shown
+from fifesim.base.spelling import nearest
 from fifesim.base.times import utc
 from fifesim.scenario.ground_keys import LONGEST_NAME, ByName, ClassKeys, GroundKeys, LandscapeKeys
-from fifesim.scenario.section import Section, file, nearest, number, seed, text
+from fifesim.scenario.section import Section, file, number, seed, text
 
 LAND_FORMS = ("flint-hills", "flat")
 INTERVALS = ("product", "native")

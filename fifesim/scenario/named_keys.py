@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from fifesim.base.foreign import shown
+from fifesim.base.spelling import nearest
 from fifesim.scenario.ground_keys import ByName
 from fifesim.scenario.keys import Keys
 from fifesim.scenario.scenario import Scenario, parse_scenario
-from fifesim.scenario.section import nearest
 
 
 class NamedKey(NamedTuple):

@@ -7,7 +7,6 @@ from typing import get_args
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from fifesim.base.foreign import check_regular, shown
-from fifesim.base.spelling import nearest as nearest
 
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 

@@ -8,6 +8,7 @@ from pydantic import field_validator, model_validator
 from fifesim.atmosphere.air import mixtures, models
 from fifesim.atmosphere.air.raster import read_aerosol
 from fifesim.base.foreign import shown
+from fifesim.base.spelling import nearest
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.prospect import Leaf
@@ -18,7 +19,6 @@ from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.scenario.ground_keys import ClassKeys, GroundKeys, StandKeys
 from fifesim.scenario.keys import AirKeys, SensorKeys, TerrainKeys
-from fifesim.scenario.section import nearest
 from fifesim.sensor.description.instruments import instrument, noise_of
 from fifesim.sensor.response.noise import NoiseModel, check_kinds
 

@@ -14,12 +14,12 @@ from typing import Any, Literal
 from fifesim.base.annotations import FilePath
 from fifesim.base.foreign import shown
 from fifesim.base.seeds import check_seed
+from fifesim.base.spelling import nearest
 from fifesim.scenario.distributions import distribution_of
 from fifesim.scenario.ground_keys import COVERS
 from fifesim.scenario.keys import LAND_FORMS
 from fifesim.scenario.named_keys import find_key, put, values_of
 from fifesim.scenario.scenario import Scenario, grid_keys, parse_scenario
-from fifesim.scenario.section import nearest
 from fifesim.scenario.sequences import SEQUENCES
 from fifesim.scenario.toml import load_values, plain_table
 
