@@ -114,8 +114,8 @@ def elevation_around(seed, cell, row, column, shape):
     return assemble(partial(_coarse_tile, int(seed), *cell), _COARSE_TILE, row, column, shape)
 
 
-# So many of 84 cells are 170 MB: what fifty landscapes of chips see around them.
-@lru_cache(maxsize=3072)
+# So many of 84 cells are 115 MB: what thirty landscapes of chips see around them.
+@lru_cache(maxsize=2048)
 def _coarse_tile(seed, down, across, tile_row, tile_column):
     rows, columns = (tile * _COARSE_TILE + np.arange(_COARSE_TILE) for tile in (tile_row, tile_column))
     return elevation(seed, centres(0.0, -down, rows), centres(0.0, across, columns))
