@@ -1,6 +1,5 @@
 """Coordinates from one reference system to another, by operations whose accuracy is known."""
 
-import re
 import warnings
 from functools import lru_cache
 
@@ -12,6 +11,7 @@ from pyproj.transformer import TransformerGroup
 
 from fifesim.base.foreign import in_a_line, shown
 from fifesim.base.warned import warn
+from fifesim.rasters import proj_objects
 
 # By how much a metre of a grid may differ from one on the ground. [1]
 _SCALE_BOUND = 0.035
@@ -190,9 +190,10 @@ def check_metres(crs, bounds):
     if ways not in ({"east", "north"}, {"north"}, {"south"}):
         raise ValueError(f"the axes of the CRS must lead east and north, those of {name} lead {' and '.join(ways)}")
     west, south, east, north = bounds
-    found = []
+    # A CRS takes longer to compare than its text.
+    text, found = crs.to_wkt(), []
     for x, y in (((west + east) / 2, (south + north) / 2), (west, north), (east, north), (west, south), (east, south)):
-        scale, longitude, latitude = _scale(crs, x, y)
+        scale, longitude, latitude = _scale(text, x, y)
         if scale is None:
             raise ValueError(
                 f"west = {west:.10g}, north = {north:.10g}: the grid lies outside of the area of {name}{_reach(crs)}; "
@@ -222,8 +223,7 @@ def _warn_of_scale(name, scale, longitude, latitude):
 @lru_cache(maxsize=1024)
 def _scale(crs, x, y):
     """Scale furthest from one at a point, None where the CRS does not reach it; longitude and latitude. [degree]"""
-    # Longitude from the CRS's own prime meridian, for `get_factors` takes none other into account.
-    plane = pyproj.Proj(re.sub(r"\+pm=\S+", "", pyproj.Proj(crs).srs))
+    plane = proj_objects.from_own_meridian(crs)
     longitude, latitude = plane(x, y, inverse=True, errcheck=False)
     if not np.allclose(plane(longitude, latitude, errcheck=False), (x, y), rtol=0, atol=_RETURNS):
         return None, longitude, latitude
@@ -295,10 +295,16 @@ def convergence(grid):
     angle : float
         [degree]
     """
-    crs = pyproj.CRS.from_wkt(grid.crs.to_wkt())
+    text = grid.crs.to_wkt()
     x, y = transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)
-    to_degrees = pyproj.Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
-    return float(pyproj.Proj(crs).get_factors(*to_degrees.transform(x, y)).meridian_convergence)
+    place = proj_objects.transformer(text, _degrees_of(text)).transform(x, y)
+    return float(proj_objects.projection_of(text).get_factors(*place).meridian_convergence)
+
+
+@lru_cache(maxsize=64)
+def _degrees_of(crs):
+    """The CRS of longitude and latitude that a projected one is made of, as text."""
+    return pyproj.CRS.from_wkt(crs).geodetic_crs.to_wkt()
 
 
 def transform_points(affine, columns, rows):

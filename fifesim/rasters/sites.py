@@ -5,14 +5,13 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Literal
 
-import pyproj
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.base import fife
 from fifesim.base.kinds import described
 from fifesim.rasters import grid as grids
-from fifesim.rasters import whereabouts
+from fifesim.rasters import proj_objects, whereabouts
 
 _NAME = "FIFE"
 _FAR = 1.0  # from the site a scene is another place [degree]
@@ -135,6 +134,6 @@ def _within(longitude, latitude):
     if max(abs(longitude - fife.LONGITUDE), abs(latitude - fife.LATITUDE)) > 1:
         return False
     crs, west, north = fife.CORNERS["NAD83"]
-    x, y = pyproj.Transformer.from_crs(4326, crs, always_xy=True).transform(longitude, latitude)
+    x, y = proj_objects.transformer(4326, crs).transform(longitude, latitude)
     # The corner of one datum is 9 m from that of the other.
     return max(abs(x - west - fife.SIZE / 2), abs(y - north + fife.SIZE / 2)) <= fife.SIZE / 2 + 10

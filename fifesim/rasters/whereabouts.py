@@ -6,7 +6,7 @@ import numpy as np
 import pyproj
 from odc.geo.crs import CRS
 
-from fifesim.rasters import projection
+from fifesim.rasters import proj_objects, projection
 
 
 def middle(grid):
@@ -47,8 +47,7 @@ def degrees_at(crs, x, y):
     longitude, latitude : float
         As of `middle`; infinite where the CRS does not reach. [degree]
     """
-    to_degrees = pyproj.Transformer.from_crs(crs, 4326, always_xy=True)
-    return tuple(float(each) for each in to_degrees.transform(x, y))
+    return tuple(float(each) for each in proj_objects.transformer(crs, 4326).transform(x, y))
 
 
 def place_in_words(longitude, latitude):

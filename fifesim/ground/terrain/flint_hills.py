@@ -26,8 +26,8 @@ STEP = 10.0
 BENT_STEP = 20.0
 TILE = 252
 
-# Cells of 30 m that span a tile.
-_COARSE_TILE = 84
+# Coarse cells that are made together: larger tiles reach far beyond what is asked for.
+_COARSE_TILE = 28
 
 # Noise that bends the axes, in base level, and of the roughness: standard deviation and lattice step. [m]
 BENDING = ((450.0, 3000.0), (130.0, 700.0), (28.0, 200.0))
@@ -114,8 +114,8 @@ def elevation_around(seed, cell, row, column, shape):
     return assemble(partial(_coarse_tile, int(seed), *cell), _COARSE_TILE, row, column, shape)
 
 
-# So many of 84 cells are 170 MB: what fifty landscapes of chips see around them.
-@lru_cache(maxsize=3072)
+# So many are 120 MB: what thirty landscapes of chips see around them.
+@lru_cache(maxsize=18432)
 def _coarse_tile(seed, down, across, tile_row, tile_column):
     rows, columns = (tile * _COARSE_TILE + np.arange(_COARSE_TILE) for tile in (tile_row, tile_column))
     return elevation(seed, centres(0.0, -down, rows), centres(0.0, across, columns))

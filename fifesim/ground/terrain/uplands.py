@@ -57,8 +57,8 @@ def upland(seed, line, column):
         return _upland(seed, line, column)
 
 
-# Those within reach of fifty landscapes, in 140 MB.
-@lru_cache(maxsize=512)
+# Those within reach of three landscapes of chips, in 20 MB.
+@lru_cache(maxsize=64)
 def _upland(seed, line, column):
     drawn = generator(seed, _STREAM, (0, 0, line, column))
     erodibility, cost = (
