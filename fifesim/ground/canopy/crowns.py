@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numba.extending import register_jitable
 
 from fifesim.ground.canopy.background import over_background
@@ -239,6 +240,15 @@ def lai_in_crowns(lai, crown_cover):
     return np.where(cover > 0, lai / np.where(cover > 0, cover, 1), 0 * lai)
 
 
+@njit(nogil=True, cache=True)
+def _overfull(lai, cover):
+    """How many crowns hold too many leaves: a sum, so that several are looked at at once."""
+    count = 0
+    for i in range(lai.size):
+        count += (lai[i] > LARGEST_LAI * cover[i]) & (cover[i] > 0)
+    return count
+
+
 def check_crowns(lai, crown_cover):
     """
     Refuse crowns that hold more leaves than any canopy; NaN passes, and so does a cover of 0, bare ground.
@@ -261,8 +271,8 @@ def check_crowns(lai, crown_cover):
     """
     check_share("crown_cover", crown_cover)
     lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
-    # Seldom are there any; then ground without crowns, which holds no leaves, is told from crowns with too many.
-    if np.any(lai > LARGEST_LAI * cover) and np.any((lai > LARGEST_LAI * cover) & (cover > 0)):
+    # Ground without crowns holds no leaves, and is not meant.
+    if _overfull(*(np.ascontiguousarray(each).reshape(-1) for each in np.broadcast_arrays(lai, cover))):
         inside = lai / np.where(cover > 0, cover, np.inf)
         raise ValueError(
             f"leaf area index within the crowns is lai / crown_cover, at most {LARGEST_LAI:g}, got up to "

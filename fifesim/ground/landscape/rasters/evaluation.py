@@ -69,7 +69,9 @@ def _of_classes(table, parts, banded, bands, first, cover, *blocks):
     blocks = [_flat(block, has_bands, shape) for block, has_bands in zip(blocks, banded, strict=True)]
     scene, rasters = blocks[:first], blocks[first:]
     codes, groups = table
-    numbers, present = numbers_of(check_codes(cover, codes), codes)
+    numbers, present = numbers_of(cover, codes) if cover.dtype == np.int16 else (None, [True])
+    if present[-1]:
+        numbers, present = numbers_of(check_codes(cover, codes), codes)
     needed = {group for group, there in zip(groups, present, strict=False) if there}
     if len(needed) == 1 and not present[-1]:
         kernel, taken = parts[needed.pop()]
