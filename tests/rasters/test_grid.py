@@ -209,3 +209,16 @@ def test_a_raster_without_cells_is_refused(lai):
     for empty in (lai[:0], lai[:, :0]):
         with pytest.raises(ValueError, match="the raster has no cells, "):
             grids.geobox(empty)
+
+
+def test_array_that_is_placed_stays_as_it_is():
+    array = xr.DataArray(
+        np.zeros((2, 3, 4)), dims=("band", "y", "x"), coords={"band": ["a", "b"]}, attrs={"units": "1"}
+    )
+    grid = grids.grid_at("EPSG:26914", 704970.0, 4334220.0, 40.0, 30.0, 10.0)
+    placed = grids.place(array, grid)
+    assert not array.encoding and set(array.coords) == {"band"}
+    placed.attrs["units"] = "m"
+    placed.coords["spatial_ref"].attrs["GeoTransform"] = ""
+    assert array.attrs == {"units": "1"} and grids.geobox(grids.place(array, grid)) == grid
+    assert grids.place(array, grid).sel(band="b").shape == (3, 4)

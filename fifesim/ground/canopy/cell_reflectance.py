@@ -13,12 +13,8 @@ from fifesim.ground.canopy.crowns import (
     crowns_over_background,
     lai_in_crowns,
 )
-from fifesim.ground.canopy.foliage_table import (
-    crown_table,
-    interpolate_crowned,
-    interpolate_foliage,
-    tabulate_foliage,
-)
+from fifesim.ground.canopy.foliage_interpolation import interpolate_crowned, interpolate_foliage
+from fifesim.ground.canopy.foliage_table import crown_table, tabulate_foliage
 from fifesim.ground.canopy.scene import cell_by_cell, decay, leaves_of, sky_of
 
 # Of the ground below, where a table of terms is tested.

@@ -4,7 +4,7 @@ import pytest
 from broken import exceeded, notices
 
 from fifesim.experiments.verification import foliage
-from fifesim.ground.canopy import foliage_table, layers
+from fifesim.ground.canopy import foliage_interpolation, layers
 
 
 @pytest.mark.parametrize("check", [each for each in foliage.CHECKS if each is not foliage._tables])
@@ -15,8 +15,8 @@ def test_all_is_well(check):
 @pytest.mark.parametrize(
     "owner, kernel, check",
     [
-        (foliage_table, "_foliage", foliage._tables),
-        (foliage_table, "_crowned", foliage._tables),
+        (foliage_interpolation, "_foliage", foliage._tables),
+        (foliage_interpolation, "_crowned", foliage._tables),
         (layers, "bidirectional_gap", foliage._other_layers),
         (foliage, "crowns_over_background", foliage._crowns),
         (foliage, "light_budget", foliage._energy),

@@ -1,74 +1,31 @@
-"""Tables over leaf area and dead share, against the functions that they hold."""
+"""Tables over leaf area and dead share."""
 
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy.background import over_background
-from fifesim.ground.canopy.crowns import crown_shares, crowns_over_background
-from fifesim.ground.canopy.foliage_table import (
-    LIMIT,
-    crown_table,
-    interpolate_crowned,
-    interpolate_foliage,
-    tabulate_foliage,
-)
+from fifesim.ground.canopy.crowns import crown_shares
+from fifesim.ground.canopy.foliage_table import crown_table, tabulate_foliage
 
 
-def terms_of(count, lai, brown):
-    """Terms of two bands: layers of dead leaves below others, as steep as those of a canopy."""
-    rates = np.linspace(0.5, 2.0, 2 * count)[:, None]
-    return (np.exp(-rates * (1 - brown) * lai) + 0.5 * np.exp(-rates * brown * lai)) / (1 + rates)
+def test_nodes_of_a_table_are_its_function():
+    """Of B-splines times 6, (c_-1 + 4 c_0 + c_1) / 6, in single precision."""
+    table = tabulate_foliage(lambda lai, brown: np.exp(-lai * (1 + brown))[None], rate=1.0)
+    c = 6 * table.coefficients[..., 0].astype(float)
+    across = (c[:-2] + 4 * c[1:-1] + c[2:]) / 6
+    found = across[:, :-2] + 4 * across[:, 1:-1] + across[:, 2:]
+    position = np.arange(len(found)) / table.steps[0]
+    odds = np.arange(found.shape[1]) / table.steps[1]
+    lai, brown = (1 / (1 - position) ** 2 - 1) / table.rate, odds**2 / (odds**2 + (1 - odds) ** 2)
+    np.testing.assert_allclose(found, np.exp(-lai[:, None] * (1 + brown)), rtol=0, atol=3e-7)
 
 
-@pytest.fixture(scope="module")
-def cells():
-    rng = np.random.default_rng(3)
-    lai = np.concatenate([[0, 0, LIMIT, LIMIT], rng.gamma(1.5, 1.5, 500), rng.uniform(0, LIMIT, 500)])
-    brown = np.concatenate([[0, 1, 0, 1], rng.uniform(0, 1, 1000)])
-    return lai, brown, rng.uniform(0.1, 1, lai.size), rng.uniform(0, 0.4, (2, lai.size))
-
-
-@pytest.fixture(scope="module")
-def table():
-    return tabulate_foliage(lambda lai, brown: terms_of(4, lai, brown), rate=2.0)
-
-
-def test_terms_of_cells_are_joined_over_their_ground(cells, table):
-    lai, brown, _, ground = cells
-    expected = over_background(*terms_of(4, lai, brown).reshape(2, 4, -1).swapaxes(0, 1), ground)
-    np.testing.assert_allclose(interpolate_foliage(table, lai, brown, ground), expected, rtol=0, atol=1e-6)
-    one = interpolate_foliage(table, lai, brown, ground[:, :1])
-    np.testing.assert_array_equal(one[:, 0], interpolate_foliage(table, lai, brown, ground)[:, 0])
-
-
-@pytest.mark.parametrize("view", [(28.5, 0, 0), (60, 58, 10), (85, 80, 180)])
-def test_crowns_of_cells_are_joined_with_their_gaps(cells, view):
-    lai, brown, cover, ground = cells
-    cover[:4] = 0, 1, 1, 1
-    lai = np.minimum(lai, 0.99 * LIMIT * cover)
-    table = tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
-    shares = crown_shares(cover, 0.8, *view)
-    of_crowns = cover, shares.sun, shares.view, shares.apart, shares.lit
-    inside = np.divide(lai, cover, where=cover > 0, out=np.zeros_like(lai))
-    terms = tuple(0.5 * terms_of(8, inside, brown).reshape(2, 8, -1).swapaxes(0, 1))
-    expected = crowns_over_background(terms, of_crowns, ground)
-    found = interpolate_crowned(table, crown_table(0.8, *view), lai, brown, cover, ground)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
-
-
-def test_leaves_of_one_kind_need_no_axis():
-    table = tabulate_foliage(lambda lai, _: 0.5 * terms_of(8, lai, 0.3), rate=2.0, by_brown=False)
-    assert table.coefficients.shape[1:] == (1, 16)
-    lai, cover, shares = np.array([0.4, 3.0]), np.ones(2), (1.0, 1.0, 1.0, 0.0, 1.0)
-    found = interpolate_crowned(table, crown_table(1.0, 30, 0, 0), lai, np.array([0.3]), cover, np.full((2, 1), 0.2))
-    terms = tuple(0.5 * terms_of(8, lai, 0.3).reshape(2, 8, -1).swapaxes(0, 1))
-    np.testing.assert_allclose(found, crowns_over_background(terms, shares, 0.2), rtol=0, atol=1e-6)
-
-
-def test_no_data_stay_and_what_is_beyond_is_marked(table):
-    lai, brown = np.array([1, np.nan, 1, LIMIT + 1e-9]), np.array([0.2, 0.2, np.nan, 0.2])
-    found = interpolate_foliage(table, lai, brown, np.array([[0.1], [0.2]]))
-    assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:3]).all() and np.isinf(found[:, 3]).all()
+def test_crowns_at_nodes_of_their_table():
+    table = crown_table(0.8, 60, 40, 10)
+    found = table[:-2] + 4 * table[1:-1] + table[2:]
+    root = np.linspace(0, 1, len(found))
+    shares = crown_shares(1 - root**4, 0.8, 60, 40, 10)
+    expected = np.stack([shares.sun, shares.view, shares.apart, shares.lit], axis=-1)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_a_table_that_cannot_be_says_so():

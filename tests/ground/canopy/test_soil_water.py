@@ -97,3 +97,12 @@ def test_numbers_are_broadcast_and_missing_ones_stay_missing():
 def test_moisture_that_is_no_share_is_one_line(moisture):
     with pytest.raises(ValueError, match=rf"moisture must be in \[0, 1\], got {moisture:g}: .* moisture=0.3"):
         moistened(np.full(1, 0.2), moisture, water_films(TM[:1]))
+
+
+def test_cells_are_those_of_any_part():
+    """More than are done at once."""
+    rng = np.random.default_rng(3)
+    dry, moisture, films = rng.uniform(0, 0.5, (40_000, 6)), rng.uniform(0, 1, 40_000), water_films(TM)
+    whole = moistened(dry, moisture, films)
+    for part in (slice(0, 20_000), slice(17_001, 40_000), slice(39_999, None)):
+        np.testing.assert_array_equal(whole[part], moistened(dry[part], moisture[part], films))

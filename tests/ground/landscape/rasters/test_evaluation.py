@@ -46,7 +46,7 @@ def test_block_of_one_class_is_handed_over_as_it_is(lai, cover):
     np.testing.assert_array_equal(one, np.sqrt(lai))
 
 
-@pytest.mark.parametrize("codes", [[1, 5], [1, 5, 9], [-1, 1, 5, 9]], ids=str)
+@pytest.mark.parametrize("codes", [[1, 5], [-1, 1, 5], [1, 5, 9], [-1, 1, 5, 9]], ids=str)
 def test_classes_of_one_kernel_are_evaluated_together(lai, codes):
     calls = []
     both = (lambda cells: calls.append(cells.size) or np.sqrt(cells), [])
