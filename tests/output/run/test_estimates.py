@@ -34,12 +34,14 @@ def test_piece_that_is_timed_is_part_of_the_scene():
     assert (box.affine.c - whole.affine.c) % 30 == pytest.approx(0, abs=1e-6)
 
 
-def test_pace_is_that_of_making_the_blocks(monkeypatch):
-    scenario = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}).complete()
+def test_pace_is_that_of_making_all_blocks(monkeypatch):
+    scenario, made = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}).complete(), []
     monkeypatch.setattr(estimates, "simulate_to_folder", lambda *given, **options: None)
-    monkeypatch.setattr(estimates, "run_on_threads", lambda *given: time.sleep(0.3))
+    monkeypatch.setattr(estimates, "run_on_threads", lambda *given: made.append(given) or time.sleep(0.2))
     _, cells, pace, _ = estimates._calibrate(scenario, 1)
-    assert cells == 90 * 90 and cells / pace > 0.3
+    ((graph, outputs, _, threads),) = made
+    assert {name for name, _ in outputs.values()} >= {"image", "lai"} and set(outputs) <= set(graph) and threads == 1
+    assert cells == 90 * 90 and cells / pace > 0.2
 
 
 @pytest.mark.slow
