@@ -166,3 +166,15 @@ def test_a_cut_file_names_itself(tmp_path):
         fifesim.open_lai(tmp_path / "cut.tif", GRID)
     with pytest.raises(OSError, match=r"cannot read .*cut\.tif"):
         fifesim.fine_dem(tmp_path / "cut.tif", GRID)
+
+
+def test_a_file_that_may_not_be_read_says_so(tmp_path, monkeypatch):
+    """A superuser may read all: the system's refusal is made up."""
+    path = write(tmp_path / "secret.tif")
+
+    def refuse(*given):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(opening, "open", refuse, raising=False)
+    with pytest.raises(ValueError, match=r"cannot read .*secret\.tif as a raster: Permission denied"):
+        opening.raster_file(path)
