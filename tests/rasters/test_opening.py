@@ -181,3 +181,15 @@ def test_other_formats_stay_a_matter_of_trust(tmp_path):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(ValueError, match="allow_remote=True"):
             opening.raster_file(tmp_path / name)
+
+
+def test_a_file_that_may_not_be_read_says_so(tmp_path, monkeypatch):
+    """A superuser may read all: the system's refusal is made up."""
+    path = write(tmp_path / "secret.tif")
+
+    def refuse(*given):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(opening, "open", refuse, raising=False)
+    with pytest.raises(ValueError, match=r"cannot read .*secret\.tif as a raster: Permission denied"):
+        opening.raster_file(path)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import special
 
 from fifesim.base.seeds import check_seed, generator
-from fifesim.ground.landscape.autoregression import check_arp, field_variance
+from fifesim.ground.landscape.autoregression import field_variance
 from fifesim.ground.landscape.correlations import Impossible, largest_share, refused
 from fifesim.ground.landscape.scores import Scores, add_scores, normal_scores, score_table
 
@@ -104,12 +104,11 @@ def cross_correlation(arp, other):
     >>> cross_correlation(0.2, 0.2), round(cross_correlation(0.05, 0.24), 3)
     (1.0, 0.63)
     """
-    check_arp(arp)
-    check_arp(other)
+    variances = field_variance(arp) * field_variance(other)
     if abs(arp - other) < 1e-7:
         return 1.0
     one, two = (a * 2 / np.pi * special.ellipk((4 * a) ** 2) for a in (arp, other))
-    return float((one - two) / (arp - other) / np.sqrt(field_variance(arp) * field_variance(other)))
+    return float((one - two) / (arp - other) / np.sqrt(variances))
 
 
 def copula(arps, correlations, samples=None, coarser=()):

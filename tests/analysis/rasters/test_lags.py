@@ -73,6 +73,14 @@ def test_empty_raster_is_refused(lai):
         fifesim.autocovariance(lai * np.nan, 30.0)
 
 
+def test_values_that_do_not_vary_have_no_covariance(lai):
+    """They are no missing ones."""
+    found = fifesim.autocovariance(lai * 0 + 0.25, 30.0)
+    assert int(found["count"].max()) == lai.size
+    np.testing.assert_allclose(found["covariance"], 0, atol=1e-15)
+    np.testing.assert_allclose(found["semivariance"], 0, atol=1e-15)
+
+
 def test_values_that_do_not_vary_have_no_correlation(lai):
     with pytest.raises(ValueError, match="needs values that vary"):
         fifesim.variogram(lai * 0 + 0.3, 20)

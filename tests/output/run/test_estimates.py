@@ -34,6 +34,16 @@ def test_piece_that_is_timed_is_part_of_the_scene():
     assert (box.affine.c - whole.affine.c) % 30 == pytest.approx(0, abs=1e-6)
 
 
+def test_pace_is_that_of_making_all_blocks(monkeypatch):
+    scenario, made = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}).complete(), []
+    monkeypatch.setattr(estimates, "simulate_to_folder", lambda *given, **options: None)
+    monkeypatch.setattr(estimates, "run_on_threads", lambda *given: made.append(given) or time.sleep(0.2))
+    _, cells, pace, _ = estimates._calibrate(scenario, 1)
+    ((graph, outputs, _, threads),) = made
+    assert {name for name, _ in outputs.values()} >= {"image", "lai"} and set(outputs) <= set(graph) and threads == 1
+    assert cells == 90 * 90 and cells / pace > 0.2
+
+
 @pytest.mark.slow
 def test_time_is_that_of_the_whole_run_with_start_and_report(tmp_path):
     """A scene no larger than the piece takes as long as its run, within what a busy machine makes of it."""
