@@ -76,8 +76,3 @@ def test_unknown_keys_and_tables_that_are_none_are_refused():
         Shelf(width=1.0)
     with pytest.raises(ValidationError, match="expected a table of keys, got 3"):
         Shelf.model_validate(3)
-
-
-def test_nearest_is_a_hint_or_nothing():
-    assert nearest("colur", ["colour", "length"]) == "did you mean 'colour'? "
-    assert nearest("zzz", ["colour"]) == ""

@@ -278,9 +278,10 @@ def check_lai(lai):
     cells = np.asarray(lai, float)
     if not within(cells, 0.0, LARGEST_LAI):
         wrong = (cells < 0) | (cells > LARGEST_LAI)
+        scale = _of_another_scale(cells) if np.nanmax(cells) > LARGEST_LAI else ""
         raise ValueError(
             f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
-            f"{wrong.sum()} of {cells.size} cells: {_of_another_scale(cells)}set cells without data to NaN, such as "
+            f"{wrong.sum()} of {cells.size} cells: {scale}set cells without data to NaN, such as "
             "lai.where(lai >= 0)"
         )
     return lai

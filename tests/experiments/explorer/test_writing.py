@@ -1,5 +1,7 @@
 """The command and the function: one whole file, or nothing."""
 
+import re
+
 import pytest
 from typer.testing import CliRunner
 
@@ -21,7 +23,7 @@ def test_command_writes_one_page_and_replaces_none(quick, small, tmp_path, monke
     (tmp_path / "mine.toml").write_text(write_scenario(small.complete()))
     made = CliRunner().invoke(app, ["explore", "mine.toml", "-o", "pages/mine.html"])
     assert made.exit_code == 0, made.output
-    assert made.output.strip() == "pages/mine.html"
+    assert re.fullmatch(r"pages/mine.html\ndone in .*: open pages/mine.html in a browser\n", made.output)
     assert [path.name for path in (tmp_path / "pages").iterdir()] == ["mine.html"]
     again = CliRunner().invoke(app, ["explore", "mine.toml", "-o", "pages/mine.html"])
     assert again.exit_code == 2 and "--overwrite" in again.output
