@@ -1,4 +1,4 @@
-"""The light that falls on a slope, and what of the light that it sends up is seen (Eqs. 4 and 5)."""
+"""The light that falls on a slope, and what of the light that it sends up is seen (Equations 4 and 5)."""
 
 from typing import NamedTuple
 
