@@ -113,6 +113,22 @@ def held(array):
     return da.Array(layers, name, array.chunks, dtype=array.dtype, meta=array._meta)
 
 
+def is_rim(key, chunk):
+    """
+    Whether a task cuts out a part of a chunk that others need, without which it need not wait for them.
+
+    Parameters
+    ----------
+    key, chunk : key of a dask graph
+        Of the task, and of the chunk.
+
+    Returns
+    -------
+    answer : bool
+    """
+    return key[0] == f"cut-{chunk[0]}"
+
+
 def slices(sizes):
     """
     Slices of chunks.

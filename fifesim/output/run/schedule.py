@@ -4,11 +4,17 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import dask.threaded
+from dask.core import get_deps, quote
 from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
 from dask.order import order
 
+from fifesim.rasters.windows import is_rim
+
 # A worker that dies takes a task with it; one that kills its workers this often is at fault itself.
 _RETRIES = 3
+
+# Outputs whose tasks are put in order together.
+_PIECE = 600
 
 
 def tasks_of(arrays, wanted):
@@ -50,9 +56,11 @@ def run_on_threads(graph, outputs, deliver, threads):
     Exception
         Whatever a task or ``deliver`` raises; tasks that run are finished first.
     """
-    pool = ThreadPoolExecutor(threads)
+    pool, kept = ThreadPoolExecutor(threads), {}
     try:
-        dask.threaded.get(*_in_order(graph, outputs, deliver), pool=pool)
+        for tasks, last, waiting in _in_pieces(graph, outputs, deliver):
+            _, *values = dask.threaded.get(tasks | kept, [last, *waiting], pool=pool)
+            kept = {key: quote(value) for key, value in zip(waiting, values, strict=True)}
     finally:
         pool.shutdown(cancel_futures=True)
 
@@ -76,7 +84,9 @@ def run_on_client(graph, outputs, deliver, client):
     """
     from distributed import KilledWorker, as_completed  # there already, where a client is
 
-    ranks = order(_in_order(graph, outputs, deliver)[0])
+    ranks = {}
+    for tasks, _, _ in _in_pieces(graph, outputs, deliver):
+        ranks |= {key: len(ranks) + rank for key, rank in order(tasks).items()}
     layer = MaterializedLayer(graph, annotations={"priority": _Priority(ranks), "retries": _RETRIES})
     whole = HighLevelGraph({"blocks": layer}, {"blocks": set()})
     futures = dict(zip(client.get(whole, list(outputs), sync=False, optimize_graph=False), outputs, strict=True))
@@ -100,19 +110,40 @@ class _Priority:
         return -self._ranks[key]
 
 
-def _in_order(graph, outputs, deliver):
+def _in_pieces(graph, outputs, deliver):
     """
-    The graph with the delivery of each output, and the last of these, which is all that there is to ask for.
+    The tasks of some outputs after those of others: tasks, the last of them, and those whose results still wait then.
 
-    dask goes into the depth of what is asked first. A delivery waits for the one before it, so that outputs are made
-    one after the other, and no chunk waits for an output that is far off.
+    dask goes into the depth of what is asked first. The delivery of an output waits for the one before it and for the
+    rims that are cut off its chunks, so that outputs are made one after the other, and no chunk waits for an output
+    that is far off. In pieces, as the memory that dask needs to order such a chain grows with its square.
     """
-    tasks, before = dict(graph), []
-    for number, (key, place) in enumerate(outputs.items()):
-        tasks[("delivered", number)] = (partial(_deliver, deliver, *place), key, before)
-        before = [("delivered", number)]
-    return tasks, before
+    dependencies, dependents = get_deps(graph)
+    made, waiting, wanted = set(), set(), list(outputs)
+    for first in range(0, len(wanted), _PIECE):
+        tasks, last = {}, None
+        for key in wanted[first : first + _PIECE]:
+            needed = _needed(key, dependencies, made)
+            rims = {each for source in needed for each in dependents[source] if is_rim(each, source)}
+            tasks |= {each: graph[each] for each in needed | rims}
+            made |= needed | rims
+            tasks["delivered", key] = (partial(_deliver, deliver, *outputs[key]), key, last, list(rims))
+            last = ("delivered", key)
+        later = set(wanted[first + _PIECE :])
+        waiting = [each for each in {*waiting, *tasks} & made if each in later or not dependents[each] <= made]
+        yield tasks, last, waiting
 
 
-def _deliver(deliver, name, index, block, before):
+def _needed(key, dependencies, made):
+    """A task and all that it needs and that is not made."""
+    needed, asked = set(), [key]
+    while asked:
+        each = asked.pop()
+        if each not in made and each not in needed:
+            needed.add(each)
+            asked += dependencies[each]
+    return needed
+
+
+def _deliver(deliver, name, index, block, before, rims):
     deliver(name, index, block)
