@@ -106,17 +106,23 @@ def saved_array(folder, name, array):
     Returns
     -------
     array : dask.array.Array
-        In the same chunks.
+        In chunks of whole rows, each of a row of blocks: far fewer tasks than blocks.
     """
-    leading = array.shape[:-2]
-    edges = [{start: number for number, start in enumerate(np.cumsum((0, *sizes)).tolist())} for sizes in array.chunks]
+    leading, (down, across) = array.shape[:-2], array.chunks[-2:]
+    numbers = {start: number for number, start in enumerate(np.cumsum((0, *down)).tolist())}
 
-    def ask(rows, columns):
-        index = (*(0 for _ in leading), edges[-2][rows.start], edges[-1][columns.start])
-        return (str(_path(folder, name, index)),), ()
+    def row_of_blocks(number):
+        paths = (_path(folder, name, (*(0 for _ in leading), number, column)) for column in range(len(across)))
+        return np.concatenate([_load(path) for path in paths], axis=-1)
 
     return array_from_windows(
-        _load, [], array.chunks[-2:], ask, token=f"saved-{folder}-{name}", leading=leading, dtype=array.dtype
+        row_of_blocks,
+        [],
+        (down, (sum(across),)),
+        lambda rows, columns: ((numbers[rows.start],), ()),
+        token=f"saved-{folder}-{name}",
+        leading=leading,
+        dtype=array.dtype,
     )
 
 

@@ -10,11 +10,13 @@ import xarray as xr
 from fifesim import fife_site
 from fifesim.base.footprints import axis_operator
 from fifesim.base.line_spread import Boxcar
+from fifesim.output.run import schedule
 from fifesim.output.run.schedule import run_on_threads, tasks_of
 from fifesim.rasters import grid as grids
 from fifesim.rasters.chunks import neighbourhood
 from fifesim.rasters.places import tiles
 from fifesim.rasters.regularization import resample
+from fifesim.rasters.windows import array_from_windows
 
 
 def places(row, column, shape):
@@ -51,6 +53,30 @@ def test_blocks_are_those_of_dask(threads):
     assert len(found) == array.npartitions
 
 
+@pytest.mark.parametrize("piece", [1, 5])
+def test_what_waits_for_later_pieces_is_made_once(monkeypatch, piece):
+    monkeypatch.setattr(schedule, "_PIECE", piece)
+    made, found = [], {}
+
+    def source(row, column, shape):
+        made.append((row, column))
+        return places(row, column, shape)
+
+    grid = fife_site(30 / 9, window=((0, 60), (0, 40)))
+    cells = tiles(source, grid, 10, tile=10)
+    around = neighbourhood(lambda block: block[1:-1, 1:-1] + block[:-2, 2:], cells * 2, 1)
+    arrays = {"cells": cells.data, "around": around.data}
+    run_on_threads(
+        *tasks_of(arrays, [(name, index) for index in np.ndindex(6, 4) for name in arrays]),
+        lambda name, index, block: found.update({(name, *index): block}),
+        2,
+    )
+    assert len(made) == len(set(made)) == 24
+    for (name, *index), block in found.items():
+        np.testing.assert_array_equal(block, arrays[name].blocks[tuple(index)].compute(scheduler="sync"))
+    assert len(found) == 48
+
+
 def test_only_what_is_wanted_is_computed():
     array = means(96, 17)
     all_of_it = tasks_of({"means": array}, wanted(array))[0]
@@ -58,19 +84,24 @@ def test_only_what_is_wanted_is_computed():
     assert len(one) < len(all_of_it) / 6
 
 
-def chunks_at_once(rows, columns):
-    """Most chunks in memory together when pixels are made of so many of them, by one thread."""
-    alive, most = set(), 0
+class Watch:
+    """Makes chunks, and sees how many of them are in memory together at most."""
 
-    def watched(block):
-        nonlocal most
+    def __init__(self):
+        self.alive, self.most = set(), 0
+
+    def __call__(self, block):
         made = block + 1
-        alive.add(id(made))
-        weakref.finalize(made, alive.discard, id(made))
-        most = max(most, len(alive))
+        self.alive.add(id(made))
+        weakref.finalize(made, self.alive.discard, id(made))
+        self.most = max(self.most, len(self.alive))
         return made
 
-    shape, options = (rows * 10, columns * 10), {"dtype": float, "meta": np.empty((0, 0))}
+
+def chunks_at_once(rows, columns):
+    """Most chunks in memory together when pixels are made of so many of them, by one thread."""
+    watched, shape = Watch(), (rows * 10, columns * 10)
+    options = {"dtype": float, "meta": np.empty((0, 0))}
     truth = da.ones(shape, chunks=10).map_blocks(watched, **options)
     image = truth.map_blocks(np.sqrt).map_blocks(watched, **options)
     grid = fife_site(30 / 9, window=((0, rows * 10), (0, columns * 10)))
@@ -87,7 +118,22 @@ def chunks_at_once(rows, columns):
     }
     places = [(name, index) for index in np.ndindex(arrays["image"].numblocks) for name in arrays]
     run_on_threads(*tasks_of(arrays, places), lambda *block: None, 1)
-    return most
+    return watched.most
+
+
+@pytest.mark.parametrize("piece", [7, 600])
+def test_no_chunk_waits_for_those_that_need_its_rims_only(monkeypatch, piece):
+    """Blocks that read a row and a column before them too: the row of blocks above waits as rims."""
+    monkeypatch.setattr(schedule, "_PIECE", piece)
+
+    def ask(*place):
+        return (), [tuple(slice(part.start - 1, part.stop) for part in place)]
+
+    watched, sizes = Watch(), ((10,) * 4, (10,) * 20)
+    cells = da.ones((40, 200), chunks=10).map_blocks(watched, dtype=float, meta=np.empty((0, 0)))
+    blocks = array_from_windows(lambda window: window[1:, 1:] + window[:-1, :-1], [cells], sizes, ask, token="before")
+    run_on_threads(*tasks_of({"blocks": blocks}, wanted(blocks, "blocks")), lambda *block: None, 1)
+    assert watched.most <= 3
 
 
 def test_what_waits_grows_neither_with_rows_nor_with_columns():
