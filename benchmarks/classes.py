@@ -1,9 +1,9 @@
 """What classes of cover cost, as ratios of processor time to the same scene without classes, in one run."""
 
-import time
 from itertools import count
 
 from scipy import stats
+from timing import seconds
 
 import fifesim
 
@@ -26,17 +26,6 @@ def table(classes):
         )
         for number in range(classes)
     ]
-
-
-def seconds(call, times=5):
-    """Least processor time of some calls; the first fills caches."""
-    call()
-    spent = []
-    for _ in range(times):
-        start = time.process_time()
-        call()
-        spent.append(time.process_time() - start)
-    return min(spent)
 
 
 def main():

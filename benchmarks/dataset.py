@@ -63,7 +63,7 @@ def measured(study, chips, workers, folder):
 def floor_seconds():
     """Processor time of a floor."""
     start = time.process_time()
-    floor(CHIP, 1)
+    floor(CHIP)
     return time.process_time() - start
 
 

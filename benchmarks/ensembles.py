@@ -72,7 +72,7 @@ def main():
     for name, (scenario_of, numbers, side) in cases.items():
         spent = seconds(scenario_of, numbers)
         start = time.process_time()
-        floor(side, 1)
+        floor(side)
         print(f"| {name} | {1 / spent:.0f} | {spent / (time.process_time() - start):.2g} |", flush=True)
 
 

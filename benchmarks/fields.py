@@ -5,10 +5,10 @@ What fields that correlate and soils that vary cost, beside the floor of `chain.
 """
 
 import argparse
-import time
 
 import dask
 from chain import BANDS, CASE, floor
+from timing import seconds
 
 import fifesim
 from fifesim.ground.landscape.rasters.fields import of_elevation
@@ -50,24 +50,13 @@ def cases(cells):
     }
 
 
-def seconds(call, times=3):
-    """Least processor time of some calls, after one that warms up."""
-    call()
-    spent = []
-    for _ in range(times):
-        start = time.process_time()
-        call()
-        spent.append(time.process_time() - start)
-    return min(spent)
-
-
 def main():
     """Print a table of ratios."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument("--cells", type=int, default=3000, help="cells along each side, at most 4500")
     options = parser.parse_args()
     with dask.config.set(scheduler="synchronous"):
-        base = seconds(lambda: floor(options.cells, 1))
+        base = seconds(lambda: floor(options.cells))
         print(f"{options.cells**2 / 1e6:.1f} million cells, floor {base:.2f} s of processor time\n")
         print("| | times the floor |\n|---|---|")
         for name, call in cases(options.cells).items():

@@ -1,37 +1,12 @@
 """What dead leaves, crowns and soil by cell cost the canopy, beside the whole flat chain, in one run."""
 
-import time
-
 import numpy as np
+from timing import in_turn, seconds
 
 import fifesim
 
 BANDS = ["TM3", "TM4"]
 CELLS = 2000
-
-
-def seconds(call, times=5):
-    """Processor time of the fastest of some calls, once tables are made and kernels compiled."""
-    call()
-    spent = []
-    for _ in range(times):
-        start = time.process_time()
-        call()
-        spent.append(time.process_time() - start)
-    return min(spent)
-
-
-def in_turn(calls, rounds=6):
-    """The same of several calls, one after the other in each round: other work on the machine slows all of them."""
-    spent = dict.fromkeys(calls, np.inf)
-    for call in calls.values():
-        call()
-    for _ in range(rounds):
-        for name, call in calls.items():
-            start = time.process_time()
-            call()
-            spent[name] = min(spent[name], time.process_time() - start)
-    return spent
 
 
 def chain(seed):

@@ -1,24 +1,13 @@
 """What leaves that differ from cell to cell cost, as ratios to the same scene of equal leaves, in one run."""
 
-import time
-
 import numpy as np
 import xarray as xr
+from timing import seconds
 
 import fifesim
 
 BANDS = ["TM3", "TM4"]
 CELLS = 500
-
-
-def seconds(options, lai, times=2):
-    """Processor time of the reflectance of a scene, once its tables are made."""
-    spent = []
-    for _ in range(times):
-        start = time.process_time()
-        fifesim.surface_reflectance(lai, bands=BANDS, **options)
-        spent.append(time.process_time() - start)
-    return min(spent)
 
 
 def main():
@@ -34,11 +23,15 @@ def main():
         "leaf optics by cell": {"leaf_optics": {"TM3": (optics, optics), "TM4": (0.45, 0.42)}},
         "equal leaves, exact": {"exact": True},
     }
-    floor = seconds({}, lai, times=9)
+
+    def spent_on(options, times=2):
+        return seconds(lambda: fifesim.surface_reflectance(lai, bands=BANDS, **options), times)
+
+    floor = spent_on({}, times=9)
     print(f"equal leaves: {lai.size / floor / 1e6:.0f} million cells a second of processor time, {len(BANDS)} bands\n")
     print("| | times equal leaves | us a cell |\n|---|---|---|")
     for name, options in cases.items():
-        spent = seconds(options, lai)
+        spent = spent_on(options)
         print(f"| {name} | {spent / floor:.3g} | {spent / lai.size * 1e6:.2g} |")
 
 

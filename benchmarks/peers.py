@@ -5,8 +5,8 @@ What a user would put together today, on the same work; each peer beside the sta
 """
 
 import numpy as np
+from chain import BANDS, CELL, grid_of
 from scipy import ndimage
-from work import BANDS, CELL, grid_of
 
 LEAVES = {"TM3": (0.0691, 0.0357), "TM4": (0.4533, 0.4215)}
 SOIL = {"TM3": 0.15, "TM4": 0.19}

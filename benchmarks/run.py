@@ -1,167 +1,61 @@
 """
-One table: cells a second and peak memory of each stage and chain, at several sizes, beside a floor and beside peers.
+All benchmarks by one command, each in a process of its own, and their tables on one page.
 
-    python benchmarks/run.py --million 1 4 16 64 --output table.md
-
-Every number is from a process of its own. Speeds are cells in a second of processor time, the best of some calls after
-one that warms up, because other work on a machine changes the time on the clock more.
+    python benchmarks/run.py --output tables.md
 """
 
 import argparse
-import json
 import platform
-import resource
 import subprocess
 import sys
-import time
+from contextlib import nullcontext
 from datetime import date
 from pathlib import Path
 
-import dask
-import numpy as np
 import psutil
-from chain import own_peak
-from peers import PEERS
-from work import CHAINS, FLOOR, STAGES, chain_on
 
-KNOWN = {**FLOOR, **STAGES, **CHAINS, **{name: peer[0] for name, peer in PEERS.items()}}
-
-
-def processor_time():
-    """Of this process and of those that it has waited for. [s]"""
-    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-
-
-def measure(name, side, threads, repeat):
-    """Print processor time, time on the clock and peak memory of a call."""
-    dask.config.set(scheduler="threads", num_workers=threads)
-    if not any(name == peer for peer in PEERS):
-        KNOWN[name](min(side, 900))()
-    call = KNOWN[name](side)
-    found = []
-    for _ in range(repeat):
-        start, clock = processor_time(), time.perf_counter()
-        call()
-        found.append((processor_time() - start, time.perf_counter() - clock))
-    seconds, clock = (min(column) for column in zip(*found, strict=True))
-    print(json.dumps({"name": name, "cells": side**2, "seconds": seconds, "clock": clock, "memory": own_peak()}))
+PARTS = {
+    "Stages, chains and peers": "stages.py",
+    "Threads": "chain.py",
+    "Whole commands": "commands.py",
+    "Ensembles": "ensembles.py",
+    "Training sets": "dataset.py",
+    "Landscapes": "landscape.py",
+    "Classes": "classes.py",
+    "Fields and soils": "fields.py",
+    "Leaves by cell": "leaves.py",
+    "Terrain": "terrain.py",
+    "Atmosphere": "atmosphere.py",
+    "Sensor": "sensor.py",
+    "Spectra": "spectra.py",
+    "Start": "start.py",
+}
 
 
-def on_workers(side, workers):
-    """Print the time on the clock of the flat chain on processes of a local cluster."""
-    from distributed import Client, LocalCluster
-
-    with (
-        LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
-        Client(cluster) as client,
-    ):
-        chain_on(900 * workers).compute()
-        client.wait_for_workers(workers)
-        start = time.perf_counter()
-        chain_on(side).compute()
-        print(json.dumps({"name": f"{workers} workers", "cells": side**2, "clock": time.perf_counter() - start}))
-
-
-def apart(*arguments):
-    """What another process of this program prints."""
-    command = [sys.executable, __file__, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode:
-        print(done.stderr[-2000:], file=sys.stderr)
-        return None
-    return json.loads(done.stdout.splitlines()[-1])
-
-
-def exponent(rows):
-    """Of the growth of processor time with cells, fitted to all sizes."""
-    known = [(row["cells"], row["seconds"]) for row in rows if row]
-    if len(known) < 2:
-        return None
-    return float(np.polyfit(*np.log(np.array(known)).T, 1)[0])
-
-
-def tables(million, threads, repeat, peers, workers):
-    sides = [round((each * 1e6) ** 0.5) for each in million]
-    found = {
-        name: [apart("--one", name, side, threads, repeat) for side in sides] for name in (*FLOOR, *STAGES, *CHAINS)
-    }
-    yield f"Measured on {date.today()}: {machine()}. {threads} thread(s); M is million cells.\n"
-    yield from speeds(found, million)
-    if peers:
-        yield ""
-        yield from beside_peers(found, threads)
-    if workers:
-        yield ""
-        yield from scaling(sides[-1])
-
-
-def speeds(found, million):
-    floors = found[next(iter(FLOOR))]
-    heads = [f"{each:g} M: million cells/s" for each in million]
-    memory = f"peak memory, {million[0]:g} to {million[-1]:g} M [GB]"
-    yield f"| | {' | '.join(heads)} | times the floor | exponent | {memory} |"
-    yield f"|{'---|' * (len(heads) + 4)}"
-    for name, rows in found.items():
-        rates = [f"{row['cells'] / row['seconds'] / 1e6:.1f}" if row else "failed" for row in rows]
-        times = [
-            row["seconds"] / base["seconds"]
-            for row, base in zip(rows, floors, strict=True)
-            if row and base and row["cells"] > 8e6
-        ]
-        ratio = f"{np.median(times):.2f}" if times else ""
-        grown = exponent(rows)
-        memory = [f"{row['memory']:.2f}" for row in (rows[0], rows[-1]) if row]
-        yield f"| {name} | {' | '.join(rates)} | {ratio} | {grown and f'{grown:.2f}'} | {' to '.join(memory)} |"
-
-
-def beside_peers(found, threads):
-    yield "| peer | cells/s | fifesim, same stage: cells/s | fifesim is faster by |\n|---|---|---|---|"
-    for name, (_, stage, side) in PEERS.items():
-        row, own = apart("--one", name, side, threads, 1), found[stage][min(1, len(found[stage]) - 1)]
-        if row is None or own is None:
-            yield f"| {name} | not measured | | |"
-            continue
-        rate, ours = (each["cells"] / each["seconds"] for each in (row, own))
-        yield f"| {name} | {rate:,.0f} | {ours:,.0f} | {ours / rate:,.3g} |"
-
-
-def scaling(side):
-    one, two = (apart("--workers-of", workers, side) for workers in (1, 2))
-    if one and two:
-        ratio = one["clock"] / two["clock"]
-        yield f"Workers of dask.distributed, flat chain of {side**2 / 1e6:.0f} M: 2 are {ratio:.2f} times as fast as 1."
-
-
-def machine():
+def lines(parts):
+    """Of the page, as they are found."""
     cores, memory = psutil.cpu_count(), psutil.virtual_memory().total / 1e9
-    return f"{platform.machine()}, {cores} cores, {memory:.0f} GB, Python {platform.python_version()}"
+    machine = f"{platform.machine()}, {cores} cores, {memory:.0f} GB, Python {platform.python_version()}"
+    yield f"Measured on {date.today()}: {machine}."
+    for title in parts:
+        yield f"\n## {title}\n"
+        command = [sys.executable, Path(__file__).with_name(PARTS[title])]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as run:
+            yield from (line.rstrip("\n") for line in run.stdout)
+        if run.returncode:
+            yield "failed"
 
 
 def main():
+    """Print the page, and write it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument("--million", type=float, nargs="+", default=[1, 4, 16, 64], help="sizes [million cells]")
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--repeat", type=int, default=2)
-    parser.add_argument("--no-peers", action="store_true")
-    parser.add_argument("--no-workers", action="store_true")
-    parser.add_argument("--output", type=Path, help="file for the table, beside standard output")
-    parser.add_argument("--one", nargs=4, help=argparse.SUPPRESS)
-    parser.add_argument("--workers-of", nargs=2, type=int, help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.one:
-        name, *numbers = options.one
-        measure(name, *map(int, numbers))
-    elif options.workers_of:
-        on_workers(options.workers_of[1], options.workers_of[0])
-    else:
-        lines = []
-        for line in tables(
-            options.million, options.threads, options.repeat, not options.no_peers, not options.no_workers
-        ):
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART")
+    parser.add_argument("--output", type=Path, help="file for the page, beside standard output")
+    given = parser.parse_args()
+    with given.output.open("w", encoding="utf-8") if given.output else nullcontext() as file:
+        for line in lines(given.parts):
             print(line, flush=True)
-            lines.append(line)
-        if options.output:
-            options.output.write_text("\n".join(lines) + "\n", encoding="utf-8")
+            print(line, file=file, flush=True) if file else None
 
 
 if __name__ == "__main__":

@@ -8,14 +8,14 @@ in which each call has its turn; absolute times differ from machine to machine a
 """
 
 import argparse
-import time
 from itertools import count
 
 import dask
 import numpy as np
 import xarray as xr
-from chain import BANDS, CASE, floor, own_peak
-from work import _run, grid_of
+from chain import BANDS, CASE, floor, grid_of
+from timing import in_turn, own_peak
+from work import _run
 
 import fifesim
 from fifesim.base.geometry import fife_geometry
@@ -72,17 +72,6 @@ def calls(grid, dem):
     }
 
 
-def rounds(named, repeat):
-    """Best processor time of each call, all in turn so that what else the machine does meets all."""
-    best = dict.fromkeys(named, np.inf)
-    for _ in range(repeat):
-        for name, call in named.items():
-            start = time.process_time()
-            call()
-            best[name] = min(best[name], time.process_time() - start)
-    return best
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument("--cells", type=int, default=4000, help="cells along each side")
@@ -99,7 +88,7 @@ def main():
         print(f"peak memory: {own_peak():.2f} GB")
         return
     named = {"floor": lambda: floor(arguments.cells, arguments.threads)} | calls(grid, dem)
-    best = rounds(named, arguments.repeat)
+    best = in_turn(named, arguments.repeat)
     million = arguments.cells**2 / 1e6
     print(f"{million:.1f} million cells, {len(BANDS)} bands, {arguments.threads} thread(s)")
     print("| | million cells/s | times the floor |\n|---|---|---|")

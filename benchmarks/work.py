@@ -5,28 +5,18 @@ Each gives, as a pair, the call and how many cells it makes.
 """
 
 import tempfile
-from itertools import count
 from pathlib import Path
 
 import dask
 import numpy as np
-from chain import BANDS, CASE, floor
+from chain import BANDS, CASE, CELL, SEEDS, chain_on, floor, grid_of
 
 import fifesim
 from fifesim.output.run.folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
-CELL = 30 / 9
 WHEN = {"geometry": {"time": "1987-06-06T16:35:00Z"}, "atmosphere": {"altitude": 0.4}}  # wherever it reaches
-WEST, NORTH = 704970.0, 4334220.0
-
-# A landscape of its own for each call: the last tiles of one are kept.
-SEEDS = count(100)
-
-
-def grid_of(side):
-    return fifesim.grid_at("EPSG:26914", WEST, NORTH, side * CELL + 1e-3, side * CELL + 1e-3, CELL)
 
 
 def scenario_of(side, dem="flat"):
@@ -88,12 +78,7 @@ def run_terrain(side):
 
 
 def floor_of(side):
-    return lambda: floor(side, 1)
-
-
-def chain_on(side):
-    lai = fifesim.lai_scene(grid_of(side), "burned-grazed", arp=0.15, seed=next(SEEDS), chunks="auto")
-    return lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE).fifesim.to_toa().fifesim.sense("TM")
+    return lambda: floor(side)
 
 
 def _to_folder(scenario):

@@ -1,0 +1,46 @@
+"""Processor time of calls, which other work on a machine changes less than time on the clock, and memory."""
+
+import resource
+import time
+from pathlib import Path
+
+import numpy as np
+
+
+def seconds(call, times=3):
+    """Processor time of the fastest of some calls, once tables are made and kernels compiled."""
+    return both_times(call, times)[0]
+
+
+def both_times(call, times=3):
+    """The same, and time on the clock."""
+    call()
+    spent = []
+    for _ in range(times):
+        start, clock = time.process_time(), time.perf_counter()
+        call()
+        spent.append((time.process_time() - start, time.perf_counter() - clock))
+    return np.min(spent, axis=0)
+
+
+def in_turn(calls, rounds=3):
+    """Processor time of several calls that take turns, so that other work on the machine slows all of them."""
+    spent = dict.fromkeys(calls, np.inf)
+    for call in calls.values():
+        call()
+    for _ in range(rounds):
+        for name, call in calls.items():
+            start = time.process_time()
+            call()
+            spent[name] = min(spent[name], time.process_time() - start)
+    return spent
+
+
+def own_peak():
+    """Peak resident memory of this process [GB]."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        # ru_maxrss of a child starts at its parent's: Linux counts this one afresh for each program.
+        line = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
+        return int(line.split()[1]) / 1e6
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
