@@ -1,5 +1,6 @@
 """Lazy arrays whose every block is one task, which gathers windows of others and hands them to a kernel."""
 
+from collections import defaultdict
 from functools import partial
 from itertools import pairwise, product
 from typing import NamedTuple
@@ -25,8 +26,9 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
     """
     Lazy array whose blocks are made by a kernel from windows of other lazy arrays.
 
-    Where a window needs little of a chunk, that is cut out first, so that the chunk need not wait in memory for its
-    neighbours. All tasks are one layer of the graph, and the kernel is in it once.
+    Where a window needs little of a chunk, that is cut out first, and a block made of the whole chunk waits for what is
+    cut out of it, so that the chunk need not wait in memory for its neighbours. All tasks are one layer of the graph,
+    and the kernel is in it once.
 
     Parameters
     ----------
@@ -54,7 +56,7 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
     """
     arrays = [_lazy(array) for array in arrays]
     name, shared = f"windows-{token}", f"windows-kernel-{token}"
-    graph = {shared: kernel}
+    graph, rims, wholes = {shared: kernel}, defaultdict(list), {}
     starts = [[_starts(sizes) for sizes in array.chunks[-2:]] for array in arrays]
     for i, rows in enumerate(slices(chunks[0])):
         for j, columns in enumerate(slices(chunks[1])):
@@ -63,10 +65,14 @@ def array_from_windows(kernel, arrays, chunks, ask, *, token, leading=(), dtype=
             # The last part is that within a chunk, of which rims need no copies then.
             for part in reversed(list(product(_cut_at(rows, seams[0]), across))):
                 place, windows = ask(*part)
-                found = [_plan(*each, graph, held) for each in zip(arrays, starts, windows, strict=True)]
+                found = [_plan(*each, graph, rims, held) for each in zip(arrays, starts, windows, strict=True)]
                 made.insert(0, (place, [plan for plan, _ in found]))
                 keys.insert(0, [parts for _, parts in found])
-            graph[(name, *(0 for _ in leading), i, j)] = (partial(_make_parts, made, len(across)), shared, keys)
+            block = (name, *(0 for _ in leading), i, j)
+            graph[block] = (partial(_make_parts, made, len(across)), shared, keys)
+            wholes[block] = held
+    for block, held in wholes.items():
+        graph[block] = (*graph[block], [rim for chunk in held for rim in rims[chunk]])
     sizes = (*((length,) for length in leading), *chunks)
     layers = HighLevelGraph.from_collections(name, graph, dependencies=arrays)
     return da.Array(layers, name, sizes, dtype=dtype, meta=np.empty((0,) * len(sizes), dtype))
@@ -111,22 +117,6 @@ def held(array):
     graph = {(name, *index): (_same, (array.name, *index)) for index in np.ndindex(array.numblocks)}
     layers = HighLevelGraph.from_collections(name, graph, dependencies=[array])
     return da.Array(layers, name, array.chunks, dtype=array.dtype, meta=array._meta)
-
-
-def is_rim(key, chunk):
-    """
-    Whether a task cuts out a part of a chunk that others need, without which it need not wait for them.
-
-    Parameters
-    ----------
-    key, chunk : key of a dask graph
-        Of the task, and of the chunk.
-
-    Returns
-    -------
-    answer : bool
-    """
-    return key[0] == f"cut-{chunk[0]}"
 
 
 def slices(sizes):
@@ -231,7 +221,7 @@ def _starts(sizes):
     return np.concatenate([[0], np.cumsum(sizes)]).astype(int)
 
 
-def _plan(array, edges, window, graph, held):
+def _plan(array, edges, window, graph, rims, held):
     """
     Where the parts of a window come from.
 
@@ -249,6 +239,8 @@ def _plan(array, edges, window, graph, held):
             if key not in held and 2 * size < whole:
                 cut = (f"cut-{array.name}", i, j, *(edge for each in part for edge in (each.start, each.stop)))
                 graph[cut] = _part(array, (edges[0][i], edges[1][j]), part, key)
+                if key in graph[cut]:
+                    rims[key].append(cut)
                 key, part = cut, (slice(None), slice(None))
             else:
                 held.add(key)
@@ -289,8 +281,8 @@ def _cut_at(part, seams):
     return [slice(start, stop) for start, stop in pairwise(edges)]
 
 
-def _make_parts(made, across, kernel, keys):
-    """A block of parts, so many of them in a row."""
+def _make_parts(made, across, kernel, keys, rims):
+    """A block of parts, so many of them in a row; of chunks that it takes in whole, the rims for others are cut."""
     blocks = [_make(place, plans, kernel, parts) for (place, plans), parts in zip(made, keys, strict=True)]
     if len(blocks) == 1:
         return blocks[0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from fifesim.rasters.windows import array_by_place, array_from_windows, gather, held, is_rim, slices
+from fifesim.rasters.windows import array_by_place, array_from_windows, gather, held, slices
 
 CELLS = np.arange(11.0 * 13).reshape(11, 13)
 
@@ -52,7 +52,7 @@ def test_little_of_a_chunk_is_cut_out_of_it_first(columns, cut):
     found = array_from_windows(
         lambda window: window, [source], ((10,), (columns,)), lambda *at: ((), [at]), token="little"
     )
-    assert any(is_rim(key, (source.name, 0, 0)) for key in found.dask) is cut
+    assert any(str(key[0]).startswith("cut-") for key in found.dask if isinstance(key, tuple)) is cut
     assert found.compute().sum() == 10 * columns
 
 

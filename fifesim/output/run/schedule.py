@@ -8,8 +8,6 @@ from dask.core import get_deps, quote
 from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
 from dask.order import order
 
-from fifesim.rasters.windows import is_rim
-
 # A worker that dies takes a task with it; one that kills its workers this often is at fault itself.
 _RETRIES = 3
 
@@ -114,9 +112,9 @@ def _in_pieces(graph, outputs, deliver):
     """
     The tasks of some outputs after those of others: tasks, the last of them, and those whose results still wait then.
 
-    dask goes into the depth of what is asked first. The delivery of an output waits for the one before it and for the
-    rims that are cut off its chunks, so that outputs are made one after the other, and no chunk waits for an output
-    that is far off. In pieces, as the memory that dask needs to order such a chain grows with its square.
+    dask goes into the depth of what is asked first. A delivery waits for the one before it, so that outputs are made
+    one after the other, and no chunk waits for an output that is far off. In pieces, as the memory that dask needs to
+    order such a chain grows with its square.
     """
     dependencies, dependents = get_deps(graph)
     made, waiting, wanted = set(), set(), list(outputs)
@@ -124,10 +122,9 @@ def _in_pieces(graph, outputs, deliver):
         tasks, last = {}, None
         for key in wanted[first : first + _PIECE]:
             needed = _needed(key, dependencies, made)
-            rims = {each for source in needed for each in dependents[source] if is_rim(each, source)}
-            tasks |= {each: graph[each] for each in needed | rims}
-            made |= needed | rims
-            tasks["delivered", key] = (partial(_deliver, deliver, *outputs[key]), key, last, list(rims))
+            tasks |= {each: graph[each] for each in needed}
+            made |= needed
+            tasks["delivered", key] = (partial(_deliver, deliver, *outputs[key]), key, last)
             last = ("delivered", key)
         later = set(wanted[first + _PIECE :])
         waiting = [each for each in {*waiting, *tasks} & made if each in later or not dependents[each] <= made]
@@ -145,5 +142,5 @@ def _needed(key, dependencies, made):
     return needed
 
 
-def _deliver(deliver, name, index, block, before, rims):
+def _deliver(deliver, name, index, block, before):
     deliver(name, index, block)
