@@ -237,11 +237,7 @@ def _plan(array, edges, window, graph, rims, held):
             part = (row_taken, column_taken)
             size = (row_taken.stop - row_taken.start) * (column_taken.stop - column_taken.start)
             if key not in held and 2 * size < whole:
-                cut = (f"cut-{array.name}", i, j, *(edge for each in part for edge in (each.start, each.stop)))
-                graph[cut] = _part(array, (edges[0][i], edges[1][j]), part, key)
-                if key in graph[cut]:
-                    rims[key].append(cut)
-                key, part = cut, (slice(None), slice(None))
+                key, part = _part(array, (edges[0][i], edges[1][j]), part, key, graph, rims), (slice(None), slice(None))
             else:
                 held.add(key)
             into.append((row_into, column_into))
@@ -260,15 +256,18 @@ def _overlaps(edges, part):
             yield index, slice(first - part.start, last - part.start), slice(first - before, last - before)
 
 
-def _part(array, start, part, key):
-    """Task that cuts a part off a chunk, or makes it where that takes no chunk."""
+def _part(array, start, part, chunk, graph, rims):
+    """Key of a task that cuts a part off a chunk, or a task that makes the part where that takes no chunk."""
     layer = array.dask.layers.get(array.name)
     if isinstance(layer, _MadeByPlace):
         rows, columns = (
             slice(int(first) + each.start, int(first) + each.stop) for first, each in zip(start, part, strict=True)
         )
         return _part_by_place(layer.kernel, rows, columns)
-    return (partial(_cut, part), key)
+    cut = (f"cut-{array.name}", *chunk[-2:], *(edge for each in part for edge in (each.start, each.stop)))
+    graph[cut] = (partial(_cut, part), chunk)
+    rims[chunk].append(cut)
+    return cut
 
 
 def _cut(part, chunk):

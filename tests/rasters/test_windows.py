@@ -5,6 +5,7 @@ import dask.array as da
 import numpy as np
 import pytest
 import xarray as xr
+from dask.core import get_dependencies
 
 from fifesim.rasters.windows import array_by_place, array_from_windows, gather, held, slices
 
@@ -72,6 +73,19 @@ def test_cells_by_place_are_those_of_one_call():
         return CELLS[row : row + shape[0], column : column + shape[1]]
 
     np.testing.assert_array_equal(array_by_place(kernel, ((4, 7), (6, 6, 1)), token="cells").compute(), CELLS)
+
+
+def test_what_lies_beside_a_chunk_by_place_is_made_with_the_block():
+    """As a task of its own, dask may put it off, and the chunk waits for it."""
+    cells = array_by_place(
+        lambda row, column, shape: CELLS[row:, column:][: shape[0], : shape[1]], ((11,), (7, 6)), token="c"
+    )
+    found = mean_of_three(cells, cells.chunks)
+    np.testing.assert_array_equal(found.compute()[:, 1:-1], CELLS[:, 1:-1])
+    tasks = dict(found.dask)
+    for column in (0, 1):
+        needed = get_dependencies(tasks, (found.name, 0, column))
+        assert {key for key in needed if isinstance(key, tuple)} == {(cells.name, 0, column)}
 
 
 def test_slices_follow_each_other():
