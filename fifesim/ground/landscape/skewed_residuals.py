@@ -1,0 +1,124 @@
+r"""
+What means of a bent function of a field say of its residuals from block kriging.
+
+A field of pixel means y is K y + r, and its residuals r are independent of y. Where the means m of a function g(x) are
+known, and g is no straight line, m says something of r too: the density of r is that without m times a weight w. Here
+residuals that were drawn without m are shifted so that they have this density, to second order in the bend of g.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import fft
+
+from fifesim.ground.landscape.block_kriging import block_means, by_pixel, densities, kriged, kriging_filter, of_means
+
+# Of the shift before, where the gradient is asked again: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for a quadratic ln w.
+_AGAIN = 0.75
+
+
+class Kriging(NamedTuple):
+    """Filters of a window of pixels, for a process of unit variance."""
+
+    response: np.ndarray  # from pixels to cells, of `kriging_filter`
+    process: np.ndarray  # spectral density of the cells, on the half plane of a real transform
+    precision: np.ndarray  # inverse spectral density of the pixels, on such a half plane
+    shares: np.ndarray  # shape (down, across): weight that a cell has in its own estimate from the means over pixels
+
+    @classmethod
+    def of(cls, arp, trend, ratio, shape):
+        """
+        Filters of a process on a trend.
+
+        Parameters
+        ----------
+        arp, trend, ratio, shape
+            As in `fifesim.ground.landscape.block_kriging.kriging_filter`.
+
+        Returns
+        -------
+        kriging : Kriging
+        """
+        response = kriging_filter(arp, trend, ratio, shape)
+        process, slow, mean = densities(arp, ratio, shape)
+        precision = np.zeros(shape)
+        if np.isfinite(trend):
+            precision = 1.0 / of_means(process + trend**2 * slow, mean, ratio)
+            precision[0, 0] = 0.0  # the mean of all is not known
+        single = np.zeros(shape)
+        single[0, 0] = 1.0 / (ratio[0] * ratio[1])
+        return cls(
+            response,
+            process[:, : response.shape[1]].astype(np.float32),
+            precision[:, : shape[1] // 2 + 1].astype(np.float32),
+            kriged(single, response, ratio)[: ratio[0], : ratio[1]],
+        )
+
+
+def residual_shift(own, known, shift, kriging, transform, deviation):
+    r"""
+    Shift that gives residuals the density that is left to them by known means of a function of the field.
+
+    .. math::
+
+        \ln w = -\tfrac12 y^\mathsf{T} P y - \ln \left| \frac{\partial m}{\partial y} \right|, \qquad
+        r' = r + C \, \nabla_r \ln w
+
+    with y the means of the field that go with r and m, P the inverse of their covariance, and C that of the cells.
+
+    Parameters
+    ----------
+    own : array, shape (rows * down, columns * across)
+        Field of the process.
+    known : array, shape (rows, columns)
+        y, for this field and the shift so far.
+    shift : array, shape of own, or 0.0
+        So far: the gradient is taken where the residuals are half of those of own and three quarters of this.
+    kriging : Kriging
+    transform : object
+        Gives the ``slopes(field)`` of the function: its first and second derivatives.
+    deviation : float or array, shape of own
+        Standard deviation of own.
+
+    Returns
+    -------
+    shift : array of float32, shape of own
+        To be added to own; at most one standard deviation.
+
+    Notes
+    -----
+    Of a quadratic ln w, half of the gradient makes variances right and of a linear one all of it: both is the gradient
+    at half of the residuals. A second shift, which knows the first, is right in the square of ln w as well. The
+    derivative of m is inverted as if it were diagonal.
+
+    References
+    ----------
+    Own derivation; ``tests/ground/landscape/test_skewed_residuals.py`` compares with densities by quadrature.
+    """
+    variance = float(np.mean(np.square(deviation)))
+    if not variance:
+        return np.zeros_like(own)
+    ratio = kriging.shares.shape
+    half = own / 2 + np.float32(_AGAIN) * shift
+    steep, bent = transform.slopes(kriged(known - block_means(half, ratio), kriging.response, ratio) + half)
+    mean = block_means(steep, ratio)
+    inverse = by_pixel(np.divide(1.0, mean, out=np.zeros_like(mean), where=mean > 0), ratio)
+    steep = (steep * inverse).astype(np.float32)
+    bent = (bent * inverse).astype(np.float32) * np.tile(kriging.shares, mean.shape)
+    spectrum = fft.rfft2(known) * kriging.precision
+    pixels = fft.irfft2(spectrum, s=known.shape) / variance + _summed(bent, kriging.response, ratio)
+    gradient = by_pixel((pixels / bent[: ratio[0], : ratio[1]].size).astype(np.float32), ratio) * steep - bent
+    # What all cells of a pixel share is no residual.
+    gradient -= by_pixel(block_means(gradient, ratio), ratio)
+    spectrum = fft.rfft2(deviation * gradient)
+    spectrum *= kriging.process
+    return np.clip(deviation * fft.irfft2(spectrum, s=own.shape, overwrite_x=True), -deviation, deviation)
+
+
+def _summed(cells, response, ratio):
+    """Sums of cells by the weights that pixels have in them: the transpose of `kriged`."""
+    spectrum = fft.rfft2(cells)
+    spectrum *= np.conj(response)
+    # Every ratio-th row is the mean of the frequencies that are one by pixel.
+    folded = spectrum.reshape(ratio[0], -1, spectrum.shape[1]).mean(axis=0)
+    return fft.irfft2(folded, s=(len(folded), cells.shape[1]))[:, :: ratio[1]]
