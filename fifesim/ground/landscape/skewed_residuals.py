@@ -16,13 +16,16 @@ from fifesim.ground.landscape.block_kriging import block_means, by_pixel, densit
 # Of the shift before, where the gradient is asked again: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for a quadratic ln w.
 _AGAIN = 0.75
 
+# What the levels of pixels vary about is their mean by weights of this standard deviation. [pixel]
+_SURROUNDINGS = 3.0
+
 
 class Kriging(NamedTuple):
     """Filters of a window of pixels, for a process of unit variance."""
 
     response: np.ndarray  # from pixels to cells, of `kriging_filter`
     process: np.ndarray  # spectral density of the cells, on the half plane of a real transform
-    precision: np.ndarray  # inverse spectral density of the pixels, on such a half plane
+    precision: np.ndarray  # inverse spectral density of the pixels without their local mean, on such a half plane
     shares: np.ndarray  # shape (down, across): weight that a cell has in its own estimate from the means over pixels
 
     @classmethod
@@ -43,8 +46,9 @@ class Kriging(NamedTuple):
         process, slow, mean = densities(arp, ratio, shape)
         precision = np.zeros(shape)
         if np.isfinite(trend):
-            precision = 1.0 / of_means(process + trend**2 * slow, mean, ratio)
-            precision[0, 0] = 0.0  # the mean of all is not known
+            squared = [(2.0 * np.pi * fft.fftfreq(size) * _SURROUNDINGS) ** 2 for size in shape]
+            around = np.exp(-0.5 * (squared[0][:, None] + squared[1]))
+            precision = (1.0 - around) / of_means(process + trend**2 * slow, mean, ratio)
         single = np.zeros(shape)
         single[0, 0] = 1.0 / (ratio[0] * ratio[1])
         return cls(
@@ -106,6 +110,9 @@ def residual_shift(own, known, shift, kriging, transform, deviation):
     steep = (steep * inverse).astype(np.float32)
     bent = (bent * inverse).astype(np.float32) * np.tile(kriging.shares, mean.shape)
     spectrum = fft.rfft2(known) * kriging.precision
+    # Where cells hardly vary, residuals have nowhere to go.
+    if np.ndim(deviation):
+        variance = np.maximum(block_means(np.square(deviation), ratio), variance / 4)
     pixels = fft.irfft2(spectrum, s=known.shape) / variance + _summed(bent, kriging.response, ratio)
     gradient = by_pixel((pixels / bent[: ratio[0], : ratio[1]].size).astype(np.float32), ratio) * steep - bent
     # What all cells of a pixel share is no residual.
