@@ -1,9 +1,9 @@
 """
 Cells below the pixels of a map of leaf area: they vary as the autoregressive process, and their means are the map's.
 
-The field of cells is conditioned on levels of the pixels by block kriging, and mapped to leaf area. The levels are found
-so that means over pixels are those of the map, and the residuals are shifted for what these means say of them. What is
-left of some pixels shifts these by themselves, and a last factor, 0.999 to 1.001 as a rule, makes means exact.
+The field of cells is conditioned on levels of the pixels by block kriging, and mapped to leaf area. Levels are found so
+that means over pixels are those of the map, and residuals are shifted for what these means say of them. What is left of
+some pixels shifts these by themselves, and a last factor, 0.999 to 1.001 as a rule, makes means exact.
 """
 
 from dataclasses import dataclass

@@ -86,13 +86,14 @@ def downscale(
     Notes
     -----
     Exact: the mean of the cells of each pixel, within rounding (1e-12), and that none is negative. Approximate: where
-    the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 1 %,
-    of a skewed distribution at an arp of 0.24 within 2 %, inside of pixels and across their borders alike. The model is
-    a field whose logarithm is normal for `cv`, quantiles of a normal field for `distribution`; cells may pass the end
-    of a distribution by 0.1 %. What a map has beside that is a trend, as strong as second differences of its pixels say
-    in the surroundings of each tile, which is interpolated. A map that is smoother than the model leaves cells less
-    room: of a uniform map, in pixels of 3 x 3 cells, neighbours across a border have 0.89, 0.81 and 0.55 times the
-    model's semivariance at arp 0, 0.15 and 0.24, those in a pixel 1, 0.98 and 0.75 times.
+    the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 0.3 %,
+    with a cv of 0.4 within 0.7 %, inside of pixels and across their borders alike; wider distributions leave more. The
+    model is a field whose logarithm is normal for `cv`, which is then the root of the mean of variance over squared
+    mean of its pixels, and quantiles of a normal field for `distribution`; cells may pass the end of a distribution by
+    0.1 %. What a map has beside that is a trend, as strong as second differences of its pixels say in the surroundings
+    of each tile, which is interpolated. A map that is smoother than the model leaves cells less room: of a uniform map,
+    in pixels of 3 x 3 cells of a cv of 0.1, neighbours across a border have 0.88, 0.80 and 0.53 times the model's
+    semivariance at arp 0, 0.15 and 0.24, those in a pixel 1.00, 0.97 and 0.72 times.
 
     The field of cells is that of `fifesim.lai_scene`, whose seed gives the same ups and downs. A tile of cells holds at
     least 8 pixels along an axis and reads 12 around: pixels of 150 x 150 cells take 1.6 GB, and many times the time
@@ -105,7 +106,7 @@ def downscale(
     See Also
     --------
     fifesim.ground.landscape.downscaling.downscaled, fifesim.ground.landscape.block_kriging.kriging_filter,
-    fifesim.ground.landscape.map_trends.map_trend
+    fifesim.ground.landscape.skewed_residuals.residual_shift, fifesim.ground.landscape.map_trends.map_trend
 
     Examples
     --------
