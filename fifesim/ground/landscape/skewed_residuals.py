@@ -11,7 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy import fft
 
-from fifesim.ground.landscape.block_kriging import block_means, by_pixel, densities, kriged, kriging_filter, of_means
+from fifesim.ground.landscape.block_kriging import (
+    block_means,
+    by_pixel,
+    densities,
+    densities_of_means,
+    kriged,
+    kriging_filter,
+)
 
 # Of the shift before, where the gradient is asked again: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for a quadratic ln w.
 _AGAIN = 0.75
@@ -43,17 +50,17 @@ class Kriging(NamedTuple):
         kriging : Kriging
         """
         response = kriging_filter(arp, trend, ratio, shape)
-        process, slow, mean = densities(arp, ratio, shape)
         precision = np.zeros(shape)
         if np.isfinite(trend):
+            process, slow = densities_of_means(arp, ratio, shape)
             squared = [(2.0 * np.pi * fft.fftfreq(size) * _SURROUNDINGS) ** 2 for size in shape]
             around = np.exp(-0.5 * (squared[0][:, None] + squared[1]))
-            precision = (1.0 - around) / of_means(process + trend**2 * slow, mean, ratio)
+            precision = (1.0 - around) / (process + trend**2 * slow)
         single = np.zeros(shape)
         single[0, 0] = 1.0 / (ratio[0] * ratio[1])
         return cls(
             response,
-            process[:, : response.shape[1]].astype(np.float32),
+            densities(arp, ratio, shape)[0][:, : response.shape[1]].astype(np.float32),
             precision[:, : shape[1] // 2 + 1].astype(np.float32),
             kriged(single, response, ratio)[: ratio[0], : ratio[1]],
         )

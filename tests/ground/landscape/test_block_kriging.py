@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from oracles_field import covariances
 
-from fifesim.ground.landscape.block_kriging import block_means, by_pixel, kriged, kriging_filter
+from fifesim.ground.landscape.block_kriging import (
+    block_means,
+    by_pixel,
+    densities,
+    densities_of_means,
+    kriged,
+    kriging_filter,
+    of_means,
+)
 
 
 def on_torus(row):
@@ -66,6 +74,13 @@ def process(arp, cells):
     wide = covariances(arp)
     spectrum = 1 / (1 - 2 * arp * (np.cos(u[:, None]) + np.cos(v))) ** 2
     return np.fft.ifft2(spectrum).real / wide[0, 0]
+
+
+@pytest.mark.parametrize("ratio", [(3, 3), (2, 5), (4, 1)])
+def test_densities_of_means_are_sums_over_those_of_cells(ratio):
+    *both, mean = densities(0.2, ratio, (12, 10))
+    for each, found in zip(both, densities_of_means(0.2, ratio, (12, 10)), strict=True):
+        np.testing.assert_allclose(found, of_means(each, mean, ratio), rtol=1e-13)
 
 
 def test_means_of_the_cells_are_the_pixels():

@@ -96,7 +96,7 @@ def downscale(
     semivariance at arp 0, 0.15 and 0.24, those in a pixel 1.00, 0.97 and 0.72 times.
 
     The field of cells is that of `fifesim.lai_scene`, whose seed gives the same ups and downs. A tile of cells holds at
-    least 8 pixels along an axis and reads 12 around: pixels of 150 x 150 cells take 1.6 GB, and many times the time
+    least 8 pixels along an axis and reads 12 around: pixels of 150 x 150 cells take 1.7 GB, and many times the time
     of a cell in a pixel of 3 x 3.
 
     References
