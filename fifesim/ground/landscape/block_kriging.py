@@ -213,3 +213,34 @@ def kriged(pixels, response, ratio):
     repeated = (response.reshape(ratio[0], *spectrum.shape) * spectrum).reshape(response.shape)
     size = pixels.shape[0] * ratio[0], pixels.shape[1] * ratio[1]
     return fft.irfft2(repeated, s=size, overwrite_x=True)
+
+
+def weighed(cells, response, ratio):
+    """
+    Sums of cells by the weights that pixels have in them: the transpose of `kriged`.
+
+    Parameters
+    ----------
+    cells : array, shape (rows * ratio[0], columns * ratio[1])
+    response : array
+        From `kriging_filter`.
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+
+    Returns
+    -------
+    pixels : array, shape (rows, columns)
+
+    Examples
+    --------
+    All pixels together have a weight of one in each cell:
+
+    >>> pixels = weighed(np.full((12, 12), 2.0), kriging_filter(0.2, 0.1, (3, 3), (4, 4)), (3, 3))
+    >>> bool(np.allclose(pixels, 2.0 * 9, atol=1e-4))
+    True
+    """
+    spectrum = fft.rfft2(cells)
+    spectrum *= np.conj(response)
+    # Of every ratio-th row the spectrum is the mean over the frequencies that are one of pixels.
+    folded = spectrum.reshape(ratio[0], -1, spectrum.shape[1]).mean(axis=0)
+    return fft.irfft2(folded, s=(len(folded), cells.shape[1]))[:, :: ratio[1]]

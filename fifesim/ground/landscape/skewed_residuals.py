@@ -18,6 +18,7 @@ from fifesim.ground.landscape.block_kriging import (
     densities_of_means,
     kriged,
     kriging_filter,
+    weighed,
 )
 
 # Of the shift before, where the gradient is asked again: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for a quadratic ln w.
@@ -120,19 +121,10 @@ def residual_shift(own, known, shift, kriging, transform, deviation):
     # Where cells hardly vary, residuals have nowhere to go.
     if np.ndim(deviation):
         variance = np.maximum(block_means(np.square(deviation), ratio), variance / 4)
-    pixels = fft.irfft2(spectrum, s=known.shape) / variance + _summed(bent, kriging.response, ratio)
+    pixels = fft.irfft2(spectrum, s=known.shape) / variance + weighed(bent, kriging.response, ratio)
     gradient = by_pixel((pixels / bent[: ratio[0], : ratio[1]].size).astype(np.float32), ratio) * steep - bent
     # What all cells of a pixel share is no residual.
     gradient -= by_pixel(block_means(gradient, ratio), ratio)
     spectrum = fft.rfft2(deviation * gradient)
     spectrum *= kriging.process
     return np.clip(deviation * fft.irfft2(spectrum, s=own.shape, overwrite_x=True), -deviation, deviation)
-
-
-def _summed(cells, response, ratio):
-    """Sums of cells by the weights that pixels have in them: the transpose of `kriged`."""
-    spectrum = fft.rfft2(cells)
-    spectrum *= np.conj(response)
-    # Every ratio-th row is the mean of the frequencies that are one by pixel.
-    folded = spectrum.reshape(ratio[0], -1, spectrum.shape[1]).mean(axis=0)
-    return fft.irfft2(folded, s=(len(folded), cells.shape[1]))[:, :: ratio[1]]

@@ -64,23 +64,24 @@ def test_shift_is_the_gradient_of_the_density_by_matrices(arp, trend):
     residual = field - estimate @ (mean @ field)
 
     class Bent:
-        """x + bend x**2 / 2."""
+        """x + bend (x**2 / 2 + x**3 / 6)."""
+
+        def cells(self, x):
+            return x + bend * (x**2 / 2 + x**3 / 6)
 
         def slopes(self, x):
-            return 1 + bend * x, np.full_like(x, bend)
+            return 1 + bend * (x + x**2 / 2), bend * (1 + x)
 
     def logarithm(residual, wanted):
         y = wanted.copy()
         for _ in range(20):
-            x = estimate @ y + residual
-            y -= mean @ (x + bend * x**2 / 2) - wanted
-        slopes = mean @ ((1 + bend * (estimate @ y + residual))[:, None] * estimate)
+            y -= mean @ Bent().cells(estimate @ y + residual) - wanted
+        slopes = mean @ (Bent().slopes(estimate @ y + residual)[0][:, None] * estimate)
         return -0.5 * y @ precision @ y - np.linalg.slogdet(slopes)[1]
 
     # The gradient is asked at half of the residuals.
-    x = estimate @ levels + residual / 2
-    wanted = mean @ (x + bend * x**2 / 2)
-    shift = residual_shift(residual.reshape(cells), levels.reshape(shape), np.float32(0.0), kriging, Bent(), 1.0)
+    wanted = mean @ Bent().cells(estimate @ levels + residual / 2)
+    shift = residual_shift(field.reshape(cells), levels.reshape(shape), np.float32(0.0), kriging, Bent(), 1.0)
     gradient = [
         (logarithm(residual / 2 + step * each, wanted) - logarithm(residual / 2 - step * each, wanted)) / (2 * step)
         for each in np.eye(144)
@@ -123,3 +124,14 @@ def test_what_lies_far_off_says_nothing():
     )
     assert np.abs(here - there)[:, 72:144].max() < 1e-3 * 0.3
     assert np.abs(here - there)[:, :36].max() > 0.01
+
+
+def test_shift_where_the_deviation_differs_is_that_of_each():
+    """Well inside of two halves, what it is where the deviation is the same in all."""
+    kriging, field = Kriging.of(0.1, 0.0, (3, 3), (40, 40)), np.random.default_rng(1).standard_normal((120, 120))
+    deviation = np.where(np.arange(120) < 60, 0.2, 0.5) * np.ones((120, 120))
+    known = block_means(deviation * np.random.default_rng(2).standard_normal((120, 120)), (3, 3))
+    both = residual_shift(deviation * field, known, np.float32(0.0), kriging, LogNormal(), deviation)
+    for each, inside in ((0.2, slice(24, 36)), (0.5, slice(84, 96))):
+        alone = residual_shift(each * field, known, np.float32(0.0), kriging, LogNormal(), each)
+        np.testing.assert_allclose(both[:, inside], alone[:, inside], rtol=0, atol=0.02 * alone[:, inside].std())
