@@ -103,9 +103,11 @@ def residual_shift(own, known, shift, kriging, transform, deviation):
     at half of the residuals. A second shift, which knows the first, is right in the square of ln w as well. The
     derivative of m is inverted as if it were diagonal.
 
+    The weight is that of a change of variables, from y to m, in the normal density of r and y.
+
     References
     ----------
-    Own derivation; ``tests/ground/landscape/test_skewed_residuals.py`` compares with densities by quadrature.
+    [KyriakidisYoo2005]_ for residuals of straight functions, which need none of this
     """
     variance = float(np.mean(np.square(deviation)))
     if not variance:
