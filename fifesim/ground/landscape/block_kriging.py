@@ -122,10 +122,39 @@ def densities(arp, ratio, shape):
         [1]
     """
     u, v = (2.0 * np.pi * fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
+    return _densities(arp, ratio, u, v)
+
+
+def _densities(arp, ratio, u, v):
+    """At angular frequencies of rows and of columns."""
     squared = 2.0 * (1.0 - np.cos(u[:, None])) * ratio[0] ** 2 + 2.0 * (1.0 - np.cos(v)) * ratio[1] ** 2
     trend = ratio[0] * ratio[1] / (squared + _SLOWEST) ** 2
     process = response(arp, u[:, None], v) ** 2 / field_variance(arp)
     return process, trend, _mean_response(u, ratio[0])[:, None] * _mean_response(v, ratio[1])
+
+
+def densities_of_means(arp, ratio, shape):
+    """
+    Spectral densities of the means of the process and of a trend over pixels.
+
+    Parameters
+    ----------
+    arp, ratio, shape
+        As in `kriging_filter`.
+
+    Returns
+    -------
+    process, trend : array, shape (rows, columns)
+        Of those of `densities`. [1]
+    """
+    u, v = (2.0 * np.pi * fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
+    process, trend = np.zeros(shape), np.zeros(shape)
+    # The frequencies of rows that are one of pixels after one another: those of all cells would be large.
+    for some in u.reshape(ratio[0], shape[0]):
+        *both, mean = _densities(arp, ratio, some, v)
+        for total, each in zip((process, trend), both, strict=True):
+            total += of_means(each, mean, (1, ratio[1])) / ratio[0]
+    return process, trend
 
 
 def of_means(density, mean, ratio):
@@ -184,3 +213,34 @@ def kriged(pixels, response, ratio):
     repeated = (response.reshape(ratio[0], *spectrum.shape) * spectrum).reshape(response.shape)
     size = pixels.shape[0] * ratio[0], pixels.shape[1] * ratio[1]
     return fft.irfft2(repeated, s=size, overwrite_x=True)
+
+
+def weighed(cells, response, ratio):
+    """
+    Sums of cells by the weights that pixels have in them: the transpose of `kriged`.
+
+    Parameters
+    ----------
+    cells : array, shape (rows * ratio[0], columns * ratio[1])
+    response : array
+        From `kriging_filter`.
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+
+    Returns
+    -------
+    pixels : array, shape (rows, columns)
+
+    Examples
+    --------
+    All pixels together have a weight of one in each cell:
+
+    >>> pixels = weighed(np.full((12, 12), 2.0), kriging_filter(0.2, 0.1, (3, 3), (4, 4)), (3, 3))
+    >>> bool(np.allclose(pixels, 2.0 * 9, atol=1e-4))
+    True
+    """
+    spectrum = fft.rfft2(cells)
+    spectrum *= np.conj(response)
+    # Of every ratio-th row the spectrum is the mean over the frequencies that are one of pixels.
+    folded = spectrum.reshape(ratio[0], -1, spectrum.shape[1]).mean(axis=0)
+    return fft.irfft2(folded, s=(len(folded), cells.shape[1]))[:, :: ratio[1]]

@@ -119,37 +119,29 @@ def deviation_table(arp, ratio):
     return np.sqrt(np.maximum.accumulate(squared)), deviations
 
 
-def marginal_deviation(transform, arp, ratio):
-    """
-    Deviation of the field at which cells of given means vary within pixels as those of a distribution.
+def level_deviations(transform, deviations, arp, ratio):
+    r"""
+    Deviations of a process whose means over pixels vary as the levels that the means of leaf area have.
 
-    It is above 1 by a percent or two: given its mean, a pixel of large variance has a low level.
+    .. math:: s_l^2 = \mathrm{var}\,g(\bar l) / v
+
+    with g the level of a mean and v the share of `kept_variance`. They are above those of the cells where leaf area is
+    a bent function: what cells do in a pixel moves its mean.
 
     Parameters
     ----------
     transform : object
         Gives leaf area ``cells(field)`` and the ``level(mean)`` of pixels.
+    deviations : array, shape (n,)
+        Of the field of cells.
     arp, ratio
         As in `kept_variance`.
 
     Returns
     -------
-    deviation : float
-        [1]
+    deviations : array, shape (n,)
+        Those of `pixel_sample`.
     """
     sample = pixel_sample(arp, ratio)
-    truth = transform.cells(sample)
-    means = truth.mean(axis=1)
-    # Pixels and means of others.
-    levels, inside = sample.mean(axis=1, keepdims=True), np.roll(sample, len(sample) // 2, axis=0)
-    inside = inside - inside.mean(axis=1, keepdims=True)
-
-    def excess(deviation):
-        level = levels.copy()
-        for _ in range(8):
-            got = transform.cells(level + deviation * inside)
-            level += (transform.level(means) - transform.level(got.mean(axis=1)))[:, None]
-        return got.var(axis=1).mean() / truth.var(axis=1).mean() - 1.0
-
-    first, second = excess(1.0), excess(1.02)
-    return 1.0 - 0.02 * first / (second - first)
+    found = [np.std(transform.level(transform.cells(each * sample).mean(axis=1))) for each in deviations]
+    return np.array(found) / np.sqrt(kept_variance(arp, ratio))

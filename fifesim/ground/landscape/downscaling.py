@@ -1,9 +1,9 @@
 """
 Cells below the pixels of a map of leaf area: they vary as the autoregressive process, and their means are the map's.
 
-The field of cells is conditioned on the levels of the pixels by block kriging, and mapped to leaf area. The levels are
-found so that means over pixels are those of the map; what is left of some pixels shifts these by themselves, and a last
-factor, 0.999 to 1.001 as a rule, makes means exact.
+The field of cells is conditioned on levels of the pixels by block kriging, and mapped to leaf area. Levels are found so
+that means over pixels are those of the map, and residuals are shifted for what these means say of them. What is left of
+some pixels shifts these by themselves, and a last factor, 0.999 to 1.001 as a rule, makes means exact.
 """
 
 from dataclasses import dataclass
@@ -13,9 +13,11 @@ from scipy import ndimage
 
 from fifesim.ground.landscape.block_kriging import block_means, by_pixel, kriged
 from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
+from fifesim.ground.landscape.skewed_residuals import residual_shift
 
-# Each step makes what is left of the misfit five times smaller or more.
-STEPS = 4
+# Towards the map's means before, between and after the two shifts of residuals. Each step makes what is left of the
+# misfit five times smaller or more.
+STEPS = (1, 1, 3)
 
 SHIFTS = 8  # of single pixels
 
@@ -74,6 +76,22 @@ class LogNormal:
         """
         return np.exp(field)
 
+    def slopes(self, field):
+        """
+        First and second derivatives of leaf area by the field.
+
+        Parameters
+        ----------
+        field : array
+
+        Returns
+        -------
+        first, second : array, shape of field
+            [m2 m-2]
+        """
+        lai = np.exp(field)
+        return lai, lai
+
     def level(self, mean):
         """
         Level of the field in pixels of a mean.
@@ -111,11 +129,16 @@ class Marginal:
         From `ground.landscape.quantiles.quantile_table`.
     levels, means : array, shape (n,)
         Mean of pixels by the level of their field.
+    steep, bent : array, shape (n,)
+        First and second derivatives of leaf area, by the level of a field that is known but for three quarters of the
+        variance within pixels.
     """
 
     table: np.ndarray
     levels: np.ndarray
     means: np.ndarray
+    steep: np.ndarray
+    bent: np.ndarray
 
     @classmethod
     def of(cls, distribution, kept):
@@ -135,8 +158,13 @@ class Marginal:
         table = quantile_table(distribution)
         levels = np.linspace(-_FURTHEST, _FURTHEST, 1025)
         nodes, weights = np.polynomial.hermite_e.hermegauss(48)
+        weights = weights / np.sqrt(2.0 * np.pi)
         around = quantile_map(levels[:, None] + np.sqrt(1.0 - kept) * nodes, table)
-        return cls(table, levels, np.maximum.accumulate(around @ weights / np.sqrt(2.0 * np.pi)))
+        # Halved residuals lack three quarters of their variance. Integrals by parts need no derivative of quantiles.
+        lacking = np.sqrt(0.75 * (1.0 - kept))
+        near = quantile_map(levels[:, None] + lacking * nodes, table)
+        steep, bent = near @ (weights * nodes) / lacking, near @ (weights * (nodes**2 - 1.0)) / lacking**2
+        return cls(table, levels, np.maximum.accumulate(around @ weights), steep, bent)
 
     def cells(self, field):
         """
@@ -152,6 +180,21 @@ class Marginal:
             [m2 m-2]
         """
         return quantile_map(field, self.table)
+
+    def slopes(self, field):
+        """
+        First and second derivatives of leaf area by the field, where half of the residuals is known.
+
+        Parameters
+        ----------
+        field : array, shape (y, x)
+
+        Returns
+        -------
+        first, second : array, shape (y, x)
+            [m2 m-2]
+        """
+        return quantile_map(field, self.steep), quantile_map(field, self.bent)
 
     def level(self, mean):
         """
@@ -192,7 +235,7 @@ class Marginal:
             )
 
 
-def downscaled(pixels, field, response, transform, deviation):
+def downscaled(pixels, field, kriging, transform, deviation):
     """
     Leaf area of the cells in a window of pixels.
 
@@ -202,8 +245,8 @@ def downscaled(pixels, field, response, transform, deviation):
         Means; NaN where unknown. [m2 m-2]
     field : array, shape (rows * down, columns * across)
         Standard normal field of the autoregressive process.
-    response : array
-        From `kriging_filter`, for this shape of pixels.
+    kriging : fifesim.ground.landscape.skewed_residuals.Kriging
+        For this shape of pixels.
     transform : LogNormal or Marginal
     deviation : float or array, shape of pixels
         Standard deviation of the field of the cells, in units of levels.
@@ -231,12 +274,25 @@ def downscaled(pixels, field, response, transform, deviation):
     filled = _nearest(vegetated)
     means = pixels[filled]
     wanted = transform.level(means)
-    own = field * (deviation if np.ndim(deviation) == 0 else _between(deviation[filled], ratio).astype(np.float32))
-    levels = wanted - block_means(own, ratio)
-    for _ in range(STEPS):
-        got = block_means(transform.cells(kriged(levels, response, ratio) + own), ratio)
-        levels += (wanted - transform.level(got))[filled]
-    lai = _met(kriged(levels, response, ratio) + own, wanted, means, vegetated, transform)
+    if np.ndim(deviation):
+        deviation = _between(deviation[filled], ratio).astype(np.float32)
+    own = field * deviation
+
+    def solved(known, own, steps):
+        """Means of the field for those of leaf area."""
+        means_of_own = block_means(own, ratio)
+        for _ in range(steps):
+            got = block_means(transform.cells(kriged(known - means_of_own, kriging.response, ratio) + own), ratio)
+            known = known + (wanted - transform.level(got))[filled]
+        return known
+
+    known, shift = solved(wanted, own, STEPS[0]), np.float32(0.0)
+    for steps in STEPS[1:]:
+        shift = residual_shift(own, known, shift, kriging, transform, deviation)
+        known = solved(known, own + shift, steps)
+    own = own + shift
+    cells = kriged(known - block_means(own, ratio), kriging.response, ratio) + own
+    lai = _met(cells, wanted, means, vegetated, transform)
     lai *= by_pixel(np.where(vegetated, means / block_means(lai, ratio), np.where(pixels == 0, 0.0, np.nan)), ratio)
     return lai
 

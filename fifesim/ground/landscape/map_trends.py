@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fifesim.ground.landscape.block_kriging import densities, of_means
+from fifesim.ground.landscape.block_kriging import densities_of_means
 
 # Over so many pixels second differences are taken; and the pixels along an axis whose frequencies they are summed over.
 _LAGS, _PIXELS = (1, 2, 4, 8), 128
@@ -88,8 +88,7 @@ def _bends(levels, known, lag, axis):
 @lru_cache(maxsize=8)
 def _second_differences(arp, ratio):
     """By lag, variances of second differences of means over pixels along each axis: of a process and a trend of one."""
-    *both, mean = densities(arp, ratio, (_PIXELS, _PIXELS))
-    process, slow = (of_means(each, mean, ratio) for each in both)
+    process, slow = densities_of_means(arp, ratio, (_PIXELS, _PIXELS))
     frequency = 2.0 * np.pi * np.fft.fftfreq(_PIXELS)
     variances = {}
     for lag in _LAGS:

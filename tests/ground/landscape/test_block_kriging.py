@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from oracles_field import covariances
 
-from fifesim.ground.landscape.block_kriging import block_means, by_pixel, kriged, kriging_filter
+from fifesim.ground.landscape.block_kriging import (
+    block_means,
+    by_pixel,
+    densities,
+    densities_of_means,
+    kriged,
+    kriging_filter,
+    of_means,
+    weighed,
+)
 
 
 def on_torus(row):
@@ -66,6 +75,20 @@ def process(arp, cells):
     wide = covariances(arp)
     spectrum = 1 / (1 - 2 * arp * (np.cos(u[:, None]) + np.cos(v))) ** 2
     return np.fft.ifft2(spectrum).real / wide[0, 0]
+
+
+@pytest.mark.parametrize("ratio", [(3, 3), (2, 5), (4, 1)])
+def test_densities_of_means_are_sums_over_those_of_cells(ratio):
+    *both, mean = densities(0.2, ratio, (12, 10))
+    for each, found in zip(both, densities_of_means(0.2, ratio, (12, 10)), strict=True):
+        np.testing.assert_allclose(found, of_means(each, mean, ratio), rtol=1e-13)
+
+
+@pytest.mark.parametrize("ratio, shape", [((3, 3), (8, 6)), ((2, 5), (5, 4))])
+def test_sums_by_the_weights_of_pixels_are_the_transpose_of_the_estimate(ratio, shape):
+    cells = np.random.default_rng(1).standard_normal(np.multiply(shape, ratio))
+    found = weighed(cells, kriging_filter(0.2, 0.3, ratio, shape), ratio)
+    np.testing.assert_allclose(found.ravel(), weights(0.2, 0.3, ratio, shape).T @ cells.ravel(), rtol=0, atol=2e-5)
 
 
 def test_means_of_the_cells_are_the_pixels():

@@ -1,5 +1,7 @@
 """Trends of maps: what the process alone has of them, what is drawn with one, and what leaves them alone."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -74,3 +76,12 @@ def test_too_few_pixels_are_left_to_the_process():
     lonely = np.zeros((6, 6), bool)
     lonely[::3, ::3] = True
     assert map_trend(levels, lonely, 0.1, 0.15, RATIO) == 0.0
+
+
+def test_large_pixels_need_no_memory_for_all_of_their_cells():
+    """Those of 128 x 128 pixels of 20 x 20 cells are 52 MB an array."""
+    tracemalloc.start()
+    map_trend(np.random.default_rng(1).standard_normal((20, 20)), np.ones((20, 20), bool), 0.3, 0.1375, (20, 20))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 4e7

@@ -16,14 +16,15 @@ from fifesim.base.lattice import assemble
 from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.optics import check_map
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
-from fifesim.ground.landscape.block_kriging import by_pixel, kriging_filter
-from fifesim.ground.landscape.dispersion import deviation_table, kept_variance, marginal_deviation
+from fifesim.ground.landscape.block_kriging import by_pixel
+from fifesim.ground.landscape.dispersion import deviation_table, kept_variance, level_deviations
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.downscaling import LogNormal, Marginal, downscaled, fife_variation
 from fifesim.ground.landscape.field import window_field
 from fifesim.ground.landscape.map_trends import map_trend
 from fifesim.ground.landscape.raster import distribution_name, one_layer
 from fifesim.ground.landscape.rasters.pixels import MARGIN, PixelReads, pixel_lattice
+from fifesim.ground.landscape.skewed_residuals import Kriging
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -85,16 +86,17 @@ def downscale(
     Notes
     -----
     Exact: the mean of the cells of each pixel, within rounding (1e-12), and that none is negative. Approximate: where
-    the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 1 %,
-    of a skewed distribution at an arp of 0.24 within 2 %, inside of pixels and across their borders alike. The model is
-    a field whose logarithm is normal for `cv`, quantiles of a normal field for `distribution`; cells may pass the end
-    of a distribution by 0.1 %. What a map has beside that is a trend, as strong as second differences of its pixels say
-    in the surroundings of each tile, which is interpolated. A map that is smoother than the model leaves cells less
-    room: of a uniform map, in pixels of 3 x 3 cells, neighbours across a border have 0.89, 0.81 and 0.55 times the
-    model's semivariance at arp 0, 0.15 and 0.24, those in a pixel 1, 0.98 and 0.75 times.
+    the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 0.3 %,
+    with a cv of 0.4 within 0.7 %, inside of pixels and across their borders alike; wider distributions leave more. The
+    model is a field whose logarithm is normal for `cv`, which is then the root of the mean of variance over squared
+    mean of its pixels, and quantiles of a normal field for `distribution`; cells may pass the end of a distribution by
+    0.1 %. What a map has beside that is a trend, as strong as second differences of its pixels say in the surroundings
+    of each tile, which is interpolated. A map that is smoother than the model leaves cells less room: of a uniform map,
+    in pixels of 3 x 3 cells of a cv of 0.1, neighbours across a border have 0.88, 0.80 and 0.53 times the model's
+    semivariance at arp 0, 0.15 and 0.24, those in a pixel 1.00, 0.97 and 0.72 times.
 
     The field of cells is that of `fifesim.lai_scene`, whose seed gives the same ups and downs. A tile of cells holds at
-    least 8 pixels along an axis and reads 12 around: pixels of 150 x 150 cells take 1.6 GB, and many times the time
+    least 8 pixels along an axis and reads 12 around: pixels of 150 x 150 cells take 1.7 GB, and many times the time
     of a cell in a pixel of 3 x 3.
 
     References
@@ -104,7 +106,7 @@ def downscale(
     See Also
     --------
     fifesim.ground.landscape.downscaling.downscaled, fifesim.ground.landscape.block_kriging.kriging_filter,
-    fifesim.ground.landscape.map_trends.map_trend
+    fifesim.ground.landscape.skewed_residuals.residual_shift, fifesim.ground.landscape.map_trends.map_trend
 
     Examples
     --------
@@ -146,17 +148,17 @@ class _Model:
 
     arp: float
     transform: LogNormal | Marginal
-    variation: object  # a function of the means of pixels, or None where the deviation is one
-    table: tuple | None  # deviations of the field by cv
-    deviation: float | None  # of the field where it is the same in all pixels
+    variation: object  # a function of the means of pixels, or None where deviations are the same in all
+    table: tuple | None  # from `_table`
+    same: tuple | None
     words: str
 
     def deviations(self, pixels):
-        """Of the field of cells, in units of levels."""
+        """Of the field of cells, in units of levels, and of a process whose means vary as the levels."""
         if self.variation is None:
-            return self.deviation
+            return self.same
         found = np.asarray(self.variation(np.where(pixels > 0, pixels, 1.0)), float)
-        return np.interp(_checked_variation(np.broadcast_to(found, pixels.shape), self.table), *self.table)
+        return _of_variation(_checked_variation(np.broadcast_to(found, pixels.shape), self.table), self.table)
 
 
 def _model(arp, distribution, cv, ratio):
@@ -166,19 +168,28 @@ def _model(arp, distribution, cv, ratio):
         )
     if distribution is not None:
         transform = Marginal.of(lai_distribution(distribution), kept_variance(arp, ratio))
-        deviation = marginal_deviation(transform, arp, ratio)
-        return _Model(arp, transform, None, None, deviation, distribution_name(distribution))
-    table = _deviations(arp, ratio)
+        same = 1.0, float(level_deviations(transform, [1.0], arp, ratio)[0])
+        return _Model(arp, transform, None, None, same, distribution_name(distribution))
+    table = _table(arp, ratio)
     variation = fife_variation if cv is None else cv
     if callable(variation):
         _checked_variation(np.asarray(variation(np.ones((1, 1))), float), table)
         words = "log-normal, cv of FIFE's grass" if cv is None else "log-normal, cv by the mean"
         return _Model(arp, LogNormal(), variation, table, None, words)
     _checked_variation(np.asarray(cv, float), table)
-    return _Model(arp, LogNormal(), None, None, float(np.interp(cv, *table)), f"log-normal, cv {cv:g}")
+    same = tuple(map(float, _of_variation(cv, table)))
+    return _Model(arp, LogNormal(), None, None, same, f"log-normal, cv {cv:g}")
 
 
-_deviations = lru_cache(maxsize=4)(deviation_table)
+@lru_cache(maxsize=4)
+def _table(arp, ratio):
+    """Coefficients of variation within pixels, and by these the deviations of log-normal cells and of levels."""
+    variations, deviations = deviation_table(arp, ratio)
+    return variations, deviations, level_deviations(LogNormal(), deviations, arp, ratio)
+
+
+def _of_variation(values, table):
+    return tuple(np.interp(values, table[0], each) for each in table[1:])
 
 
 def _checked_variation(values, table):
@@ -221,15 +232,15 @@ def _tile(model, seed, lattice, row, column, pixels):
     ]
     size = tuple(count * number for count, number in zip(shape, lattice.ratio, strict=True))
     field = window_field(seed, model.arp, *first, size)
-    known, deviations = pixels > 0, model.deviations(pixels)
+    known, (deviations, of_levels) = pixels > 0, model.deviations(pixels)
     # Of pixels without leaves no level is asked.
     levels = model.transform.level(np.where(known, pixels, pixels[known].max()))
-    trend = map_trend(levels, known, deviations, model.arp, lattice.ratio)
-    cells = downscaled(pixels, field, _filter(model.arp, trend, lattice.ratio, shape), model.transform, deviations)
+    trend = map_trend(levels, known, of_levels, model.arp, lattice.ratio)
+    cells = downscaled(pixels, field, _kriging(model.arp, trend, lattice.ratio, shape), model.transform, deviations)
     cut = tuple(slice(MARGIN * number, -MARGIN * number) for number in lattice.ratio)
     tile = cells[cut].copy()
     tile.flags.writeable = False
     return tile
 
 
-_filter = lru_cache(maxsize=8)(kriging_filter)
+_kriging = lru_cache(maxsize=8)(Kriging.of)

@@ -5,9 +5,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from lazy import ODD_CHUNKS, check_place, no_compute
+from scipy import stats
 
 import fifesim
 from fifesim.ground.landscape.block_kriging import block_means
+from fifesim.ground.landscape.map_trends import map_trend
+from fifesim.ground.landscape.rasters import downscaling
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 
@@ -134,6 +137,24 @@ def test_distribution_and_functions_of_the_mean_are_taken(lai_map):
     dense = lai_map.values > 2.2
     np.testing.assert_allclose(spread[dense].mean(), smooth[dense].mean(), rtol=0.6)
     assert np.nanmean(spread[lai_map.values < 0.7]) > 0.35
+
+
+@pytest.mark.parametrize("options", [{"cv": 0.4}, {"distribution": "burned-grazed"}])
+def test_map_of_the_model_is_not_taken_for_a_trend(monkeypatch, options):
+    """What cells do in pixels moves the levels of these: by 5 % of their variance, which would pass for 0.5 or more."""
+    grid = fifesim.grid_at("EPSG:32614", 672000, 4368000, 1680, 1680, 10 / 3)
+    density = options.get("distribution", stats.lognorm(0.428))
+    found = []
+
+    def recorded(*given):
+        found.append(map_trend(*given))
+        return found[-1]
+
+    monkeypatch.setattr(downscaling, "map_trend", recorded)
+    fifesim.downscale(
+        fifesim.lai_scene(grid, density, arp=0.05, seed=1).fifesim.aggregate(10), grid, arp=0.05, **options
+    )
+    assert len(found) == 1 and found[0] <= 0.25
 
 
 def test_default_is_the_grass_of_fife(lai_map):
