@@ -228,7 +228,10 @@ def kt(
     (('band', 'y', 'x'), True)
     """
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
-    light = _sunlight(*air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time), "kt")
+    air, bands, sun = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
+    # The same elevation as in `surface_reflectance`, so that a graph has the sky above it once.
+    dem = beside_altitude(dem, air.altitude)
+    light = _sunlight(air, bands, sun, "kt")
     return terrain.kt_on_slopes(directions.dated(reflectance, time), dem, horizon=horizon, **light)
 
 
