@@ -168,9 +168,8 @@ def surface_reflectance(
     )
     if dem is None:
         return level
-    dem = beside_altitude(dem, atmosphere.altitude)
-    light = _sunlight(atmosphere, responses, geometry, "surface_reflectance on slopes")
-    return terrain.terrain_reflectance(level, dem, upwelling=upwelling, horizon=horizon, **light)
+    light = _sunlight(dem, atmosphere, responses, geometry, "surface_reflectance on slopes")
+    return terrain.terrain_reflectance(level, upwelling=upwelling, horizon=horizon, **light)
 
 
 @by_date
@@ -228,8 +227,8 @@ def kt(
     (('band', 'y', 'x'), True)
     """
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
-    light = _sunlight(*air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time), "kt")
-    return terrain.kt_on_slopes(directions.dated(reflectance, time), dem, horizon=horizon, **light)
+    light = _sunlight(dem, *air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time), "kt")
+    return terrain.kt_on_slopes(directions.dated(reflectance, time), horizon=horizon, **light)
 
 
 @by_date
@@ -379,9 +378,10 @@ def _of(instrument, array):
     return array.drop_attrs(deep=False).assign_attrs(attrs | attributes_of(find_instrument(instrument)))
 
 
-def _sunlight(atmosphere, bands, geometry, what):
-    """What Kt needs of the atmosphere, below one direction of sun and sensor."""
+def _sunlight(dem, atmosphere, bands, geometry, what):
+    """What Kt needs below one direction of sun and sensor: of the same elevation, a graph has the sky above it once."""
     geometry = directions.uniform_geometry(geometry, what)
     terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
     down, direct = terms.transmittance_down, terms.direct_transmittance_down
-    return {"geometry": geometry, "transmittance_down": down, "direct_transmittance": direct}
+    dem = beside_altitude(dem, atmosphere.altitude)
+    return {"dem": dem, "geometry": geometry, "transmittance_down": down, "direct_transmittance": direct}

@@ -2,10 +2,14 @@
 
 import importlib.metadata
 import platform
+from functools import cache
 
 _PACKAGES = (
     "fifesim", "numpy", "scipy", "xarray", "dask", "numba", "rasterio", "odc-geo", "pvlib", "pyrsr", "matplotlib",
 )  # fmt: skip
+
+# Each asks for a file to be parsed, and a run says them five times.
+_version = cache(importlib.metadata.version)
 
 
 def versions():
@@ -16,4 +20,4 @@ def versions():
     -------
     versions : dict of str to str
     """
-    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _PACKAGES}
+    return {"python": platform.python_version()} | {name: _version(name) for name in _PACKAGES}

@@ -1,11 +1,13 @@
 """How commands speak."""
 
+import atexit
+import gc
 import logging
 
 import pytest
 
 from fifesim.base.logs import LOG, quiet
-from fifesim.output.terminal import Exit, in_time, listening, report, say, stop, tell
+from fifesim.output.terminal import Exit, importing, in_time, listening, report, say, stop, tell
 
 
 def test_the_last_line_says_how_long_it_took_and_what_to_open(capsys):
@@ -54,3 +56,15 @@ def test_a_mistake_ends_with_its_code_and_at_most_500_characters(code, capsys):
     assert caught.value.code == code
     said = capsys.readouterr().err
     assert said.startswith("fifesim: xxx") and len(said) <= 501
+
+
+def test_what_imports_make_is_not_searched_for_garbage(monkeypatch):
+    """Nor when the interpreter ends."""
+    last = []
+    monkeypatch.setattr(atexit, "register", last.append)
+    with importing():
+        assert not gc.isenabled()
+    try:
+        assert gc.isenabled() and gc.get_freeze_count() > 0 and last == [gc.freeze]
+    finally:
+        gc.unfreeze()

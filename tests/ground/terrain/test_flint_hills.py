@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy import ndimage
+from scipy import interpolate, ndimage
 
 from fifesim.ground.terrain import flint_hills
 
@@ -158,6 +158,15 @@ def test_hypsometry_is_the_survey_at_its_quantiles_and_a_line_beyond():
     lowest, highest = flint_hills.hypsometry(np.array([322.1, 1108.3]))
     assert (lowest, highest) == (334.0, 443.5)
     np.testing.assert_allclose(flint_hills.hypsometry(np.array([302.1, 1158.3])), [330.0, 453.5], rtol=1e-12)
+
+
+def test_hypsometry_is_a_monotone_cubic_to_the_bit():
+    """Of Fritsch and Carlson, by scipy; at the knots as well, and in an array of any shape."""
+    knots, heights = flint_hills._ERODED, flint_hills._WATERSHED
+    eroded = np.concatenate([np.random.default_rng(1).uniform(knots[0], knots[-1], 900), knots]).reshape(9, -1)
+    expected = interpolate.PchipInterpolator(knots, heights)(eroded)
+    assert flint_hills.hypsometry(eroded).tobytes() == expected.tobytes()
+    assert flint_hills.hypsometry(eroded.T).tobytes() == expected.T.tobytes()
 
 
 @pytest.mark.parametrize(("height", "share"), flint_hills.BENCHES)
