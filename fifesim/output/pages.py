@@ -127,6 +127,6 @@ def plus_minus(value, digits=1):
 
 
 def _embedded(picture):
-    """Address of a PNG or JPEG picture that is the picture itself."""
-    kind = "jpeg" if picture.startswith(b"\xff\xd8") else "png"
+    """Address of a PNG or WebP picture that is the picture itself."""
+    kind = "webp" if picture[8:12] == b"WEBP" else "png"
     return f"data:image/{kind};base64," + base64.b64encode(picture).decode("ascii")

