@@ -15,8 +15,8 @@ _CHUNK = 1008
 
 _TILES_PER_CHUNK = 2
 
-# Rows of a part of a tile: with the columns of a chunk 1 MB in double precision, which a processor's cache keeps.
-_ROWS = 126
+# Rows of a part of a tile: with the columns of a chunk 2 MB in double precision, which a processor's cache keeps.
+_ROWS = 252
 
 
 def tiles(kernel, grid, chunks=None, *, tile, dtype=float):

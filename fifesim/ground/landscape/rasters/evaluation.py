@@ -9,8 +9,8 @@ from fifesim.base.geometry import ANGLES
 from fifesim.ground.landscape.compression import cells_by_class, check_codes, numbers_of
 from fifesim.rasters import chunks as chunking
 
-# Cells that are evaluated at once, 1 MB of each raster: what is made between stays in a processor's cache.
-_AT_ONCE = 2**17
+# Cells that are evaluated at once, 2 MB of each raster: what is made between stays in a processor's cache.
+_AT_ONCE = 2**18
 
 
 def by_class(kernels, cover, *scene, bands=None):
