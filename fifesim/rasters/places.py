@@ -1,17 +1,22 @@
 """Arrays of kernels that are told where their cells lie."""
 
+from itertools import product
+
 import dask.array as da
 import numpy as np
 import xarray as xr
 from dask.base import tokenize
 
 from fifesim.rasters import grid as grids
-from fifesim.rasters.windows import array_by_place
+from fifesim.rasters.windows import array_by_place, slices
 
 # Edge of an automatic chunk, and tiles along it at most: 8 MB in double precision. [cell]
 _CHUNK = 1008
 
 _TILES_PER_CHUNK = 2
+
+# Rows of a part of a tile: with the columns of a chunk 2 MB in double precision, which a processor's cache keeps.
+_ROWS = 252
 
 
 def tiles(kernel, grid, chunks=None, *, tile, dtype=float):
@@ -43,6 +48,31 @@ def tiles(kernel, grid, chunks=None, *, tile, dtype=float):
     return grids.place(lazy.rename(None), grid)
 
 
+def part_by_part(kernel, grid, *arrays, tile):
+    """
+    Array of such a kernel in memory, made in parts of tiles: what the kernel makes between takes no memory of its own.
+
+    Parameters
+    ----------
+    kernel : callable
+        As of `tiles`, or ``kernel(row, column, (rows, columns), *blocks)`` of what other arrays have in these cells.
+    grid : odc.geo.geobox.GeoBox
+    *arrays : numpy.ndarray, shape (y, x)
+    tile
+        As in `tiles`.
+
+    Returns
+    -------
+    array : xarray.DataArray, dims (y, x)
+    """
+    out = np.empty(tuple(grid.shape))
+    for rows, columns in product(*map(slices, _tile_chunks(grid, tile))):
+        for first in range(rows.start, rows.stop, _ROWS):
+            part = slice(first, min(first + _ROWS, rows.stop)), columns
+            out[part] = kernel(first, columns.start, out[part].shape, *(each[part] for each in arrays))
+    return grids.place(xr.DataArray(out, dims=("y", "x")), grid)
+
+
 def chunk_sizes(grid, chunks, *, tile):
     """
     Sizes of the chunks of an array on a grid.
@@ -61,7 +91,7 @@ def chunk_sizes(grid, chunks, *, tile):
     return da.core.normalize_chunks(sizes, shape=tuple(grid.shape), dtype=float)
 
 
-def located(kernel, array):
+def located(kernel, array, *, tile=None):
     """
     Apply a kernel that must know where its block lies.
 
@@ -70,6 +100,8 @@ def located(kernel, array):
     kernel : callable
         ``kernel(block, starts)`` gives an array like the block, whose first element lies at these indices of the whole.
     array : xarray.DataArray
+    tile : int, optional
+        As in `tiles`: what is in memory, over (y, x), is made `part_by_part`.
 
     Returns
     -------
@@ -83,7 +115,11 @@ def located(kernel, array):
     data = array.data
     if isinstance(data, da.Array):
         return array.copy(data=data.map_blocks(call, dtype=float, meta=np.empty((0,) * data.ndim)))
-    return array.copy(data=kernel(data, (0,) * data.ndim))
+    if tile is None:
+        return array.copy(data=kernel(data, (0,) * data.ndim))
+    return part_by_part(
+        lambda row, column, shape, block: kernel(block, (row, column)), grids.geobox(array), data, tile=tile
+    )
 
 
 def _tile_chunks(grid, tile):

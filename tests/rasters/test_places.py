@@ -35,3 +35,34 @@ def test_automatic_chunks_end_where_tiles_end():
 def test_unknown_dimension_of_chunks_is_named():
     with pytest.raises(ValueError, match="chunks name the dimensions y and x, got band"):
         places.tiles(cells_that_tell_their_place, GRID, {"band": 1}, tile=8)
+
+
+@pytest.mark.parametrize("tile", [8, 1008])
+def test_parts_make_the_whole_and_none_lies_in_two_chunks(monkeypatch, tile):
+    monkeypatch.setattr(places, "_ROWS", 3)
+    other, asked = np.random.default_rng(1).random(tuple(GRID.shape)), []
+
+    def kernel(row, column, shape, block):
+        asked.append((row, column, shape))
+        return cells_that_tell_their_place(row, column, shape) + block
+
+    out = places.part_by_part(kernel, GRID, other, tile=tile)
+    np.testing.assert_array_equal(out, cells_that_tell_their_place(0, 0, tuple(GRID.shape)) + other)
+    grids.check_grid(grids.geobox(out))
+    step, lattice = 16 if tile == 8 else tile, grids.lattice_position(GRID)
+    for row, column, (rows, columns) in asked:
+        assert rows <= 3
+        for first, size, start in zip((row, column), (rows, columns), lattice, strict=True):
+            assert (start + first) // step == (start + first + size - 1) // step
+
+
+@pytest.mark.parametrize("tile", [None, 8])
+def test_kernel_is_told_where_its_block_lies(monkeypatch, tile):
+    monkeypatch.setattr(places, "_ROWS", 3)
+    array = places.tiles(cells_that_tell_their_place, GRID, tile=8)
+
+    def kernel(block, starts):
+        return block - cells_that_tell_their_place(*starts, block.shape)
+
+    assert (places.located(kernel, array, tile=tile) == 0).all()
+    assert (places.located(kernel, array.chunk({"y": 5, "x": 8}), tile=tile) == 0).all()

@@ -30,7 +30,7 @@ _PER_MOISTURE = (WETTEST - DRIEST) / CAPACITY
 _FILMS = 6
 
 # Cells that are done together, so that they stay in the nearest cache, and in the next.
-_RUN, _AT_ONCE = 512, 2**14
+_RUN, _AT_ONCE = 256, 2**14
 
 
 class WaterFilms(NamedTuple):
@@ -217,8 +217,7 @@ def _moisten(dry, moisture, surface, inside, entrance, passed, out):
 # No divisor is 0: without that being asked, cells are done several at once.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _films(dry, moisture, start, bare, surface, inside, entrance, passed, out):
-    covered, below = np.empty((_FILMS, _RUN)), np.empty(_RUN)
-    above, under = np.empty(_RUN), np.empty(_RUN)
+    covered = np.empty((_FILMS, _RUN))
     for begin in range(0, bare.size, _RUN):
         free, first = bare[begin : begin + _RUN], start + begin
         cells, n = slice(first, first + free.size), free.size
@@ -227,17 +226,13 @@ def _films(dry, moisture, start, bare, surface, inside, entrance, passed, out):
             soil, wet, above_all, back = dry[cells, band], out[band, cells], surface[band], inside[band]
             entering, through = entrance[band], (1 - above_all) * (1 - back)
             for i in range(n):
-                below[i] = grains_in_water(soil[i], entering)
-                above[i], under[i] = 0.0, 1.0
-            # The sum of the quotients of all films as one of two products: a division takes longer than the rest.
-            for k in range(_FILMS):
-                film, share = passed[band, k], covered[k]
-                for i in range(n):
-                    up, kept = below_film(below[i], film, back)
-                    above[i] = above[i] * kept + share[i] * up * under[i]
-                    under[i] *= kept
-            for i in range(n):
-                wet[i] = free[i] * soil[i] + (1 - free[i]) * above_all + through * above[i] / under[i]
+                below, above, under = grains_in_water(soil[i], entering), 0.0, 1.0
+                # The sum of the quotients of all films as one of two products: a division takes longer than the rest.
+                for k in range(_FILMS):
+                    up, kept = below_film(below, passed[band, k], back)
+                    above = above * kept + covered[k, i] * up * under
+                    under *= kept
+                wet[i] = free[i] * soil[i] + (1 - free[i]) * above_all + through * above / under
 
 
 @register_jitable

@@ -98,7 +98,7 @@ class Patches:
         return self.shares
 
 
-def patch_classes(patches, shares, seed, northing, easting):
+def patch_classes(patches, shares, seed, northing, easting, codes=None):
     """
     Number of the class of each cell.
 
@@ -111,11 +111,13 @@ def patch_classes(patches, shares, seed, northing, easting):
         In [0, 2**63).
     northing, easting : array, shape (y,), (x,)
         Of cell centres. [m]
+    codes : array of int16, shape (n,), optional
+        Of the classes, in the place of their numbers.
 
     Returns
     -------
     classes : array of int16, shape (y, x)
-        From 0 to n - 1.
+        From 0 to n - 1, or codes.
 
     Examples
     --------
@@ -129,12 +131,13 @@ def patch_classes(patches, shares, seed, northing, easting):
     """
     if not np.size(northing) or not np.size(easting):
         return np.zeros((np.size(northing), np.size(easting)), np.int16)
+    codes = np.arange(len(shares), dtype=np.int16) if codes is None else codes
     place = np.asarray(northing, float) / patches.size, np.asarray(easting, float) / patches.size
     if patches.pattern == "levels":
         limits = norm.ppf(np.minimum(np.cumsum(shares)[:-1], 1.0))
-        return np.searchsorted(limits, smooth_field(seed, *place), side="right").astype(np.int16)
-    limits = np.cumsum(shares)[:-1]
-    return voronoi(seed, *place, limits) if patches.pattern == "voronoi" else pastures(seed, *place, limits)
+        return codes[np.searchsorted(limits, smooth_field(seed, *place), side="right")]
+    draw = voronoi if patches.pattern == "voronoi" else pastures
+    return draw(seed, *place, lambda numbers: codes[np.searchsorted(np.cumsum(shares)[:-1], numbers, side="right")])
 
 
 def _check_shares(values):

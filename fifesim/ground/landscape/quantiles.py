@@ -42,7 +42,7 @@ def quantile_table(distribution):
     return np.maximum.accumulate(np.concatenate([[0.0], lower, upper]))[1:]
 
 
-def quantile_map(field, table):
+def quantile_map(field, table, out=None):
     """
     Map a standard normal field to the distribution of a quantile table.
 
@@ -52,6 +52,8 @@ def quantile_map(field, table):
         Standard normal deviates; NaN stays NaN.
     table : array, shape (16385,)
         From `quantile_table`.
+    out : array of float, shape (...), optional
+        Filled in and returned; it may be the field.
 
     Returns
     -------
@@ -62,7 +64,7 @@ def quantile_map(field, table):
     [Friedl1995]_, Fig. 2, step 5, for a field without end: ranks are those of the ensemble
     """
     cells = np.ascontiguousarray(field, float)
-    out = np.empty(cells.shape)
+    out = np.empty(cells.shape) if out is None else out
     _map(cells.reshape(-1), table, out.reshape(-1))
     return out
 

@@ -26,6 +26,10 @@ def test_window_is_a_slice_and_cells_of_another_size_show_the_same_patches(patte
     np.testing.assert_array_equal(finer[1::3, 1::3], whole)
     assert (patch_classes(patches, SHARES, 8, north, east) != whole).any()
     assert patch_classes(patches, SHARES, 7, north[:0], east).shape == (0, 110)
+    codes = np.array([7, 300, 2], np.int16)
+    coded = patch_classes(patches, SHARES, 7, north, east, codes)
+    assert coded.dtype == np.int16
+    np.testing.assert_array_equal(coded, codes[whole])
 
 
 def test_shares_are_as_asked_within_their_sampling_error(pattern):

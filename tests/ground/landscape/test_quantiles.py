@@ -67,6 +67,8 @@ def test_quantile_map_keeps_nan_by_cell():
     field = np.array([[0.0, np.nan], [np.nan, 1.0]])
     mapped = quantile_map(field, quantile_table(stats.uniform()))
     np.testing.assert_array_equal(np.isnan(mapped), np.isnan(field))
+    assert quantile_map(field, quantile_table(stats.uniform()), out=field) is field
+    np.testing.assert_array_equal(field, mapped)
 
 
 def test_each_class_has_the_bits_of_its_own_map():

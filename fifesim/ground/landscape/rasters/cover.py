@@ -44,7 +44,7 @@ def drawn_cover(grid, patches, table, seed, chunks=None):
 
     def cells(row, column, shape):
         place = northing[row : row + shape[0]], easting[column : column + shape[1]]
-        return codes[patch_classes(patches, shares, seed, *place)]
+        return patch_classes(patches, shares, seed, *place, codes)
 
     said = f"landscape: {patches.pattern} of {patches.size:g} m, seed {seed}"
     cover = places.tiles(cells, grid, chunks, tile=_TILE, dtype=np.int16)

@@ -1,10 +1,11 @@
 """Fields of a landscape on labelled rasters: leaf area that goes with the ground, and properties that vary."""
 
-import numpy as np
+from functools import partial
 
 from fifesim.ground.landscape.drawn import SHARES
+from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
 from fifesim.ground.landscape.rasters.fields import landscape_fields
-from fifesim.ground.landscape.rasters.properties import with_deviation, with_distribution
+from fifesim.rasters import cf
 
 
 def drawn_fields(grid, drawn, covary, arps, **options):
@@ -40,9 +41,7 @@ def drawn_fields(grid, drawn, covary, arps, **options):
         raise ValueError(
             f"covary names {name}, which is not drawn: type {name}=fifesim.Field(mean=..., sd=...), or leave it out"
         )
-    # Before anything is computed.
-    for name in set(drawn) & set(SHARES):
-        drawn[name].distribution(name)
+    options["values"] = {name: _values(name, each) for name, each in drawn.items()}
     others = {name: each.arp for name, each in drawn.items()}
     options["coarser"] = {name: each.coarser for name, each in drawn.items()}
     if not covary:
@@ -51,12 +50,27 @@ def drawn_fields(grid, drawn, covary, arps, **options):
         # Leaf area comes last: it takes of the noise of the others what its own arp needs, and they stay as they are.
         made = [landscape_fields(grid, {**others, "lai": arp}, covary, **options) for arp in dict.fromkeys(arps)]
     leaf_area = {arp: fields["lai"] for arp, fields in zip(dict.fromkeys(arps), made, strict=False) if covary}
-    return leaf_area, {name: _values(name, each, made[0][name]) for name, each in drawn.items()}
+    return leaf_area, {name: _labelled(name, each, made[0][name]) for name, each in drawn.items()}
 
 
-def _values(name, given, score):
-    """A property of its standard normal field."""
+def _values(name, given):
+    """What makes a property of standard normal scores, in their place."""
     if name in SHARES:
-        return with_distribution(score, name, given.distribution(name))
-    values = with_deviation(score, name, given.sd)
-    return values.copy(data=values.data + np.float64(given.mean)) if given.mean else values
+        return partial(_share, quantile_table(given.distribution(name)))
+    return partial(_normal, given.mean, given.sd)
+
+
+def _share(table, scores):
+    return quantile_map(scores, table, out=scores)
+
+
+def _normal(mean, deviation, scores):
+    scores *= deviation
+    if mean:
+        scores += mean
+    return scores
+
+
+def _labelled(name, given, values):
+    how = "by quantiles" if name in SHARES else f"standard deviation {given.sd:g}"
+    return cf.label(values, name, source=values, history=f"{name}: {how}")

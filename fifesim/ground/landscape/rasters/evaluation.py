@@ -9,8 +9,8 @@ from fifesim.base.geometry import ANGLES
 from fifesim.ground.landscape.compression import cells_by_class, check_codes, numbers_of
 from fifesim.rasters import chunks as chunking
 
-# Cells that are put together at once: 1 MB of each raster.
-_AT_ONCE = 2**17
+# Cells that are evaluated at once, 2 MB of each raster: what is made between stays in a processor's cache.
+_AT_ONCE = 2**18
 
 
 def by_class(kernels, cover, *scene, bands=None):
@@ -64,31 +64,41 @@ def _identity(raster):
 
 
 def _of_classes(table, parts, banded, bands, first, cover, *blocks):
-    """A block of cells: those of each kernel are put together, evaluated and put back."""
+    """A block of cells, run by run: those of each kernel are put together, evaluated and put back."""
     shape = np.broadcast_shapes(cover.shape, *(block.shape[:2] for block in blocks[:first]))
     blocks = [_flat(block, has_bands, shape) for block, has_bands in zip(blocks, banded, strict=True)]
-    scene, rasters = blocks[:first], blocks[first:]
-    codes, groups = table
+    cover, out = np.broadcast_to(cover, shape).ravel(), np.empty((bands or 1, math.prod(shape)))
+    for start in range(0, cover.size, _AT_ONCE):
+        run = slice(start, start + _AT_ONCE)
+        within, values = [(block[run] if varies else block, varies) for block, varies in blocks], out[:, run]
+        numbers, needed = _kernels_of(cover[run], *table)
+        if len(needed) == 1 and needed[0] >= 0:
+            values[...] = _evaluated(parts[needed[0]], within, first)
+            continue
+        values[...] = np.nan
+        for cells, part in zip(cells_by_class(numbers, range(len(parts))), parts, strict=True):
+            if cells.size:
+                found = _evaluated(part, [(b[cells] if varies else b, varies) for b, varies in within], first)
+                # Band by band: numpy puts cells of several rows at once back at half the speed.
+                for band, of_band in zip(values, found if bands else [found], strict=True):
+                    band[cells] = of_band
+    return out.reshape(((bands,) if bands else ()) + shape)
+
+
+def _kernels_of(cover, codes, groups):
+    """Number of the kernel of each cell, -1 where there is no class, and which of these numbers there are."""
     numbers, present = numbers_of(cover, codes) if cover.dtype == np.int16 else (None, [True])
     if present[-1]:
         numbers, present = numbers_of(check_codes(cover, codes), codes)
-    needed = {group for group, there in zip(groups, present, strict=False) if there}
-    if len(needed) == 1 and not present[-1]:
-        kernel, taken = parts[needed.pop()]
-        found = kernel(*(block for block, _ in (*scene, *(rasters[index] for index in taken))))
-        return np.reshape(found, ((bands,) if bands else ()) + shape)
-    if len(parts) < len(codes):
-        numbers = np.array([*groups, -1], np.int16)[numbers]
-    numbers, out = np.broadcast_to(numbers, shape).ravel(), np.full((bands or 1, math.prod(shape)), np.nan)
-    for mine, (kernel, taken) in zip(cells_by_class(numbers, range(len(parts))), parts, strict=True):
-        read = (*scene, *(rasters[index] for index in taken))
-        for start in range(0, mine.size, _AT_ONCE):
-            cells = mine[start : start + _AT_ONCE]
-            found = kernel(*(block[cells] if varies else block for block, varies in read))
-            # Band by band: numpy puts cells of several rows at once back at half the speed.
-            for band, values in zip(out, found if bands else [found], strict=True):
-                band[cells] = values
-    return out.reshape(((bands,) if bands else ()) + shape)
+    of_kernels = np.array([*groups, -1], np.int16)
+    needed = np.unique(of_kernels[present])
+    return (numbers if len(needed) == 1 else of_kernels[numbers]), needed
+
+
+def _evaluated(part, blocks, first):
+    """What a kernel gives of cells of the scene, which comes first, and of the rasters that it takes."""
+    kernel, taken = part
+    return kernel(*(block for block, _ in (*blocks[:first], *(blocks[first + index] for index in taken))))
 
 
 def _flat(block, has_bands, shape):

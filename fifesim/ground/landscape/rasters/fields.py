@@ -108,6 +108,12 @@ def correlated_fields(
     >>> bool(-0.5 < np.corrcoef(fields["lai"].values.ravel(), fields["soil"].values.ravel())[0, 1] < -0.3)
     True
     """
+    options = {"coarser": coarser, "seed": seed, "covariates": covariates, "reference": reference, "chunks": chunks}
+    return _fields(grid, arps, correlations, **options)
+
+
+def _fields(grid, arps, correlations, *, coarser, seed, covariates, reference, chunks, values=None):
+    """The same; where ``values`` have a function of a name, with what this makes of the cells of the field."""
     grids.check_grid(grid)
     seed = check_seed(seed)
     for name, arp in arps.items():
@@ -123,7 +129,7 @@ def correlated_fields(
     fields = {}
     for name in arps:
         ground = {other: covariates[other] for other in covariates if (name, other) in pairs}
-        field = _field(grid, name, streams, parts, ground, chunks)
+        field = _field(grid, name, streams, parts, ground, chunks, (values or {}).get(name, lambda cells: cells))
         said = f"correlated_fields: {name}, arp {arps[name]:g}, seed {seed}"
         said += f", {coarser[name]} x {coarser[name]} cells" if coarser[name] > 1 else ""
         said += "".join(f", {one}-{other} {r:g}" for (one, other), r in pairs.items() if name in (one, other))
@@ -145,6 +151,7 @@ def landscape_fields(
     geometry=None,
     time=None,
     chunks=None,
+    values=None,
 ):
     """
     Fields of a landscape, some of which follow its elevation.
@@ -161,11 +168,13 @@ def landscape_fields(
         Other properties of the ground, or one's own of these names.
     geometry, time : optional
         Of the sun, as in `fifesim.illumination`.
+    values : dict of str to callable, optional
+        Of fields by name, ``values[name](cells)`` gives those of a block, which it may change, in the place of its own.
 
     Returns
     -------
     fields : dict of str to xarray.DataArray, dims (y, x)
-        Standard normal. [1]
+        Standard normal, but for those with ``values``. [1]
 
     Raises
     ------
@@ -187,7 +196,7 @@ def landscape_fields(
     if of_dem:
         covariates |= of_elevation(dem, of_dem, geometry=geometry, time=time)
     options = {"coarser": coarser, "seed": seed, "covariates": covariates, "reference": reference, "chunks": chunks}
-    return correlated_fields(grid, arps, correlations, **options)
+    return _fields(grid, arps, correlations, values=values, **options)
 
 
 def of_elevation(dem, names, *, geometry=None, time=None):
@@ -245,26 +254,30 @@ def _lattices(arps, coarser):
     return {name: check_coarser((coarser or {}).get(name, 1)) for name in arps}
 
 
-def _field(grid, name, streams, parts, ground, chunks):
+def _field(grid, name, streams, parts, ground, chunks, values):
     """One field, of the noises that are in it and of the ground that it follows; streams are seeds, arps and sizes."""
     lattice = grids.lattice_position(grid)
 
-    def noise(made, first_row, first_column, shape):
-        return _noise(name, streams, made, (lattice[0] + first_row, lattice[1] + first_column), shape)
+    def cells(made, row, column, shape, *layers):
+        found = _noise(name, streams, made, (lattice[0] + row, lattice[1] + column), shape)
+        if layers:
+            found = correlated(made.ground[name], found, made.covariates, dict(zip(ground, layers, strict=True)))
+        return values(found)
 
-    if isinstance(parts, Copula) and not ground:
+    if isinstance(parts, Copula):
+        layers = [each.values for each in ground.values()] if chunks is None else []
         # A first window raises what is refused before anything lazy is built.
-        noise(parts, 0, 0, (0, 0))
-        return places.tiles(partial(noise, parts), grid, chunks, tile=TILE)
+        cells(parts, 0, 0, (0, 0))
+        if chunks is None:
+            return places.part_by_part(partial(cells, parts), grid, *layers, tile=TILE)
+        if not ground:
+            return places.tiles(partial(cells, parts), grid, chunks, tile=TILE)
 
     def kernel(rows, columns, *layers, made=None):
         if made is None:
             *layers, last = layers
             made = last.item()
-        cells = noise(made, int(rows.flat[0]), int(columns.flat[0]), (rows.size, columns.size))
-        if not ground:
-            return cells
-        return correlated(made.ground[name], cells, made.covariates, dict(zip(ground, layers, strict=True)))
+        return cells(made, int(rows.flat[0]), int(columns.flat[0]), (rows.size, columns.size), *layers)
 
     at = [xr.DataArray(np.arange(size), dims=axis) for axis, size in zip("yx", grid.shape, strict=True)]
     if chunks is not None:

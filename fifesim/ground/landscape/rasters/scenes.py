@@ -20,7 +20,7 @@ from fifesim.ground.landscape.compression import numbers_of
 from fifesim.ground.landscape.cover import Patches
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.drawn import Field
-from fifesim.ground.landscape.field import streaming_field
+from fifesim.ground.landscape.field import TILE, streaming_field
 from fifesim.ground.landscape.quantiles import NODES, quantile_map_of_classes, quantile_table
 from fifesim.ground.landscape.raster import lai_window
 from fifesim.ground.landscape.rasters.cover import classes_of, cover_map, drawn_cover
@@ -212,12 +212,14 @@ def _lai(grid, cover, table, arp, seed, scores):
     # What streaming_field refuses is known before anything lazy is built.
     for of_class in arps:
         streaming_field(seed, of_class, 0, 0, (0, 0))
+    plain = cover.copy(deep=False)
+    plain.attrs = {}
     if scores:
         kernel = partial(_leaf_area_of_scores, codes, tables, arps, tuple(scores))
-        lai = grids.place(chunking.pointwise(kernel, cover.drop_attrs(), *scores.values()), grid)
+        lai = grids.place(chunking.pointwise(kernel, plain, *scores.values()), grid)
     else:
         kernel = partial(_leaf_area, codes, tables, arps, seed, grids.lattice_position(grid))
-        lai = grids.place(places.located(kernel, cover.drop_attrs()), grid)
+        lai = grids.place(places.located(kernel, plain, tile=TILE), grid)
     history = "\n".join([cover.attrs["history"], f"landscape: leaf area of {len(table)} classes, seed {seed}"])
     made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": "by class"} | made_on_site(grid)
     return cf.label(lai, "lai", history=history, **made, method="streaming", references=_REFERENCE)

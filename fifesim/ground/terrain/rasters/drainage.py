@@ -65,7 +65,9 @@ def wetness(dem: xr.DataArray, *, resolution: float | None = None) -> xr.DataArr
     between = places.between((0, 0), tuple(grid.shape))
 
     def block(rows, columns, elevation, index):
-        return np.where(np.isnan(elevation), np.nan, between.values(index, rows, columns))
+        found = between.values(index, rows, columns)
+        np.copyto(found, np.nan, where=np.isnan(elevation))
+        return found
 
     reads = [chunking.margin_reads(data, 0), between.reads(_at_places(data, places))]
     out = chunking.windows(block, reads, data.shape, data.chunks if isinstance(data, da.Array) else None)

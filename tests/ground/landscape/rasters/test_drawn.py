@@ -9,6 +9,7 @@ from scipy import stats
 import fifesim
 from fifesim.ground.landscape.autoregression import response
 from fifesim.ground.landscape.drawn import Field
+from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
 from fifesim.ground.landscape.rasters.drawn import drawn_fields
 from fifesim.rasters import cf
 
@@ -92,6 +93,18 @@ def test_mean_of_a_field_is_added_to_what_may_be_negative(grid):
     level, dark = (drawn_fields(grid, each, None, (), seed=7)[1]["soil"] for each in drawn)
     np.testing.assert_array_equal(dark, level + -0.1)
     assert cf.attributes("soil").items() <= dark.attrs.items()
+
+
+def test_properties_are_made_of_the_scores_of_their_names(grid):
+    """Those of `correlated_fields`, to the bit."""
+    scores = fifesim.correlated_fields(grid, {name: each.arp for name, each in DRAWN.items()}, seed=7)
+    made = drawn_fields(grid, DRAWN, None, (), seed=7)[1]
+    np.testing.assert_array_equal(made["soil"], scores["soil"] * DRAWN["soil"].sd)
+    brown = quantile_map(scores["brown"].values, quantile_table(DRAWN["brown"].distribution("brown")))
+    np.testing.assert_array_equal(made["brown"], brown)
+    assert made["soil"].name == "soil" and made["soil"].attrs["arp"] == 0.2 and made["brown"].attrs["site"] == "FIFE"
+    assert made["soil"].attrs["history"].endswith("soil: standard deviation 0.04")
+    assert made["brown"].attrs["history"].endswith("brown: by quantiles")
 
 
 @pytest.mark.parametrize("name", ["soil", "brown"])
