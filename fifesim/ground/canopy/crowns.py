@@ -67,8 +67,8 @@ def crown_shares(crown_cover, crown_shape, sza, vza, raa):
 
     Examples
     --------
-    >>> crown_shares(1.0, 1.0, 60.0, 0.0, 0.0).both
-    np.float64(1.0)
+    >>> float(crown_shares(1.0, 1.0, 60.0, 0.0, 0.0).both)
+    1.0
     """
     gap = 1 - np.asarray(crown_cover, float)
     sun_path, view_path = (1 / np.cos(np.radians(np.asarray(angle, float))) for angle in (sza, vza))
