@@ -13,8 +13,8 @@ _LINK = re.compile(r"(?<!`)`(\w+)\.(\w+)`(?!`)")
 _BRACKET = re.compile(r"\[[^\]\[`\"']*\]")
 _UNIT = re.compile(r"\b(m|km|cm|um|sr|g|kg|ug|K|pixel)(-?[1-4])\b")
 _RAISED = str.maketrans("-1234", "⁻¹²³⁴")
-_SEPARATOR = re.compile(r",\s*(\\q?quad)\s+")
-_WIDEST = 36
+_SEPARATOR = re.compile(r"([,;])\s*(\\q?quad)\s+")
+_WIDEST = 28
 
 
 def readable(lines):
@@ -107,12 +107,12 @@ def _stacked(formula):
         return None
     first, *rest = _SEPARATOR.split(formula)
     lines = [first]
-    for space, part in zip(rest[::2], rest[1::2], strict=True):
-        together = f"{lines[-1]}, {space} {part}"
+    for mark, space, part in zip(rest[::3], rest[1::3], rest[2::3], strict=True):
+        together = f"{lines[-1]}{mark} {space} {part}"
         if _width(together) <= _WIDEST:
             lines[-1] = together
         else:
-            lines[-1] += r", \\"
+            lines[-1] += mark + r" \\"
             lines.append(part)
     return lines if len(lines) > 1 else None
 

@@ -88,8 +88,8 @@ def clumped(canopy, shares):
     .. math::
 
         \tau_{ss}' &= 1 - C_s + C_s \tau_{ss} \\
-        \tau_{ssoo}' &= C_{so} \tau_{ssoo} + (C_o - C_{so}) \tau_{oo} + (C_s - C_{so}) \tau_{ss}
-            + 1 - C_s - C_o + C_{so}
+        \tau_{ssoo}' &= C_{so} \tau_{ssoo} + (C_o - C_{so}) \tau_{oo} + (C_s - C_{so}) \tau_{ss} \\
+            &\quad + 1 - C_s - C_o + C_{so}
 
     Parameters
     ----------
