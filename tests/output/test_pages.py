@@ -49,3 +49,9 @@ def test_a_name_without_a_value_is_an_error(template):
 
 def test_versions_are_on_every_page(template):
     assert f"matplotlib {matplotlib.__version__}" in pages.html(template(""))
+
+
+@pytest.mark.parametrize(("value", "sign", "text"), [(-4e-4, True, "0.000"), (4e-4, True, "0.000"), (-0.0, False, "0.000"),
+                                                     (-6e-4, True, "−0.001"), (6e-4, True, "+0.001")])  # fmt: skip
+def test_zero_has_no_sign(value, sign, text):
+    assert pages.fixed(value, 3, sign=sign) == text
