@@ -14,7 +14,7 @@ _BRACKET = re.compile(r"\[[^\]\[`\"']*\]")
 _UNIT = re.compile(r"\b(m|km|cm|um|sr|g|kg|ug|K|pixel)(-?[1-4])\b")
 _RAISED = str.maketrans("-1234", "⁻¹²³⁴")
 _SEPARATOR = re.compile(r"([,;])\s*(\\q?quad)\s+")
-_WIDEST = 28
+_WIDEST = 26
 
 
 def readable(lines):
