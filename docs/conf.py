@@ -165,7 +165,9 @@ def _signature(app, what, name, obj, options, signature, returns):
 def setup(app):
     app.connect("autodoc-process-signature", _signature)
     app.connect("source-read", _link_identifiers)
-    app.connect("autodoc-process-docstring", _docstring, priority=100)  # before numpydoc reads it
+    app.connect(
+        "autodoc-process-docstring", _docstring, priority=100
+    )  # before numpydoc reads it
     app.connect("builder-inited", _thumbnails, priority=900)  # after the gallery is drawn
     app.add_role("cite", _cite)
     app.connect("autodoc-skip-member", _skip)

@@ -3,8 +3,9 @@
 import re
 from importlib import import_module
 
-import fifesim
 import make_api
+
+import fifesim
 from fifesim.accessor import PUBLIC
 
 _PATH = re.compile(r"\bfifesim(?:\.\w+)*\.(\w+)\.(\w+)\b")
@@ -40,7 +41,9 @@ def _is_code(line):
 def _linked(line):
     line = _PATH.sub(_public, line)
     line = _MODULE.sub(lambda found: _of_module(found) or found[0], line)
-    return _LINK.sub(lambda found: f"`.{found[1]}.{found[2]}`" if _known(found[1]) else found[0], line)
+    return _LINK.sub(
+        lambda found: f"`.{found[1]}.{found[2]}`" if _known(found[1]) else found[0], line
+    )
 
 
 def _public(found):
@@ -70,9 +73,12 @@ def _known(module):
 
 def _raised(line):
     """Units with their exponents raised, which no line breaks: m-2 is m⁻²."""
-    return _BRACKET.sub(
-        lambda found: _UNIT.sub(lambda unit: unit[1] + unit[2].translate(_RAISED), found[0]), line
-    )
+    return _BRACKET.sub(_raised_units, line)
+
+
+def _raised_units(found):
+    raised = _UNIT.sub(lambda unit: unit[1] + unit[2].translate(_RAISED), found[0])
+    return found[0] if raised == found[0] else raised.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _equations(lines):
@@ -119,5 +125,7 @@ def _stacked(formula):
 
 def _width(formula):
     """About how many letters wide a formula is."""
-    formula = re.sub(r"\\(left|right|mathrm|mathbf|text|[dt]?frac|,|quad|limits|operatorname)", "", formula)
+    formula = re.sub(
+        r"\\(left|right|mathrm|mathbf|text|[dt]?frac|,|quad|limits|operatorname)", "", formula
+    )
     return len(re.findall(r"\\[a-zA-Z]+|[^\s{}^_\\]", formula))

@@ -51,7 +51,8 @@ def test_versions_are_on_every_page(template):
     assert f"matplotlib {matplotlib.__version__}" in pages.html(template(""))
 
 
-@pytest.mark.parametrize(("value", "sign", "text"), [(-4e-4, True, "0.000"), (4e-4, True, "0.000"), (-0.0, False, "0.000"),
-                                                     (-6e-4, True, "−0.001"), (6e-4, True, "+0.001")])  # fmt: skip
-def test_zero_has_no_sign(value, sign, text):
-    assert pages.fixed(value, 3, sign=sign) == text
+def test_zero_has_no_sign():
+    assert [pages.fixed(value, 3, sign=True) for value in (-4e-4, 4e-4, -6e-4, 6e-4)] == [
+        "0.000", "0.000", "−0.001", "+0.001",
+    ]  # fmt: skip
+    assert pages.fixed(-0.0, 3) == "0.000"

@@ -71,7 +71,8 @@ def environment(sums, surroundings, spread):
 
     .. math::
 
-        \langle \rho \rangle = \rho_\mathrm{out} + \frac{K * \left[ m (\rho - \rho_\mathrm{out}) \right]}{1 - K * (i - m)}
+        \langle \rho \rangle = \rho_\mathrm{out}
+            + \frac{K * \left[ m (\rho - \rho_\mathrm{out}) \right]}{1 - K * (i - m)}
 
     with K the point spread, i what lies inside of the scene and m what of it is valid.
 

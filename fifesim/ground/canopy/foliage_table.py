@@ -25,7 +25,8 @@ class FoliageTable(NamedTuple):
     Tensor product of uniform cubic B-splines.
 
     The axes are :math:`1 - 1 / \sqrt{1 + a L}` with the rate a; and :math:`q / (1 + q)` with
-    :math:`q^2 = f_B / (1 - f_B)`, on which a thin layer above or below a thick one has no steep side. Where the dead share is one number, its axis has one node.
+    :math:`q^2 = f_B / (1 - f_B)`, on which a thin layer above or below a thick one has no steep side. Where the dead
+    share is one number, its axis has one node.
     """
 
     rate: float

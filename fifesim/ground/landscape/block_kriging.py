@@ -3,7 +3,8 @@ Cells from means over pixels: block kriging of the autoregressive process on a s
 
 A field x of cells is a trend plus the process. Its means over pixels, :math:`B x`, are known to be m. The best linear
 estimate of the cells is :math:`K m` with :math:`K = C B^T (B C B^T)^{-1}`, and any field z of the same law becomes one
-with these means as :math:`z + K (m - B z)`. Pixels are whole numbers of cells, so that K is a filter, which a Fourier transform applies exactly.
+with these means as :math:`z + K (m - B z)`. Pixels are whole numbers of cells, so that K is a filter, which a Fourier
+transform applies exactly.
 """
 
 import numpy as np
