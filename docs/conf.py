@@ -17,6 +17,7 @@ from sphinx.ext import autosummary
 import fifesim
 
 sys.path.insert(0, str(Path(__file__).parent))
+import docstrings
 import make_api
 import make_bounds
 
@@ -105,9 +106,11 @@ def _skip(app, what, name, obj, skip, options):
     return True if made else None
 
 
-def _cite_tables(app, what, name, obj, options, lines):
-    """The page that shows the list of tables, in the place of its path in the repository."""
-    lines[:] = [line.replace("``data/README.md``", ":doc:`/data`") for line in lines]
+def _docstring(app, what, name, obj, options, lines):
+    """A docstring as a page shows it, with the list of tables in the place of its path in the repository."""
+    lines[:] = docstrings.readable(
+        [line.replace("``data/README.md``", ":doc:`/data`") for line in lines]
+    )
 
 
 def _thumbnails(app):
@@ -149,16 +152,22 @@ def _link_identifiers(app, docname, source):
 
 
 def _signature(app, what, name, obj, options, signature, returns):
-    """The sections of a scenario by name: their defaults, all keys with their values, fill a page."""
+    """
+    Signatures to read: defaults that are made anew and functions as `...`.
+
+    A scenario has its sections by name, for their defaults, all keys with their values, fill a page.
+    """
     if name == "fifesim.Scenario":
         return f"(*, {', '.join(obj.model_fields)})", returns
-    return None
+    return signature and re.sub(r"<(factory|built-in function \w+)>", "...", signature), returns
 
 
 def setup(app):
     app.connect("autodoc-process-signature", _signature)
     app.connect("source-read", _link_identifiers)
-    app.connect("autodoc-process-docstring", _cite_tables)
+    app.connect(
+        "autodoc-process-docstring", _docstring, priority=100
+    )  # before numpydoc reads it
     app.connect("builder-inited", _thumbnails, priority=900)  # after the gallery is drawn
     app.add_role("cite", _cite)
     app.connect("autodoc-skip-member", _skip)

@@ -10,6 +10,12 @@ PAGES = Path(__file__).parent / "api"
 PACKAGE = Path(fifesim.__file__).parent
 PHYSICS = ("base", "ground", "atmosphere", "sensor", "analysis")
 
+# Modules of the lowest folder that have no formula.
+_MACHINERY = {
+    f"base.{name}"
+    for name in ("arguments", "datasets", "fife", "foreign", "kinds", "logs", "metadata")
+} | {f"base.{name}" for name in ("methods", "refusals", "spelling", "times", "warned")}
+
 # Functions of a module of the API that is public as a whole.
 _BESIDE = {"Atmosphere": ["atmosphere.spectrum"]}
 
@@ -79,7 +85,9 @@ def modules():
     return [
         name
         for name in dotted
-        if not name.endswith((".raster", ".annotations")) and ".rasters." not in name
+        if not name.endswith((".raster", ".annotations"))
+        and ".rasters." not in name
+        and name not in _MACHINERY
     ]
 
 
@@ -96,7 +104,8 @@ def physics():
     parts = [_heading("Physics", text)]
     for folder, names in groupby(modules(), key=lambda name: name.rpartition(".")[0]):
         parts.append(
-            f"\n.. rubric:: {folder.replace('.', ', ')}\n" + _summary(list(names), options)
+            f"\n.. rubric:: {folder.replace('.', ', ')}\n"
+            + _summary([f"~{name}" for name in names], options)
         )
     return "".join(parts)
 

@@ -2,6 +2,8 @@
 
 import importlib
 import re
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,8 @@ from fifesim.accessor import PUBLIC
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 
+# A block of Python, and what it prints where the page shows it.
+_BLOCK = re.compile(r"^```python\n(.*?)^```$(?:\n+```text\n(.*?)^```$)?", re.DOTALL | re.MULTILINE)
 _CITED = re.compile(r"\[([A-Za-z]+\d{4})\]_")
 
 
@@ -23,7 +27,7 @@ def api(monkeypatch):
 
 def python_blocks(path):
     """Blocks that a page shows as Python, but for those marked ``no-run``."""
-    return re.findall(r"^```python\n(.*?)^```", path.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    return [block for block, _ in _BLOCK.findall(path.read_text(encoding="utf-8"))]
 
 
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted((DOCS / "howto").glob("*.md"))]
@@ -34,8 +38,12 @@ def test_code_of_a_page_runs(page, tmp_path, monkeypatch):
     """Blocks run in order and share their names, as a reader runs them."""
     monkeypatch.chdir(tmp_path)
     names = {}
-    for block in python_blocks(ROOT / page):
-        exec(compile(block, page, "exec"), names)
+    for block, printed in _BLOCK.findall((ROOT / page).read_text(encoding="utf-8")):
+        told = StringIO()
+        with redirect_stdout(told):
+            exec(compile(block, page, "exec"), names)
+        # What a page shows below a block is what the block prints.
+        assert not printed or told.getvalue().split() == printed.split()
 
 
 def test_scenario_and_instrument_of_the_pages_are_valid(tmp_path):

@@ -57,8 +57,8 @@ def enhanced(nir, red, blue):
 
     Examples
     --------
-    >>> float(enhanced(0.5, 0.1, 0.08))
-    0.6666666666666666
+    >>> round(float(enhanced(0.5, 0.1, 0.08)), 3)
+    0.667
     """
     nir, red, blue = (np.asarray(each, float) for each in (nir, red, blue))
     return _ratio(2.5 * (nir - red), nir + 6 * red - 7.5 * blue + 1)
@@ -89,8 +89,8 @@ def enhanced_of_two_bands(nir, red):
 
     Examples
     --------
-    >>> round(float(enhanced_of_two_bands(0.5, 0.1)), 12)
-    0.574712643678
+    >>> round(float(enhanced_of_two_bands(0.5, 0.1)), 3)
+    0.575
     """
     nir, red = np.asarray(nir, float), np.asarray(red, float)
     return _ratio(2.5 * (nir - red), nir + 2.4 * red + 1)

@@ -33,6 +33,7 @@ class Regression:
 
     Examples
     --------
+    >>> from fifesim import Regression
     >>> line = {"slope": 4.0, "intercept": -0.7, "r2": 0.9, "n": 100, "residual_deviation": 0.1}
     >>> fit = Regression(**line, x_mean=0.5, x_sum_of_squares=0.8)
     >>> fit.predict(0.5)

@@ -43,6 +43,7 @@ class Geometry:
 
     Examples
     --------
+    >>> from fifesim import Geometry
     >>> Geometry(sza=30, saa=120, vza=10, vaa=290).raa
     170.0
     """
@@ -263,6 +264,7 @@ def fife_geometry() -> Geometry:
 
     Examples
     --------
+    >>> from fifesim import fife_geometry
     >>> round(fife_geometry().sza, 1)
     28.5
     """

@@ -238,8 +238,8 @@ def spectral_adjustment(
     --------
     >>> import fifesim
     >>> lines = fifesim.spectral_adjustment("MSI", "OLI", bands=["OLI4"])
-    >>> lines.source_band.values, lines.slope.round(2).values
-    (array(['MSI4'], dtype='<U4'), array([0.96]))
+    >>> lines.source_band.item(), lines.slope.round(2).item()
+    ('MSI4', 0.96)
     """
     source, target = find_instrument(source), find_instrument(target)
     to = target.select(bands) if bands is not None else [band for band in target.bands if _beside(source.bands, band)]

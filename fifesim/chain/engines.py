@@ -65,6 +65,7 @@ def compare_engines(
 
     Examples
     --------
+    >>> from fifesim import Atmosphere, Setup, compare_engines
     >>> haze = Setup(atmosphere=Atmosphere(visibility=8), bands=("TM3", "TM4"))
     >>> compare_engines(haze, engines=["5S"])["toa_reflectance"].dims
     ('engine', 'band')

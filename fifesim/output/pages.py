@@ -83,7 +83,7 @@ def fixed(value, digits=2, sign=False):
     digits : int, optional
         After the point.
     sign : bool, optional
-        Also of positive numbers.
+        Also of positive numbers; what is printed as zero has none.
 
     Returns
     -------
@@ -92,14 +92,14 @@ def fixed(value, digits=2, sign=False):
 
     Examples
     --------
-    >>> fixed(-0.125), fixed(0.5, 1, sign=True), fixed(-1e-9), fixed(None)
-    ('−0.12', '+0.5', '0.00', '–')
+    >>> fixed(-0.125), fixed(0.5, 1, sign=True), fixed(-1e-9), fixed(-1e-9, 3, sign=True), fixed(None)
+    ('−0.12', '+0.5', '0.00', '0.000', '–')
     """
     if value is None or not np.isfinite(value):
         return "–"
     text = f"{value:{'+' if sign else ''}.{digits}f}"
-    if not sign and float(text) == 0:
-        text = text.lstrip("-")
+    if float(text) == 0:
+        text = text.lstrip("+-")
     return text.replace("-", "−")
 
 

@@ -141,7 +141,7 @@ def plot_fit(
     y, x : xarray.DataArray, dims (y, x), optional
         What was given to `fifesim.regress`; large ones are thinned before they are computed.
     pair : {"coordinates", "index"}, optional
-        As there.
+        As in `fifesim.regress`.
     level : float, optional
         Of the prediction interval. [1]
     axes : matplotlib.axes.Axes, optional

@@ -46,12 +46,12 @@ def grid_at(crs: MaybeCRS, west: float, north: float, width: float, height: floa
     Raises
     ------
     ValueError
-        If there is no such CRS, it is not one that `check_grid` passes, or the size holds no cell.
+        If there is no such CRS, it is not projected or not in metres, or the size holds no cell.
 
     Examples
     --------
     >>> import fifesim
-    >>> grid = fifesim.grid_at("EPSG:32633", west=390000, north=5820000, width=300, height=200, cell=5)
+    >>> grid = fifesim.grid_at("EPSG:32633", 390000, 5820000, width=300, height=200, cell=5)
     >>> grid.shape, grid.resolution.x
     (Shape2d(x=60, y=40), 5.0)
     """

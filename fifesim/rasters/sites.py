@@ -47,6 +47,7 @@ def fife_site(
 
     Examples
     --------
+    >>> from fifesim import fife_site
     >>> fife_site(30).shape
     Shape2d(x=500, y=500)
     """

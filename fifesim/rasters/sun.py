@@ -50,6 +50,7 @@ def sun_position(
 
     Examples
     --------
+    >>> from fifesim import sun_position
     >>> season = sun_position(["1987-06-06T16:35Z", "1987-12-06T16:35Z"], 39.06, -96.54)
     >>> season["sza"].round(1).values.tolist()
     [28.5, 66.0]

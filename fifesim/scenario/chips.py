@@ -135,7 +135,8 @@ def chips_of(study: Study, n: int) -> Chips:
     >>> chips = fifesim.chips_of(study, 20)
     >>> np.bincount(chips.landscape).tolist()
     [2, 2, 2, 2, 2, 2, 2, 2, 2, 2]
-    >>> chips.scenario(3).atmosphere.visibility == float(chips.table()["atmosphere.visibility"][3])
+    >>> drawn = chips.table()["atmosphere.visibility"]
+    >>> chips.scenario(3).atmosphere.visibility == float(drawn[3])
     True
     """
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:

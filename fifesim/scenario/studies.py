@@ -73,6 +73,7 @@ class Study:
 
     Examples
     --------
+    >>> from fifesim import Scenario, Study
     >>> chip = Scenario(grid={"width": 180, "height": 180}, terrain={"dem": "flat"})
     >>> study = Study(chip, {"visibility": {"uniform": [10, 60]}}, landscapes=10)
     >>> study.quotas()
@@ -166,6 +167,7 @@ def read_study(path: FilePath) -> Study:
 
     Examples
     --------
+    >>> from fifesim import read_study
     >>> study = read_study("study.toml")  # doctest: +SKIP
     """
     values = load_values(path)

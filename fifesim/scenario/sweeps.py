@@ -59,10 +59,11 @@ def sweep(
     Raises
     ------
     ValueError
-        If an axis has no values or is no key
+        If an axis has no values or is no key.
 
     Examples
     --------
+    >>> from fifesim import Scenario, sweep
     >>> fit = sweep(Scenario(), {"arp": [0.05, 0.15, 0.24], "visibility": [10.0, 45.0]})
     >>> dict(fit.r2.sizes)
     {'arp': 3, 'visibility': 2, 'variable': 2}

@@ -49,3 +49,10 @@ def test_a_name_without_a_value_is_an_error(template):
 
 def test_versions_are_on_every_page(template):
     assert f"matplotlib {matplotlib.__version__}" in pages.html(template(""))
+
+
+def test_zero_has_no_sign():
+    assert [pages.fixed(value, 3, sign=True) for value in (-4e-4, 4e-4, -6e-4, 6e-4)] == [
+        "0.000", "0.000", "−0.001", "+0.001",
+    ]  # fmt: skip
+    assert pages.fixed(-0.0, 3) == "0.000"

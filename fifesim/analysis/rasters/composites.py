@@ -65,7 +65,8 @@ def composite(
     >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
     >>> clear = image.fifesim.to_reflectance()
     >>> dates = np.array(["1987-06-06T16:35", "1987-06-22T16:35"], "datetime64[ns]")
-    >>> stack = xr.concat([0.5 * clear + 0.1, clear], xr.DataArray(dates, dims="time", name="time"))
+    >>> time = xr.DataArray(dates, dims="time", name="time")
+    >>> stack = xr.concat([0.5 * clear + 0.1, clear], time)
     >>> best = stack.fifesim.composite()
     >>> bool((best.date == dates[1]).all())
     True

@@ -23,10 +23,10 @@ def environment_function(radius, vza=0.0):
 
     .. math::
 
-        F_R &= 1 - 0.930 \, e^{-0.080 r} - 0.070 \, e^{-1.10 r}, \qquad
-        F_A = 1 - 0.448 \, e^{-0.27 r} - 0.552 \, e^{-2.83 r} \\
-        F_R' &= F_R \left[ 1 + L (1 - F_R) \right], \qquad
-        F_A' = F_A \left[ 1 + a + b F_A - (a + b) F_A^2 \right]
+        F_R &= 1 - 0.930 \, e^{-0.080 r} - 0.070 \, e^{-1.10 r} \\
+        F_A &= 1 - 0.448 \, e^{-0.27 r} - 0.552 \, e^{-2.83 r} \\
+        F_R' &= F_R \left[ 1 + L (1 - F_R) \right] \\
+        F_A' &= F_A \left[ 1 + a + b F_A - (a + b) F_A^2 \right]
 
     with r in km, :math:`L = \ln \mu_v`, :math:`a = 1.3347 L + 0.57757 L^2` and :math:`b = -1.479 L - 1.5275 L^2`.
 

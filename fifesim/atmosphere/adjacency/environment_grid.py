@@ -71,7 +71,8 @@ def environment(sums, surroundings, spread):
 
     .. math::
 
-        \langle \rho \rangle = \rho_{out} + \frac{K * \left[ m (\rho - \rho_{out}) \right]}{1 - K * (i - m)}
+        \langle \rho \rangle = \rho_\mathrm{out}
+            + \frac{K * \left[ m (\rho - \rho_\mathrm{out}) \right]}{1 - K * (i - m)}
 
     with K the point spread, i what lies inside of the scene and m what of it is valid.
 
@@ -80,13 +81,13 @@ def environment(sums, surroundings, spread):
     sums : array, shape (2, 1, 1, y, x)
         Of the scene's reflectance, from `block_sums`.
     surroundings : None, float or array, shape (y, x) with the margins
-        :math:`\rho_{out}`: the scene's mean, a number, or that of the blocks with their mean beyond them. [1]
+        :math:`\rho_\mathrm{out}`: the scene's mean, a number, or that of the blocks with their mean beyond them. [1]
     spread : Spread
 
     Returns
     -------
     environment : array, shape (y + 2, x + 2)
-        NaN if there is no valid cell to tell :math:`\rho_{out}`. [1]
+        NaN if there is no valid cell to tell :math:`\rho_\mathrm{out}`. [1]
 
     References
     ----------

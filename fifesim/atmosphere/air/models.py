@@ -85,6 +85,7 @@ class Atmosphere:
     --------
     The text that travels with the data says all:
 
+    >>> from fifesim import Atmosphere
     >>> Atmosphere.parse(Atmosphere(visibility=23).text) == Atmosphere(visibility=23)
     True
     """

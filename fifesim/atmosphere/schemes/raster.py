@@ -53,6 +53,15 @@ def spectrum(atmosphere: Atmosphere | None = None, geometry: Directions | None =
     See Also
     --------
     fifesim.atmosphere.schemes.engines.band_terms
+
+    Examples
+    --------
+    Water vapour takes nothing at 0.865 um, and more than half of the light at 0.94 um:
+
+    >>> from fifesim import atmosphere
+    >>> light = atmosphere.spectrum()
+    >>> light.gas_transmittance.sel(wavelength=[0.865, 0.94]).round(2).values.tolist()
+    [1.0, 0.44]
     """
     atmosphere = Atmosphere() if atmosphere is None else atmosphere
     geometry = directions.uniform_geometry(fife_geometry() if geometry is None else geometry, "spectrum")

@@ -19,11 +19,10 @@ def sobolev_conservative_reflectance(tau, phase, mu_s, mu_v):
 
     .. math::
 
-        \rho = 1 - \frac{R(\mu_s) R(\mu_v)}{4 + 3 \tau}
-            + \left[P - 2 (\mu_s + \mu_v) + 3 \mu_s \mu_v\right] \frac{1 - e^{-m \tau}}{4 (\mu_s + \mu_v)}
-
-        R(\mu) = 1 + \tfrac{3}{2} \mu + \left(1 - \tfrac{3}{2} \mu\right) e^{-\tau / \mu}, \qquad
-        m = \frac{1}{\mu_s} + \frac{1}{\mu_v}
+        \rho &= 1 - \frac{R(\mu_s) R(\mu_v)}{4 + 3 \tau} \\
+            &\quad + \left[P - 2 (\mu_s + \mu_v) + 3 \mu_s \mu_v\right] \frac{1 - e^{-m \tau}}{4 (\mu_s + \mu_v)} \\
+        R(\mu) &= 1 + \tfrac{3}{2} \mu + \left(1 - \tfrac{3}{2} \mu\right) e^{-\tau / \mu} \\
+        m &= \frac{1}{\mu_s} + \frac{1}{\mu_v}
 
     Parameters
     ----------

@@ -34,8 +34,8 @@ def path_reflectance(
 
     .. math::
 
-        \rho = \rho_1 + \frac{1}{\mu_s} \sum_m (-1)^m \cos(m \, raa) \int J^m(\tau, \mu_v)
-            e^{-\tau / \mu_v} \frac{\mathrm{d}\tau}{\mu_v}
+        \rho &= \rho_1 + \frac{1}{\mu_s} \sum_m (-1)^m \cos(m \, \mathrm{raa}) \, I^m, \\
+        I^m &= \int J^m(\tau, \mu_v) \, e^{-\tau / \mu_v} \frac{\mathrm{d}\tau}{\mu_v}
 
     :math:`\rho_1`, the light scattered once, has the whole phase function; :math:`J^m` is the source of the light that
     is scattered more often, its forward peak counted as not scattered.

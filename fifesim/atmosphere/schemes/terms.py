@@ -165,7 +165,7 @@ def band_means(scattering, nodes, atmosphere, bands, sza, vza):
 
         T_g = \frac{\langle T_g T T \rangle}{\langle T \rangle \langle T \rangle}, \qquad
         S = \frac{\langle S \, T_g T T \rangle}{\langle T_g T T \rangle}, \qquad
-        \rho_a = \frac{\langle (\rho_a - \rho_R) T_g + \rho_R T_g^{dry} \rangle}{T_g}
+        \rho_a = \frac{\langle (\rho_a - \rho_R) T_g + \rho_R T_g^\mathrm{dry} \rangle}{T_g}
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def band_means(scattering, nodes, atmosphere, bands, sza, vza):
     -----
     These means make the band's reflectance equal to the mean over the spectrum at first and second order in the
     surface reflectance. Molecules scatter above the water vapour and are not dimmed by it
-    (:math:`T_g^{dry}` leaves it out); aerosol mixes with it. The gases do not enter the flux at the ground.
+    (:math:`T_g^\mathrm{dry}` leaves it out); aerosol mixes with it. The gases do not enter the flux at the ground.
 
     References
     ----------

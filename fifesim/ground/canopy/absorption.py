@@ -87,8 +87,8 @@ def green_fpar(lai, extinction, brown, dissociation=0.0, fpar_inf=FPAR_INF):
 
     .. math::
 
-        \mathrm{FPAR}_g = \mathrm{FPAR}_\infty \left[ (1 - b_1) \left( 1 - e^{-K L_1} \right)
-            + (1 - b_2) \, e^{-K L_1} \left( 1 - e^{-K L_2} \right) \right]
+        \mathrm{FPAR}_g = \mathrm{FPAR}_\infty \, \big[ &(1 - b_1) \left( 1 - e^{-K L_1} \right) \\
+            &+ (1 - b_2) \, e^{-K L_1} \left( 1 - e^{-K L_2} \right) \big]
 
     Parameters
     ----------

@@ -21,8 +21,8 @@ def with_background(canopy, background):
 
     .. math::
 
-        r_{so}^* = r_{so} + (\tau_{ssoo} - \tau_{ss} \tau_{oo}) \, r
-            + (\tau_{ss} + \tau_{sd}) \, \frac{r}{1 - r \, r_{dd}} \, (\tau_{oo} + \tau_{do})
+        r_{so}^* &= r_{so} + (\tau_{ssoo} - \tau_{ss} \tau_{oo}) \, r \\
+            &\quad + (\tau_{ss} + \tau_{sd}) \, \frac{r}{1 - r \, r_{dd}} \, (\tau_{oo} + \tau_{do})
 
     and likewise, without the second term, for the other three; :math:`r_{dd}` is that of light from below.
 

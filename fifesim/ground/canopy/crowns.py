@@ -67,8 +67,8 @@ def crown_shares(crown_cover, crown_shape, sza, vza, raa):
 
     Examples
     --------
-    >>> crown_shares(1.0, 1.0, 60.0, 0.0, 0.0).both
-    np.float64(1.0)
+    >>> float(crown_shares(1.0, 1.0, 60.0, 0.0, 0.0).both)
+    1.0
     """
     gap = 1 - np.asarray(crown_cover, float)
     sun_path, view_path = (1 / np.cos(np.radians(np.asarray(angle, float))) for angle in (sza, vza))
@@ -88,8 +88,8 @@ def clumped(canopy, shares):
     .. math::
 
         \tau_{ss}' &= 1 - C_s + C_s \tau_{ss} \\
-        \tau_{ssoo}' &= C_{so} \tau_{ssoo} + (C_o - C_{so}) \tau_{oo} + (C_s - C_{so}) \tau_{ss}
-            + 1 - C_s - C_o + C_{so}
+        \tau_{ssoo}' &= C_{so} \tau_{ssoo} + (C_o - C_{so}) \tau_{oo} + (C_s - C_{so}) \tau_{ss} \\
+            &\quad + 1 - C_s - C_o + C_{so}
 
     Parameters
     ----------

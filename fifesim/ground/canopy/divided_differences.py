@@ -16,9 +16,9 @@ def exponential_chain(lai, *rates):
 
     .. math::
 
-        C(L; r_0 \dots r_n) = \int\limits_{0 < t_1 < \dots < t_n < L}
+        C(L; r_0 \dots r_n) &= L^n \exp[-r_0 L, \dots, -r_n L] \\
+            &= \int\limits_{0 < t_1 < \dots < t_n < L}
             e^{-r_0 t_1 - r_1 (t_2 - t_1) - \dots - r_n (L - t_n)} \, dt_1 \dots dt_n
-            = L^n \exp[-r_0 L, \dots, -r_n L]
 
     Parameters
     ----------

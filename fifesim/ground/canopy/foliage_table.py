@@ -21,11 +21,12 @@ TERMS = 8
 
 
 class FoliageTable(NamedTuple):
-    """
+    r"""
     Tensor product of uniform cubic B-splines.
 
-    The axes are 1 - 1 / sqrt(1 + rate L); and q / (1 + q) with q^2 = fB / (1 - fB), on which a thin layer above or
-    below a thick one has no steep side. Where the dead share is one number, its axis has one node.
+    The axes are :math:`1 - 1 / \sqrt{1 + a L}` with the rate a; and :math:`q / (1 + q)` with
+    :math:`q^2 = f_B / (1 - f_B)`, on which a thin layer above or below a thick one has no steep side. Where the dead
+    share is one number, its axis has one node.
     """
 
     rate: float

@@ -75,13 +75,17 @@ def bidirectional_gap(lai, ks, ko, alpha):
 
     Notes
     -----
-    The gap fraction to relative depth x is P(x) = exp(-K L x + kappa L (1 - e^(-alpha x)) / alpha) with K = ks + ko
-    and kappa = sqrt(ks ko). Its integral to infinite depth is, by parts again and again,
+    The gap fraction to relative depth x is
 
-        sum_n (kappa L)^n / prod_j=0..n (K L + j alpha),
+    .. math:: P(x) = \exp\left[-K L x + \kappa L \, (1 - e^{-\alpha x}) / \alpha \right]
 
-    and what lies below x = 1 is P(1) times the same with kappa e^(-alpha). As kappa <= K / 2 each term is at
-    most half of the one before: 56 terms reach rounding, for any hot spot.
+    with :math:`K = k_s + k_o` and :math:`\kappa = \sqrt{k_s k_o}`. Its integral to infinite depth is, by parts again
+    and again,
+
+    .. math:: \sum_n (\kappa L)^n \Big/ \prod_{j=0}^n (K L + j \alpha)
+
+    and what lies below :math:`x = 1` is :math:`P(1)` times the same with :math:`\kappa e^{-\alpha}`. As
+    :math:`\kappa \le K / 2` each term is at most half of the one before: 56 terms reach rounding, for any hot spot.
 
     References
     ----------

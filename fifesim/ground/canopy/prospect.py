@@ -63,6 +63,7 @@ class Leaf:
 
     Examples
     --------
+    >>> from fifesim import Leaf
     >>> Leaf(water=12)
     Traceback (most recent call last):
     ...
@@ -163,10 +164,12 @@ def _column(value):
 
 
 def layer_transmissivity(absorption):
-    """
+    r"""
     Isotropic light that passes an absorbing layer, without its surfaces.
 
-    ``tau = (1 - k) exp(-k) + k^2 E1(k)``, E1 the exponential integral.
+    .. math:: \tau = (1 - k) \, e^{-k} + k^2 E_1(k)
+
+    with :math:`E_1` the exponential integral.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ def soil_line(bands):
     r"""
     Change of the reflectance of bands along the soil line, for a change of brightness.
 
-    .. math:: s_b = \frac{d_b}{d(0.55 \, \mu m)}, \quad d = r_{dry} - r_{wet}
+    .. math:: s_b = \frac{d_b}{d(0.55 \, \mathrm{\mu m})}, \quad d = r_\mathrm{dry} - r_\mathrm{wet}
 
     Parameters
     ----------

@@ -81,6 +81,7 @@ class Background:
 
     Examples
     --------
+    >>> from fifesim import Background
     >>> Background({"soil_dry": 0.6, "dead_grass": 0.4}).fractions["soil_dry"]
     0.6
     """
@@ -121,6 +122,7 @@ def check_shares(names, shares):
     Raises
     ------
     ValueError
+        If one is outside 0 to 1, or the sum is not 1.
 
     Examples
     --------

@@ -1,9 +1,10 @@
-"""
+r"""
 Cells from means over pixels: block kriging of the autoregressive process on a smooth trend.
 
-A field x of cells is a trend plus the process. Its means over pixels B x are known to be m. The best linear estimate of
-the cells is K m with K = C B' (B C B')^-1, and any field z of the same law becomes one with these means as
-z + K (m - B z). Pixels are whole numbers of cells, so that K is a filter, which a Fourier transform applies exactly.
+A field x of cells is a trend plus the process. Its means over pixels, :math:`B x`, are known to be m. The best linear
+estimate of the cells is :math:`K m` with :math:`K = C B^T (B C B^T)^{-1}`, and any field z of the same law becomes one
+with these means as :math:`z + K (m - B z)`. Pixels are whole numbers of cells, so that K is a filter, which a Fourier
+transform applies exactly.
 """
 
 import numpy as np

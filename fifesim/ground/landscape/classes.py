@@ -73,6 +73,7 @@ class CoverClass:
 
     Examples
     --------
+    >>> from fifesim import CoverClass
     >>> CoverClass("water", lai=0.0, background=0.03).hotspot is None
     True
     """
@@ -213,6 +214,7 @@ def fife_classes() -> dict[str, CoverClass]:
 
     Examples
     --------
+    >>> from fifesim import fife_classes
     >>> list(fife_classes())
     ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """

@@ -48,6 +48,7 @@ class Patches:
 
     Examples
     --------
+    >>> from fifesim import Patches
     >>> Patches("voronoi", 300, shares={"grass": 0.7, "wood": 0.3}).size
     300.0
     """

@@ -27,6 +27,7 @@ def treatments() -> list[str]:
 
     Examples
     --------
+    >>> from fifesim import treatments
     >>> treatments()
     ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """
@@ -66,6 +67,7 @@ def lai_distribution(source: FilePath | Distribution) -> Distribution:
 
     Examples
     --------
+    >>> from fifesim import lai_distribution
     >>> from scipy import stats
     >>> round(float(lai_distribution(stats.gamma(4, scale=0.4)).mean()), 2)
     1.6

@@ -43,6 +43,7 @@ class Field:
 
     Examples
     --------
+    >>> from fifesim import Field
     >>> float(Field(mean=0.2, sd=0.1).distribution("brown").mean())
     0.2
     """
@@ -73,7 +74,7 @@ class Field:
         Parameters
         ----------
         name : str
-            Of the property, one of `SHARES`.
+            Of the property, ``"moisture"``, ``"brown"`` or ``"crown_cover"``.
 
         Returns
         -------

@@ -1,9 +1,9 @@
-"""
+r"""
 Elevation onto finer cells by quintic B-splines: smooth to the fourth derivative, free of the source's facets.
 
 A spline that interpolates a lattice recovers a surface whose wavelengths are above five lattice cells within 1e-3 of
-its amplitude, and a plane exactly. What it gives at a point depends on lattice values d cells away as 0.431**d, so that
-a margin of `MARGIN` cells makes it a local operation.
+its amplitude, and a plane exactly. What it gives at a point depends on lattice values d cells away as
+:math:`0.431^d`, so that a margin of `MARGIN` cells makes it a local operation.
 """
 
 import numba

@@ -7,10 +7,12 @@ from numba import njit
 
 
 class StreamPower(NamedTuple):
-    """
+    r"""
     Law of erosion over one unit of time.
 
-    dz/dt = uplift - erodibility area**area_exponent slope + creep laplacian(z), in m and m2.
+    .. math:: \frac{\partial z}{\partial t} = U - K A^m S + D \nabla^2 z
+
+    with the uplift U, the erodibility K, the drained area A [m2] and its exponent m, the slope S and the creep D.
     """
 
     steps: int

@@ -90,6 +90,7 @@ def dataset(
 
     Examples
     --------
+    >>> from fifesim import dataset
     >>> chips = dataset("study.toml", "chips.zarr", 10_000)  # doctest: +SKIP
     >>> train = chips.sel(chip=chips.split == "train")  # doctest: +SKIP
     """

@@ -16,9 +16,11 @@ from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count,
 from fifesim.sensor.description.names import key, lookup
 from fifesim.sensor.description.performance import Product, Scan
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
+from fifesim.sensor.description.wording import worded
 from fifesim.sensor.response.noise import NoiseModel
 
 
+@worded
 @dataclass(frozen=True, config=CONFIG)
 class Instrument:
     """
@@ -39,6 +41,7 @@ class Instrument:
     lsf : response of both axes or TwoAxesResponse
         Spatial response; see `fifesim.sensor.description.spatial_response`.
     bands : tuple of InstrumentBand
+        As `fifesim.sensor.description.band` has them; at least one.
     sources : dict
         Key of ``references`` for each number; a band's own sources come first.
     references : dict
@@ -59,9 +62,8 @@ class Instrument:
 
     Raises
     ------
-    pydantic.ValidationError
-        If a value is wrong or has no source; `fifesim.sensor.description.instruments.read_instrument` names file and
-        key.
+    ValueError
+        If an argument is missing or unknown, or a value is wrong or has no source.
 
     Examples
     --------

@@ -15,9 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from fifesim.base import datasets
 from fifesim.base.annotations import FilePath
-from fifesim.base.foreign import in_a_line, read_toml, shown
-from fifesim.base.refusals import in_own_words
-from fifesim.base.spelling import nearest
+from fifesim.base.foreign import in_a_line, read_toml
 from fifesim.sensor.description.band import InstrumentBand
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import key, lookup
@@ -25,9 +23,7 @@ from fifesim.sensor.description.performance import Noise, Product, Scan
 from fifesim.sensor.description.plausibility import check_units
 from fifesim.sensor.description.responses import with_response
 from fifesim.sensor.description.short_file import completed
-
-# Keys whose value has several forms: what follows them in the place of an error is the form's name.
-_FORMS = ("srf", "lsf", "interval", "ifov")
+from fifesim.sensor.description.wording import in_words
 
 # What a misspelt key may be; those of short files among them.
 _KEYS = {each.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan) for each in fields(kind)} | {
@@ -63,6 +59,7 @@ def instrument(
 
     Examples
     --------
+    >>> from fifesim import instrument
     >>> tm = instrument("tm")
     >>> tm.name, round(tm.line_spread.width, 2), round(tm.ground_interval, 3)
     ('TM', 30.32, 30.315)
@@ -113,6 +110,7 @@ def instrument_names() -> tuple[str, ...]:
 
     Examples
     --------
+    >>> from fifesim import instrument_names
     >>> "TM" in instrument_names()
     True
     """
@@ -145,7 +143,8 @@ def read_instrument(path: FilePath) -> Instrument:
     >>> from pathlib import Path
     >>> from tempfile import mkdtemp
     >>> import fifesim
-    >>> bands = '{ name = "red", center = 0.668, width = 0.010 }, { name = "nir", center = 0.840, width = 0.040 }'
+    >>> bands = '{ name = "red", center = 0.668, width = 0.010 }, '
+    >>> bands += '{ name = "nir", center = 0.840, width = 0.040 }'
     >>> path = Path(mkdtemp()) / "camera.toml"
     >>> text = f'name = "Camera"\\naltitude = 120.0\\ngsd = 0.1\\nbits = 12\\nbands = [{bands}]\\n'
     >>> _ = path.write_text(text, encoding="utf-8")
@@ -224,8 +223,7 @@ def _parse(path):
     try:
         return TypeAdapter(Instrument).validate_python(_with_folder(content, path.parent))
     except ValidationError as error:
-        reasons = "; ".join(_explain(item) for item in error.errors())
-        raise ValueError(in_a_line(f"{path.name}: {reasons}")) from None
+        raise ValueError(in_a_line(f"{path.name}: {in_words(error, _KEYS)}")) from None
 
 
 def _with_folder(content, folder):
@@ -236,37 +234,6 @@ def _with_folder(content, folder):
         if isinstance(srf, dict) and "table" in srf:
             srf["folder"] = str(folder)
     return content
-
-
-def _explain(error):
-    """One line that names the key, its value and what is allowed; bands count from 1."""
-    key = ".".join(_key_parts(error["loc"]))
-    if error["type"] == "unexpected_keyword_argument":
-        hint = nearest(str(error["loc"][-1]), _KEYS).removesuffix("? ")
-        return f"unknown key {key}, {hint}" if hint else f"unknown key {key}"
-    if error["type"] == "missing":
-        return f"the key {key} is missing"
-    if error["type"] == "union_tag_invalid":
-        return f"{key}.kind = {shown(error['ctx']['tag'])}: it must be one of {error['ctx']['expected_tags']}"
-    if error["type"] == "union_tag_not_found":
-        return f"the key {key}.kind is missing"
-    if error["type"] == "value_error":
-        return ": ".join(filter(None, (key, str(error["ctx"]["error"]))))
-    return f"{key} = {shown(error['input'])}: {in_own_words(error)}"
-
-
-def _key_parts(places):
-    """Keys of a place in the file, without the names of the forms that a value may have."""
-    places = list(places)
-    while places:
-        part = places.pop(0)
-        yield str(part + 1) if isinstance(part, int) else part
-        if part in _FORMS and places:
-            form = places.pop(0)
-            if part == "lsf" and form == "axes" and places:
-                yield places.pop(0)
-            if part == "lsf" and places and places[0] in ("cosine", "boxcar", "gaussian", "table", "system"):
-                places.pop(0)
 
 
 @lru_cache

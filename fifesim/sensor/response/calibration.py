@@ -9,7 +9,7 @@ def gain_offset(full_scale_radiance, min_radiance, bits):
     r"""
     Gain and offset of a linear calibration.
 
-    .. math:: g = \frac{L_{max} - L_{min}}{2^b - 1}, \qquad o = L_{min}
+    .. math:: g = \frac{L_\mathrm{max} - L_\mathrm{min}}{2^b - 1}, \qquad o = L_\mathrm{min}
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def gain_offset(full_scale_radiance, min_radiance, bits):
 
     References
     ----------
-    [Chander2009]_, Eq. 1, with the calibrated counts 0 to 2^b - 1; [Friedl1995]_, Table 1
+    [Chander2009]_, Eq. 1, with the calibrated counts 0 to :math:`2^b - 1`; [Friedl1995]_, Table 1
 
     Examples
     --------

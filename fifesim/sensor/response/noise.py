@@ -54,7 +54,7 @@ class NoiseModel:
 
     Examples
     --------
-    >>> from fifesim.sensor.response.noise import NoiseModel
+    >>> from fifesim import NoiseModel
     >>> NoiseModel(thermal=0.1, shot=0.01).detectors
     1
     """

@@ -25,11 +25,11 @@ class CosineSpread(FiniteSpread):
 
     .. math::
 
-        w(x) &= \cos\frac{2 \pi x}{3 W}, \qquad |x| \le W / 2 \\
+        w(x) &= \cos\frac{2 \pi x}{3 W}, \quad |x| \le W / 2 \\
         C(x) &= \frac{1}{2} + \frac{1}{\sqrt{3}} \sin\frac{2 \pi x}{3 W} \\
-        M(f) &= \frac{\pi}{3 \sqrt{3}} \left[ \mathrm{sinc}\left(\frac{1}{3} - f W\right)
-            + \mathrm{sinc}\left(\frac{1}{3} + f W\right) \right],
-        \qquad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}
+        M(f) &= \frac{\pi}{3 \sqrt{3}} \left[ \mathrm{sinc}\left(\tfrac{1}{3} - f W\right)
+            + \mathrm{sinc}\left(\tfrac{1}{3} + f W\right) \right] \\
+        \mathrm{sinc}\,t &= \frac{\sin \pi t}{\pi t}
 
     References
     ----------

@@ -72,8 +72,9 @@ def footprint_operator(footprints, rows, columns):
 
     .. math::
 
-        w_{ij} \propto \sum_k \left[ C_{along}(u + \tfrac{a}{2}) - C_{along}(u - \tfrac{a}{2}) \right]
-            \left[ C_{across}(v + \tfrac{b}{2}) - C_{across}(v - \tfrac{b}{2}) \right]
+        w_{ij} \propto \sum_k
+            &\left[ C_\mathrm{along}(u + \tfrac{a}{2}) - C_\mathrm{along}(u - \tfrac{a}{2}) \right] \\
+            \cdot &\left[ C_\mathrm{across}(v + \tfrac{b}{2}) - C_\mathrm{across}(v - \tfrac{b}{2}) \right]
 
     over pieces k of cell j, which lie at u along and v across the track from the centre of pixel i. A piece stands for
     an upright rectangle of sides a and b with its own second moments; on a grid along the track that is exact.

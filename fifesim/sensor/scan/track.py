@@ -41,7 +41,7 @@ class Track:
 
     Examples
     --------
-    >>> from fifesim.sensor.scan.track import Track
+    >>> from fifesim import Track
     >>> Track(latitude=39.1, longitude=-96.6, heading=190.0).heading
     190.0
     """

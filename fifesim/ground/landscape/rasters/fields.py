@@ -105,7 +105,8 @@ def correlated_fields(
     >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
     >>> pairs = {("lai", "soil"): -0.4}
     >>> fields = fifesim.correlated_fields(grid, {"lai": 0.15, "soil": 0.15}, pairs, seed=7)
-    >>> bool(-0.5 < np.corrcoef(fields["lai"].values.ravel(), fields["soil"].values.ravel())[0, 1] < -0.3)
+    >>> lai, soil = (fields[name].values.ravel() for name in ("lai", "soil"))
+    >>> bool(-0.5 < np.corrcoef(lai, soil)[0, 1] < -0.3)
     True
     """
     options = {"coarser": coarser, "seed": seed, "covariates": covariates, "reference": reference, "chunks": chunks}

@@ -78,7 +78,8 @@ def calibrate(
     >>> lai = fifesim.lai_scene(grid, seed=7)
     >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
     >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
-    >>> counts = image.drop_vars(["gain", "offset"]).drop_attrs().rio.write_crs(grid.crs.to_wkt())
+    >>> counts = image.drop_vars(["gain", "offset"]).drop_attrs()
+    >>> counts = counts.rio.write_crs(grid.crs.to_wkt())
     >>> again = counts.fifesim.calibrate("TM", time="1987-06-06T16:35Z")
     >>> bool(abs(again.fifesim.ndvi() - image.fifesim.ndvi()).max() < 1e-3)
     True

@@ -96,6 +96,7 @@ def open_landsat(
 
     Examples
     --------
+    >>> import fifesim
     >>> product = "LT05_L1TP_028033_19870606_20201014_02_T1_MTL.txt"
     >>> image = fifesim.open_landsat(product)  # doctest: +SKIP
     >>> image.fifesim.to_surface().fifesim.ndvi()  # doctest: +SKIP

@@ -112,6 +112,7 @@ def open_sentinel2(
 
     Examples
     --------
+    >>> import fifesim
     >>> product = "S2A_MSIL2A_20220603T171901_N0510_R012_T14SPJ_20240622T102300.SAFE"
     >>> scene = fifesim.open_sentinel2(product, 10)  # doctest: +SKIP
     >>> scene.fifesim.as_seen_by("TM", time="1987-06-06T16:35Z")  # doctest: +SKIP

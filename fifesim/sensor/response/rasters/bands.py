@@ -80,7 +80,8 @@ def to_bands(
     >>> import numpy as np
     >>> import xarray as xr
     >>> wavelength = xr.Variable("wavelength", np.arange(0.4, 1.0, 0.005), {"units": "um"})
-    >>> spectra = xr.DataArray(np.full((120, 2, 2), 0.3), {"wavelength": wavelength}, ("wavelength", "y", "x"))
+    >>> grey = np.full((120, 2, 2), 0.3)
+    >>> spectra = xr.DataArray(grey, {"wavelength": wavelength}, ("wavelength", "y", "x"))
     >>> spectra.fifesim.to_bands("OLI", bands=["OLI4", "OLI5"]).isel(y=0, x=0).round(6).values
     array([0.3, 0.3])
     """

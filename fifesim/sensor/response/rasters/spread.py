@@ -19,7 +19,7 @@ def psf(
     r"""
     Point spread function of an instrument on the ground at nadir.
 
-    .. math:: p(x, y) = w_{along}(y) \, w_{across}(x)
+    .. math:: p(x, y) = w_\mathrm{along}(y) \, w_\mathrm{across}(x)
 
     Parameters
     ----------
