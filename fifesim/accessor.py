@@ -124,22 +124,6 @@ def _accessor(kind):
 
 DataArrayAccessor, DatasetAccessor, DataTreeAccessor = map(_accessor, ("DataArray", "Dataset", "DataTree"))
 
-
-class _Anew:
-    """
-    An accessor that is made whenever it is asked for.
-
-    xarray keeps accessors in their rasters: such a ring leaves the raster's memory to the garbage collector, which
-    counts objects and not their gigabytes.
-    """
-
-    def __init__(self, accessor):
-        self._accessor = accessor
-
-    def __get__(self, raster, owner):
-        return self._accessor if raster is None else self._accessor(raster)
-
-
-xr.DataArray.fifesim = _Anew(DataArrayAccessor)
-xr.Dataset.fifesim = _Anew(DatasetAccessor)
-xr.DataTree.fifesim = _Anew(DataTreeAccessor)
+xr.register_dataarray_accessor("fifesim")(DataArrayAccessor)
+xr.register_dataset_accessor("fifesim")(DatasetAccessor)
+xr.register_datatree_accessor("fifesim")(DataTreeAccessor)

@@ -1,10 +1,8 @@
 """The accessor forwards, and does nothing else."""
 
-import gc
 import inspect
 import pickle
 import re
-import weakref
 from pathlib import Path
 
 import numpy as np
@@ -89,19 +87,3 @@ def test_a_tree_of_images_has_methods_of_its_own(lai):
     tree = xr.DataTree.from_dict({"/TM": lai.to_dataset(name="lai")})
     assert tree.fifesim.comparison_table.__func__ is fifesim.comparison_table
     assert tree.fifesim.comparison_table.__self__ is tree
-
-
-def test_raster_is_freed_when_its_last_name_goes(lai):
-    """No ring through an accessor leaves the memory of a scene to the garbage collector."""
-    gc.collect()
-    gc.disable()
-    try:
-        rasters = [lai.copy(deep=True)]
-        rasters.append(rasters[0].fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]))
-        rasters.append(rasters[1].fifesim.to_toa())
-        rasters.append(rasters[2].fifesim.sense("TM"))
-        cells = [weakref.ref(each.data) for each in rasters]
-        del rasters
-        assert [each() is None for each in cells] == [True] * 4
-    finally:
-        gc.enable()

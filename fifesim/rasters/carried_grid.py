@@ -5,7 +5,6 @@ from functools import lru_cache
 import numpy as np
 from affine import Affine
 from odc.geo.geobox import GeoBox
-from odc.geo.xr import ODCExtensionDa
 
 from fifesim.base.lattice import centres, whole_cells
 
@@ -72,21 +71,3 @@ def _edge(origin, cell, size):
     first, last = centres(origin, cell, np.array([0, size - 1])).tolist()
     step = (last - first) / (size - 1) if size > 1 else cell
     return first - step / 2
-
-
-def has_crs(array):
-    """
-    Whether a raster says what its coordinates are of.
-
-    Parameters
-    ----------
-    array : xarray.DataArray
-
-    Returns
-    -------
-    answer : bool
-    """
-    if "spatial_ref" in array.coords and array.coords["spatial_ref"].attrs:
-        return True
-    # Not by .odc, which xarray would keep in the array: such a ring leaves its memory to the garbage collector.
-    return ODCExtensionDa(array).crs is not None

@@ -9,7 +9,6 @@ import xarray as xr
 from dask.base import tokenize
 
 from fifesim.rasters import grid as grids
-from fifesim.rasters.carried_grid import has_crs
 from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.windows import array_from_windows, gather, slices
 
@@ -260,7 +259,7 @@ def _is_raster(array):
 def _with_crs(arrays):
     """The same, where rasters without a CRS lie on the cells of one that has it."""
     rasters = [array for array in arrays if _is_raster(array)]
-    known = [array for array in rasters if has_crs(array)] if rasters[1:] else []
+    known = [array for array in rasters if array.odc.crs is not None] if rasters[1:] else []
     if len(known) in (0, len(rasters)):
         return arrays
     return [with_crs_of(array, known[0]) if _is_raster(array) else array for array in arrays]

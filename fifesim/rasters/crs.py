@@ -3,7 +3,6 @@
 import numpy as np
 
 from fifesim.rasters import grid as grids
-from fifesim.rasters.carried_grid import has_crs
 
 
 def with_crs_of(array, main):
@@ -20,7 +19,7 @@ def with_crs_of(array, main):
     array : xarray.DataArray
         What was given where it has a CRS, or ``x`` and ``y`` that are not those of ``main``.
     """
-    if {"y", "x"} - set(array.dims) or has_crs(array) or not has_crs(main):
+    if {"y", "x"} - set(array.dims) or array.odc.crs is not None or main.odc.crs is None:
         return array
     grid = grids.geobox(main)
     for axis, size in zip(("y", "x"), grids.cell_size(grid), strict=True):

@@ -11,13 +11,12 @@ import xarray as xr
 from affine import Affine
 from odc.geo.crs import MaybeCRS
 from odc.geo.geobox import GeoBox
-from odc.geo.xr import ODCExtensionDa
 
 from fifesim.base.annotations import Pair
 from fifesim.base.lattice import whole_cells
 from fifesim.rasters import projection
 from fifesim.rasters.axes import check_axes
-from fifesim.rasters.carried_grid import centres_of, has_crs, on_lattice
+from fifesim.rasters.carried_grid import centres_of, on_lattice
 from fifesim.rasters.references import reference_of
 from fifesim.rasters.spacing import along_axis, exact_cell
 
@@ -134,12 +133,12 @@ def geobox(array):
     check_axes(array)
     if 0 in array.shape:
         raise ValueError(f"the raster has no cells, shape {array.shape}: look at how it was selected")
-    if not has_crs(array):
+    if not ("spatial_ref" in array.coords and array.coords["spatial_ref"].attrs) and array.odc.crs is None:
         raise ValueError(
             "the raster has no CRS: open its file with decode_coords='all', or import rioxarray and give it one with "
             ".rio.write_crs('EPSG:26914'); xr.where drops it, .where of a raster keeps it"
         )
-    found = ODCExtensionDa(array).geobox
+    found = array.odc.geobox
     if found is None:
         cure = ": one row tells no cell, give .rio.write_transform(...)" if 1 in (array.y.size, array.x.size) else ""
         raise ValueError(f"the raster's x and y are not the centres of a regular grid{cure}")
