@@ -36,6 +36,7 @@ def lines(parts):
     """Of the page, as they are found."""
     cores, memory = psutil.cpu_count(), psutil.virtual_memory().total / 1e9
     machine = f"{platform.machine()}, {cores} cores, {memory:.0f} GB, Python {platform.python_version()}"
+    yield "# Tables\n"
     yield f"Measured on {date.today()}: {machine}."
     for title in parts:
         yield f"\n## {title}\n"

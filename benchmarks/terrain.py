@@ -90,7 +90,7 @@ def main():
     named = {"floor": lambda: floor(arguments.cells, arguments.threads)} | calls(grid, dem)
     best = in_turn(named, arguments.repeat)
     million = arguments.cells**2 / 1e6
-    print(f"{million:.1f} million cells, {len(BANDS)} bands, {arguments.threads} thread(s)")
+    print(f"{million:.1f} million cells, {len(BANDS)} bands, {arguments.threads} thread(s)\n")
     print("| | million cells/s | times the floor |\n|---|---|---|")
     for name, taken in best.items():
         print(f"| {name} | {million / taken:.1f} | {taken / best['floor']:.2f} |")
