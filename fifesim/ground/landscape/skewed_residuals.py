@@ -24,7 +24,8 @@ from fifesim.ground.landscape.block_kriging import (
 # Of the shift before, where the gradient is asked again: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for a quadratic ln w.
 _AGAIN = 0.75
 
-# What the levels of pixels vary about is their mean by weights of this standard deviation. [pixel]
+# What the levels of pixels vary about is their mean by weights of this standard deviation, a quarter of the pixels that
+# are read around a tile; by narrower weights, the process itself would count as its mean. [pixel]
 _SURROUNDINGS = 3.0
 
 
