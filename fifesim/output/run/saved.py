@@ -40,7 +40,9 @@ def save_block(folder, name, index, block):
     # numpy would not say why a file cannot be written.
     content = io.BytesIO()
     np.save(content, block)
-    content.write(_checksum(content.getbuffer()))
+    with content.getbuffer() as whole:
+        checksum = _checksum(whole)
+    content.write(checksum)
     try:
         partial_path.write_bytes(content.getbuffer())
         os.replace(partial_path, path)
