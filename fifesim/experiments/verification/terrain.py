@@ -115,7 +115,7 @@ def _horizons():
         found = horizon.horizon_tangent(_plane(slope, aspect, (2 * m + 2, 2 * n + 2)), 20.0, 30.0, directions, 1500.0)
         worst = np.maximum(worst, largest(found, np.maximum(rise, 0.0)[:, None, None]))
         for azimuth in (0.0, 33.3, 351.0):
-            toward = lights.horizon_toward(rise, directions, azimuth)
+            toward = horizon.horizon_toward(rise, directions, azimuth)
             worst = np.maximum(
                 worst, largest(toward, -np.tan(np.radians(slope)) * np.cos(np.radians(azimuth - aspect)))
             )

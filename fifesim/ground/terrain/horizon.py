@@ -217,6 +217,40 @@ def _samples(azimuth, cell_y, cell_x, reach):
     return first, second, minor - np.floor(minor), major / k
 
 
+def horizon_toward(tangents, directions, azimuth):
+    r"""
+    Tangent of the elevation of the horizon in one azimuth.
+
+    Between two directions the horizon is a great circle, as that of a straight ridge is.
+
+    Parameters
+    ----------
+    tangents : array, shape (direction, ...)
+        cot H. [1]
+    directions : array, shape (direction,)
+        Azimuths, evenly spaced and clockwise from the first. [degree]
+    azimuth : float
+        [degree]
+
+    Returns
+    -------
+    tangent : array, shape (...)
+        [1]
+
+    Examples
+    --------
+    >>> float(horizon_toward(np.arange(16.0), np.arange(16) * 22.5, 45.0))
+    2.0
+    """
+    count = len(directions)
+    step = 360 / count
+    position = ((azimuth - directions[0]) % 360) / step
+    first = int(position) % count
+    part, step = np.radians((position - int(position)) * step), np.radians(step)
+    before, after = np.sin(step - part) / np.sin(step), np.sin(part) / np.sin(step)
+    return before * tangents[first] + after * tangents[(first + 1) % count]
+
+
 @njit(nogil=True, cache=True)
 def _march(dem, rays, top, left, out):
     cells, columns, width = dem.ravel(), out.shape[2], dem.shape[1]

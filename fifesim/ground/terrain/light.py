@@ -66,40 +66,6 @@ def direction_vector(zenith, azimuth):
     return Vector(np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith))
 
 
-def horizon_toward(tangents, directions, azimuth):
-    r"""
-    Tangent of the elevation of the horizon in one azimuth.
-
-    Between two directions the horizon is a great circle, as that of a straight ridge is.
-
-    Parameters
-    ----------
-    tangents : array, shape (direction, ...)
-        cot H. [1]
-    directions : array, shape (direction,)
-        Azimuths, evenly spaced and clockwise from the first. [degree]
-    azimuth : float
-        [degree]
-
-    Returns
-    -------
-    tangent : array, shape (...)
-        [1]
-
-    Examples
-    --------
-    >>> float(horizon_toward(np.arange(16.0), np.arange(16) * 22.5, 45.0))
-    2.0
-    """
-    count = len(directions)
-    step = 360 / count
-    position = ((azimuth - directions[0]) % 360) / step
-    first = int(position) % count
-    part, step = np.radians((position - int(position)) * step), np.radians(step)
-    before, after = np.sin(step - part) / np.sin(step), np.sin(part) / np.sin(step)
-    return before * tangents[first] + after * tangents[(first + 1) % count]
-
-
 @register_jitable
 def topographic_factor(sky_view, terrain_view, reflectance, mu_s_local, mu_s, direct_transmittance, transmittance_down):
     r"""
@@ -231,11 +197,41 @@ def slope_reflectance(reflectance, dem, sky, cell, geometry, direct_transmittanc
     ----------
     [Friedl1995]_, Eqs. 4 and 5
     """
+    air = direct_transmittance, transmittance_down
+    return _factors(reflectance, dem, sky, cell, geometry, *air, upwelling, True)
+
+
+def slope_factor(reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down):
+    """
+    Topographic correction factor Kt of cells.
+
+    Parameters
+    ----------
+    reflectance : array, shape (band, rows, columns)
+        Of the land around, as it is on level ground. [1]
+    dem, sky, cell, geometry
+        As in `slope_light`.
+    direct_transmittance, transmittance_down : array, shape (band,)
+        As in `topographic_factor`. [1]
+
+    Returns
+    -------
+    kt : array, shape (band, rows, columns)
+        To the bit that of the formula; NaN where elevation or reflectance is. [1]
+
+    See Also
+    --------
+    topographic_factor
+    """
+    return _factors(reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down, False, False)
+
+
+def _factors(reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down, upwelling, reflected):
     reflectance = np.ascontiguousarray(reflectance, float)
     out = np.empty(reflectance.shape)
     direct, total = np.asarray(direct_transmittance, float), np.asarray(transmittance_down, float)
     dem, sky = _contiguous(dem, sky)
-    _slope_reflectance(reflectance, dem, sky, _setting(cell, geometry), direct, total, upwelling, out)
+    _slope_factors(reflectance, dem, sky, _setting(cell, geometry), direct, total, upwelling, reflected, out)
     return out
 
 
@@ -264,7 +260,7 @@ def _slope_light(dem, sky, setting, light):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _slope_reflectance(rho, dem, sky, setting, direct, total, upwelling, out):
+def _slope_factors(rho, dem, sky, setting, direct, total, upwelling, reflected, out):
     columns = out.shape[2]
     above, below, gradient = np.empty((4, columns)), np.empty((4, columns)), np.empty((2, columns))
     line = SlopeLight(np.empty(columns), np.empty(columns), np.empty(columns), np.empty(columns))
@@ -275,7 +271,9 @@ def _slope_reflectance(rho, dem, sky, setting, direct, total, upwelling, out):
         if not upwelling:
             line.upwelling[:] = 1.0
         for band in range(out.shape[0]):
-            _reflectance_of_row(rho[band, i], line, setting.sun.z, direct[band], total[band], out[band, i])
+            _factor_of_row(rho[band, i], line, setting.sun.z, direct[band], total[band], out[band, i])
+            if reflected:
+                _reflect_row(rho[band, i], line.upwelling, out[band, i])
 
 
 @register_jitable
@@ -331,8 +329,13 @@ def _light_of_row(east, north, above, below, share, setting, light):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _reflectance_of_row(rho, light, mu_s, direct, total, out):
+def _factor_of_row(rho, light, mu_s, direct, total, out):
     for j in range(out.size):
         land = terrain_view(light.sky_view[j], light.cosine[j])
-        kt = topographic_factor(light.sky_view[j], land, rho[j], light.mu_s_local[j], mu_s, direct, total)
-        out[j] = rho[j] * kt * light.upwelling[j]
+        out[j] = topographic_factor(light.sky_view[j], land, rho[j], light.mu_s_local[j], mu_s, direct, total)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _reflect_row(rho, upwelling, out):
+    for j in range(out.size):
+        out[j] = rho[j] * out[j] * upwelling[j]

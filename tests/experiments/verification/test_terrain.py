@@ -19,7 +19,7 @@ def test_all_is_well(check):
         (sky, "_sky_vector", terrain._any_sky),
         (horizon, "horizon_tangent", terrain._horizons),
         (light, "_slope_light", terrain._light),
-        (light, "_slope_reflectance", terrain._light),
+        (light, "_slope_factors", terrain._light),
     ],
 )
 def test_production_kernels_are_checked(monkeypatch, owner, kernel, check):

@@ -20,7 +20,7 @@ def sky_of(dem, cell, reach, saa):
     tangents = horizons.horizon_tangent(padded, cell, cell, AZIMUTHS, reach)
     edged = np.pad(dem, 1, constant_values=np.nan)
     vector = sky_vector(tangents, AZIMUTHS, *gradient(edged, cell, cell))
-    layers = np.concatenate([vector, lights.horizon_toward(tangents, AZIMUTHS, saa)[None]])
+    layers = np.concatenate([vector, horizons.horizon_toward(tangents, AZIMUTHS, saa)[None]])
     row, column = (np.arange(size) for size in dem.shape)
     return edged, lights.Sky(layers, row, np.zeros(row.size), column, np.zeros(column.size))
 
@@ -151,6 +151,23 @@ def test_fused_reflectance_is_rho_kt_and_the_view_factor():
     np.testing.assert_allclose(lights.slope_reflectance(*arguments, upwelling=False), expected, rtol=1e-13)
     np.testing.assert_allclose(lights.slope_reflectance(*arguments), expected * light.upwelling, rtol=1e-13)
     assert np.isnan(expected).sum() == 2
+
+
+def test_fused_factor_has_the_bits_of_the_formula():
+    dem, geometry = hills((30, 35), seed=5, relief=60.0), Geometry(55.0, 100.0, 30.0, 20.0)
+    dem[3, 4] = np.nan
+    edged, sky = sky_of(dem, 10.0, 300.0, geometry.saa)
+    rho = np.random.default_rng(4).uniform(0, 0.6, (2, *dem.shape))
+    direct, total = np.array([0.6, 0.8]), np.array([0.85, 0.95])
+    light = light_of(dem, 10.0, geometry, 300.0)
+    expected = kt_of(light, rho, geometry, direct[:, None, None], total[:, None, None])
+    found = lights.slope_factor(rho, edged, sky, (10.0, 10.0), geometry, direct, total)
+    assert np.isnan(found).sum() == 2
+    assert found.tobytes() == expected.tobytes()
+    turned = np.moveaxis(np.ascontiguousarray(np.moveaxis(rho, 0, -1)), -1, 0)
+    for make in (lights.slope_factor, lights.slope_reflectance):
+        of_turned, of_copy = (make(each, edged, sky, (10.0, 10.0), geometry, direct, total) for each in (turned, rho))
+        np.testing.assert_array_equal(of_turned, of_copy)
 
 
 def test_places_between_are_interpolated():

@@ -34,6 +34,14 @@ def test_level_ground_faces_north_and_a_missing_cell_is_missing():
     assert np.nansum(np.abs(slope)) == np.nansum(np.abs(aspect)) == 0
 
 
+def test_slope_alone_has_the_bits_of_slope_and_aspect():
+    dem = hills((20, 30), seed=3)
+    dem[4, 7] = dem[0] = np.nan
+    found = terrain.steepness(dem, 12.0, 7.0)
+    assert np.isnan(found).sum() == 1
+    assert found.tobytes() == terrain.slope_aspect(dem, 12.0, 7.0)[0].tobytes()
+
+
 def test_gradient_is_that_of_numpy_at_any_cells():
     dem = hills((20, 30), seed=3)
     north, east = np.gradient(dem, -12.0, 7.0)

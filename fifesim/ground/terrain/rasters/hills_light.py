@@ -9,7 +9,7 @@ from fifesim.ground.terrain.flint_hills import elevation, elevation_around
 from fifesim.ground.terrain.rasters.dem import look_at_altitude
 from fifesim.ground.terrain.rasters.places import between_places, places_of, places_on
 from fifesim.ground.terrain.rasters.sky import DIRECTIONS, sky_under, useful_reach
-from fifesim.ground.terrain.slope import gradient, steepness
+from fifesim.ground.terrain.slope import steepness
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.carried_grid import as_carried, centres_of
@@ -75,7 +75,7 @@ def steepest(grid, seed):
         [degree]
     """
     land = np.pad(_land(grid, seed), 1, constant_values=np.nan)
-    return float(steepness(*gradient(land, *grids.cell_size(grid))).max())
+    return float(steepness(land, *grids.cell_size(grid)).max())
 
 
 def _land(grid, seed):

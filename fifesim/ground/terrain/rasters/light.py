@@ -10,11 +10,10 @@ import xarray as xr
 from fifesim.base.annotations import Time
 from fifesim.base.geometry import fife_geometry
 from fifesim.ground.terrain import sky as skies
-from fifesim.ground.terrain.light import slope_light, slope_reflectance
+from fifesim.ground.terrain.light import slope_factor, slope_light, slope_reflectance
 from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid, source_resolution
 from fifesim.ground.terrain.rasters.places import between_places
 from fifesim.ground.terrain.rasters.sky import sky_above
-from fifesim.ground.terrain.slope_factors import slope_factor
 from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -130,7 +129,7 @@ def illumination(
 
     See Also
     --------
-    fifesim.ground.terrain.slope.along_normal, fifesim.ground.terrain.light.horizon_toward
+    fifesim.ground.terrain.slope.along_normal, fifesim.ground.terrain.horizon.horizon_toward
 
     Examples
     --------
@@ -211,12 +210,11 @@ def kt_on_slopes(reflectance, dem, *, direct_transmittance, transmittance_down, 
 
     See Also
     --------
-    fifesim.ground.terrain.slope_factors.slope_factor
+    fifesim.ground.terrain.light.slope_factor
     """
 
     def kernel(rho, elevation, sky, cell, seen):
-        light = slope_light(elevation, sky, cell, seen)
-        return slope_factor(light, rho, geometry.mu_s, direct_transmittance, transmittance_down)
+        return slope_factor(rho, elevation, sky, cell, seen, direct_transmittance, transmittance_down)
 
     return _of_level(kernel, reflectance, dem, geometry, horizon, "kt", "kt: Eq. 4")
 

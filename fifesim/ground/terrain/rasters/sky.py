@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.ground.terrain import horizon as horizons
-from fifesim.ground.terrain.light import direction_vector, horizon_toward
+from fifesim.ground.terrain.light import direction_vector
 from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid, source_resolution
 from fifesim.ground.terrain.rasters.places import chunks_beside, horizon_places, places_of
 from fifesim.ground.terrain.sky import sky_vector
@@ -174,7 +174,7 @@ def sky_under(zenith, data, places, geometry):
 def _layers(tangents, directions, own, geometry):
     """Vector of the sky, and tangent of the horizon toward the sun."""
     vector = sky_vector(tangents, directions, *own)
-    return np.concatenate([vector, horizon_toward(tangents, directions, geometry.saa)[None]])
+    return np.concatenate([vector, horizons.horizon_toward(tangents, directions, geometry.saa)[None]])
 
 
 def _samples(data, places):

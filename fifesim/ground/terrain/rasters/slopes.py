@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 
 from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid
-from fifesim.ground.terrain.slope import angles, gradient, steepness
+from fifesim.ground.terrain.slope import slope_aspect, steepness
 from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -77,14 +77,14 @@ def aspect(dem: xr.DataArray) -> xr.DataArray:
     >>> bool(((aspect >= 0) & (aspect < 360)).all())
     True
     """
-    return _slope_or_aspect(dem, "aspect", lambda east, north: angles(east, north)[1])
+    return _slope_or_aspect(dem, "aspect", lambda *ground: slope_aspect(*ground)[1])
 
 
-def _slope_or_aspect(dem, name, of_gradient):
+def _slope_or_aspect(dem, name, of_ground):
     grid = elevation_grid(dem)
 
     def kernel(block):
-        return of_gradient(*gradient(block, *grids.cell_size(grid)))
+        return of_ground(block, *grids.cell_size(grid))
 
     out = grids.place(chunking.neighbourhood(kernel, dem, 1), grid)
     return cf.label(out, name, source=dem, history=f"{name}: central differences", references=REFERENCE)
