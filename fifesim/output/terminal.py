@@ -16,6 +16,7 @@ from typer.core import TyperGroup
 
 from fifesim.base.foreign import in_a_line
 from fifesim.base.logs import LOG, is_quiet, quiet
+from fifesim.output.memory import keep_freed
 
 # Of a message, and of a line in one of many. [character]
 _LONGEST, _SHORTEST = 500, 50
@@ -118,11 +119,12 @@ def listening(level):
 @contextmanager
 def importing():
     """
-    A context for slow imports.
+    A context for slow imports, with which a command that works on scenes begins.
 
     They make objects that stay: to look for garbage among them takes a sixth of their time, and among all that there is
     when the interpreter ends half of its last moments.
     """
+    keep_freed()
     atexit.register(gc.freeze)
     gc.disable()
     try:
