@@ -47,7 +47,7 @@ from .ground.terrain.rasters.light import sky_view as sky_view  # method
 from .ground.terrain.rasters.light import terrain_view as terrain_view  # method
 from .ground.terrain.rasters.light import illumination as illumination  # method
 from .ground.terrain.rasters.light import shadow as shadow  # method
-from .chain.steps import kt as kt  # method
+from .chain.slopes import kt as kt  # method
 
 # Atmosphere
 from .atmosphere.air.models import Atmosphere as Atmosphere

@@ -16,7 +16,7 @@ from fifesim.chain import landscapes
 from fifesim.chain.setup import Setup
 from fifesim.ground.canopy.raster import fpar_kernel
 from fifesim.ground.canopy.rasters.evaluation import canopy_kernel
-from fifesim.ground.terrain.light import slope_reflectance
+from fifesim.ground.terrain.lit_slopes import slope_reflectance
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters import digital_numbers
@@ -105,7 +105,7 @@ class Kernels:
         level : array, shape (band, y, x)
             Of level ground. [1]
         light : tuple
-            From `fifesim.ground.terrain.rasters.light.light_on_slopes`.
+            From `fifesim.ground.terrain.rasters.lit_slopes.light_on_slopes`.
 
         Returns
         -------
@@ -114,7 +114,7 @@ class Kernels:
 
         See Also
         --------
-        fifesim.ground.terrain.rasters.light.terrain_reflectance
+        fifesim.ground.terrain.rasters.lit_slopes.terrain_reflectance
         """
         air = self._terms.direct_transmittance_down, self._terms.transmittance_down
         return slope_reflectance(level, *light, *air, self.setup.upwelling)

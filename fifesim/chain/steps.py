@@ -6,17 +6,16 @@ import xarray as xr
 
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes import engines
 from fifesim.base.annotations import FilePath, Names, Numbers, Time
 from fifesim.chain import landscapes
 from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
 from fifesim.chain.seen_canopy import seen_through_air
+from fifesim.chain.slopes import sunlight
 from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
 from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.rasters import soils
-from fifesim.ground.terrain.rasters import light as terrain
-from fifesim.ground.terrain.rasters.dem import beside_altitude
+from fifesim.ground.terrain.rasters import lit_slopes
 from fifesim.rasters import directions
 from fifesim.rasters.annotations import Directions, NumberOrRaster
 from fifesim.rasters.axes import north_up
@@ -130,7 +129,7 @@ def surface_reflectance(
     fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.layers.two_layers,
     fifesim.ground.canopy.crowns.clumped,
     fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil_water.moistened,
-    fifesim.ground.terrain.light.slope_reflectance
+    fifesim.ground.terrain.lit_slopes.slope_reflectance
 
     Examples
     --------
@@ -168,67 +167,8 @@ def surface_reflectance(
     )
     if dem is None:
         return level
-    light = _sunlight(dem, atmosphere, responses, geometry, "surface_reflectance on slopes")
-    return terrain.terrain_reflectance(level, upwelling=upwelling, horizon=horizon, **light)
-
-
-@by_date
-def kt(
-    reflectance: xr.DataArray,
-    dem: xr.DataArray,
-    *,
-    horizon: xr.DataArray | None = None,
-    atmosphere: Atmosphere | None = None,
-    geometry: Directions | None = None,
-    time: Time | None = None,
-    instrument: FilePath | Instrument | None = None,
-) -> xr.DataArray:
-    """
-    Topographic correction factor Kt: what terrain does to the irradiance in each band.
-
-    Parameters
-    ----------
-    reflectance : xarray.DataArray, dims (band, y, x)
-        Of level ground, from `surface_reflectance` without a dem. [1]
-    dem : xarray.DataArray, dims (y, x)
-        As in `surface_reflectance`. [m]
-    horizon : xarray.DataArray, dims (direction, y, x), optional
-        As in `surface_reflectance`. [degree]
-    atmosphere, geometry, time, instrument : optional
-        As in `to_toa`.
-
-    Returns
-    -------
-    kt : xarray.DataArray, dims (band, y, x)
-        Lazy where an input is. [1]
-
-    Raises
-    ------
-    ValueError
-        As in `surface_reflectance`.
-
-    References
-    ----------
-    [Friedl1995]_, Eq. 4; [Dubayah1992]_
-
-    See Also
-    --------
-    fifesim.ground.terrain.light.topographic_factor
-
-    Examples
-    --------
-    >>> import fifesim
-    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
-    >>> dem = fifesim.flint_hills(grid, seed=7)
-    >>> lai = fifesim.lai_scene(grid, seed=7)
-    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM4"])
-    >>> kt = rho.fifesim.kt(dem)
-    >>> kt.dims, bool(abs(kt.mean() - 1) < 0.1)
-    (('band', 'y', 'x'), True)
-    """
-    reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
-    light = _sunlight(dem, *air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time), "kt")
-    return terrain.kt_on_slopes(directions.dated(reflectance, time), horizon=horizon, **light)
+    light = sunlight(dem, atmosphere, responses, geometry, "surface_reflectance on slopes")
+    return lit_slopes.terrain_reflectance(level, upwelling=upwelling, horizon=horizon, **light)
 
 
 @by_date
@@ -376,12 +316,3 @@ def _of(instrument, array):
         return array
     attrs = {key: value for key, value in array.attrs.items() if key != "instrument_description"}
     return array.drop_attrs(deep=False).assign_attrs(attrs | attributes_of(find_instrument(instrument)))
-
-
-def _sunlight(dem, atmosphere, bands, geometry, what):
-    """What Kt needs below one direction of sun and sensor: of the same elevation, a graph has the sky above it once."""
-    geometry = directions.uniform_geometry(geometry, what)
-    terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
-    down, direct = terms.transmittance_down, terms.direct_transmittance_down
-    dem = beside_altitude(dem, atmosphere.altitude)
-    return {"dem": dem, "geometry": geometry, "transmittance_down": down, "direct_transmittance": direct}

@@ -14,7 +14,7 @@ from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, reflectance_of
 from fifesim.ground.landscape.raster import scene_cells
 from fifesim.ground.terrain.rasters.dem import beside_altitude
-from fifesim.ground.terrain.rasters.light import light_on_slopes
+from fifesim.ground.terrain.rasters.lit_slopes import light_on_slopes
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
 from fifesim.scenario.ground import fpar_kinds, ground_scene, truth_of

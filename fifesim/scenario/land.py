@@ -79,8 +79,8 @@ def light_on_hills(scenario, grid, geometry):
     Returns
     -------
     light : tuple or None
-        The last arguments of `fifesim.ground.terrain.light.slope_reflectance` but the air's. None where the sun is so
-        low that all of the land around has to be asked whether it shines, or the ground is none of these hills.
+        The last arguments of `fifesim.ground.terrain.lit_slopes.slope_reflectance` but the air's. None where the sun is
+        so low that all of the land around has to be asked whether it shines, or the ground is none of these hills.
 
     Raises
     ------

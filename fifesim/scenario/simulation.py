@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import xarray as xr
 
 from fifesim.base.annotations import Chunks
-from fifesim.chain import steps as chain
 from fifesim.chain.comparison import shows_ndvi
 from fifesim.chain.images import ndvi
 from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, image_of, reflectance_of
+from fifesim.chain.slopes import kt_and_reflectance
 from fifesim.ground.terrain.rasters import slopes
 from fifesim.rasters import grid as grids
 from fifesim.scenario.ground import canopy_of, ground_scene, truth_of
@@ -65,8 +63,7 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto") -> xr.DataTree:
     if dem is None:
         reflectance = level
     else:
-        reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land)
-        kt = chain.kt(level, dem, horizon=horizon)
+        kt, reflectance = kt_and_reflectance(level, dem, horizon, setup.upwelling)
         dem, slope = cut(dem, grid), cut(slopes.slope(dem), grid)
         nodes["scene"]["dem"] = dem
         nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt)}

@@ -9,7 +9,7 @@ import xarray as xr
 import fifesim
 from fifesim.chain.kernels import Kernels, down, labelled_only
 from fifesim.chain.setup import reflectance_of
-from fifesim.ground.terrain.rasters.light import light_on_slopes
+from fifesim.ground.terrain.rasters.lit_slopes import light_on_slopes
 from fifesim.rasters import grid as grids
 
 GRID = fifesim.fife_site(10.0, ((300, 348), (200, 254)))

@@ -171,20 +171,3 @@ def test_one_band_goes_through_the_chain(lai):
     both = fifesim.sense(fifesim.to_toa(rho))
     one = fifesim.sense(fifesim.to_toa(rho.sel(band="TM4")))
     np.testing.assert_array_equal(one.squeeze("band"), both.sel(band="TM4"))
-
-
-def test_sky_above_slopes_is_in_a_graph_once(lai):
-    """Reflectance on slopes and Kt share all but the last layer that each makes of the light."""
-    grid = grids.geobox(lai)
-    lai, dem = lai.chunk({"y": 20, "x": 30}), fifesim.flint_hills(grid, seed=7, chunks=25)
-    level, slopes = (lai.fifesim.surface_reflectance("TM", bands=["TM4"], dem=each) for each in (None, dem))
-    own = set(level.fifesim.kt(dem).data.dask.layers) - set(slopes.data.dask.layers)
-    assert len(own) == 1, own
-
-
-def test_kt_warns_where_the_elevation_is_not_that_of_the_air(lai):
-    """As reflectance on the same slopes does."""
-    level = lai.fifesim.surface_reflectance("TM", bands=["TM4"])
-    dem = fifesim.flint_hills(grids.geobox(lai), seed=7)
-    with pytest.warns(UserWarning, match="beside an altitude of the atmosphere of 0.4 km"):
-        level.fifesim.kt(dem + 2000.0)

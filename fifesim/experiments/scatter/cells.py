@@ -7,7 +7,7 @@ import numpy as np
 from fifesim.chain.arrays import ArrayChain
 from fifesim.chain.kernels import labelled_only
 from fifesim.ground.terrain.rasters.dem import beside_altitude
-from fifesim.ground.terrain.rasters.light import light_on_slopes
+from fifesim.ground.terrain.rasters.lit_slopes import light_on_slopes
 
 # Half of the step of LAI by which tangents are taken: wide beside the error of the table of reflectance, 1e-6. [1]
 STEP = 0.05

@@ -9,7 +9,7 @@ from fifesim.base.geometry import Geometry
 from fifesim.experiments.verification import elevation
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.terrain import horizon
-from fifesim.ground.terrain import light as lights
+from fifesim.ground.terrain import lit_slopes as lights
 from fifesim.ground.terrain import sky as skies
 from fifesim.ground.terrain import slope as terrain
 

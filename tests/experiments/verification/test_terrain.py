@@ -4,7 +4,7 @@ import pytest
 from broken import exceeded, notices
 
 from fifesim.experiments.verification import elevation, terrain
-from fifesim.ground.terrain import horizon, light, sky, slope
+from fifesim.ground.terrain import horizon, lit_slopes, sky, slope
 
 
 @pytest.mark.parametrize("check", terrain.CHECKS[: -len(elevation.CHECKS)])
@@ -18,8 +18,8 @@ def test_all_is_well(check):
         (slope, "_gradient", terrain._slopes),
         (sky, "_sky_vector", terrain._any_sky),
         (horizon, "horizon_tangent", terrain._horizons),
-        (light, "_slope_light", terrain._light),
-        (light, "_slope_factors", terrain._light),
+        (lit_slopes, "_slope_light", terrain._light),
+        (lit_slopes, "_slope_factors", terrain._light),
     ],
 )
 def test_production_kernels_are_checked(monkeypatch, owner, kernel, check):

@@ -1,37 +1,8 @@
-"""Light on slopes: cosines, shadows, Kt and what it conserves."""
+"""Directions, and Equations 4 and 5."""
 
 import numpy as np
-import pytest
-from oracles_terrain import hills, plane, plane_gradient
 
-from fifesim.base.geometry import Geometry
-from fifesim.ground.terrain import horizon as horizons
 from fifesim.ground.terrain import light as lights
-from fifesim.ground.terrain.sky import sky_vector, sky_view, terrain_view
-from fifesim.ground.terrain.slope import gradient
-
-AZIMUTHS = horizons.azimuths(32)
-
-
-def sky_of(dem, cell, reach, saa):
-    """Elevation and sky of `slope_light` at every cell of a raster, with the horizon at the same resolution."""
-    m, n = horizons.horizon_margin(cell, cell, reach)
-    padded = np.pad(dem, ((m, m), (n, n)), constant_values=np.nan)
-    tangents = horizons.horizon_tangent(padded, cell, cell, AZIMUTHS, reach)
-    edged = np.pad(dem, 1, constant_values=np.nan)
-    vector = sky_vector(tangents, AZIMUTHS, *gradient(edged, cell, cell))
-    layers = np.concatenate([vector, horizons.horizon_toward(tangents, AZIMUTHS, saa)[None]])
-    row, column = (np.arange(size) for size in dem.shape)
-    return edged, lights.Sky(layers, row, np.zeros(row.size), column, np.zeros(column.size))
-
-
-def light_of(dem, cell, geometry, reach=500.0):
-    return lights.slope_light(*sky_of(dem, cell, reach, geometry.saa), (cell, cell), geometry)
-
-
-def kt_of(light, rho, geometry, direct=0.7, total=0.9):
-    ct = terrain_view(light.sky_view, light.cosine)
-    return lights.topographic_factor(light.sky_view, ct, rho, light.mu_s_local, geometry.mu_s, direct, total)
 
 
 def test_directions_point_where_angles_say():
@@ -42,141 +13,15 @@ def test_directions_point_where_angles_say():
     np.testing.assert_allclose(lights.direction_vector(zenith, azimuth), toward, atol=1e-15)
 
 
-def test_kernel_on_planes_is_the_formulas():
-    """The cosines by spherical trigonometry."""
-    geometry = Geometry(50.0, 110.0, 20.0, 300.0)
-
-    def cosine(slope, aspect, zenith, azimuth):
-        (s, z), across = np.radians([slope, zenith]), np.cos(np.radians(azimuth - aspect))
-        return np.cos(s) * np.cos(z) + np.sin(s) * np.sin(z) * across
-
-    for slope, aspect in ((0, 0), (15, 80), (40, 250), (60, 300)):
-        light = light_of(plane((12, 14), 10.0, 10.0, slope, aspect), 10.0, geometry)
-        mu_s, mu_v = (max(cosine(slope, aspect, *toward), 0.0) for toward in ((50.0, 110.0), (20.0, 300.0)))
-        sky = sky_view(np.zeros(32), AZIMUTHS, *plane_gradient(slope, aspect))
-        wanted = [np.cos(np.radians(slope)), sky, mu_s, mu_v / np.cos(np.radians(20.0))]
-        for found, value, tolerance in zip(light, wanted, (1e-12, 2e-4, 1e-12, 1e-12), strict=True):
-            np.testing.assert_allclose(found, value, rtol=0, atol=tolerance)
+def test_kt_is_the_light_on_a_slope_over_that_on_level_ground():
+    """Sunbeam, skylight and light of the land, each by itself."""
+    rng = np.random.default_rng(2)
+    sky, land, rho, local, level, direct = rng.uniform(0.1, 0.9, (6, 40))
+    total = direct + rng.uniform(0.01, 0.1, 40)
+    light = direct * local / level + (total - direct) * sky + total * rho * land
+    found = lights.topographic_factor(sky, land, rho, local, level, direct, total)
+    np.testing.assert_allclose(found, light / total, rtol=1e-12)
 
 
-def test_kt_and_the_upwelling_factor_are_one_on_level_ground():
-    for geometry in (Geometry(28.5, 117.0), Geometry(0.0, 0.0), Geometry(69.9, 300.0, 60.0, 100.0)):
-        light = light_of(np.full((9, 9), 371.2), 30.0, geometry)
-        np.testing.assert_allclose(kt_of(light, 0.4, geometry), 1, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(light.upwelling, 1, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("azimuth", [90.0, 180.0, 270.0, 0.0])
-@pytest.mark.parametrize("elevation", [12.0, 20.0, 45.0])
-def test_shadow_of_a_cliff_is_as_long_as_it_should_be(elevation, azimuth):
-    """A plateau of 20 m toward the sun: its shadow ends 20 m / tan(elevation) from its edge."""
-    dem = np.zeros((120, 120))
-    dem[:, 60:] = 20.0
-    dem = np.rot90(dem, (azimuth - 90) / -90)
-    light = light_of(dem, 2.0, Geometry(90 - elevation, azimuth))
-    line = np.rot90(light.mu_s_local == 0, (azimuth - 90) / 90)[60]
-    assert line[:60].sum() * 2.0 == pytest.approx(20 / np.tan(np.radians(elevation)), abs=2.0 + 1e-9)
-    # Cell 60 is on the cliff's face, which turns away.
-    assert not line[61:].any()
-    assert np.diff(line.astype(int)).clip(0).sum() == 1  # one run
-
-
-def test_shadow_between_two_directions_of_the_horizon():
-    """The edge is straight, and so is its horizon as interpolated."""
-    dem = np.zeros((120, 120))
-    dem[:, 60:] = 20.0
-    azimuth = 90 - 17.3
-    line = light_of(dem, 2.0, Geometry(70.0, azimuth)).mu_s_local[60] == 0
-    length = 20 / np.tan(np.radians(20.0)) * np.sin(np.radians(azimuth))
-    assert line[:60].sum() * 2.0 == pytest.approx(length, abs=2.0 + 1e-9)
-
-
-def test_slope_that_faces_away_is_dark():
-    light = light_of(plane((8, 8), 10.0, 10.0, 30.0, 0.0), 10.0, Geometry(65.0, 180.0))
-    assert (light.mu_s_local == 0).all()
-
-
-def pit(size=121, radius=100.0, depth=0.4):
-    rim = radius * np.sqrt(depth * (2 - depth))
-    cell = 2.4 * rim / size
-    y, x = (np.mgrid[:size, :size] - size // 2) * cell
-    z = radius * (1 - depth) - np.sqrt(np.maximum(radius**2 - x**2 - y**2, 0))
-    return np.minimum(np.where(x**2 + y**2 < rim**2, z, 0.0), 0.0), cell, np.hypot(x, y) < rim, np.pi * rim**2
-
-
-def test_skylight_and_sun_that_enter_a_closed_pit_fall_on_its_walls():
-    """With rho = 0 what Kt gives to the walls, by their area, is what passes the opening."""
-    dem, cell, inside, opening = pit()
-    for geometry in (Geometry(20.0, 30.0), Geometry(50.0, 200.0), Geometry(70.0, 310.0)):
-        light = light_of(dem, cell, geometry)
-        area = cell**2 / light.cosine
-        # The rim's cells are cut by it: 2 % of the opening is within half a cell of it.
-        for direct in (0.0, 0.5, 0.9):
-            flux = (kt_of(light, 0.0, geometry, direct) * area)[inside].sum()
-            assert flux == pytest.approx(opening, rel=0.02)
-
-
-def test_terrain_returns_what_the_walls_reflect_once():
-    """Under a uniform sky alone walls of reflectance rho add rho Ct, over their area."""
-    dem, cell, inside, _ = pit()
-    geometry = Geometry(40.0, 100.0)
-    light = light_of(dem, cell, geometry)
-    area = (cell**2 / light.cosine)[inside]
-    gain = (kt_of(light, 0.5, geometry, 0.0) - kt_of(light, 0.0, geometry, 0.0))[inside]
-    sky, cosine = light.sky_view[inside], light.cosine[inside]
-    # Ct is what the slope's hemisphere has besides sky: in the pit 1 - Vd less the level sky that its own plane hides.
-    expected = 0.5 * ((1 + cosine) / 2 - sky)
-    assert (gain * area).sum() == pytest.approx((expected * area).sum(), rel=1e-12)
-    assert (gain >= 0).all()
-
-
-def test_turning_ground_and_sun_together_turns_the_result():
-    dem = hills((41, 41), seed=3, relief=60.0)
-    before = light_of(dem, 10.0, Geometry(60.0, 35.0, 25.0, 290.0))
-    # Counterclockwise on paper is from east to north: azimuths fall by 90.
-    after = light_of(np.rot90(dem), 10.0, Geometry(60.0, 305.0, 25.0, 200.0))
-    np.testing.assert_allclose(np.rot90(before, axes=(1, 2)), after, rtol=0, atol=1e-9)
-    assert before.sky_view.std() > 1e-3 and (before.mu_s_local == 0).any()
-
-
-def test_fused_reflectance_is_rho_kt_and_the_view_factor():
-    dem, geometry = hills((30, 35), seed=5, relief=60.0), Geometry(55.0, 100.0, 30.0, 20.0)
-    dem[3, 4] = np.nan
-    edged, sky = sky_of(dem, 10.0, 300.0, geometry.saa)
-    rho = np.random.default_rng(4).uniform(0, 0.6, (2, *dem.shape))
-    direct, total = np.array([0.6, 0.8]), np.array([0.85, 0.95])
-    arguments = (rho, edged, sky, (10.0, 10.0), geometry, direct, total)
-    light = light_of(dem, 10.0, geometry, 300.0)
-    expected = rho * kt_of(light, rho, geometry, direct[:, None, None], total[:, None, None])
-    np.testing.assert_allclose(lights.slope_reflectance(*arguments, upwelling=False), expected, rtol=1e-13)
-    np.testing.assert_allclose(lights.slope_reflectance(*arguments), expected * light.upwelling, rtol=1e-13)
-    assert np.isnan(expected).sum() == 2
-
-
-def test_fused_factor_has_the_bits_of_the_formula():
-    dem, geometry = hills((30, 35), seed=5, relief=60.0), Geometry(55.0, 100.0, 30.0, 20.0)
-    dem[3, 4] = np.nan
-    edged, sky = sky_of(dem, 10.0, 300.0, geometry.saa)
-    rho = np.random.default_rng(4).uniform(0, 0.6, (2, *dem.shape))
-    direct, total = np.array([0.6, 0.8]), np.array([0.85, 0.95])
-    light = light_of(dem, 10.0, geometry, 300.0)
-    expected = kt_of(light, rho, geometry, direct[:, None, None], total[:, None, None])
-    found = lights.slope_factor(rho, edged, sky, (10.0, 10.0), geometry, direct, total)
-    assert np.isnan(found).sum() == 2
-    assert found.tobytes() == expected.tobytes()
-    turned = np.moveaxis(np.ascontiguousarray(np.moveaxis(rho, 0, -1)), -1, 0)
-    for make in (lights.slope_factor, lights.slope_reflectance):
-        of_turned, of_copy = (make(each, edged, sky, (10.0, 10.0), geometry, direct, total) for each in (turned, rho))
-        np.testing.assert_array_equal(of_turned, of_copy)
-
-
-def test_places_between_are_interpolated():
-    """A sky that varies evenly is met exactly between its places, and beyond them."""
-    rows, columns = np.arange(20.0), np.arange(24.0)
-    value = 0.6 + 0.01 * rows[:, None] + 0.005 * columns
-    layers = np.zeros((4, 3, 3))
-    layers[2] = value[4:17:6, 5:18:6]
-    row, column = (np.clip((axis - first).astype(int) // 6, 0, 1) for axis, first in ((rows, 4), (columns, 5)))
-    sky = lights.Sky(layers, row, (rows - 4 - 6 * row) / 6, column, (columns - 5 - 6 * column) / 6)
-    light = lights.slope_light(np.zeros((22, 26)), sky, (1.0, 1.0), Geometry(30.0, 0.0))
-    np.testing.assert_allclose(light.sky_view, np.clip(value, 0, 1), rtol=1e-12)
+def test_a_slope_that_faces_away_is_not_seen():
+    assert lights.upwelling_factor(np.array([0.3, 0.6, -0.2]), 0.6).tolist() == [0.5, 1.0, 0.0]

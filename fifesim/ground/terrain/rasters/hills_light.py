@@ -41,7 +41,7 @@ def light_on_hills(grid, around, seed, reach, geometry, altitude):
     Returns
     -------
     elevation, sky, cell, geometry
-        To the bit those of `fifesim.ground.terrain.rasters.light.light_on_slopes`, of the hills of these grids and
+        To the bit those of `fifesim.ground.terrain.rasters.lit_slopes.light_on_slopes`, of the hills of these grids and
         their horizon.
 
     Raises

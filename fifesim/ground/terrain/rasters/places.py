@@ -7,7 +7,7 @@ from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.ground.terrain.between_places import bilinear
-from fifesim.ground.terrain.light import Sky
+from fifesim.ground.terrain.lit_slopes import Sky
 from fifesim.rasters import cf, projection
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
@@ -116,7 +116,7 @@ class Between(NamedTuple):
 
         Returns
         -------
-        sky : fifesim.ground.terrain.light.Sky
+        sky : fifesim.ground.terrain.lit_slopes.Sky
         """
         (row, row_share), (column, column_share) = self
         row, column = row[rows] - row[rows.start], column[columns] - column[columns.start]

@@ -112,7 +112,7 @@ def sky_above(data, grid, resolution, horizon, geometry, check=True):
     Returns
     -------
     layers : numpy.ndarray or dask.array.Array, shape (4, y, x)
-        Those of `fifesim.ground.terrain.light.Sky`. [1]
+        Those of `fifesim.ground.terrain.lit_slopes.Sky`. [1]
     places : fifesim.ground.terrain.rasters.places.Places
 
     Raises

@@ -8,7 +8,7 @@ from fifesim.base.geometry import Geometry
 from fifesim.ground.terrain.rasters import hills_light, slopes
 from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.ground.terrain.rasters.hills import flint_hills
-from fifesim.ground.terrain.rasters.light import light_on_slopes
+from fifesim.ground.terrain.rasters.lit_slopes import light_on_slopes
 from fifesim.ground.terrain.rasters.sky import horizon
 from fifesim.rasters import grid as grids
 from fifesim.rasters.carried_grid import as_carried

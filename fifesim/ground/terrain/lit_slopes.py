@@ -1,0 +1,264 @@
+"""All cells of lit slopes in one pass over the ground: their light, Kt and reflectance."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+
+from fifesim.ground.terrain.light import direction_vector, topographic_factor, upwelling_factor
+from fifesim.ground.terrain.sky import sky_factor, terrain_view
+from fifesim.ground.terrain.slope import Vector, along_normal, rise, slope_cosine
+
+
+class Sky(NamedTuple):
+    """
+    The sky at places around, and where each row and each column of cells lies between these: which place is before it,
+    and the share of that after it.
+    """
+
+    layers: np.ndarray
+    """Vector of `sky.sky_vector` and tangent of the horizon toward the sun, shape (4, places, places). [1]"""
+    row: np.ndarray
+    row_share: np.ndarray
+    column: np.ndarray
+    column_share: np.ndarray
+
+
+class SlopeLight(NamedTuple):
+    """What the light on slopes depends on, each an array of cells. [1]"""
+
+    cosine: np.ndarray  # of the slope
+    sky_view: np.ndarray
+    mu_s_local: np.ndarray  # 0 in shadow
+    upwelling: np.ndarray  # Eq. 5
+
+
+class _Setting(NamedTuple):
+    """Unit vectors toward sun and sensor, tangent of the sun's elevation, and what makes a rise a gradient [1/m]."""
+
+    sun: Vector
+    sun_tangent: float
+    sensor: Vector
+    per_y: float
+    per_x: float
+
+
+def slope_light(dem, sky, cell, geometry):
+    """
+    What the light on slopes depends on.
+
+    Parameters
+    ----------
+    dem : array, shape (rows + 2, columns + 2)
+        Elevation, north up, with a margin of one cell, which may be NaN. [m]
+    sky : Sky
+    cell : (float, float)
+        Size of a cell, down and across. [m]
+    geometry : fifesim.base.geometry.Geometry
+        Of sun and sensor.
+
+    Returns
+    -------
+    light : SlopeLight
+        Fields of shape (rows, columns); NaN where elevation is. [1]
+    """
+    rows, columns = dem.shape
+    light = SlopeLight(*np.empty((len(SlopeLight._fields), rows - 2, columns - 2)))
+    _slope_light(*_contiguous(dem, sky), _setting(cell, geometry), light)
+    return light
+
+
+def slope_reflectance(reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down, upwelling=True):
+    r"""
+    Reflectance factor of cells on slopes, as seen against the irradiance of level ground.
+
+    .. math:: \rho \, K_t \, \max(\mu_v, 0) / \cos \theta_v
+
+    Parameters
+    ----------
+    reflectance : array, shape (band, rows, columns)
+        Of level ground. [1]
+    dem, sky, cell, geometry
+        As in `slope_light`.
+    direct_transmittance, transmittance_down : array, shape (band,)
+        As in `topographic_factor`. [1]
+    upwelling : bool, optional
+        Whether with the factor of Eq. 5.
+
+    Returns
+    -------
+    reflectance : array, shape (band, rows, columns)
+        [1]
+
+    References
+    ----------
+    [Friedl1995]_, Eqs. 4 and 5
+    """
+    out = np.empty(reflectance.shape)
+    air = direct_transmittance, transmittance_down
+    _pass_over(reflectance, dem, sky, cell, geometry, *air, upwelling, True, out, out)
+    return out
+
+
+def slope_factor(reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down):
+    """
+    Topographic correction factor Kt of cells.
+
+    Parameters
+    ----------
+    reflectance : array, shape (band, rows, columns)
+        Of the land around, as it is on level ground. [1]
+    dem, sky, cell, geometry
+        As in `slope_light`.
+    direct_transmittance, transmittance_down : array, shape (band,)
+        As in `topographic_factor`. [1]
+
+    Returns
+    -------
+    kt : array, shape (band, rows, columns)
+        To the bit that of the formula; NaN where elevation or reflectance is. [1]
+
+    See Also
+    --------
+    topographic_factor
+    """
+    out = np.empty(reflectance.shape)
+    air = direct_transmittance, transmittance_down
+    _pass_over(reflectance, dem, sky, cell, geometry, *air, False, False, out, out)
+    return out
+
+
+def slope_factor_and_reflectance(
+    reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down, upwelling=True
+):
+    """
+    Kt of cells and their reflectance, in one pass.
+
+    Parameters
+    ----------
+    reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down, upwelling
+        As in `slope_reflectance`.
+
+    Returns
+    -------
+    both : array, shape (2, band, rows, columns)
+        The bits of `slope_factor`, and of `slope_reflectance`. [1]
+    """
+    both = np.empty((2, *reflectance.shape))
+    air = direct_transmittance, transmittance_down
+    _pass_over(reflectance, dem, sky, cell, geometry, *air, upwelling, True, *both)
+    return both
+
+
+def _pass_over(reflectance, dem, sky, cell, geometry, direct, total, upwelling, reflected, kt, out):
+    """Fill in Kt and, if it is asked for, reflectance, which may be in the place of Kt."""
+    rho, air = np.ascontiguousarray(reflectance, float), (np.asarray(direct, float), np.asarray(total, float))
+    _slope_factors(rho, *_contiguous(dem, sky), _setting(cell, geometry), *air, upwelling, reflected, kt, out)
+
+
+def _contiguous(dem, sky):
+    return np.ascontiguousarray(dem, float), sky._replace(layers=np.ascontiguousarray(sky.layers, float))
+
+
+def _setting(cell, geometry):
+    sun, view = direction_vector(geometry.sza, geometry.saa), direction_vector(geometry.vza, geometry.vaa)
+    # Overhead, no horizon reaches the sun.
+    sun_tangent = sun.z / np.hypot(sun.x, sun.y) if geometry.sza > 0 else np.inf
+    cell_y, cell_x = cell
+    return _Setting(sun, sun_tangent, view, 0.5 / cell_y, 0.5 / cell_x)
+
+
+# Divided as numpy does: a check of each divisor for 0 would keep a loop from taking several cells at once.
+@njit(nogil=True, cache=True, error_model="numpy")
+def _slope_light(dem, sky, setting, light):
+    columns = light.cosine.shape[1]
+    above, below, gradient = np.empty((4, columns)), np.empty((4, columns)), np.empty((2, columns))
+    for i in range(light.cosine.shape[0]):
+        _sky_beside(sky, i, above, below)
+        _gradient_of_row(dem[i], dem[i + 1], dem[i + 2], setting, gradient[0], gradient[1])
+        line = SlopeLight(light.cosine[i], light.sky_view[i], light.mu_s_local[i], light.upwelling[i])
+        _light_of_row(gradient[0], gradient[1], above, below, sky.row_share[i], setting, line)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _slope_factors(rho, dem, sky, setting, direct, total, upwelling, reflected, kt, out):
+    columns = out.shape[2]
+    above, below, gradient = np.empty((4, columns)), np.empty((4, columns)), np.empty((2, columns))
+    line = SlopeLight(np.empty(columns), np.empty(columns), np.empty(columns), np.empty(columns))
+    for i in range(out.shape[1]):
+        _sky_beside(sky, i, above, below)
+        _gradient_of_row(dem[i], dem[i + 1], dem[i + 2], setting, gradient[0], gradient[1])
+        _light_of_row(gradient[0], gradient[1], above, below, sky.row_share[i], setting, line)
+        if not upwelling:
+            line.upwelling[:] = 1.0
+        for band in range(out.shape[0]):
+            _factor_of_row(rho[band, i], line, setting.sun.z, direct[band], total[band], kt[band, i])
+            if reflected:
+                out[band, i] = kt[band, i]
+                _reflect_row(rho[band, i], line.upwelling, out[band, i])
+
+
+@register_jitable
+def _between(before, after, share):
+    return (1 - share) * before + share * after
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _sky_beside(sky, i, above, below):
+    """The sky of the rows of places above and below a row of cells, at its columns; those of the row before stay."""
+    row, last = sky.row[i], sky.layers.shape[1] - 1
+    if i > 0 and row == sky.row[i - 1]:
+        return
+    if i > 0 and row == sky.row[i - 1] + 1:
+        above[:] = below
+    else:
+        _sky_of_places(sky, row, above)
+    _sky_of_places(sky, min(row + 1, last), below)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _sky_of_places(sky, row, out):
+    last = sky.layers.shape[2] - 1
+    for layer in range(out.shape[0]):
+        places = sky.layers[layer, row]
+        for j in range(out.shape[1]):
+            before = sky.column[j]
+            out[layer, j] = _between(places[before], places[min(before + 1, last)], sky.column_share[j])
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _gradient_of_row(above, here, below, setting, east, north):
+    """Rise of one row of cells from its elevation and that of its neighbours, each with a margin of one cell."""
+    for j in range(east.size):
+        rising = rise(here[j], here[j + 1], here[j + 2]) * setting.per_x
+        east[j] = np.nan if np.isnan(here[j + 1]) else rising
+        north[j] = rise(below[j + 1], here[j + 1], above[j + 1]) * setting.per_y
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _light_of_row(east, north, above, below, share, setting, light):
+    for j in range(east.size):
+        seen = Vector(
+            _between(above[0, j], below[0, j], share),
+            _between(above[1, j], below[1, j], share),
+            _between(above[2, j], below[2, j], share),
+        )
+        lit = _between(above[3, j], below[3, j], share) <= setting.sun_tangent
+        light.cosine[j] = slope_cosine(east[j], north[j])
+        light.sky_view[j] = sky_factor(seen, east[j], north[j])
+        light.mu_s_local[j] = np.maximum(along_normal(setting.sun, east[j], north[j]), 0.0) * lit
+        light.upwelling[j] = upwelling_factor(along_normal(setting.sensor, east[j], north[j]), setting.sensor.z)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _factor_of_row(rho, light, mu_s, direct, total, out):
+    for j in range(out.size):
+        land = terrain_view(light.sky_view[j], light.cosine[j])
+        out[j] = topographic_factor(light.sky_view[j], land, rho[j], light.mu_s_local[j], mu_s, direct, total)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _reflect_row(rho, upwelling, out):
+    for j in range(out.size):
+        out[j] = rho[j] * out[j] * upwelling[j]

@@ -1,0 +1,40 @@
+"""Slopes below the air."""
+
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.chain.slopes import kt_and_reflectance
+from fifesim.rasters import grid as grids
+
+
+def test_sky_above_slopes_is_in_a_graph_once(lai):
+    """Reflectance on slopes and Kt share all but the last layer that each makes of the light."""
+    grid = grids.geobox(lai)
+    lai, dem = lai.chunk({"y": 20, "x": 30}), fifesim.flint_hills(grid, seed=7, chunks=25)
+    level, slopes = (lai.fifesim.surface_reflectance("TM", bands=["TM4"], dem=each) for each in (None, dem))
+    own = set(level.fifesim.kt(dem).data.dask.layers) - set(slopes.data.dask.layers)
+    assert len(own) == 1, own
+
+
+def test_kt_warns_where_the_elevation_is_not_that_of_the_air(lai):
+    """As reflectance on the same slopes does."""
+    level = lai.fifesim.surface_reflectance("TM", bands=["TM4"])
+    dem = fifesim.flint_hills(grids.geobox(lai), seed=7)
+    with pytest.warns(UserWarning, match="beside an altitude of the atmosphere of 0.4 km"):
+        level.fifesim.kt(dem + 2000.0)
+
+
+@pytest.mark.parametrize("upwelling", [True, False])
+def test_one_pass_gives_what_both_steps_give(lai, upwelling):
+    """With the labels of both, and lazily."""
+    dem = fifesim.flint_hills(grids.geobox(lai), seed=7)
+    level = fifesim.surface_reflectance(lai.chunk(20), bands=["TM3", "TM4"])
+    found = kt_and_reflectance(level, dem, upwelling=upwelling)
+    expected = (
+        level.fifesim.kt(dem),
+        fifesim.surface_reflectance(lai, bands=["TM3", "TM4"], dem=dem, upwelling=upwelling),
+    )
+    for one, other in zip(found, expected, strict=True):
+        assert one.chunks is not None
+        xr.testing.assert_identical(one.compute(), other.compute())
