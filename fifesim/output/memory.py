@@ -4,11 +4,12 @@ import ctypes
 import os
 import sys
 
-# What mallopt calls them: the free memory at whose end it is given back, and the smallest block that is always.
-_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+# What mallopt calls them: so much free memory at the end of a heap goes back, blocks of such a size always do, and how
+# many heaps there are: one, as those of threads go back when they are empty.
+_TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 
-# Some blocks of a scene. [byte]
-_KEPT = 2**28
+# More than a run frees at once, and what mallopt takes as a whole number. [byte]
+_KEPT = 2**30
 
 
 def keep_freed():
@@ -24,3 +25,4 @@ def keep_freed():
     if mallopt:
         mallopt(_TRIM_THRESHOLD, _KEPT)
         mallopt(_MMAP_THRESHOLD, _KEPT)
+        mallopt(_ARENA_MAX, 1)

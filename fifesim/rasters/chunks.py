@@ -1,6 +1,7 @@
 """How a kernel of numpy arrays meets dask: by cell, by place, or from windows of others."""
 
 from itertools import combinations, product
+from operator import itemgetter
 from typing import NamedTuple
 
 import dask.array as da
@@ -156,6 +157,26 @@ def windows(kernel, reads, shape, chunks=None, dtype=float, seams=((), ())):
     arrays, leading = [each.array for each in reads], shape[:-2]
     how = {"token": token, "leading": leading, "dtype": dtype, "seams": seams}
     return array_from_windows(kernel, arrays, chunks, ask, **how)
+
+
+def along_first(array):
+    """
+    The entries of an array along its first axis, as views of it.
+
+    Parameters
+    ----------
+    array : numpy.ndarray or dask.array.Array, shape (n, ...)
+        In one chunk along that axis.
+
+    Returns
+    -------
+    entries : tuple of numpy.ndarray or dask.array.Array
+        By an index, dask would copy them.
+    """
+    if isinstance(array, np.ndarray):
+        return tuple(array)
+    meta = np.empty((0,) * (array.ndim - 1), array.dtype)
+    return tuple(array.map_blocks(itemgetter(k), drop_axis=0, meta=meta) for k in range(array.shape[0]))
 
 
 def in_blocks(kernel, reads, shape, size, dtype=float):

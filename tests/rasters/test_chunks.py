@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import dask
+import dask.array as da
 import numpy as np
 import pytest
 import xarray as xr
@@ -105,3 +107,17 @@ def test_blocks_read_windows_of_any_shape(array_type, size):
         assert found.chunks[1] == tuple([size] * (12 // size) + [12 % size] * bool(12 % size))
     expected = [cells.values[k, k : k + 12] for k in range(30)]
     np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("lazy", [True, False])
+def test_entries_along_the_first_axis_are_views(lazy):
+    whole = np.arange(24.0).reshape(2, 3, 4)
+    array = da.from_array(whole, chunks=(2, 2, 4)) if lazy else whole
+    found = chunks.along_first(array)
+    np.testing.assert_array_equal(np.stack(found), whole)
+    if lazy:
+        assert found[1].chunks == ((2, 1), (4,)) and found[1].dtype == whole.dtype
+        blocks = dask.get(dict(found[1].dask), [(found[1].name, 0, 0)])
+        assert blocks[0].base is not None
+    else:
+        assert np.shares_memory(found[1], whole)

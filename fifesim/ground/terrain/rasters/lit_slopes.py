@@ -138,7 +138,7 @@ def kt_and_reflectance(
         return slope_factor_and_reflectance(rho, elevation, sky, cell, seen, *air, upwelling)
 
     level = reflectance.transpose("band", "y", "x")
-    kt, seen = on_slopes(kernel, dem, horizon, geometry, level, leading=(2,))
+    kt, seen = chunking.along_first(on_slopes(kernel, dem, horizon, geometry, level, leading=(2,)))
     return _labelled(kt, level, geometry, "kt", _KT), _labelled(seen, level, geometry, *_reflected(upwelling))
 
 
