@@ -4,8 +4,8 @@ from fifesim.analysis.rasters.pairs import matched
 from fifesim.analysis.rasters.regression import regress
 from fifesim.base import datasets
 from fifesim.rasters import grid as grids
+from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import grid_keys
-from fifesim.scenario.simulation import simulate
 
 # Cells along the edge of the part that is paired as the paper's scenes are: as many as `fifesim reproduce` takes.
 _CELLS, _EDGE = 333, 1110.0
@@ -65,6 +65,6 @@ def _papers_pairing(scenario):
     sensor = scenario.sensor.model_copy(update={"interval": "native", "offset": [0.0, 0.0]})
     terrain = scenario.terrain.model_copy(update={"dem": "flat", "fill": None, "vertical_units": None})
     part = {"grid": grid_keys(box[:cells, :cells]), "terrain": terrain, "sensor": sensor}
-    run = simulate(scenario.model_copy(update=part), chunks=None)
+    run = realise(scenario.model_copy(update=part))
     truth, image = matched(run["truth"]["lai"], run["image"]["ndvi"], "index")
     return cells, regress(truth, image, pair="index").r2
