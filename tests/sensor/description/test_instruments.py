@@ -2,6 +2,8 @@
 
 import os
 import shutil
+import subprocess
+import sys
 import tomllib
 
 import numpy as np
@@ -100,3 +102,10 @@ def test_tables_of_a_file_are_found_from_wherever_it_was_named(tmp_path, monkeyp
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir("elsewhere")
     assert [band.response for band in mine.bands] == [band.response for band in instrument("AVHRR9").bands]
+
+
+def test_an_instrument_called_as_its_file_is_found_without_reading_the_others():
+    """To read all takes ten times as long; by an alias it is the same one."""
+    code = "import fifesim.sensor.description.instruments as i; tm = i.instrument('Tm'); count = i._listed.cache_info()"
+    code += ".currsize; assert count == 1, count; assert i.instrument('Landsat 5') is tm"
+    subprocess.run([sys.executable, "-c", code], check=True)

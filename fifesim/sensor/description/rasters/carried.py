@@ -31,10 +31,17 @@ def attributes_of(description):
         responses written out.
     """
     named = {"instrument": description.name}
-    if description.name in instrument_names() and find_instrument(description.name) == description:
+    if _is_catalogued(description):
         return named
     bands = tuple(replace(band, srf=_written_out(band.response)) for band in description.bands)
     return named | {"instrument_description": _ADAPTER.dump_json(replace(description, bands=bands)).decode()}
+
+
+def _is_catalogued(description):
+    try:
+        return catalogued(description.name) == description
+    except ValueError:
+        return False
 
 
 def carried_instrument(array):
