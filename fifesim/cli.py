@@ -21,8 +21,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-# Before scipy is imported: dask has a thread for each core, and on small matrices those of BLAS wait longer than they
-# work. Who has set the number keeps it.
+# For scipy, processes of workers, and what `_importing` tells numpy: dask has a thread for each core, and on small
+# matrices those of BLAS wait longer than they work. Who has set the number keeps it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _Paper = Annotated[bool, typer.Option("--paper", help="The paper's one stand, in the place of the landscape.")]

@@ -396,3 +396,17 @@ def test_help_does_not_import_what_is_slow():
     code = f"import sys; from fifesim.cli import app; print([name for name in {slow} if name in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
     assert found.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("given", [None, "2"])
+def test_commands_take_one_thread_of_blas_unless_told_otherwise(given):
+    """numpy's too, which is there before the command is: its threads wait for each other, longer than they work."""
+    given = {} if given is None else {"OPENBLAS_NUM_THREADS": given}
+    code = (
+        "from fifesim.cli import app, _importing\nwith _importing(): import scipy.linalg\n"
+        "from threadpoolctl import threadpool_info\n"
+        "print({each['num_threads'] for each in threadpool_info() if each['user_api'] == 'blas'})"
+    )
+    env = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")} | given
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env)
+    assert found.stdout.strip() == (f"{{{min(2, os.cpu_count())}}}" if given else "{1}")

@@ -12,6 +12,7 @@ from enum import IntEnum
 from typing import Annotated
 
 import typer
+from threadpoolctl import threadpool_limits
 from typer.core import TyperGroup
 
 from fifesim.base.foreign import in_a_line
@@ -122,7 +123,8 @@ def importing():
     A context for slow imports, with which a command that works on scenes begins.
 
     They make objects that stay: to look for garbage among them takes a sixth of their time, and among all that there is
-    when the interpreter ends half of its last moments.
+    when the interpreter ends half of its last moments. numpy, which comes with the package before a command can say how
+    many threads its BLAS may have, is told afterwards.
     """
     keep_freed()
     atexit.register(gc.freeze)
@@ -132,6 +134,8 @@ def importing():
     finally:
         gc.freeze()
         gc.enable()
+        if os.environ.get("OPENBLAS_NUM_THREADS") == "1":
+            threadpool_limits(1, user_api="blas")
 
 
 def say(*texts, err=False):
