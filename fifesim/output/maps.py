@@ -103,10 +103,12 @@ def value_map(array, title, cmap="YlGn", *, limits=None, middle=None, frame=None
     if middle is not None:
         half = max(abs(low - middle), abs(high - middle), 1e-6)
         low, high = middle - half, middle + half
-    with np.errstate(invalid="ignore"):
-        shares = np.nan_to_num(Normalize(low, max(high, low + 1e-9), clip=True)(array.values).filled(np.nan))
-    pixels = colours(shares, bytes=True)[..., :3]
-    return _map(array, pixels, np.isfinite(array.values), title, _bar(colours, low, high), frame)
+    known = np.isfinite(array.values)
+    # As matplotlib does, in a quarter of the time.
+    shares = (np.where(known, array.values, low) - low) / max(high - low, 1e-9)
+    shades = np.clip(shares * colours.N, 0, colours.N - 1).astype(np.uint16)
+    pixels = colours(np.arange(colours.N), bytes=True)[:, :3][shades]
+    return _map(array, pixels, known, title, _bar(colours, low, high), frame)
 
 
 def relief_map(dem, title):
@@ -220,7 +222,8 @@ def encoded(pixels, lossless=False):
 
 
 def _map(array, pixels, valid, title, bar, frame=None):
-    pixels = np.where(valid[..., None], pixels, _NO_DATA)
+    if not valid.all():
+        pixels = np.where(valid[..., None], pixels, _NO_DATA)
     box = grids.geobox(array).boundingbox
     marked = frame and (
         100 * (frame.left - box.left) / box.span_x,

@@ -40,7 +40,9 @@ _BLOCK = 512
 _AT_ONCE = 16 * 2**20
 
 _TILED = {"driver": "GTiff", "tiled": True, "blockxsize": _BLOCK, "blockysize": _BLOCK, "bigtiff": "if_safer"}
-_COG = {"driver": "COG", "compress": "deflate", "predictor": "yes", "overview_resampling": "average"}
+# Of numbers that vary from cell to cell zlib finds little: its least effort takes three fifths of the time, for 2 %
+# more bytes of floats and 5 % of digital numbers.
+_COG = {"driver": "COG", "compress": "deflate", "level": 1, "predictor": "yes", "overview_resampling": "average"}
 # Without it GDAL leaves behind what the whole file has in IMAGERY.
 _COG |= {"copy_src_mdd": "yes"}
 
