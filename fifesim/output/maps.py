@@ -33,6 +33,9 @@ _LEVEL = 2
 _MOST = 0.5, 99.5
 _STOPS = 9
 
+# Decimals of a number beside a colour bar are fewer.
+_MOST_DIGITS = 12
+
 
 class Bar(NamedTuple):
     """A colour bar: stops of a gradient, and numbers with their places along it. [%]"""
@@ -244,8 +247,9 @@ def _scale(width):
 def _bar(colours, low, high):
     stops = [to_hex(colours(share)) for share in np.linspace(0, 1, _STOPS)]
     ticks = [each for each in MaxNLocator(4).tick_values(low, high) if low <= each <= high and high > low]
-    step = min(np.diff(ticks), default=1.0)
-    digits = int(max(0, -np.floor(np.log10(step) + 1e-9)))
+    # As few as the steps need: that from .25 to .5 has two.
+    step = min(np.diff(ticks), default=1.0) * 10.0 ** np.arange(_MOST_DIGITS)
+    digits = int(np.argmax(np.abs(step - step.round()) < 1e-6 * step))
     texts = (f"{each:.{digits}f}".replace("-", "−") for each in ticks)
     return Bar(stops, [(100 * (each - low) / (high - low), text) for each, text in zip(ticks, texts, strict=True)])
 

@@ -23,6 +23,22 @@ def dn(lai):
     return rho.fifesim.to_toa().fifesim.sense("TM").compute()
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "texts"),
+    [
+        (0.2, 1.1, ["0.25", "0.50", "0.75", "1.00"]),
+        (0.1, 0.9, ["0.2", "0.4", "0.6", "0.8"]),
+        (-0.05, 0.05, ["−0.050", "−0.025", "0.000", "0.025", "0.050"]),
+        (340.0, 440.0, ["350", "375", "400", "425"]),
+    ],
+)
+def test_numbers_of_a_bar_have_the_digits_that_they_need(lai, low, high, texts):
+    bar = value_map(lai, "leaves", limits=(low, high)).bar
+    assert [text for _, text in bar.ticks] == texts
+    for place, text in bar.ticks:
+        assert place == pytest.approx(100 * (float(text.replace("−", "-")) - low) / (high - low))
+
+
 def test_colours_are_those_of_the_bar(lai):
     """A value at the low end has the first stop, one beyond the high end the last, and no data is grey."""
     values = lai.copy(data=np.linspace(0.0, 4.0, lai.size).reshape(lai.shape))
