@@ -257,12 +257,13 @@ def _lattices(arps, coarser):
 
 def _field(grid, name, streams, parts, ground, chunks, values):
     """One field, of the noises that are in it and of the ground that it follows; streams are seeds, arps and sizes."""
-    lattice = grids.lattice_position(grid)
+    # Kernels hold names, not rasters: what they hold goes with them into each worker.
+    lattice, followed = grids.lattice_position(grid), tuple(ground)
 
     def cells(made, row, column, shape, *layers):
         found = _noise(name, streams, made, (lattice[0] + row, lattice[1] + column), shape)
         if layers:
-            found = correlated(made.ground[name], found, made.covariates, dict(zip(ground, layers, strict=True)))
+            found = correlated(made.ground[name], found, made.covariates, dict(zip(followed, layers, strict=True)))
         return values(found)
 
     if isinstance(parts, Copula):
