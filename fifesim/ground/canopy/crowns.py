@@ -240,13 +240,37 @@ def lai_in_crowns(lai, crown_cover):
     return np.where(cover > 0, lai / np.where(cover > 0, cover, 1), 0 * lai)
 
 
-@njit(nogil=True, cache=True)
-def _overfull(lai, cover):
-    """How many crowns hold too many leaves: a sum, so that several are looked at at once."""
+@register_jitable
+def overfull(lai, crown_cover):
+    """
+    How many crowns hold more leaves than any canopy; NaN is passed over, and ground without crowns.
+
+    Parameters
+    ----------
+    lai : array, shape (n,)
+        Of the ground. [m2 m-2]
+    crown_cover : array, shape (n,)
+        [1]
+
+    Returns
+    -------
+    count : int
+        A sum, so that several cells are looked at at once.
+
+    Examples
+    --------
+    >>> overfull(np.array([5.0, 5.0, 5.0]), np.array([0.5, 0.01, 0.0]))
+    1
+    """
     count = 0
     for i in range(lai.size):
-        count += (lai[i] > LARGEST_LAI * cover[i]) & (cover[i] > 0)
+        count += (lai[i] > LARGEST_LAI * crown_cover[i]) & (crown_cover[i] > 0)
     return count
+
+
+@njit(nogil=True, cache=True)
+def _overfull(lai, crown_cover):
+    return overfull(lai, crown_cover)
 
 
 def check_crowns(lai, crown_cover):
@@ -271,8 +295,10 @@ def check_crowns(lai, crown_cover):
     """
     check_share("crown_cover", crown_cover)
     lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
+    shape = np.broadcast_shapes(lai.shape, cover.shape)
+    cells = (each if each.shape == shape else np.broadcast_to(each, shape) for each in (lai, cover))
     # Ground without crowns holds no leaves, and is not meant.
-    if _overfull(*(np.ascontiguousarray(each).reshape(-1) for each in np.broadcast_arrays(lai, cover))):
+    if _overfull(*(np.ascontiguousarray(each).reshape(-1) for each in cells)):
         inside = lai / np.where(cover > 0, cover, np.inf)
         raise ValueError(
             f"leaf area index within the crowns is lai / crown_cover, at most {LARGEST_LAI:g}, got up to "

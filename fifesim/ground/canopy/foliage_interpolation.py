@@ -5,8 +5,10 @@ from numba import njit
 from numba.extending import register_jitable
 
 from fifesim.ground.canopy.background import over_background
-from fifesim.ground.canopy.crowns import crowns_over_background
+from fifesim.ground.canopy.crowns import crowns_over_background, overfull
 from fifesim.ground.canopy.foliage_table import LIMIT, TERMS
+from fifesim.ground.canopy.optics import LARGEST_LAI
+from fifesim.ground.canopy.ranges import outside
 
 # Cells whose places in a table are found together: they stay in the nearest cache.
 _RUN = 256
@@ -31,10 +33,12 @@ def interpolate_foliage(table, lai, brown, background):
     -------
     reflectance : array, shape (band, n)
         Infinite where the leaf area within crowns is above `LIMIT`. [1]
+    wrong : int
+        How many values no canopy has: a leaf area outside 0 to `LARGEST_LAI`, others outside 0 to 1.
     """
     values = np.empty((table.coefficients.shape[-1] // 4, lai.size))
-    _foliage(*(np.ascontiguousarray(each) for each in (lai, brown, background)), table, values)
-    return values
+    wrong = _foliage(*(np.ascontiguousarray(each) for each in (lai, brown, background)), table, values)
+    return values, wrong
 
 
 def interpolate_crowned(table, crowns, lai, brown, crown_cover, background):
@@ -60,11 +64,13 @@ def interpolate_crowned(table, crowns, lai, brown, crown_cover, background):
     -------
     reflectance : array, shape (band, n)
         Infinite where the leaf area within crowns is above `LIMIT`. [1]
+    wrong : int
+        As of `interpolate_foliage`; crowns with a leaf area above `LARGEST_LAI` count too.
     """
     values = np.empty((table.coefficients.shape[-1] // TERMS, lai.size))
     cells = (np.ascontiguousarray(each) for each in (lai, brown, crown_cover, background))
-    _crowned(*cells, table, crowns, values)
-    return values
+    wrong = _crowned(*cells, table, crowns, values)
+    return values, wrong
 
 
 @register_jitable
@@ -173,17 +179,21 @@ def _foliage(lai, brown, background, table, values):
     wide, terms = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns))
     starts, leaves, dead = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN)
     of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
+    wrong = 0
     for first in range(0, lai.size, _RUN):
         cells, shares = lai[first : first + _RUN], brown[first : first + _RUN] if of_brown else alike
+        wrong += outside(cells, 0.0, LARGEST_LAI) + outside(shares, 0.0, 1.0)
         _places(table, cells, shares, starts, leaves, dead)
         _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
+            wrong += outside(below, 0.0, 1.0)
             for i in range(cells.size):
                 t, ground = terms[i], below[i if of_ground else 0]
                 seen = over_background(t[4 * band], t[4 * band + 1], t[4 * band + 2], t[4 * band + 3], ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if cells[i] > LIMIT else np.nan
+    return wrong
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -193,11 +203,15 @@ def _crowned(lai, brown, cover, background, table, crowns, values):
     starts, leaves, dead, inside = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN), np.zeros(_RUN)
     places, shares = np.zeros(_RUN, np.int64), np.zeros(_RUN)
     of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
+    wrong = 0
     for first in range(0, lai.size, _RUN):
         cells, crowned = lai[first : first + _RUN], cover[first : first + _RUN]
+        browns = brown[first : first + _RUN] if of_brown else alike
+        wrong += outside(cells, 0.0, LARGEST_LAI) + outside(browns, 0.0, 1.0)
+        wrong += outside(crowned, 0.0, 1.0) + overfull(cells, crowned)
         _within(cells, crowned, inside)
         of_cells = inside[: cells.size]
-        _places(table, of_cells, brown[first : first + _RUN] if of_brown else alike, starts, leaves, dead)
+        _places(table, of_cells, browns, starts, leaves, dead)
         if table.coefficients.shape[1] > 1:
             _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
         else:
@@ -207,8 +221,10 @@ def _crowned(lai, brown, cover, background, table, crowns, values):
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
+            wrong += outside(below, 0.0, 1.0)
             for i in range(cells.size):
                 t, p, ground = terms[i, TERMS * band : TERMS * (band + 1)], parts[i], below[i if of_ground else 0]
                 of_band = t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]
                 seen = crowns_over_background(of_band, (crowned[i], p[0], p[1], p[2], p[3]), ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if of_cells[i] > LIMIT else np.nan
+    return wrong

@@ -163,8 +163,8 @@ def _filtered_tile(size, weights, arp, tile_row, tile_column):
     return tile
 
 
-# Splines between cells of a coarser lattice reach into the tiles around: those of four properties in two rows of a scene
-# of 20 million cells are kept until the next row needs them. So many of 252 cells are 33 MB.
+# Splines between cells of a coarser lattice reach into the tiles around: those of four properties in a row of chunks of
+# 20 million cells are kept until the next row needs them. So many of 252 cells are 33 MB.
 _small_tile = lru_cache(maxsize=128)(_filtered_tile)
 
 
