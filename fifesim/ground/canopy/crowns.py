@@ -259,7 +259,7 @@ def overfull(lai, crown_cover):
 
     Examples
     --------
-    >>> overfull(np.array([5.0, 5.0, 5.0]), np.array([0.5, 0.01, 0.0]))
+    >>> int(overfull(np.array([5.0, 5.0, 5.0]), np.array([0.5, 0.01, 0.0])))
     1
     """
     count = 0

@@ -48,7 +48,7 @@ def outside(values, lowest, highest):
 
     Examples
     --------
-    >>> outside(np.array([0.2, np.nan, 1.5]), 0.0, 1.0)
+    >>> int(outside(np.array([0.2, np.nan, 1.5]), 0.0, 1.0))
     1
     """
     count = 0
