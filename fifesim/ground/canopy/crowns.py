@@ -240,37 +240,13 @@ def lai_in_crowns(lai, crown_cover):
     return np.where(cover > 0, lai / np.where(cover > 0, cover, 1), 0 * lai)
 
 
-@register_jitable
-def overfull(lai, crown_cover):
-    """
-    How many crowns hold more leaves than any canopy; NaN is passed over, and ground without crowns.
-
-    Parameters
-    ----------
-    lai : array, shape (n,)
-        Of the ground. [m2 m-2]
-    crown_cover : array, shape (n,)
-        [1]
-
-    Returns
-    -------
-    count : int
-        A sum, so that several cells are looked at at once.
-
-    Examples
-    --------
-    >>> int(overfull(np.array([5.0, 5.0, 5.0]), np.array([0.5, 0.01, 0.0])))
-    1
-    """
+@njit(nogil=True, cache=True)
+def _overfull(lai, cover):
+    """How many crowns hold too many leaves: a sum, so that several are looked at at once."""
     count = 0
     for i in range(lai.size):
-        count += (lai[i] > LARGEST_LAI * crown_cover[i]) & (crown_cover[i] > 0)
+        count += (lai[i] > LARGEST_LAI * cover[i]) & (cover[i] > 0)
     return count
-
-
-@njit(nogil=True, cache=True)
-def _overfull(lai, crown_cover):
-    return overfull(lai, crown_cover)
 
 
 def check_crowns(lai, crown_cover):

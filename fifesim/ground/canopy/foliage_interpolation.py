@@ -5,10 +5,9 @@ from numba import njit
 from numba.extending import register_jitable
 
 from fifesim.ground.canopy.background import over_background
-from fifesim.ground.canopy.crowns import crowns_over_background, overfull
+from fifesim.ground.canopy.crowns import crowns_over_background
 from fifesim.ground.canopy.foliage_table import LIMIT, TERMS
 from fifesim.ground.canopy.optics import LARGEST_LAI
-from fifesim.ground.canopy.ranges import outside
 
 # Cells whose places in a table are found together: they stay in the nearest cache.
 _RUN = 256
@@ -34,7 +33,7 @@ def interpolate_foliage(table, lai, brown, background):
     reflectance : array, shape (band, n)
         Infinite where the leaf area within crowns is above `LIMIT`. [1]
     wrong : int
-        How many values no canopy has: a leaf area outside 0 to `LARGEST_LAI`, others outside 0 to 1.
+        Above 0 where a cell has what no canopy has: a leaf area outside 0 to `LARGEST_LAI`, others outside 0 to 1.
     """
     values = np.empty((table.coefficients.shape[-1] // 4, lai.size))
     wrong = _foliage(*(np.ascontiguousarray(each) for each in (lai, brown, background)), table, values)
@@ -65,7 +64,7 @@ def interpolate_crowned(table, crowns, lai, brown, crown_cover, background):
     reflectance : array, shape (band, n)
         Infinite where the leaf area within crowns is above `LIMIT`. [1]
     wrong : int
-        As of `interpolate_foliage`; crowns with a leaf area above `LARGEST_LAI` count too.
+        As of `interpolate_foliage`; leaf area within crowns counts too.
     """
     values = np.empty((table.coefficients.shape[-1] // TERMS, lai.size))
     cells = (np.ascontiguousarray(each) for each in (lai, brown, crown_cover, background))
@@ -99,26 +98,36 @@ def _place_brown(table, brown):
     return _place(dead / (dead + np.sqrt(1 - brown)) * table.steps[1], table.coefficients.shape[1])
 
 
-# The three below are loops without branches, so that cells are done several at once.
+# The three below are loops without branches, so that cells are done several at once. What is wrong is counted beside
+# divisions, which take as long without.
 @register_jitable
 def _places(table, lai, brown, starts, leaves, dead):
-    """First coefficients of cells in rows of columns, -1 where the table has none, and shares of intervals."""
-    browns = table.coefficients.shape[1]
+    """
+    First coefficients of cells in rows of columns, -1 where the table has none, and shares of intervals.
+
+    How many cells have what no canopy has.
+    """
+    browns, wrong = table.coefficients.shape[1], 0
     for i in range(lai.size):
         known = (lai[i] >= 0) & (lai[i] <= LIMIT) & (brown[i] >= 0) & (brown[i] <= 1)
+        wrong += (lai[i] < 0) | (lai[i] > LARGEST_LAI) | (brown[i] < 0) | (brown[i] > 1)
         row, leaves[i] = _place_leaves(table, lai[i] if known else 0.0)
         at = 0
         if browns > 1:
             at, dead[i] = _place_brown(table, brown[i] if known else 0.0)
         starts[i] = row * browns + at if known else -1
+    return wrong
 
 
 @register_jitable
 def _within(lai, cover, inside):
-    """Leaf area within crowns, NaN where the cover is no share."""
+    """Leaf area within crowns, NaN where the cover is no share; and how many cells have what no canopy has."""
+    wrong = 0
     for i in range(lai.size):
+        wrong += (lai[i] < 0) | (lai[i] > LARGEST_LAI) | (cover[i] < 0) | (cover[i] > 1)
         crowned = lai[i] / cover[i] if cover[i] > 0 else 0 * lai[i]
         inside[i] = crowned if (cover[i] >= 0) & (cover[i] <= 1) else np.nan
+    return wrong
 
 
 @register_jitable
@@ -182,15 +191,14 @@ def _foliage(lai, brown, background, table, values):
     wrong = 0
     for first in range(0, lai.size, _RUN):
         cells, shares = lai[first : first + _RUN], brown[first : first + _RUN] if of_brown else alike
-        wrong += outside(cells, 0.0, LARGEST_LAI) + outside(shares, 0.0, 1.0)
-        _places(table, cells, shares, starts, leaves, dead)
+        wrong += _places(table, cells, shares, starts, leaves, dead)
         _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
-            wrong += outside(below, 0.0, 1.0)
             for i in range(cells.size):
                 t, ground = terms[i], below[i if of_ground else 0]
+                wrong += (ground < 0) | (ground > 1)
                 seen = over_background(t[4 * band], t[4 * band + 1], t[4 * band + 2], t[4 * band + 3], ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if cells[i] > LIMIT else np.nan
     return wrong
@@ -207,11 +215,9 @@ def _crowned(lai, brown, cover, background, table, crowns, values):
     for first in range(0, lai.size, _RUN):
         cells, crowned = lai[first : first + _RUN], cover[first : first + _RUN]
         browns = brown[first : first + _RUN] if of_brown else alike
-        wrong += outside(cells, 0.0, LARGEST_LAI) + outside(browns, 0.0, 1.0)
-        wrong += outside(crowned, 0.0, 1.0) + overfull(cells, crowned)
-        _within(cells, crowned, inside)
+        wrong += _within(cells, crowned, inside)
         of_cells = inside[: cells.size]
-        _places(table, of_cells, browns, starts, leaves, dead)
+        wrong += _places(table, of_cells, browns, starts, leaves, dead)
         if table.coefficients.shape[1] > 1:
             _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
         else:
@@ -221,9 +227,9 @@ def _crowned(lai, brown, cover, background, table, crowns, values):
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
-            wrong += outside(below, 0.0, 1.0)
             for i in range(cells.size):
                 t, p, ground = terms[i, TERMS * band : TERMS * (band + 1)], parts[i], below[i if of_ground else 0]
+                wrong += (ground < 0) | (ground > 1)
                 of_band = t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]
                 seen = crowns_over_background(of_band, (crowned[i], p[0], p[1], p[2], p[3]), ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if of_cells[i] > LIMIT else np.nan
