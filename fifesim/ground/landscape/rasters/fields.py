@@ -113,8 +113,8 @@ def correlated_fields(
     return _fields(grid, arps, correlations, **options)
 
 
-def _fields(grid, arps, correlations, *, coarser, seed, covariates, reference, chunks, values=None):
-    """The same; where ``values`` have a function of a name, with what this makes of the cells of the field."""
+def _fields(grid, arps, correlations, *, coarser, seed, covariates, reference, chunks, values=None, wanted=None):
+    """The same, or some of them; where ``values`` have a function of a name, with what this makes of the cells."""
     grids.check_grid(grid)
     seed = check_seed(seed)
     for name, arp in arps.items():
@@ -128,7 +128,7 @@ def _fields(grid, arps, correlations, *, coarser, seed, covariates, reference, c
     parts = _copula(arps, pairs, covariates, reference, tuple(name for name in arps if coarser[name] > 1))
     streams = {each: (field_seed(seed, each), arps[each], coarser[each]) for each in arps}
     fields = {}
-    for name in arps:
+    for name in arps if wanted is None else wanted:
         ground = {other: covariates[other] for other in covariates if (name, other) in pairs}
         field = _field(grid, name, streams, parts, ground, chunks, (values or {}).get(name, lambda cells: cells))
         said = f"correlated_fields: {name}, arp {arps[name]:g}, seed {seed}"
@@ -153,6 +153,7 @@ def landscape_fields(
     time=None,
     chunks=None,
     values=None,
+    wanted=None,
 ):
     """
     Fields of a landscape, some of which follow its elevation.
@@ -171,6 +172,8 @@ def landscape_fields(
         Of the sun, as in `fifesim.illumination`.
     values : dict of str to callable, optional
         Of fields by name, ``values[name](cells)`` gives those of a block, which it may change, in the place of its own.
+    wanted : sequence of str, optional
+        The fields that are made.
 
     Returns
     -------
@@ -197,7 +200,7 @@ def landscape_fields(
     if of_dem:
         covariates |= of_elevation(dem, of_dem, geometry=geometry, time=time)
     options = {"coarser": coarser, "seed": seed, "covariates": covariates, "reference": reference, "chunks": chunks}
-    return _fields(grid, arps, correlations, values=values, **options)
+    return _fields(grid, arps, correlations, values=values, wanted=wanted, **options)
 
 
 def of_elevation(dem, names, *, geometry=None, time=None):
