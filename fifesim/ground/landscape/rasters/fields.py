@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
-import dask
-import dask.array as da
 import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
@@ -17,8 +15,9 @@ from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
 from fifesim.ground.landscape.coarse_lattice import check_coarser, coarse_field
 from fifesim.ground.landscape.correlations import flat, pairs_of
-from fifesim.ground.landscape.covariance import Copula, copula, correlated, field_seed
+from fifesim.ground.landscape.covariance import Copula, correlated, field_seed
 from fifesim.ground.landscape.field import TILE, mixed_field
+from fifesim.ground.landscape.rasters.following import copulas
 from fifesim.ground.terrain.rasters.drainage import wetness
 from fifesim.ground.terrain.rasters.light import illumination
 from fifesim.ground.terrain.rasters.slopes import slope
@@ -26,11 +25,7 @@ from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.crs import with_crs_of
-from fifesim.rasters.sampling import all_apart
 from fifesim.rasters.sites import made_on_site
-
-# The ground is known by at most so many rows and columns of it, evenly spaced.
-SAMPLED = 256
 
 _ARPS = Kind(
     "a number for each field, such as {'lai': 0.15, 'soil': 0.24}",
@@ -125,12 +120,12 @@ def _fields(grid, arps, correlations, *, coarser, seed, covariates, reference, c
     covariates = {name: _on_grid(name, each, grid) for name, each in covariates.items()}
     like = next((each.data for each in covariates.values() if each.chunks is not None), None)
     chunks = dict(zip("yx", like.chunks, strict=True)) if chunks is None and like is not None else chunks
-    parts = _copula(arps, pairs, covariates, reference, tuple(name for name in arps if coarser[name] > 1))
+    parts = copulas(arps, pairs, covariates, reference, tuple(name for name in arps if coarser[name] > 1))
     streams = {each: (field_seed(seed, each), arps[each], coarser[each]) for each in arps}
     fields = {}
     for name in arps if wanted is None else wanted:
         ground = {other: covariates[other] for other in covariates if (name, other) in pairs}
-        field = _field(grid, name, streams, parts, ground, chunks, (values or {}).get(name, lambda cells: cells))
+        field = _field(grid, name, streams, parts[name], ground, chunks, (values or {}).get(name, lambda cells: cells))
         said = f"correlated_fields: {name}, arp {arps[name]:g}, seed {seed}"
         said += f", {coarser[name]} x {coarser[name]} cells" if coarser[name] > 1 else ""
         said += "".join(f", {one}-{other} {r:g}" for (one, other), r in pairs.items() if name in (one, other))
@@ -317,41 +312,3 @@ def _of_coarse(weights, streams, start, shape):
             field *= weight
         total = field if total is None else np.add(total, field, out=total)
     return total
-
-
-def _copula(arps, pairs, covariates, reference, coarser):
-    """How the fields are put together; where the ground is lazy, as a lazy array without dimensions."""
-    known = covariates if reference is None else {name: _referred(reference, name) for name in covariates}
-    sizes = {each.shape for each in known.values()}
-    if len(sizes) > 1:
-        raise ValueError(f"the rasters of reference have different sizes, {sizes}: take all on one grid")
-
-    def found(*samples):
-        sampled = {name: each.ravel() for name, each in zip(known, samples, strict=True)}
-        return copula(arps, pairs, sampled, coarser)
-
-    def boxed(*samples):
-        out = np.empty((), object)
-        out[()] = found(*samples)
-        return out
-
-    arrays = [each.data for each in known.values()]
-    samples = [_evenly(each) for each in arrays]
-    lazy = [each for each in samples if isinstance(each, da.Array)]
-    found_apart = dict(zip(map(id, lazy), all_apart(lazy) if lazy else [], strict=True))
-    samples = [found_apart.get(id(each), each) for each in samples]
-    if not any(isinstance(each, da.Array) for each in arrays):
-        return found(*samples)
-    return xr.DataArray(da.from_delayed(dask.delayed(boxed)(*samples), (), dtype=object))
-
-
-def _referred(reference, name):
-    if name not in reference:
-        raise ValueError(f"reference has no {name!r}, it has {', '.join(map(str, reference))}: give all that is named")
-    return reference[name].transpose("y", "x")
-
-
-def _evenly(array):
-    steps = (max(1, -(-size // SAMPLED)) for size in array.shape)
-    rows, columns = (slice(None, None, step) for step in steps)
-    return array[rows, columns]
