@@ -15,7 +15,7 @@ from fifesim.ground.canopy.crowns import (
 )
 from fifesim.ground.canopy.foliage_interpolation import interpolate_crowned, interpolate_foliage
 from fifesim.ground.canopy.foliage_table import crown_table, tabulate_foliage
-from fifesim.ground.canopy.scene import cell_by_cell, decay, leaves_of, sky_of
+from fifesim.ground.canopy.scene import cell_by_cell, check_cells, decay, leaves_of, sky_of
 
 # Of the ground below, where a table of terms is tested.
 _GROUNDS = (0.0, 0.5, 1.0)
@@ -39,8 +39,14 @@ def varied_reflectance(lai, background, scene):
     reflectance : array, shape (band, n)
         Within 1e-6 of that of `cell_by_cell`; which it is where the dissociation is an array, and where the leaf area
         index within crowns is above `foliage_table.LIMIT`. [1]
+
+    Raises
+    ------
+    ValueError
+        As `check_cells`.
     """
     if isinstance(scene.dissociation, np.ndarray):
+        check_cells(lai, background, scene)
         return cell_by_cell(lai, background, scene)
     by_brown = isinstance(scene.brown, np.ndarray)
     # A table over the dead share is the same whatever that is.
@@ -48,10 +54,12 @@ def varied_reflectance(lai, background, scene):
     if isinstance(scene.crown_cover, np.ndarray):
         table = _crown_terms_table(alike._replace(crown_cover=1.0, crown_shape=SHAPE), by_brown)
         crowns = _crown_table(scene.crown_shape, scene.sza, scene.vza, scene.raa)
-        out = interpolate_crowned(table, crowns, lai, brown, scene.crown_cover, background)
+        out, wrong = interpolate_crowned(table, crowns, lai, brown, scene.crown_cover, background)
     else:
         inside = lai if scene.crown_cover == 1 else lai_in_crowns(lai, scene.crown_cover)
-        out = interpolate_foliage(_joined_table(alike), inside, brown, background)
+        out, wrong = interpolate_foliage(_joined_table(alike), inside, brown, background)
+    if wrong:
+        check_cells(lai, background, scene)
     if np.fmax.reduce(out[0], initial=0.0) == np.inf:
         cells = np.flatnonzero(out[0] == np.inf)
         out[:, cells] = cell_by_cell(lai[cells], np.broadcast_to(background, out.shape)[:, cells], scene.part(cells))

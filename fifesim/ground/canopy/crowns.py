@@ -271,8 +271,10 @@ def check_crowns(lai, crown_cover):
     """
     check_share("crown_cover", crown_cover)
     lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
+    shape = np.broadcast_shapes(lai.shape, cover.shape)
+    cells = (each if each.shape == shape else np.broadcast_to(each, shape) for each in (lai, cover))
     # Ground without crowns holds no leaves, and is not meant.
-    if _overfull(*(np.ascontiguousarray(each).reshape(-1) for each in np.broadcast_arrays(lai, cover))):
+    if _overfull(*(np.ascontiguousarray(each).reshape(-1) for each in cells)):
         inside = lai / np.where(cover > 0, cover, np.inf)
         raise ValueError(
             f"leaf area index within the crowns is lai / crown_cover, at most {LARGEST_LAI:g}, got up to "

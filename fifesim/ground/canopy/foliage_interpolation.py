@@ -7,6 +7,7 @@ from numba.extending import register_jitable
 from fifesim.ground.canopy.background import over_background
 from fifesim.ground.canopy.crowns import crowns_over_background
 from fifesim.ground.canopy.foliage_table import LIMIT, TERMS
+from fifesim.ground.canopy.optics import LARGEST_LAI
 
 # Cells whose places in a table are found together: they stay in the nearest cache.
 _RUN = 256
@@ -31,10 +32,12 @@ def interpolate_foliage(table, lai, brown, background):
     -------
     reflectance : array, shape (band, n)
         Infinite where the leaf area within crowns is above `LIMIT`. [1]
+    wrong : int
+        Above 0 where a cell has what no canopy has: a leaf area outside 0 to `LARGEST_LAI`, others outside 0 to 1.
     """
     values = np.empty((table.coefficients.shape[-1] // 4, lai.size))
-    _foliage(*(np.ascontiguousarray(each) for each in (lai, brown, background)), table, values)
-    return values
+    wrong = _foliage(*(np.ascontiguousarray(each) for each in (lai, brown, background)), table, values)
+    return values, wrong
 
 
 def interpolate_crowned(table, crowns, lai, brown, crown_cover, background):
@@ -60,11 +63,13 @@ def interpolate_crowned(table, crowns, lai, brown, crown_cover, background):
     -------
     reflectance : array, shape (band, n)
         Infinite where the leaf area within crowns is above `LIMIT`. [1]
+    wrong : int
+        As of `interpolate_foliage`; leaf area within crowns counts too.
     """
     values = np.empty((table.coefficients.shape[-1] // TERMS, lai.size))
     cells = (np.ascontiguousarray(each) for each in (lai, brown, crown_cover, background))
-    _crowned(*cells, table, crowns, values)
-    return values
+    wrong = _crowned(*cells, table, crowns, values)
+    return values, wrong
 
 
 @register_jitable
@@ -93,26 +98,36 @@ def _place_brown(table, brown):
     return _place(dead / (dead + np.sqrt(1 - brown)) * table.steps[1], table.coefficients.shape[1])
 
 
-# The three below are loops without branches, so that cells are done several at once.
+# The three below are loops without branches, so that cells are done several at once. What is wrong is counted beside
+# divisions, which take as long without.
 @register_jitable
 def _places(table, lai, brown, starts, leaves, dead):
-    """First coefficients of cells in rows of columns, -1 where the table has none, and shares of intervals."""
-    browns = table.coefficients.shape[1]
+    """
+    First coefficients of cells in rows of columns, -1 where the table has none, and shares of intervals.
+
+    How many cells have what no canopy has.
+    """
+    browns, wrong = table.coefficients.shape[1], 0
     for i in range(lai.size):
         known = (lai[i] >= 0) & (lai[i] <= LIMIT) & (brown[i] >= 0) & (brown[i] <= 1)
+        wrong += (lai[i] < 0) | (lai[i] > LARGEST_LAI) | (brown[i] < 0) | (brown[i] > 1)
         row, leaves[i] = _place_leaves(table, lai[i] if known else 0.0)
         at = 0
         if browns > 1:
             at, dead[i] = _place_brown(table, brown[i] if known else 0.0)
         starts[i] = row * browns + at if known else -1
+    return wrong
 
 
 @register_jitable
 def _within(lai, cover, inside):
-    """Leaf area within crowns, NaN where the cover is no share."""
+    """Leaf area within crowns, NaN where the cover is no share; and how many cells have what no canopy has."""
+    wrong = 0
     for i in range(lai.size):
+        wrong += (lai[i] < 0) | (lai[i] > LARGEST_LAI) | (cover[i] < 0) | (cover[i] > 1)
         crowned = lai[i] / cover[i] if cover[i] > 0 else 0 * lai[i]
         inside[i] = crowned if (cover[i] >= 0) & (cover[i] <= 1) else np.nan
+    return wrong
 
 
 @register_jitable
@@ -173,17 +188,20 @@ def _foliage(lai, brown, background, table, values):
     wide, terms = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns))
     starts, leaves, dead = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN)
     of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
+    wrong = 0
     for first in range(0, lai.size, _RUN):
         cells, shares = lai[first : first + _RUN], brown[first : first + _RUN] if of_brown else alike
-        _places(table, cells, shares, starts, leaves, dead)
+        wrong += _places(table, cells, shares, starts, leaves, dead)
         _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
             for i in range(cells.size):
                 t, ground = terms[i], below[i if of_ground else 0]
+                wrong += (ground < 0) | (ground > 1)
                 seen = over_background(t[4 * band], t[4 * band + 1], t[4 * band + 2], t[4 * band + 3], ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if cells[i] > LIMIT else np.nan
+    return wrong
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -193,11 +211,13 @@ def _crowned(lai, brown, cover, background, table, crowns, values):
     starts, leaves, dead, inside = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN), np.zeros(_RUN)
     places, shares = np.zeros(_RUN, np.int64), np.zeros(_RUN)
     of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
+    wrong = 0
     for first in range(0, lai.size, _RUN):
         cells, crowned = lai[first : first + _RUN], cover[first : first + _RUN]
-        _within(cells, crowned, inside)
+        browns = brown[first : first + _RUN] if of_brown else alike
+        wrong += _within(cells, crowned, inside)
         of_cells = inside[: cells.size]
-        _places(table, of_cells, brown[first : first + _RUN] if of_brown else alike, starts, leaves, dead)
+        wrong += _places(table, of_cells, browns, starts, leaves, dead)
         if table.coefficients.shape[1] > 1:
             _across(table.coefficients, starts[: cells.size], leaves, dead, wide, terms)
         else:
@@ -209,6 +229,8 @@ def _crowned(lai, brown, cover, background, table, crowns, values):
             below = background[band, first : first + _RUN] if of_ground else background[band]
             for i in range(cells.size):
                 t, p, ground = terms[i, TERMS * band : TERMS * (band + 1)], parts[i], below[i if of_ground else 0]
+                wrong += (ground < 0) | (ground > 1)
                 of_band = t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]
                 seen = crowns_over_background(of_band, (crowned[i], p[0], p[1], p[2], p[3]), ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if of_cells[i] > LIMIT else np.nan
+    return wrong

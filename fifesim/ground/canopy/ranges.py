@@ -2,6 +2,7 @@
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 
 def within(values, lowest, highest):
@@ -30,13 +31,35 @@ def within(values, lowest, highest):
     return bool(low >= lowest and high <= highest)
 
 
-@njit(nogil=True, cache=True)
-def _outside(values, lowest, highest):
-    """How many values are outside: a sum, so that several are looked at at once."""
+@register_jitable
+def outside(values, lowest, highest):
+    """
+    How many values are outside a range; NaN is passed over.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+    lowest, highest : float
+
+    Returns
+    -------
+    count : int
+        A sum, so that several values are looked at at once.
+
+    Examples
+    --------
+    >>> int(outside(np.array([0.2, np.nan, 1.5]), 0.0, 1.0))
+    1
+    """
     count = 0
     for i in range(values.size):
         count += (values[i] < lowest) | (values[i] > highest)
     return count
+
+
+@njit(nogil=True, cache=True)
+def _outside(values, lowest, highest):
+    return outside(values, lowest, highest)
 
 
 def check_fraction(name, values):

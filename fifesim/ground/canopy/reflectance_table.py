@@ -6,12 +6,12 @@ import numpy as np
 
 from fifesim.ground.canopy.background import over_background, reflectance_factor
 from fifesim.ground.canopy.cell_reflectance import varied_reflectance
-from fifesim.ground.canopy.crowns import SHAPE, check_crowns
+from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.lai_table import interpolate, interpolate_over, tabulate
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.optics import check_background, check_lai, check_leaf_optics
+from fifesim.ground.canopy.optics import check_background, check_leaf_optics
 from fifesim.ground.canopy.ranges import check_share
-from fifesim.ground.canopy.scene import Scene, canopy_of, cell_by_cell, decay, reflectance_of, sky_of
+from fifesim.ground.canopy.scene import Scene, canopy_of, cell_by_cell, check_cells, decay, reflectance_of, sky_of
 
 
 def canopy_reflectance(
@@ -92,27 +92,26 @@ def canopy_reflectance(
     >>> float(canopy_reflectance(0.0, [0.07], [0.04], 0.15, sza=30)[0])
     0.15
     """
-    check_lai(lai)
-    check_leaf_optics(leaf_reflectance, leaf_transmittance)
-    check_background(background)
     lai, background = np.asarray(lai, float), np.asarray(background, float)
     bands = np.broadcast_shapes((1,), *(np.shape(v) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction)))
     uniform = background.ndim < 2
     if uniform:
         bands = np.broadcast_shapes(bands, background.shape)
-    scene = _even((leaf_reflectance, leaf_transmittance, diffuse_fraction), bands, sza, vza, raa, leaf_angles, hotspot)
-    dead = brown_reflectance, brown_transmittance
+    leaves = map(_numbers, (leaf_reflectance, leaf_transmittance, diffuse_fraction))
+    dead = tuple(map(_numbers, (brown_reflectance, brown_transmittance)))
+    scene = _even(*leaves, bands, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
     scene = scene._replace(**_kinds(lai, brown, dissociation, dead, bands), **_crowns(lai, crown_cover, crown_shape))
-    if exact or scene.varies():
+    if not (exact or scene.varies()):
+        check_cells(lai, background, scene)
         if uniform:
-            ground = np.broadcast_to(background, bands)[:, None]
-        else:
-            ground = np.broadcast_to(background, bands + lai.shape).reshape(*bands, -1)
-        kernel = cell_by_cell if exact else varied_reflectance
-        return kernel(lai.reshape(-1), ground, scene).reshape(bands + lai.shape)
+            return interpolate(_surface_table(_per_band(background, bands), scene), lai)
+        return interpolate_over(_layer_table(scene), lai, background)
     if uniform:
-        return interpolate(_surface_table(_per_band(background, bands), scene), lai)
-    return interpolate_over(_layer_table(scene), lai, background)
+        ground = np.broadcast_to(background, bands)[:, None]
+    else:
+        ground = np.broadcast_to(background, bands + lai.shape).reshape(*bands, -1)
+    kernel = _exact_reflectance if exact else varied_reflectance
+    return kernel(lai.reshape(-1), ground, scene).reshape(bands + lai.shape)
 
 
 def even_table(
@@ -147,10 +146,10 @@ def even_table(
     ValueError
         As in `canopy_reflectance`.
     """
-    check_leaf_optics(leaf_reflectance, leaf_transmittance)
     check_background(background)
     bands = np.shape(leaf_reflectance)
-    scene = _even((leaf_reflectance, leaf_transmittance, diffuse_fraction), bands, sza, vza, raa, leaf_angles, hotspot)
+    leaves = map(_numbers, (leaf_reflectance, leaf_transmittance, diffuse_fraction))
+    scene = _even(*leaves, bands, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
     return _surface_table(_per_band(background, bands), scene)
 
 
@@ -205,9 +204,7 @@ def directional_reflectance(
     ----------
     [Verhoef2007]_
     """
-    check_lai(lai)
     leaf_reflectance, leaf_transmittance = _leaves_by_cell(leaf_reflectance, leaf_transmittance, np.shape(lai))
-    check_background(background)
     for name, angle in (("sza", np.asarray(sza, float)), ("vza", np.asarray(vza, float))):
         wrong = angle[(angle < 0) | (angle >= 90)]
         if wrong.size:
@@ -226,15 +223,35 @@ def directional_reflectance(
     scene = Scene(leaf_reflectance, leaf_transmittance, sky, sza, vza, raa, leaves, hotspot)
     kinds = _kinds(lai.reshape(cells), brown, dissociation, (brown_reflectance, brown_transmittance))
     scene = scene._replace(**kinds, **_crowns(lai.reshape(cells), crown_cover, crown_shape))
-    out = cell_by_cell(lai, ground, scene)
+    out = _exact_reflectance(lai, ground, scene)
     out[:, np.broadcast_to(missing, lai.shape)] = np.nan
     return out.reshape(bands, *cells)
 
 
-def _even(optics, bands, sza, vza, raa, leaf_angles, hotspot):
+@lru_cache(maxsize=32)
+def _even(reflectance, transmittance, sky, bands, sza, vza, raa, leaf_angles, hotspot):
     """Scene of green leaves whose optics, directions and angles are the same in all cells."""
-    optics = (_per_band(each, bands) for each in optics)
-    return Scene(*optics, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
+    check_leaf_optics(reflectance, transmittance)
+    optics = (_per_band(each, bands) for each in (reflectance, transmittance, sky))
+    return Scene(*optics, sza, vza, raa, leaf_angles, hotspot)
+
+
+@lru_cache(maxsize=32)
+def _dead(reflectance, transmittance, bands):
+    """Optics of dead leaves that are the same in all cells."""
+    check_leaf_optics(reflectance, transmittance)
+    return _per_band(reflectance, bands), _per_band(transmittance, bands)
+
+
+def _numbers(values):
+    """Numbers that a cache can look up; of optics that are not given, None."""
+    return None if values is None else tuple(np.ravel(values).tolist())
+
+
+def _exact_reflectance(lai, background, scene):
+    """Reflectance factor of cells by the models themselves, once they are checked."""
+    check_cells(lai, background, scene)
+    return cell_by_cell(lai, background, scene)
 
 
 def _leaves_by_cell(reflectance, transmittance, cells):
@@ -254,13 +271,8 @@ def _kinds(lai, brown, dissociation, dead, bands=None):
         return {}
     if any(optics is None for optics in dead):
         raise ValueError("brown leaves need optics of their own: give brown_reflectance and brown_transmittance")
-    check_share("brown", brown)
     check_share("dissociation", dissociation)
-    if bands is None:
-        dead = _leaves_by_cell(*dead, lai.shape)
-    else:
-        check_leaf_optics(*dead)
-        dead = tuple(_per_band(optics, bands) for optics in dead)
+    dead = _leaves_by_cell(*dead, lai.shape) if bands is None else _dead(*dead, bands)
     optics = dict(zip(("brown_reflectance", "brown_transmittance"), dead, strict=True))
     return {"brown": _of_cells(brown, lai), "dissociation": _of_cells(dissociation, lai)} | optics
 
@@ -271,7 +283,6 @@ def _crowns(lai, crown_cover, crown_shape):
         return {}
     if not 0 <= crown_shape < np.inf:
         raise ValueError(f"crown_shape must be at least 0, got {crown_shape:g}: it is crown diameter over height")
-    check_crowns(lai, crown_cover)
     return {"crown_cover": _of_cells(crown_cover, lai), "crown_shape": float(crown_shape)}
 
 

@@ -6,9 +6,11 @@ import numpy as np
 
 from fifesim.ground.canopy.absorption import extinction_coefficient
 from fifesim.ground.canopy.background import reflectance_factor, with_background
-from fifesim.ground.canopy.crowns import SHAPE, clumped, crown_shares, lai_in_crowns
+from fifesim.ground.canopy.crowns import SHAPE, check_crowns, clumped, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.layers import two_layers
 from fifesim.ground.canopy.leaf_angles import LeafAngles
+from fifesim.ground.canopy.optics import check_background, check_lai
+from fifesim.ground.canopy.ranges import check_share
 from fifesim.ground.canopy.sail_model import sail
 
 _BLOCK = 2**15  # cells evaluated at a time, to bound memory
@@ -167,6 +169,30 @@ def cell_by_cell(lai, background, scene):
         block = slice(start, start + _BLOCK)
         out[:, block] = reflectance_of(lai[block], background[:, block], scene.part(block))
     return out
+
+
+def check_cells(lai, background, scene):
+    """
+    Refuse cells that no canopy has; NaN passes.
+
+    Parameters
+    ----------
+    lai : array, shape (n,)
+        [m2 m-2]
+    background : array, shape (...)
+        [1]
+    scene : Scene
+
+    Raises
+    ------
+    ValueError
+        If leaf area index, background, dead share or crown cover are outside their range.
+    """
+    check_lai(lai)
+    check_background(background)
+    check_share("brown", scene.brown)
+    if not _is(scene.crown_cover, 1):
+        check_crowns(lai, scene.crown_cover)
 
 
 def decay(scene):

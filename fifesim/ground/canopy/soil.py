@@ -4,11 +4,14 @@ import numpy as np
 from numba import njit
 
 from fifesim.base import datasets
-from fifesim.ground.canopy.ranges import within
+from fifesim.ground.canopy.ranges import outside, within
 from fifesim.ground.canopy.spectra import band_means
 
 # Where the reflectance of a soil is its brightness: in the midst of visible light, as for aerosol and visibility. [um]
 GREEN = 0.55
+
+# Cells that are done together, so that they stay in the nearest cache.
+_RUN = 1024
 
 
 def soil_line(bands):
@@ -79,47 +82,58 @@ def brightened(reflectance, brightness, line):
     >>> brightened(np.array([0.15, 0.19]), -0.1, np.array([1.0, 2.0])).round(3).tolist()
     [0.05, 0.0]
     """
-    check_brightness(brightness)
-    return in_cells(_brighten, reflectance, brightness, np.asarray(line, float))
+    return in_cells(_brighten, reflectance, brightness, np.asarray(line, float), check=check_brightness)
 
 
-def in_cells(kernel, reflectance, change, *parameters):
+def in_cells(kernel, reflectance, change, *parameters, check):
     """
     Reflectance of bands that a kernel makes of that before and of a number for each cell.
 
     Parameters
     ----------
     kernel : callable
-        ``kernel(reflectance, change, *parameters, out)`` fills out, shape (band, n), from (n, band) and (n,).
+        ``kernel(reflectance, change, *parameters, out)`` fills out, shape (band, n), from (band, n), or (band, 1) where
+        it is the same in all cells, and (n,). It gives how many of the numbers are out of their range.
     reflectance : array, shape (band,) or (..., band)
-        What is the same in all cells is not copied for each.
     change : array, shape (...)
     *parameters
         Passed to the kernel.
+    check : callable
+        Of the numbers, raises where one is out of its range.
 
     Returns
     -------
     reflectance : array, shape (..., band)
         In memory one band after the other, as it is used next.
     """
-    reflectance, change = np.asarray(reflectance, float), np.asarray(change, float)
+    reflectance, change = np.atleast_1d(np.asarray(reflectance, float)), np.asarray(change, float)
     shape = np.broadcast_shapes(reflectance.shape[:-1], change.shape)
-    bands, count = reflectance.shape[-1], int(np.prod(shape))
+    cells = change if change.shape == shape else np.broadcast_to(change, shape)
+    bands = reflectance.shape[-1]
     if reflectance.ndim > 1:
-        reflectance = np.broadcast_to(np.moveaxis(reflectance, -1, 0), (bands, *shape)).reshape(bands, count).T
-    out = np.empty((bands, count))
-    change = np.ascontiguousarray(np.broadcast_to(change, shape)).reshape(-1)
-    kernel(np.broadcast_to(reflectance, (count, bands)), change, *parameters, out)
+        below = np.broadcast_to(np.moveaxis(reflectance, -1, 0), (bands, *shape)).reshape(bands, -1)
+    else:
+        below = reflectance[:, None]
+    out = np.empty((bands, cells.size))
+    if kernel(np.ascontiguousarray(below), np.ascontiguousarray(cells).reshape(-1), *parameters, out):
+        check(change)
     return np.moveaxis(out.reshape(bands, *shape), 0, -1)
 
 
 @njit(nogil=True, cache=True)
 def _brighten(reflectance, brightness, line, out):
-    for band in range(out.shape[0]):
-        for i in range(out.shape[1]):
-            value = reflectance[i, band] + brightness[i] * line[band]
-            # NaN is neither.
-            out[band, i] = 0.0 if value < 0.0 else 1.0 if value > 1.0 else value
+    by_cell, wrong = reflectance.shape[1] > 1, 0
+    for first in range(0, brightness.size, _RUN):
+        run = slice(first, first + _RUN)
+        change = brightness[run]
+        wrong += outside(change, -1.0, 1.0)
+        for band in range(out.shape[0]):
+            before, after = reflectance[band, run] if by_cell else reflectance[band], out[band, run]
+            for i in range(change.size):
+                value = before[i if by_cell else 0] + change[i] * line[band]
+                # NaN is neither.
+                after[i] = 0.0 if value < 0.0 else 1.0 if value > 1.0 else value
+    return wrong
 
 
 def check_brightness(brightness):

@@ -9,6 +9,7 @@ from numba.extending import register_jitable
 
 from fifesim.base import datasets
 from fifesim.ground.canopy.prospect import interface_transmissivity
+from fifesim.ground.canopy.ranges import outside
 from fifesim.ground.canopy.soil import check_range, check_span, in_cells
 from fifesim.ground.canopy.spectra import band_means
 
@@ -204,35 +205,40 @@ def moistened(dry, moisture, films):
     >>> moistened(np.array([0.3]), np.array([0.0, 0.5, 1.0]), films).round(3).ravel().tolist()
     [0.3, 0.23, 0.205]
     """
-    check_moisture(moisture)
-    return in_cells(_moisten, dry, moisture, *films)
+    return in_cells(_moisten, dry, moisture, *films, check=check_moisture)
 
 
 def _moisten(dry, moisture, surface, inside, entrance, passed, out):
+    wrong = 0
     for start in range(0, moisture.size, _AT_ONCE):
         bare = np.exp(moisture[start : start + _AT_ONCE] * -_PER_MOISTURE)
-        _films(dry, moisture, start, bare, surface, inside, entrance, passed, out)
+        wrong += _films(dry, moisture, start, bare, surface, inside, entrance, passed, out)
+    return wrong
 
 
 # No divisor is 0: without that being asked, cells are done several at once.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _films(dry, moisture, start, bare, surface, inside, entrance, passed, out):
-    covered = np.empty((_FILMS, _RUN))
+    covered, by_cell, wrong = np.empty((_FILMS, _RUN)), dry.shape[1] > 1, 0
     for begin in range(0, bare.size, _RUN):
-        free, first = bare[begin : begin + _RUN], start + begin
-        cells, n = slice(first, first + free.size), free.size
-        _covered(moisture[cells], free, covered)
+        free = bare[begin : begin + _RUN]
+        run = slice(start + begin, start + begin + free.size)
+        wrong += outside(moisture[run], 0.0, 1.0)
+        _covered(moisture[run], free, covered)
         for band in range(out.shape[0]):
-            soil, wet, above_all, back = dry[cells, band], out[band, cells], surface[band], inside[band]
-            entering, through = entrance[band], (1 - above_all) * (1 - back)
-            for i in range(n):
-                below, above, under = grains_in_water(soil[i], entering), 0.0, 1.0
+            soil, wet = dry[band, run] if by_cell else dry[band], out[band, run]
+            above_all, back, entering = surface[band], inside[band], entrance[band]
+            through = (1 - above_all) * (1 - back)
+            for i in range(free.size):
+                own = soil[i if by_cell else 0]
+                below, above, under = grains_in_water(own, entering), 0.0, 1.0
                 # The sum of the quotients of all films as one of two products: a division takes longer than the rest.
                 for k in range(_FILMS):
                     up, kept = below_film(below, passed[band, k], back)
                     above = above * kept + covered[k, i] * up * under
                     under *= kept
-                wet[i] = free[i] * soil[i] + (1 - free[i]) * above_all + through * above / under
+                wet[i] = free[i] * own + (1 - free[i]) * above_all + through * above / under
+    return wrong
 
 
 @register_jitable

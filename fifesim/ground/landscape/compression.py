@@ -1,5 +1,7 @@
 """Cells of a raster by their class, so that each class computes its own alone."""
 
+from functools import lru_cache
+
 import numpy as np
 from numba import njit
 
@@ -34,7 +36,7 @@ def check_codes(codes, table):
     [1, -1, 7]
     """
     codes = np.asarray(codes)
-    if codes.dtype == np.int16 and not _others(codes.ravel(), _numbers(table)):
+    if codes.dtype == np.int16 and not _others(codes.ravel(), _numbers(tuple(table))):
         return codes
     if codes.dtype.kind == "f":
         codes = np.where(np.isnan(codes), NO_CLASS, codes)
@@ -74,7 +76,7 @@ def cells_by_class(codes, table):
     >>> [cells.tolist() for cells in cells_by_class(np.array([2, 5, 2, -1], np.int16), (5, 2))]
     [[1], [0, 2]]
     """
-    order, ends = _sorted(np.asarray(codes, np.int16), _numbers(table), len(table))
+    order, ends = _sorted(np.asarray(codes, np.int16), _numbers(tuple(table)), len(table))
     return np.split(order[: ends[-1]], ends[:-1]) if len(table) else []
 
 
@@ -103,10 +105,11 @@ def numbers_of(codes, table):
     """
     codes, present = np.ascontiguousarray(codes, np.int16), np.zeros(len(table) + 1, bool)
     numbers = np.empty(codes.shape, np.int16)
-    _look_up(codes.reshape(-1), _numbers(table), numbers.reshape(-1), present)
+    _look_up(codes.reshape(-1), _numbers(tuple(table)), numbers.reshape(-1), present)
     return numbers, present
 
 
+@lru_cache(maxsize=16)
 def _numbers(table):
     """Place of each code in a table, the number of its codes for all others; -1 is the last, beyond the codes."""
     numbers = np.full(2**15 + 1, len(table), np.int16)

@@ -163,8 +163,9 @@ def _filtered_tile(size, weights, arp, tile_row, tile_column):
     return tile
 
 
-# So many of 252 cells are 16 MB.
-_small_tile = lru_cache(maxsize=64)(_filtered_tile)
+# Splines between cells of a coarser lattice reach into the tiles around: those of four properties in a row of chunks of
+# 20 million cells are kept until the next row needs them. So many of 252 cells are 33 MB.
+_small_tile = lru_cache(maxsize=128)(_filtered_tile)
 
 
 def window_field(seed, arp, row, column, shape):

@@ -69,7 +69,7 @@ def quantile_map(field, table, out=None):
     return out
 
 
-def quantile_map_of_classes(field, numbers, tables, out):
+def quantile_map_of_classes(field, numbers, tables):
     """
     The same where each class of cells has a distribution of its own.
 
@@ -78,21 +78,23 @@ def quantile_map_of_classes(field, numbers, tables, out):
     field : array, shape (y, x)
         As in `quantile_map`.
     numbers : array of int, shape (y, x)
-        Which of the tables is a cell's; cells of another number are left as they are.
+        Which of the tables is a cell's.
     tables : array, shape (n, 16385)
         From `quantile_table`; the cells of one whose values are all the same have that value, NaN or not.
-    out : array, shape (y, x)
-        Values, filled in.
+
+    Returns
+    -------
+    values : array, shape (y, x)
 
     Examples
     --------
-    >>> tables, out = np.stack([quantile_table(stats.uniform()), np.full(16385, 3.0)]), np.zeros((1, 3))
-    >>> quantile_map_of_classes(np.zeros((1, 3)), np.array([[1, 0, 2]], np.int16), tables, out)
-    >>> out.tolist()
-    [[3.0, 0.5, 0.0]]
+    >>> tables = np.stack([quantile_table(stats.uniform()), np.full(16385, 3.0)])
+    >>> quantile_map_of_classes(np.zeros((1, 3)), np.array([[1, 0, 1]], np.int16), tables).tolist()
+    [[3.0, 0.5, 3.0]]
     """
-    same = tables[:, 0] == tables[:, -1]
+    same, out = tables[:, 0] == tables[:, -1], np.empty(np.shape(field))
     _map_classes(np.ascontiguousarray(field, float).reshape(-1), numbers.reshape(-1), tables, same, out.reshape(-1))
+    return out
 
 
 @register_jitable
@@ -121,21 +123,19 @@ def _map(field, table, out):
 
 @njit(nogil=True, cache=True)
 def _map_classes(field, numbers, tables, same, out):
-    at, share, known = np.empty(_RUN, np.uint32), np.empty(_RUN), np.empty(_RUN, np.bool_)
+    at, share = np.empty(_RUN, np.uint32), np.empty(_RUN)
     flat, size = tables.reshape(-1), tables.shape[1]
     for first in range(0, field.size, _RUN):
         cells, of_cells = field[first : first + _RUN], numbers[first : first + _RUN]
         values = out[first : first + _RUN]
         _places(cells, size, at, share)
         for i in range(cells.size):
-            known[i] = (of_cells[i] >= 0) & (of_cells[i] < len(tables))
-            number = np.uint32(of_cells[i] if known[i] else 0)
+            number = np.uint32(of_cells[i])
             share[i] = 0.0 if same[number] else share[i]
             at[i] += number * np.uint32(size)
         for i in range(cells.size):
             k = np.uint64(at[i])
-            value = flat[k] * (1.0 - share[i]) + flat[k + np.uint64(1)] * share[i]
-            values[i] = value if known[i] else values[i]
+            values[i] = flat[k] * (1.0 - share[i]) + flat[k + np.uint64(1)] * share[i]
 
 
 def rank_map(field, distribution):

@@ -129,7 +129,9 @@ def _lookup(values, nodes, scores, slopes, starts, steps, weight, out):
         # Without branches, so that the loops are done for several values at once.
         for i in range(cells.size):
             inside[i] = min(max(cells[i], lowest), highest) if cells[i] == cells[i] else lowest
-            at[i] = starts[np.uint32((inside[i] - lowest) * per_start)]
+            at[i] = np.uint32((inside[i] - lowest) * per_start)
+        for i in range(cells.size):
+            at[i] = starts[at[i]]
         for _ in range(steps):
             for i in range(cells.size):
                 up = np.uint32(at[i] + 1)

@@ -23,6 +23,7 @@ def cells():
     rng = np.random.default_rng(8)
     lai, brown, cover = rng.gamma(1.2, 1.5, N), rng.beta(0.6, 0.8, N), rng.uniform(0.05, 1, N)
     lai[:8], brown[:8], cover[:8] = [0, 1, 1, 8, 8, 1e-9, 15, 20], [0.5, 0, 1, 0, 1, 0.3, 1e-6, 0.999], [1, 1] * 4
+    cover = np.maximum(cover, lai / 90)
     return lai, brown, cover, rng.choice([0, 0.2, 0.99, 1], (2, N))
 
 

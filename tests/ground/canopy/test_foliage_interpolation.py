@@ -31,9 +31,9 @@ def table():
 def test_terms_of_cells_are_joined_over_their_ground(cells, table):
     lai, brown, _, ground = cells
     expected = over_background(*terms_of(4, lai, brown).reshape(2, 4, -1).swapaxes(0, 1), ground)
-    np.testing.assert_allclose(interpolate_foliage(table, lai, brown, ground), expected, rtol=0, atol=1e-6)
-    one = interpolate_foliage(table, lai, brown, ground[:, :1])
-    np.testing.assert_array_equal(one[:, 0], interpolate_foliage(table, lai, brown, ground)[:, 0])
+    np.testing.assert_allclose(interpolate_foliage(table, lai, brown, ground)[0], expected, rtol=0, atol=1e-6)
+    one, _ = interpolate_foliage(table, lai, brown, ground[:, :1])
+    np.testing.assert_array_equal(one[:, 0], interpolate_foliage(table, lai, brown, ground)[0][:, 0])
 
 
 @pytest.mark.parametrize("view", [(28.5, 0, 0), (60, 58, 10), (85, 80, 180)])
@@ -47,7 +47,8 @@ def test_crowns_of_cells_are_joined_with_their_gaps(cells, view):
     inside = np.divide(lai, cover, where=cover > 0, out=np.zeros_like(lai))
     terms = tuple(0.5 * terms_of(8, inside, brown).reshape(2, 8, -1).swapaxes(0, 1))
     expected = crowns_over_background(terms, of_crowns, ground)
-    found = interpolate_crowned(table, crown_table(0.8, *view), lai, brown, cover, ground)
+    found, wrong = interpolate_crowned(table, crown_table(0.8, *view), lai, brown, cover, ground)
+    assert wrong == 0
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
 
@@ -55,26 +56,44 @@ def test_leaves_of_one_kind_need_no_axis():
     table = tabulate_foliage(lambda lai, _: 0.5 * terms_of(8, lai, 0.3), rate=2.0, by_brown=False)
     assert table.coefficients.shape[1:] == (1, 16)
     lai, cover, shares = np.array([0.4, 3.0]), np.ones(2), (1.0, 1.0, 1.0, 0.0, 1.0)
-    found = interpolate_crowned(table, crown_table(1.0, 30, 0, 0), lai, np.array([0.3]), cover, np.full((2, 1), 0.2))
+    found, _ = interpolate_crowned(table, crown_table(1.0, 30, 0, 0), lai, np.array([0.3]), cover, np.full((2, 1), 0.2))
     terms = tuple(0.5 * terms_of(8, lai, 0.3).reshape(2, 8, -1).swapaxes(0, 1))
     np.testing.assert_allclose(found, crowns_over_background(terms, shares, 0.2), rtol=0, atol=1e-6)
 
 
 def test_no_data_stay_and_what_is_beyond_is_marked(table):
     lai, brown = np.array([1, np.nan, 1, LIMIT + 1e-9]), np.array([0.2, 0.2, np.nan, 0.2])
-    found = interpolate_foliage(table, lai, brown, np.array([[0.1], [0.2]]))
+    found, wrong = interpolate_foliage(table, lai, brown, np.array([[0.1], [0.2]]))
     assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:3]).all() and np.isinf(found[:, 3]).all()
+    assert wrong == 0
 
 
 def test_crowns_without_data_stay_and_what_is_beyond_is_marked():
     table = tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
     lai = np.array([1, np.nan, 1, 1, 1, 0.5 * LIMIT + 1e-9])
     brown, cover = np.array([0.2, 0.2, np.nan, 0.2, 0.2, 0.2]), np.array([0.5, 0.5, 0.5, np.nan, 1.5, 0.5])
-    found = interpolate_crowned(table, crown_table(1.0, 30, 0, 0), lai, brown, cover, np.full((2, 1), 0.2))
+    found, wrong = interpolate_crowned(table, crown_table(1.0, 30, 0, 0), lai, brown, cover, np.full((2, 1), 0.2))
     assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:5]).all() and np.isinf(found[:, 5]).all()
+    assert wrong > 0
 
 
 def test_one_dead_share_is_that_of_all_cells(cells, table):
     lai, _, _, ground = cells
-    one = interpolate_foliage(table, lai, np.array([0.3]), ground)
-    np.testing.assert_array_equal(one, interpolate_foliage(table, lai, np.full(lai.size, 0.3), ground))
+    one, _ = interpolate_foliage(table, lai, np.array([0.3]), ground)
+    np.testing.assert_array_equal(one, interpolate_foliage(table, lai, np.full(lai.size, 0.3), ground)[0])
+
+
+@pytest.mark.parametrize("name", ["lai", "brown", "ground", "cover"])
+@pytest.mark.parametrize("value", [-0.1, 100.1])
+def test_values_that_no_canopy_has_are_counted(table, name, value):
+    """Wherever they are; NaN is none of them."""
+    n = 600
+    given = {"lai": np.ones(n), "brown": np.full(n, 0.2), "ground": np.full((2, n), 0.2)}
+    crowned = given | {"cover": np.full(n, 0.5)}
+    for each in crowned.values():
+        each[..., 5] = np.nan
+    crowned[name].reshape(-1)[-10] = value
+    terms = tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
+    order = [crowned[each] for each in ("lai", "brown", "cover", "ground")]
+    assert interpolate_crowned(terms, crown_table(1.0, 30, 0, 0), *order)[1] > 0
+    assert bool(interpolate_foliage(table, *given.values())[1]) == (name != "cover")

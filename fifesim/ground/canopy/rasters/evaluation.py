@@ -132,7 +132,8 @@ def _on_soil(kernel, changed, count, lai, *blocks):
 def _uniform(parameters, lai, background, **shares):
     """Reflectance below one sun, of leaves that are all alike."""
     # apply_ufunc hands the bands over as the last axis.
-    return canopy_reflectance(check_map(lai), background=np.moveaxis(background, -1, 0), **parameters, **shares)
+    bands_first = background.transpose(-1, *range(background.ndim - 1))
+    return canopy_reflectance(check_map(lai), background=bands_first, **parameters, **shares)
 
 
 def _by_cell(parameters, leaves, lai, ground, sky, sza, saa, vza, vaa, *optics, **shares):

@@ -129,9 +129,10 @@ def soil_kernel(bands, lai, soil=None, moisture=None):
         return None, []
     line = None if soil is None else soil_line(bands)
     films = None if moisture is None else water_films(tuple(bands))
+    names = tuple(given)
 
     def kernel(reflectance, *changes):
-        change = dict(zip(given, changes, strict=True))
+        change = dict(zip(names, changes, strict=True))
         if line is not None:
             reflectance = brightened(reflectance, change["soil"], line)
         if films is not None:

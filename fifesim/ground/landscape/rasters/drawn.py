@@ -4,11 +4,11 @@ from functools import partial
 
 from fifesim.ground.landscape.drawn import SHARES
 from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
-from fifesim.ground.landscape.rasters.fields import landscape_fields
+from fifesim.ground.landscape.rasters.fields import OF_ELEVATION, landscape_fields, of_elevation
 from fifesim.rasters import cf
 
 
-def drawn_fields(grid, drawn, covary, arps, **options):
+def drawn_fields(grid, drawn, covary, arps, *, dem=None, geometry=None, **options):
     """
     Standard normal fields of a landscape.
 
@@ -22,6 +22,8 @@ def drawn_fields(grid, drawn, covary, arps, **options):
         Correlations of leaf area, as `ground.landscape.rasters.fields.landscape_fields` takes them. [1]
     arps : sequence of float
         Of leaf area, where classes differ in it. [1]
+    dem, geometry
+        As in `landscape_fields`.
     **options
         Passed to `landscape_fields`.
 
@@ -47,8 +49,14 @@ def drawn_fields(grid, drawn, covary, arps, **options):
     if not covary:
         made = [landscape_fields(grid, others, **options)] if others else [{}]
     else:
+        # Of the elevation once for all.
+        named = [name for name in OF_ELEVATION if name in covary and dem is not None]
+        options |= {"dem": dem, "geometry": geometry, "covariates": of_elevation(dem, named, geometry=geometry)}
         # Leaf area comes last: it takes of the noise of the others what its own arp needs, and they stay as they are.
-        made = [landscape_fields(grid, {**others, "lai": arp}, covary, **options) for arp in dict.fromkeys(arps)]
+        made = [
+            landscape_fields(grid, {**others, "lai": arp}, covary, wanted=["lai"] if number else None, **options)
+            for number, arp in enumerate(dict.fromkeys(arps))
+        ]
     leaf_area = {arp: fields["lai"] for arp, fields in zip(dict.fromkeys(arps), made, strict=False) if covary}
     return leaf_area, {name: _labelled(name, each, made[0][name]) for name, each in drawn.items()}
 

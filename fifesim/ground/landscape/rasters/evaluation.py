@@ -72,8 +72,8 @@ def _of_classes(table, parts, banded, bands, first, cover, *blocks):
         run = slice(start, start + _AT_ONCE)
         within, values = [(block[run] if varies else block, varies) for block, varies in blocks], out[:, run]
         numbers, needed = _kernels_of(cover[run], *table)
-        if len(needed) == 1 and needed[0] >= 0:
-            values[...] = _evaluated(parts[needed[0]], within, first)
+        if len(needed) == 1 and -1 not in needed:
+            values[...] = _evaluated(parts[needed.pop()], within, first)
             continue
         values[...] = np.nan
         for cells, part in zip(cells_by_class(numbers, range(len(parts))), parts, strict=True):
@@ -91,7 +91,7 @@ def _kernels_of(cover, codes, groups):
     if present[-1]:
         numbers, present = numbers_of(check_codes(cover, codes), codes)
     of_kernels = np.array([*groups, -1], np.int16)
-    needed = np.unique(of_kernels[present])
+    needed = set(of_kernels[present].tolist())
     return (numbers if len(needed) == 1 else of_kernels[numbers]), needed
 
 

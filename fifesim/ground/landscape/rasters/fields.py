@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
-import dask
-import dask.array as da
 import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
@@ -17,8 +15,9 @@ from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
 from fifesim.ground.landscape.coarse_lattice import check_coarser, coarse_field
 from fifesim.ground.landscape.correlations import flat, pairs_of
-from fifesim.ground.landscape.covariance import Copula, copula, correlated, field_seed
+from fifesim.ground.landscape.covariance import Copula, correlated, field_seed
 from fifesim.ground.landscape.field import TILE, mixed_field
+from fifesim.ground.landscape.rasters.following import copulas
 from fifesim.ground.terrain.rasters.drainage import wetness
 from fifesim.ground.terrain.rasters.light import illumination
 from fifesim.ground.terrain.rasters.slopes import slope
@@ -26,11 +25,7 @@ from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.crs import with_crs_of
-from fifesim.rasters.sampling import all_apart
 from fifesim.rasters.sites import made_on_site
-
-# The ground is known by at most so many rows and columns of it, evenly spaced.
-SAMPLED = 256
 
 _ARPS = Kind(
     "a number for each field, such as {'lai': 0.15, 'soil': 0.24}",
@@ -113,8 +108,8 @@ def correlated_fields(
     return _fields(grid, arps, correlations, **options)
 
 
-def _fields(grid, arps, correlations, *, coarser, seed, covariates, reference, chunks, values=None):
-    """The same; where ``values`` have a function of a name, with what this makes of the cells of the field."""
+def _fields(grid, arps, correlations, *, coarser, seed, covariates, reference, chunks, values=None, wanted=None):
+    """The same, or some of them; where ``values`` have a function of a name, with what this makes of the cells."""
     grids.check_grid(grid)
     seed = check_seed(seed)
     for name, arp in arps.items():
@@ -125,12 +120,12 @@ def _fields(grid, arps, correlations, *, coarser, seed, covariates, reference, c
     covariates = {name: _on_grid(name, each, grid) for name, each in covariates.items()}
     like = next((each.data for each in covariates.values() if each.chunks is not None), None)
     chunks = dict(zip("yx", like.chunks, strict=True)) if chunks is None and like is not None else chunks
-    parts = _copula(arps, pairs, covariates, reference, tuple(name for name in arps if coarser[name] > 1))
+    parts = copulas(arps, pairs, covariates, reference, tuple(name for name in arps if coarser[name] > 1))
     streams = {each: (field_seed(seed, each), arps[each], coarser[each]) for each in arps}
     fields = {}
-    for name in arps:
+    for name in arps if wanted is None else wanted:
         ground = {other: covariates[other] for other in covariates if (name, other) in pairs}
-        field = _field(grid, name, streams, parts, ground, chunks, (values or {}).get(name, lambda cells: cells))
+        field = _field(grid, name, streams, parts[name], ground, chunks, (values or {}).get(name, lambda cells: cells))
         said = f"correlated_fields: {name}, arp {arps[name]:g}, seed {seed}"
         said += f", {coarser[name]} x {coarser[name]} cells" if coarser[name] > 1 else ""
         said += "".join(f", {one}-{other} {r:g}" for (one, other), r in pairs.items() if name in (one, other))
@@ -153,6 +148,7 @@ def landscape_fields(
     time=None,
     chunks=None,
     values=None,
+    wanted=None,
 ):
     """
     Fields of a landscape, some of which follow its elevation.
@@ -171,6 +167,8 @@ def landscape_fields(
         Of the sun, as in `fifesim.illumination`.
     values : dict of str to callable, optional
         Of fields by name, ``values[name](cells)`` gives those of a block, which it may change, in the place of its own.
+    wanted : sequence of str, optional
+        The fields that are made.
 
     Returns
     -------
@@ -197,7 +195,7 @@ def landscape_fields(
     if of_dem:
         covariates |= of_elevation(dem, of_dem, geometry=geometry, time=time)
     options = {"coarser": coarser, "seed": seed, "covariates": covariates, "reference": reference, "chunks": chunks}
-    return _fields(grid, arps, correlations, values=values, **options)
+    return _fields(grid, arps, correlations, values=values, wanted=wanted, **options)
 
 
 def of_elevation(dem, names, *, geometry=None, time=None):
@@ -257,12 +255,13 @@ def _lattices(arps, coarser):
 
 def _field(grid, name, streams, parts, ground, chunks, values):
     """One field, of the noises that are in it and of the ground that it follows; streams are seeds, arps and sizes."""
-    lattice = grids.lattice_position(grid)
+    # Kernels hold names, not rasters: what they hold goes with them into each worker.
+    lattice, followed = grids.lattice_position(grid), tuple(ground)
 
     def cells(made, row, column, shape, *layers):
         found = _noise(name, streams, made, (lattice[0] + row, lattice[1] + column), shape)
         if layers:
-            found = correlated(made.ground[name], found, made.covariates, dict(zip(ground, layers, strict=True)))
+            found = correlated(made.ground[name], found, made.covariates, dict(zip(followed, layers, strict=True)))
         return values(found)
 
     if isinstance(parts, Copula):
@@ -313,41 +312,3 @@ def _of_coarse(weights, streams, start, shape):
             field *= weight
         total = field if total is None else np.add(total, field, out=total)
     return total
-
-
-def _copula(arps, pairs, covariates, reference, coarser):
-    """How the fields are put together; where the ground is lazy, as a lazy array without dimensions."""
-    known = covariates if reference is None else {name: _referred(reference, name) for name in covariates}
-    sizes = {each.shape for each in known.values()}
-    if len(sizes) > 1:
-        raise ValueError(f"the rasters of reference have different sizes, {sizes}: take all on one grid")
-
-    def found(*samples):
-        sampled = {name: each.ravel() for name, each in zip(known, samples, strict=True)}
-        return copula(arps, pairs, sampled, coarser)
-
-    def boxed(*samples):
-        out = np.empty((), object)
-        out[()] = found(*samples)
-        return out
-
-    arrays = [each.data for each in known.values()]
-    samples = [_evenly(each) for each in arrays]
-    lazy = [each for each in samples if isinstance(each, da.Array)]
-    found_apart = dict(zip(map(id, lazy), all_apart(lazy) if lazy else [], strict=True))
-    samples = [found_apart.get(id(each), each) for each in samples]
-    if not any(isinstance(each, da.Array) for each in arrays):
-        return found(*samples)
-    return xr.DataArray(da.from_delayed(dask.delayed(boxed)(*samples), (), dtype=object))
-
-
-def _referred(reference, name):
-    if name not in reference:
-        raise ValueError(f"reference has no {name!r}, it has {', '.join(map(str, reference))}: give all that is named")
-    return reference[name].transpose("y", "x")
-
-
-def _evenly(array):
-    steps = (max(1, -(-size // SAMPLED)) for size in array.shape)
-    rows, columns = (slice(None, None, step) for step in steps)
-    return array[rows, columns]

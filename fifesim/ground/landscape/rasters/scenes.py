@@ -205,10 +205,9 @@ def _lai(grid, cover, table, arp, seed, scores):
             "where it is uniform, or give landscape(lai=) a raster"
         )
     codes = tuple(each.code for each in table)
-    tables, arps = (
-        np.stack([_quantiles(each.lai) for each in table]),
-        [arp if each.arp is None else each.arp for each in table],
-    )
+    # The last is of cells without a class.
+    tables = np.stack([*(_quantiles(each.lai) for each in table), np.full(NODES, np.nan)])
+    arps = [arp if each.arp is None else each.arp for each in table]
     # What streaming_field refuses is known before anything lazy is built.
     for of_class in arps:
         streaming_field(seed, of_class, 0, 0, (0, 0))
@@ -245,16 +244,14 @@ def _leaf_area_of_scores(codes, tables, arps, scored, cover, *scores):
 
 def _of_fields(codes, tables, arps, cover, field_of):
     """Leaf area of cells; ``field_of(arp)`` gives standard normal deviates, and is asked where a class needs them."""
-    out = np.full(cover.shape, np.nan)
     numbers, present = numbers_of(cover, codes)
-    needed = [arp if table[0] != table[-1] else None for arp, table in zip(arps, tables, strict=True)]
-    for arp in dict.fromkeys(needed):
-        mine = np.array([each == arp for each in needed])
-        if (mine & present[:-1]).any():
-            field = np.zeros(cover.shape) if arp is None else field_of(arp)
-            of_arp = numbers if mine.all() else np.where(np.append(mine, False)[numbers], numbers, -1)
-            quantile_map_of_classes(field, of_arp, tables, out)
-    return out
+    varies = (tables[:-1, 0] != tables[:-1, -1]) & present[:-1]
+    needed = list(dict.fromkeys(arp for arp, each in zip(arps, varies, strict=True) if each))
+    field = field_of(needed[0]) if needed else np.zeros(cover.shape)
+    for other in needed[1:]:
+        mine = np.array([*(arp == other for arp in arps), False])
+        field = np.where(mine[numbers], field_of(other), field)
+    return quantile_map_of_classes(field, numbers, tables)
 
 
 def _property(name, given, grid, chunks, allow_remote):

@@ -1,11 +1,13 @@
 """What lies below the canopy by cell: by band, and mixed."""
 
+import cloudpickle
 import numpy as np
 import pytest
 import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
+from fifesim.ground.canopy.rasters.soils import soil_kernel
 from fifesim.ground.canopy.soil import soil_line
 
 TM34 = ["TM3", "TM4"]
@@ -107,6 +109,14 @@ def test_bare_soil_shows_the_line_and_the_water(lai):
     expected = 0.05 * soil_line(tuple(band.response for band in fifesim.instrument("TM").select(TM34)))
     np.testing.assert_allclose(brighter[:, 0, 0], expected, rtol=1e-9)
     assert (reflectance(0 * lai, None, moisture=1.0) < reflectance(0 * lai, None, moisture=0.5)).all()
+
+
+def test_kernel_holds_no_rasters(lai, share):
+    """They are handed to it; what it holds itself is read through when lazy reflectance is named."""
+    bands = tuple(band.response for band in fifesim.instrument("TM").select(TM34))
+    large = xr.concat([share] * 40, "y")
+    kernel, rasters = soil_kernel(bands, lai, soil=large, moisture=large)
+    assert len(rasters) == 2 and len(cloudpickle.dumps(kernel)) < large.nbytes / 4
 
 
 @pytest.mark.parametrize(

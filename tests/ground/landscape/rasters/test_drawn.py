@@ -10,6 +10,7 @@ import fifesim
 from fifesim.ground.landscape.autoregression import response
 from fifesim.ground.landscape.drawn import Field
 from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
+from fifesim.ground.landscape.rasters import drawn
 from fifesim.ground.landscape.rasters.drawn import drawn_fields
 from fifesim.rasters import cf
 
@@ -105,6 +106,15 @@ def test_properties_are_made_of_the_scores_of_their_names(grid):
     assert made["soil"].name == "soil" and made["soil"].attrs["arp"] == 0.2 and made["brown"].attrs["site"] == "FIFE"
     assert made["soil"].attrs["history"].endswith("soil: standard deviation 0.04")
     assert made["brown"].attrs["history"].endswith("brown: by quantiles")
+
+
+def test_properties_and_what_the_elevation_tells_are_made_once_for_all_arps(grid, hills, monkeypatch):
+    asked, told, fields, tell = [], [], drawn.landscape_fields, drawn.of_elevation
+    monkeypatch.setattr(drawn, "landscape_fields", lambda *a, **k: asked.append(fields(*a, **k)) or asked[-1])
+    monkeypatch.setattr(drawn, "of_elevation", lambda dem, names, **k: told.append(names) or tell(dem, names, **k))
+    leaf_area, _ = drawn_fields(grid, DRAWN, COVARY, (0.1, 0.2), seed=7, dem=hills)
+    assert list(leaf_area) == [0.1, 0.2] and told == [["elevation"]]
+    assert [list(each) for each in asked] == [[*DRAWN, "lai"], ["lai"]]
 
 
 @pytest.mark.parametrize("name", ["soil", "brown"])

@@ -1,5 +1,6 @@
 """Fields that correlate, on rasters: what they are, where they are the same, and what is refused."""
 
+import cloudpickle
 import numpy as np
 import pytest
 import xarray as xr
@@ -15,6 +16,7 @@ from fifesim.ground.landscape.rasters.fields import (
 )
 from fifesim.ground.landscape.scores import normal_scores, score_table
 from fifesim.rasters import cf
+from fifesim.rasters import chunks as chunking
 
 ARPS = {"lai": 0.15, "soil": 0.24, "moisture": 0.05}
 PAIRS = {("lai", "soil"): -0.4, ("lai", "moisture"): 0.3, ("soil", "moisture"): 0.2}
@@ -132,6 +134,15 @@ def test_one_lazy_property_beside_others_in_memory(grid, ground):
     found = landscape_fields(grid, {"lai": 0.15}, asked, seed=7, covariates=mixed)["lai"]
     assert found.chunks is not None
     xr.testing.assert_identical(found.compute(), expected)
+
+
+def test_kernels_hold_no_rasters(grid, ground, monkeypatch):
+    """What they hold is read through when they are named, and goes with them into each worker."""
+    kernels, made = [], chunking.pointwise
+    monkeypatch.setattr(chunking, "pointwise", lambda kernel, *a, **k: kernels.append(kernel) or made(kernel, *a, **k))
+    lazy = {"elevation": in_chunks(ground["elevation"], {"y": 250, "x": 333})}
+    landscape_fields(grid, {"lai": 0.15}, {"elevation": 0.3}, seed=7, covariates=lazy)
+    assert len(cloudpickle.dumps(kernels[-1])) < ground["elevation"].nbytes / 4
 
 
 def test_window_with_the_reference_of_the_whole_is_a_slice(grid, ground, following):
