@@ -68,8 +68,9 @@ def apparent_reflectance(
     0.25
     """
     factors = path_reflectance, transmittance_down, transmittance_up, spherical_albedo, gas_transmittance
-    toa = _by_cell(_apparent, (surface_reflectance, surface_reflectance), factors)
-    _check_converged(toa, surface_reflectance, spherical_albedo, "surface_reflectance")
+    toa, refused = _by_cell(_apparent, (surface_reflectance, surface_reflectance), factors)
+    if refused:
+        _refuse(surface_reflectance, spherical_albedo, "surface_reflectance")
     return toa
 
 
@@ -109,7 +110,7 @@ def corrected_reflectance(
     0.25
     """
     factors = path_reflectance, transmittance_down, transmittance_up, spherical_albedo, gas_transmittance
-    return _by_cell(_corrected, (toa_reflectance,), factors)
+    return _by_cell(_corrected, (toa_reflectance,), factors)[0]
 
 
 def inhomogeneous_reflectance(target, environment, terms):
@@ -155,8 +156,9 @@ def inhomogeneous_reflectance(target, environment, terms):
     """
     path, down, direct, diffuse, albedo, gas = terms
     leaving = np.multiply(target, direct) + np.multiply(environment, diffuse)
-    toa = _by_cell(_apparent, (leaving, environment), (path, down, 1.0, albedo, gas))
-    _check_converged(toa, environment, albedo, "the environment's reflectance")
+    toa, refused = _by_cell(_apparent, (leaving, environment), (path, down, 1.0, albedo, gas))
+    if refused:
+        _refuse(environment, albedo, "the environment's reflectance")
     return toa
 
 
@@ -266,18 +268,21 @@ def corrected_reflectance_of_cell(toa, path, down, up, albedo, gas):
     return ground / (1 + albedo * ground)
 
 
-def _check_converged(toa, around, spherical_albedo, what):
-    """Refuse reflectances that `apparent_reflectance_of_cell` marks."""
-    if np.any(np.isinf(toa)):
-        trapped = around * np.asarray(spherical_albedo, float)
-        raise ValueError(
-            f"{what} times spherical_albedo must be below 1, got {np.nanmax(trapped):g}: "
-            "reflectance is a fraction, not a percentage"
-        )
+def _refuse(around, spherical_albedo, what):
+    """Say which reflectances `apparent_reflectance_of_cell` has marked."""
+    trapped = np.asarray(around, float) * np.asarray(spherical_albedo, float)
+    raise ValueError(
+        f"{what} times spherical_albedo must be below 1, got {np.nanmax(trapped):g}: "
+        "reflectance is a fraction, not a percentage"
+    )
 
 
 def _by_cell(kernel, cells, terms):
-    """Kernel over arrays that broadcast. Terms that are the same along all last axes are not spread out over them."""
+    """
+    Kernel over arrays that broadcast, and what it says of them.
+
+    Terms that are the same along all last axes are not spread out over them.
+    """
     cells = [np.asarray(each) for each in cells]
     terms = np.broadcast_arrays(*(np.asarray(each, float) for each in terms))
     shape = np.broadcast_shapes(terms[0].shape, *(each.shape for each in cells))
@@ -288,17 +293,22 @@ def _by_cell(kernel, cells, terms):
     out = np.empty((spread.shape[1], math.prod(shape[split:])))
     # A cell in single precision is widened when it is read.
     wide = [each if each.dtype == np.float32 else each.astype(float, copy=False) for each in cells]
-    kernel(*(np.ascontiguousarray(np.broadcast_to(each, shape)).reshape(out.shape) for each in wide), spread, out)
-    return out.reshape(shape)[()]
+    wide = (np.ascontiguousarray(np.broadcast_to(each, shape)).reshape(out.shape) for each in wide)
+    said = kernel(*wide, spread, out)
+    return out.reshape(shape)[()], said
 
 
 # Where no light comes through, division by zero is no error but what numpy makes of it.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _apparent(leaving, around, terms, out):
+    """Fill in what is seen; how many reflectances are to be refused."""
+    refused = 0
     for i in range(out.shape[0]):
         path, down, up, albedo, gas = terms[:, i]
         for j in range(out.shape[1]):
             out[i, j] = apparent_reflectance_of_cell(leaving[i, j], around[i, j], path, down, up, albedo, gas)
+            refused += np.isinf(out[i, j])
+    return refused
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
