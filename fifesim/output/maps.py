@@ -22,9 +22,8 @@ _NO_DATA = np.array([217, 217, 217], np.uint8)
 # Pictures with fewer pixels along the longer side keep their values and their edges. [pixel]
 _FEW = 200
 
-# Of lossy pictures: noise of pixels stays, at a third of the bytes. More effort than the least takes half as long again
-# for 3 % of them.
-_QUALITY, _EFFORT = 78, 0
+# Of lossy pictures: noise of pixels stays, at a third of the bytes.
+_QUALITY = 78
 
 # Of lossless ones: from 4 up zlib takes longer, and noise of pixels takes more bytes.
 _LEVEL = 2
@@ -220,7 +219,7 @@ def encoded(pixels, lossless=False):
     elif max(picture.size) < _FEW:
         picture.quantize(256, dither=Image.Dither.NONE).save(buffer, "png")
     else:
-        picture.save(buffer, "webp", quality=_QUALITY, method=_EFFORT)
+        picture.save(buffer, "webp", quality=_QUALITY, method=2)
     return buffer.getvalue()
 
 

@@ -132,35 +132,40 @@ def test_turning_ground_and_sun_together_turns_the_result():
     assert before.sky_view.std() > 1e-3 and (before.mu_s_local == 0).any()
 
 
-def test_fused_reflectance_is_rho_kt_and_the_view_factor():
+@pytest.fixture
+def lit():
+    """What fused passes take of hills with a hole, and rho and Kt of these by the formulas."""
     dem, geometry = hills((30, 35), seed=5, relief=60.0), Geometry(55.0, 100.0, 30.0, 20.0)
     dem[3, 4] = np.nan
-    edged, sky = sky_of(dem, 10.0, 300.0, geometry.saa)
     rho = np.random.default_rng(4).uniform(0, 0.6, (2, *dem.shape))
     direct, total = np.array([0.6, 0.8]), np.array([0.85, 0.95])
-    arguments = (rho, edged, sky, (10.0, 10.0), geometry, direct, total)
     light = light_of(dem, 10.0, geometry, 300.0)
-    expected = rho * kt_of(light, rho, geometry, direct[:, None, None], total[:, None, None])
+    kt = kt_of(light, rho, geometry, direct[:, None, None], total[:, None, None])
+    return (rho, *sky_of(dem, 10.0, 300.0, geometry.saa), (10.0, 10.0), geometry, direct, total), light, kt
+
+
+def test_fused_reflectance_is_rho_kt_and_the_view_factor(lit):
+    arguments, light, kt = lit
+    expected = arguments[0] * kt
     np.testing.assert_allclose(lights.slope_reflectance(*arguments, upwelling=False), expected, rtol=1e-13)
     np.testing.assert_allclose(lights.slope_reflectance(*arguments), expected * light.upwelling, rtol=1e-13)
     assert np.isnan(expected).sum() == 2
 
 
-def test_fused_factor_has_the_bits_of_the_formula():
-    dem, geometry = hills((30, 35), seed=5, relief=60.0), Geometry(55.0, 100.0, 30.0, 20.0)
-    dem[3, 4] = np.nan
-    edged, sky = sky_of(dem, 10.0, 300.0, geometry.saa)
-    rho = np.random.default_rng(4).uniform(0, 0.6, (2, *dem.shape))
-    direct, total = np.array([0.6, 0.8]), np.array([0.85, 0.95])
-    light = light_of(dem, 10.0, geometry, 300.0)
-    expected = kt_of(light, rho, geometry, direct[:, None, None], total[:, None, None])
-    found = lights.slope_factor(rho, edged, sky, (10.0, 10.0), geometry, direct, total)
-    assert np.isnan(found).sum() == 2
-    assert found.tobytes() == expected.tobytes()
+@pytest.mark.parametrize("upwelling", [True, False])
+def test_fused_factor_has_the_bits_of_the_formula_and_comes_with_reflectance(lit, upwelling):
+    arguments, _, kt = lit
+    assert lights.slope_factor(*arguments).tobytes() == kt.tobytes()
+    factor, reflectance = lights.slope_factor_and_reflectance(*arguments, upwelling)
+    assert factor.tobytes() == kt.tobytes()
+    assert reflectance.tobytes() == lights.slope_reflectance(*arguments, upwelling).tobytes()
+
+
+@pytest.mark.parametrize("make", [lights.slope_factor, lights.slope_reflectance])
+def test_bands_last_in_memory_are_no_other_bands(lit, make):
+    rho, *others = lit[0]
     turned = np.moveaxis(np.ascontiguousarray(np.moveaxis(rho, 0, -1)), -1, 0)
-    for make in (lights.slope_factor, lights.slope_reflectance):
-        of_turned, of_copy = (make(each, edged, sky, (10.0, 10.0), geometry, direct, total) for each in (turned, rho))
-        np.testing.assert_array_equal(of_turned, of_copy)
+    np.testing.assert_array_equal(make(turned, *others), make(rho, *others))
 
 
 def test_places_between_are_interpolated():

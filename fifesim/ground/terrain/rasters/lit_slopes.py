@@ -26,15 +26,8 @@ def kt_on_slopes(reflectance, dem, *, direct_transmittance, transmittance_down, 
 
     Parameters
     ----------
-    reflectance : xarray.DataArray, dims (band, y, x)
-        Of the land around, as on level ground. [1]
-    dem : xarray.DataArray, dims (y, x)
-        On the same cells, or more of them. [m]
-    direct_transmittance, transmittance_down : array, shape (band,)
-        Of the sunbeam, and of all light, from the sun to the ground. [1]
-    geometry : fifesim.base.geometry.Geometry
-    horizon : xarray.DataArray, dims (direction, y, x), optional
-        As in `sky_view`.
+    reflectance, dem, direct_transmittance, transmittance_down, geometry, horizon
+        As in `terrain_reflectance`.
 
     Returns
     -------
