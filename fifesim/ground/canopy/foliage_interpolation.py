@@ -138,8 +138,8 @@ def _rooms(crowns, cover, at, share):
         at[i], share[i] = _place(np.sqrt(np.sqrt(1 - known)) * (len(crowns) - 3), len(crowns))
 
 
-# Two loops over flat arrays, by places that have no sign: views of rows, and places that may count from the end, take
-# longer than the work.
+# Columns are found by places that have no sign, here in flat arrays and below: views of rows, and places that may count
+# from the end, take longer than the work.
 @register_jitable
 def _along(table, rows, shares, out):
     """Values of all columns of a table, shape (n, column), from splines of one variable."""
@@ -185,10 +185,10 @@ def _single(weights):
 @njit(nogil=True, cache=True, error_model="numpy")
 def _foliage(lai, brown, background, table, values):
     columns = table.coefficients.shape[2]
-    wide, terms = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns))
+    wide, terms = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns), np.float32)
     starts, leaves, dead = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN)
     of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
-    wrong = 0
+    wrong, step = 0, int(of_ground)
     for first in range(0, lai.size, _RUN):
         cells, shares = lai[first : first + _RUN], brown[first : first + _RUN] if of_brown else alike
         wrong += _places(table, cells, shares, starts, leaves, dead)
@@ -196,10 +196,11 @@ def _foliage(lai, brown, background, table, values):
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
+            k = np.uint64(4 * band)
             for i in range(cells.size):
-                t, ground = terms[i], below[i if of_ground else 0]
+                t, ground = terms[i], below[step * i]
                 wrong += (ground < 0) | (ground > 1)
-                seen = over_background(t[4 * band], t[4 * band + 1], t[4 * band + 2], t[4 * band + 3], ground)
+                seen = over_background(t[k], t[k + 1], t[k + 2], t[k + 3], ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if cells[i] > LIMIT else np.nan
     return wrong
 
@@ -207,11 +208,11 @@ def _foliage(lai, brown, background, table, values):
 @njit(nogil=True, cache=True, error_model="numpy")
 def _crowned(lai, brown, cover, background, table, crowns, values):
     columns = table.coefficients.shape[2]
-    wide, terms, parts = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns)), np.zeros((_RUN, 4))
+    wide, terms = np.zeros(4 * columns, np.float32), np.zeros((_RUN, columns), np.float32)
     starts, leaves, dead, inside = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros(_RUN), np.zeros(_RUN)
-    places, shares = np.zeros(_RUN, np.int64), np.zeros(_RUN)
+    places, shares, parts = np.zeros(_RUN, np.int64), np.zeros(_RUN), np.zeros((_RUN, 4))
     of_ground, of_brown, alike = background.shape[1] > 1, brown.size > 1, np.full(_RUN, brown[0])
-    wrong = 0
+    wrong, step = 0, int(of_ground)
     for first in range(0, lai.size, _RUN):
         cells, crowned = lai[first : first + _RUN], cover[first : first + _RUN]
         browns = brown[first : first + _RUN] if of_brown else alike
@@ -227,10 +228,11 @@ def _crowned(lai, brown, cover, background, table, crowns, values):
         for band in range(values.shape[0]):
             out = values[band, first : first + _RUN]
             below = background[band, first : first + _RUN] if of_ground else background[band]
+            k = np.uint64(TERMS * band)
             for i in range(cells.size):
-                t, p, ground = terms[i, TERMS * band : TERMS * (band + 1)], parts[i], below[i if of_ground else 0]
+                t, p, ground = terms[i], parts[i], below[step * i]
                 wrong += (ground < 0) | (ground > 1)
-                of_band = t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]
+                of_band = t[k], t[k + 1], t[k + 2], t[k + 3], t[k + 4], t[k + 5], t[k + 6], t[k + 7]
                 seen = crowns_over_background(of_band, (crowned[i], p[0], p[1], p[2], p[3]), ground)
                 out[i] = seen if starts[i] >= 0 else np.inf if of_cells[i] > LIMIT else np.nan
     return wrong
