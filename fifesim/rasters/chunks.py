@@ -1,7 +1,6 @@
 """How a kernel of numpy arrays meets dask: by cell, by place, or from windows of others."""
 
 from itertools import combinations, product
-from operator import itemgetter
 from typing import NamedTuple
 
 import dask.array as da
@@ -41,26 +40,46 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
     ValueError
         If the rasters differ in grid, or in a scalar coordinate such as sza.
     """
-    arrays = aligned(arrays)
-    core = {}
+    arrays, core = aligned(arrays), {}
     if bands is not None:
-        core = {
-            "input_core_dims": [["band"] if "band" in array.dims else [] for array in arrays],
-            "output_core_dims": [["band"]],
-            # A file opened lazily has one band a chunk, and the kernel wants all.
-            "dask_gufunc_kwargs": {"output_sizes": {"band": bands}, "allow_rechunk": True},
-        }
+        core["input_core_dims"] = [["band"] if "band" in array.dims else [] for array in arrays]
+        core["output_core_dims"] = [["band"]]
 
     def call(*blocks):
         out = np.asarray(kernel(*blocks, **parameters), dtype)
         # apply_ufunc wants new axes last; the transpose below undoes this view.
         return out if bands is None else np.moveaxis(out, 0, -1)
 
-    out = xr.apply_ufunc(
-        call, *arrays, join="exact", dask="parallelized", output_dtypes=[dtype], keep_attrs=True, **core
-    )
+    def by_blocks(*data):
+        if not any(isinstance(each, da.Array) for each in data):
+            return call(*data)
+        along_band = [bool(dims) for dims in core.get("input_core_dims", [[]] * len(data))]
+        return _blockwise(call, data, along_band, bands, np.dtype(dtype))
+
+    out = xr.apply_ufunc(by_blocks, *arrays, join="exact", dask="allowed", keep_attrs=True, **core)
     dims = [name for name in ("band", "y", "x") if name in out.dims]
     return out.transpose(*dims, ...)
+
+
+def _blockwise(call, data, along_band, bands, dtype):
+    """
+    An array of which a block is made of those of others: its last axis is new, of so many bands.
+
+    dask's own gufuncs put the blocks along such an axis together, which copies one, too.
+    """
+    loops = max(each.ndim - along for each, along in zip(data, along_band, strict=True))
+    arguments, last = [], {loops: bands} if bands is not None else {}
+    for each, along in zip(data, along_band, strict=True):
+        if along and isinstance(each, da.Array):
+            # A file opened lazily has one band a chunk, and the kernel wants all.
+            each = each.rechunk({-1: -1})
+        axes = (*range(loops - each.ndim + along, loops), *(loops,) * along)
+        whole = isinstance(each, np.ndarray) and each.ndim == along
+        arguments += [each, None if whole else axes]
+    known = any(axes is not None and loops in axes for axes in arguments[1::2])
+    how = {"adjust_chunks" if known else "new_axes": last}
+    meta = np.empty((0,) * (loops + len(last)), dtype)
+    return da.blockwise(call, (*range(loops), *last), *arguments, dtype=dtype, meta=meta, **how)
 
 
 class Reads(NamedTuple):
@@ -175,8 +194,14 @@ def along_first(array):
     """
     if isinstance(array, np.ndarray):
         return tuple(array)
+    axes = tuple(range(array.ndim))
     meta = np.empty((0,) * (array.ndim - 1), array.dtype)
-    return tuple(array.map_blocks(itemgetter(k), drop_axis=0, meta=meta) for k in range(array.shape[0]))
+    return tuple(da.blockwise(_entry, axes[1:], array, axes, k, None, meta=meta) for k in range(array.shape[0]))
+
+
+def _entry(chunks, k):
+    (chunk,) = chunks
+    return chunk[k]
 
 
 def in_blocks(kernel, reads, shape, size, dtype=float):
