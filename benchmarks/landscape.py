@@ -1,20 +1,16 @@
 """What dead leaves, crowns and soil by cell cost the canopy, beside the whole flat chain, in one run."""
 
+from functools import partial
+from itertools import count
+
+import dask
 import numpy as np
 from timing import in_turn, seconds
 
 import fifesim
 
 BANDS = ["TM3", "TM4"]
-CELLS = 2000
-
-
-def chain(seed):
-    """Field to digital numbers, of a new landscape each time."""
-    grid = fifesim.fife_site(30 / 9, window=((0, CELLS), (0, CELLS)))
-    lai = fifesim.lai_scene(grid, seed=next(seed))
-    return lai.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM")
-
+CELLS, LAZY_CELLS = 2000, 4500
 
 FIELDS = {
     "soil": fifesim.Field(sd=0.03, arp=0.05, coarser=4),
@@ -22,18 +18,47 @@ FIELDS = {
     "crown_cover": fifesim.Field(mean=0.8, sd=0.1, arp=0.05, coarser=4),
     "moisture": fifesim.Field(mean=0.25, sd=0.08, arp=0.05, coarser=4),
 }
+COVARY = {"wetness": 0.4, "elevation": -0.2, "soil": -0.3}
 
 
-def landscape_chain(seed, names, **options):
-    """The same of a landscape of three classes with some properties that vary."""
-    grid = fifesim.fife_site(30 / 9, window=((0, CELLS), (0, CELLS)))
-    land = fifesim.landscape(grid, seed=next(seed), **{name: FIELDS[name] for name in names}, **options)
-    return land.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM")
+def grid_of(cells):
+    """Grid of cells x cells on the site."""
+    return fifesim.fife_site(30 / 9, window=((0, cells), (0, cells)))
+
+
+def image_of(scene):
+    """Digital numbers of leaf area or of a landscape, in memory."""
+    return scene.fifesim.surface_reflectance("TM", bands=BANDS).fifesim.to_toa().fifesim.sense("TM").compute()
+
+
+def chains(grid, seeds, names, lazy=False):
+    """The flat chain, and those of landscapes of three classes with properties that vary, of a new scene each time."""
+    dem, chunks = fifesim.flint_hills(grid, seed=7), {"chunks": "auto"} if lazy else {}
+    dem = dem.chunk(fifesim.lai_scene(grid, **chunks).chunksizes) if lazy else dem
+
+    def landscape(given, **options):
+        fields = {name: FIELDS[name] for name in given}
+        return image_of(fifesim.landscape(grid, seed=next(seeds), **fields, **options, **chunks))
+
+    found = {"flat": lambda: image_of(fifesim.lai_scene(grid, seed=next(seeds), **chunks))}
+    for given in names:
+        found[", ".join(["three classes", *given])] = partial(landscape, given)
+    given, said = names[-1], f"{list(found)[-1]}, leaf area that goes with three"
+    return found | {said: partial(landscape, given, covary=COVARY, dem=dem)}
+
+
+def whole_chains(title, calls, cells):
+    """Print a table of them, in turn."""
+    found = in_turn(calls)
+    print(f"\n| {title} | flat chains | ns a cell |\n|---|---|---|")
+    for said, spent in found.items():
+        print(f"| {said} | {spent / found['flat']:.2f} | {spent / cells * 1e9:.0f} |", flush=True)
 
 
 def main():
     """Print a table of processor time a cell, and of ratios to the flat chain."""
-    lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, CELLS), (0, CELLS))), seed=1)
+    grid, seeds = grid_of(CELLS), count(50)
+    lai = fifesim.lai_scene(grid, seed=1)
     rng = np.random.default_rng(1)
 
     def raster(values):
@@ -56,25 +81,19 @@ def main():
             "background": soil,
         },
     }
+    in_memory = chains(grid, seeds, [list(FIELDS)[:n] for n in range(5)])
     # The largest first: a process that has not had its memory yet pays for that in the first case.
-    landscape_chain(iter([1]), FIELDS)
-    seeds = iter(range(50, 5000))
-    whole = in_turn({"flat": lambda: chain(seeds)})["flat"]
+    list(in_memory.values())[-2]()
+    whole = in_turn({"flat": in_memory["flat"]})["flat"]
     print(f"flat chain, field to digital numbers: {whole / lai.size * 1e9:.0f} ns a cell, {len(BANDS)} bands\n")
     print("| canopy alone | ns a cell | flat chains |\n|---|---|---|")
     for name, options in cases.items():
         spent = seconds(lambda given=options: fifesim.surface_reflectance(lai, "TM", bands=BANDS, **given))
         print(f"| {name} | {spent / lai.size * 1e9:.0f} | {spent / whole:.2f} |", flush=True)
-    dem = fifesim.flint_hills(fifesim.fife_site(30 / 9, window=((0, CELLS), (0, CELLS))), seed=7)
-    go = {"covary": {"wetness": 0.4, "elevation": -0.2, "soil": -0.3}, "dem": dem}
-    chains = {"flat": lambda: chain(seeds)}
-    for names, options in (((), {}), *((list(FIELDS)[: n + 1], {}) for n in range(4)), (list(FIELDS), go)):
-        said = ", ".join(["three classes", *names]) + (", leaf area that goes with three" if options else "")
-        chains[said] = lambda given=names, more=options: landscape_chain(seeds, given, **more)
-    found = in_turn(chains)
-    print("\n| whole chain, level ground | flat chains | ns a cell |\n|---|---|---|")
-    for said, spent in found.items():
-        print(f"| {said} | {spent / found['flat']:.2f} | {spent / lai.size * 1e9:.0f} |", flush=True)
+    whole_chains("whole chain, level ground", in_memory, lai.size)
+    grid = grid_of(LAZY_CELLS)
+    with dask.config.set(scheduler="synchronous"):
+        whole_chains("20 million cells, in chunks", chains(grid, seeds, [list(FIELDS)], lazy=True), LAZY_CELLS**2)
 
 
 if __name__ == "__main__":

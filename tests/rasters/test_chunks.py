@@ -56,6 +56,28 @@ def test_kernel_that_makes_bands_gets_those_of_its_inputs_together(pieces):
     np.testing.assert_array_equal(out, plain.values - cube.values)
 
 
+def test_blocks_along_bands_are_not_copied():
+    """Blocks that dask puts together along an axis are copied, one too."""
+    made, seen = [], []
+
+    def source(block):
+        made.append(block + 1)
+        return made[-1]
+
+    def kernel(cells, weights):
+        seen.append(cells)
+        return np.moveaxis(cells * weights, -1, 0)
+
+    cube = in_chunks(raster(bands=3), {"band": 3, "y": 20, "x": 25})
+    cube = cube.copy(data=cube.data.map_blocks(source, meta=cube.data._meta))
+    out = chunks.pointwise(kernel, cube, BANDS, bands=3)
+    first, *_ = chunks.along_first(cube.data)
+    entries = first.map_blocks(lambda entry: seen.append(entry) or entry, meta=first._meta)
+    dask.compute(out, entries, scheduler="synchronous")
+    assert len(seen) == 2 * cube.data.npartitions
+    assert all(any(np.shares_memory(block, each) for each in made) for block in seen)
+
+
 def test_dtype_is_known_before_anything_is_computed():
     out = chunks.pointwise(lambda a: (a * 9).astype(np.uint8), in_chunks(raster(), ODD_CHUNKS), dtype=np.uint8)
     assert out.dtype == np.uint8 == out.compute().dtype
