@@ -331,11 +331,13 @@ def aligned(arrays):
     """
     arrays = _with_crs(arrays)
     rasters = [array for array in arrays if _is_raster(array)]
-    for one, other in combinations(rasters, 2):
-        if not grids.same_grid(grids.geobox(one), grids.geobox(other)):
+    # One raster lies on its own cells, whatever they are.
+    placed = [(array, grids.geobox(array)) for array in rasters] if rasters[1:] else []
+    for (one, own), (other, others) in combinations(placed, 2):
+        if not grids.same_grid(own, others):
             raise ValueError(
-                f"{one.name!r} and {other.name!r} lie on different grids, {grids.in_words(grids.geobox(one))} and "
-                f"{grids.in_words(grids.geobox(other))}: bring one onto the other's first"
+                f"{one.name!r} and {other.name!r} lie on different grids, {grids.in_words(own)} and "
+                f"{grids.in_words(others)}: bring one onto the other's first"
             )
         for name in set(one.coords) & set(other.coords) - {"spatial_ref"}:
             a, b = one.coords[name], other.coords[name]
