@@ -56,6 +56,16 @@ def test_kernel_that_makes_bands_gets_those_of_its_inputs_together(pieces):
     np.testing.assert_array_equal(out, plain.values - cube.values)
 
 
+@pytest.mark.parametrize("pieces", [ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
+def test_what_is_in_memory_meets_what_is_lazy(pieces):
+    plain, cube = raster(), in_chunks(raster(seed=1, bands=3), pieces)
+    with no_compute():
+        sums = chunks.pointwise(lambda a, b, c: a + b * c, cube, plain, BANDS)
+        made = chunks.pointwise(lambda a, b, c: np.moveaxis(a + b[..., None] * c, -1, 0), cube, plain, BANDS, bands=3)
+    for out in (sums, made):
+        np.testing.assert_array_equal(out, cube.values + plain.values * BANDS.values[:, None, None])
+
+
 def test_blocks_along_bands_are_not_copied():
     """Blocks that dask puts together along an axis are copied, one too."""
     made, seen = [], []
