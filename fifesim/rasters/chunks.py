@@ -41,9 +41,9 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
         If the rasters differ in grid, or in a scalar coordinate such as sza.
     """
     arrays, core = aligned(arrays), {}
+    along_band = [bands is not None and "band" in array.dims for array in arrays]
     if bands is not None:
-        core["input_core_dims"] = [["band"] if "band" in array.dims else [] for array in arrays]
-        core["output_core_dims"] = [["band"]]
+        core = {"input_core_dims": [["band"] * along for along in along_band], "output_core_dims": [["band"]]}
 
     def call(*blocks):
         out = np.asarray(kernel(*blocks, **parameters), dtype)
@@ -51,10 +51,8 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
         return out if bands is None else np.moveaxis(out, 0, -1)
 
     def by_blocks(*data):
-        if not any(isinstance(each, da.Array) for each in data):
-            return call(*data)
-        along_band = [bool(dims) for dims in core.get("input_core_dims", [[]] * len(data))]
-        return _blockwise(call, data, along_band, bands, np.dtype(dtype))
+        lazy = any(isinstance(each, da.Array) for each in data)
+        return _blockwise(call, data, along_band, bands, dtype) if lazy else call(*data)
 
     out = xr.apply_ufunc(by_blocks, *arrays, join="exact", dask="allowed", keep_attrs=True, **core)
     dims = [name for name in ("band", "y", "x") if name in out.dims]
@@ -76,7 +74,7 @@ def _blockwise(call, data, along_band, bands, dtype):
         axes = (*range(loops - each.ndim + along, loops), *(loops,) * along)
         whole = isinstance(each, np.ndarray) and each.ndim == along
         arguments += [each, None if whole else axes]
-    known = any(axes is not None and loops in axes for axes in arguments[1::2])
+    known = any(loops in (axes or ()) for axes in arguments[1::2])
     how = {"adjust_chunks" if known else "new_axes": last}
     meta = np.empty((0,) * (loops + len(last)), dtype)
     return da.blockwise(call, (*range(loops), *last), *arguments, dtype=dtype, meta=meta, **how)
@@ -200,6 +198,7 @@ def along_first(array):
 
 
 def _entry(chunks, k):
+    # Along an axis that a result lacks, dask hands over a list of chunks.
     (chunk,) = chunks
     return chunk[k]
 

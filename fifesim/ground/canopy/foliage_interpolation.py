@@ -9,7 +9,8 @@ from fifesim.ground.canopy.crowns import crowns_over_background
 from fifesim.ground.canopy.foliage_table import LIMIT, TERMS
 from fifesim.ground.canopy.optics import LARGEST_LAI
 
-# Cells whose places in a table are found together: they stay in the nearest cache.
+# Cells whose places in a table are found together: with their terms, in single precision as the table is, they stay in
+# the nearest cache.
 _RUN = 256
 
 
