@@ -1,5 +1,6 @@
 """Bring a raster file onto a grid, by an operation between the two CRSs whose accuracy is known."""
 
+import logging
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import product
@@ -12,6 +13,7 @@ import rasterio
 import rasterio.windows
 import xarray as xr
 from affine import Affine
+from numba import njit
 from odc.geo.geobox import GeoBox
 from rasterio.enums import Resampling
 from rasterio.warp import reproject
@@ -31,6 +33,10 @@ _TILE = 512
 # millimetres for cells of 10 m, a centimetre for 30 m.
 _STRIP = 32
 
+# rasterio passes the coordinate operation to the transformer, which applies it, and to the warper, which logs since
+# GDAL 3.11 that it has no such option.
+logging.getLogger("rasterio._env").addFilter(lambda record: "option COORDINATE_OPERATION" not in record.getMessage())
+
 # rasterio silences a warning of its own around each call, in a way that is not safe among threads.
 _ONE_AT_A_TIME = Lock()
 
@@ -44,9 +50,8 @@ _MOST_CELLS = 2**26
 _SOURCE_MARGIN = 4
 
 
-# How cells larger than those of a file, and others, are made from its own.
-_OF_QUANTITIES = (Resampling.average, Resampling.bilinear)
-_OF_CLASSES = (Resampling.mode, Resampling.nearest)
+# The most frequent class of a cell is that of the most of its samples, at most so many along a side.
+_MOST_SAMPLES = 64
 
 
 def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False):
@@ -171,7 +176,7 @@ class _ArraySource:
         return np.ma.asarray(self.cells[rows, columns])
 
     def window_transform(self, window):
-        return self.transform * Affine.translation(window.col_off, window.row_off)
+        return rasterio.windows.transform(window, self.transform)
 
 
 class _TileReads(NamedTuple):
@@ -269,16 +274,17 @@ def _tile(source, crs, name, grid, pipeline, back, classes, tile_row, tile_colum
     options = {"src_crs": crs, "src_nodata": np.nan}
     options |= {"dst_crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()), "dst_nodata": np.nan}
     finer = max(_cells_per_cell(source, crs, grid, back)) > 1.01
-    larger, other = _OF_CLASSES if classes else _OF_QUANTITIES
-    options |= {"resampling": larger if finer else other}
+    larger = Resampling.average if finer else Resampling.bilinear
+    options |= {"resampling": Resampling.nearest if classes else larger}
     options |= {"COORDINATE_OPERATION": pipeline} if pipeline else {}
     # Of the tile, not of the grid, so that it is the same in every window.
-    size = _block_size(max(_cells_per_cell(source, crs, _part(grid, top, left, _TILE), back)))
+    cells = max(_cells_per_cell(source, crs, _part(grid, top, left, _TILE), back))
+    size, samples = _block_size(cells), _samples(cells) if classes and finer else 1
     for down, across in product(range(0, _TILE, size), repeat=2):
         first, start = top + down, left + across
         if -size < first < grid.shape.y and -size < start < grid.shape.x:
             block = _part(grid, first, start, size)
-            out[down : down + size, across : across + size] = _warp_block(source, name, block, back, options)
+            out[down : down + size, across : across + size] = _warp_block(source, name, block, back, options, samples)
     return out
 
 
@@ -298,8 +304,43 @@ def _block_size(cells):
     return size
 
 
-def _warp_block(source, name, block, back, options):
-    """A block of cells, from one window of the file."""
+def _samples(cells):
+    """
+    Samples along a side of a cell that spans so many source cells: a multiple of their number, odd for each of them.
+
+    At 1.1 source cells per cell, five samples miss the class with the largest area in 1 % of the cells where it leads
+    by 5 to 10 %. GDAL's mode counts every source cell that a cell touches as a whole one and misses 17 % (GDAL 3.12) or
+    33 % (3.10) of these.
+    """
+    along = max(round(cells), 1) if np.isfinite(cells) else 1
+    return min(along * (5 if along == 1 else 3 if along < 8 else 1), _MOST_SAMPLES)
+
+
+@njit(nogil=True, cache=True)
+def _most_frequent(values, samples):
+    """Most frequent value among samples x samples neighbours, the smallest of equally frequent ones; NaN is skipped."""
+    out = np.full((values.shape[0] // samples, values.shape[1] // samples), np.nan)
+    found, counts = np.empty(samples * samples), np.empty(samples * samples, np.int64)
+    for row in range(out.shape[0]):
+        for column in range(out.shape[1]):
+            kinds, most = 0, 0
+            for i in range(row * samples, (row + 1) * samples):
+                for j in range(column * samples, (column + 1) * samples):
+                    value, kind = values[i, j], 0
+                    while kind < kinds and found[kind] != value:
+                        kind += 1
+                    if kind == kinds and value == value:
+                        found[kind], counts[kind], kinds = value, 0, kinds + 1
+                    if value == value:
+                        counts[kind] += 1
+            for kind in range(kinds):
+                if counts[kind] > most or (counts[kind] == most and found[kind] < out[row, column]):
+                    most, out[row, column] = counts[kind], found[kind]
+    return out
+
+
+def _warp_block(source, name, block, back, options, samples):
+    """A block of cells, from one window of the file; the most frequent of samples x samples values where asked."""
     size, a = block.shape.x, block.affine
     out = np.full((size, size), np.nan)
     window = _source_window(source, options["src_crs"], block, back)
@@ -313,9 +354,9 @@ def _warp_block(source, name, block, back, options):
     values = source.read(1, window=window, masked=True).astype(float).filled(np.nan)
     values = values * source.scales[0] + source.offsets[0]
     for first in range(0, size, _STRIP):
-        strip = np.full((size, min(size, _STRIP)), np.nan)
-        transform = Affine(a.a, 0.0, a.c + first * a.a, 0.0, a.e, a.f)
+        strip = np.full((size * samples, min(size, _STRIP) * samples), np.nan)
+        transform = Affine(a.a / samples, 0.0, a.c + first * a.a, 0.0, a.e / samples, a.f)
         with _ONE_AT_A_TIME:
             reproject(values, strip, src_transform=source.window_transform(window), dst_transform=transform, **options)
-        out[:, first : first + _STRIP] = strip
+        out[:, first : first + _STRIP] = strip if samples == 1 else _most_frequent(strip, samples)
     return out

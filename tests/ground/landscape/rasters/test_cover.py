@@ -1,6 +1,9 @@
 """Cover on labelled rasters: drawn, and a user's own map in its classes."""
 
+import logging
+
 import numpy as np
+import pyproj
 import pytest
 import rioxarray
 import xarray as xr
@@ -80,10 +83,43 @@ def test_smaller_cells_have_the_nearest_class_and_larger_ones_the_most_frequent(
 def test_map_in_another_projection_keeps_its_classes(tmp_path, site, codes):
     """Classes in between, which means of their codes would be, are none of the table."""
     path = write(tmp_path / "cover.tif", codes, site.affine)
-    turned = rioxarray.open_rasterio(path).rio.reproject("EPSG:4326", nodata=0)
+    turned = rioxarray.open_rasterio(path).rio.reproject("EPSG:4326")
+    assert (turned == turned.rio.nodata).any()
     cover = cover_map(turned, site, TABLE)
     assert (cover.values == codes).mean() > 0.5
     assert set(np.unique(cover)) <= {-1, *CODES}
+
+
+def test_cells_have_the_class_with_the_largest_area(tmp_path, site, codes, caplog):
+    """Compared with the areas of the classes, from 400 points of each cell carried to the map by pyproj."""
+    path = write(tmp_path / "cover.tif", codes, site.affine)
+    turned = rioxarray.open_rasterio(path, masked=True).rio.reproject("EPSG:4326")[0]
+    with caplog.at_level(logging.WARNING):
+        found = cover_map(turned, site, TABLE).values
+    assert caplog.messages == []
+    along = 20
+    rows, columns = (np.mgrid[: 45 * along, : 54 * along] + 0.5) / along
+    to_degrees = pyproj.Transformer.from_crs(site.crs.proj, 4326, always_xy=True)
+    columns, rows = ~turned.rio.transform() * np.array(to_degrees.transform(*(site.affine * (columns, rows))))
+    rows, columns = (
+        np.clip(np.floor(each).astype(int), 0, n - 1) for each, n in zip((rows, columns), turned.shape, strict=True)
+    )
+    points = turned.values[rows, columns].reshape(45, along, 54, along)
+    areas = np.stack([(points == code).mean(axis=(1, 3)) for code in CODES])
+    first, second = np.sort(areas, axis=0)[:0:-1]
+    # Five samples place a boundary within 0.1 of a cell along each axis, which moves two areas in opposite directions.
+    clear = first - second > 0.4
+    assert clear.sum() > 1300
+    np.testing.assert_array_equal(found[clear], np.array(CODES)[areas.argmax(axis=0)][clear])
+
+
+def test_reprojected_map_that_declares_another_nodata_value_is_refused(tmp_path, site, codes):
+    """rioxarray's `reproject(nodata=0)` may fill with 0 and keep the `_FillValue` of its input."""
+    path = write(tmp_path / "cover.tif", codes, site.affine)
+    turned = rioxarray.open_rasterio(path).rio.reproject("EPSG:4326")
+    filled = turned.where(turned != turned.rio.nodata, 0).assign_attrs(turned.attrs)
+    with pytest.raises(ValueError, match="codes without a class: 0, in"):
+        cover_map(filled, site, TABLE)
 
 
 def test_missing_stays_missing(tmp_path, site, codes):
