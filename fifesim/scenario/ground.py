@@ -3,8 +3,10 @@
 import xarray as xr
 
 from fifesim.chain.landscapes import fpar
+from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.cover import PATTERNS, Patches
+from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.drawn import Field
 from fifesim.ground.landscape.raster import lai_scene, lai_window
 from fifesim.ground.landscape.rasters.scenes import landscape
@@ -92,6 +94,36 @@ def drawn_properties(scenario):
         for name, deviation in own.deviations.items()
         if deviation
     }
+
+
+def check_crown_cover(scenario):
+    """
+    Check that the crowns of each stand can hold the largest leaf area index of its distribution.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+
+    Raises
+    ------
+    ValueError
+        If the leaf area index within the crowns could exceed the largest that SAIL is evaluated for. The check is left
+        to the run where leaf area or crown cover varies in a map or field.
+    """
+    land = scenario.ground
+    if land.lai_file or "crown_cover" in drawn_properties(scenario):
+        return
+    stands = [("ground", land.distribution, land.crown_cover)]
+    if scenario.landscape.cover != "none":
+        stands = [
+            (f"classes.{name}", each.lai, land.crown_cover if each.crown_cover is None else each.crown_cover)
+            for name, each in scenario.class_table().items()
+        ]
+    for place, distribution, cover in stands:
+        try:
+            check_crowns(lai_distribution(distribution).support()[1], cover)
+        except ValueError as error:
+            raise ValueError(f"{place}.crown_cover = {cover:g}: {error}") from None
 
 
 def canopy_of(scenario):

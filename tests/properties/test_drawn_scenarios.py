@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import rasterio
 from affine import Affine
-from hypothesis import HealthCheck, event, given, settings
+from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
 import fifesim
@@ -214,12 +214,7 @@ def check_image(scenario, run):
     assert truth["fpar"].min() >= 0 and truth["fpar"].max() <= 1
 
 
-@settings(
-    max_examples=DRAWS,
-    derandomize="FIFESIM_DRAWS" not in os.environ,
-    deadline=20_000,
-    suppress_health_check=[HealthCheck.too_slow],
-)
+@settings(max_examples=DRAWS)
 @given(scenarios())
 def test_a_drawn_scenario_is_refused_in_a_few_lines_or_runs(folder, drawn):
     text = "\n".join(f"{toml(name)} = {toml(keys)}" for name, keys in drawn.items())
@@ -249,7 +244,15 @@ def test_a_drawn_scenario_is_refused_in_a_few_lines_or_runs(folder, drawn):
             check_refusal(error)
             event("refused as it is simulated")
             return
-        check_image(scenario, run)
+        try:
+            check_image(scenario, run)
+        except ValueError as error:
+            # Whether crowns can hold their leaves is known in advance unless one of the two varies.
+            assert scenario.ground.lai_file or scenario.landscape.deviations.get("crown_cover"), error
+            check_refusal(error)
+            assert "leaf area index within the crowns" in str(error)
+            event("refused as it is computed")
+            return
         event("computed")
 
 

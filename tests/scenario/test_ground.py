@@ -314,3 +314,15 @@ def test_share_that_cannot_vary_so_much_is_told_before_a_run(ground, deviation, 
     case = parse_scenario(SMALL | {"ground": ground, "landscape": {"deviations": {deviation: 0.2}}})
     with pytest.raises(ValueError, match=said):
         case.complete()
+
+
+@pytest.mark.parametrize("cover", [0.01, 5e-324])
+@pytest.mark.parametrize("place", ["ground", "classes.thin"])
+def test_crowns_that_cannot_hold_the_leaves_are_refused_before_a_run(place, cover):
+    """Also where leaf area divided by crown cover overflows."""
+    keys = {"ground": {"crown_cover": cover}}
+    if place == "classes.thin":
+        keys = {"landscape": {"cover": "voronoi"}, "classes": {"thin": {"crown_cover": cover}, "dense": {}}}
+    with pytest.raises(ValueError, match=rf"{place}\.crown_cover = {cover:g}: .* at most 100, got up to "):
+        parse_scenario(SMALL | keys).complete()
+    assert parse_scenario(SMALL | {"ground": {"crown_cover": 0.05}}).complete().ground.crown_cover == 0.05

@@ -275,7 +275,8 @@ def check_crowns(lai, crown_cover):
     cells = (each if each.shape == shape else np.broadcast_to(each, shape) for each in (lai, cover))
     # Ground without crowns holds no leaves, and is not meant.
     if _overfull(*(np.ascontiguousarray(each).reshape(-1) for each in cells)):
-        inside = lai / np.where(cover > 0, cover, np.inf)
+        with np.errstate(over="ignore"):
+            inside = lai / np.where(cover > 0, cover, np.inf)
         raise ValueError(
             f"leaf area index within the crowns is lai / crown_cover, at most {LARGEST_LAI:g}, got up to "
             f"{np.nanmax(inside):g}: where crowns cover that little lower the leaf area, or give crown_cover 0"
