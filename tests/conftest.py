@@ -1,10 +1,20 @@
 """What tests of rasters share."""
 
+import os
+
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks
 
 import fifesim
+
+# The same examples in each run. With FIFESIM_DRAWS, the scheduled job draws as many new ones, and prints how to
+# reproduce a failure.
+_COMMON = {"deadline": None, "database": None, "print_blob": True, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("fixed", derandomize=True, **_COMMON)
+settings.register_profile("random", derandomize=False, **_COMMON)
+settings.load_profile("random" if "FIFESIM_DRAWS" in os.environ else "fixed")
 
 
 @pytest.fixture(params=[None, CHUNKS, ODD_CHUNKS], ids=["numpy", "chunked", "odd-chunks"])

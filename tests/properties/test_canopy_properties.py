@@ -9,7 +9,7 @@ from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
 from fifesim.ground.canopy.sail_model import sail
 
-modest = settings(derandomize=True, max_examples=80, deadline=None)
+modest = settings(max_examples=80)
 zenith = st.floats(0, 89.9)
 azimuth = st.floats(0, 180)
 lai = st.floats(0, 50)

@@ -30,7 +30,7 @@ def pieces(draw, size, most):
     return tuple(end - start for start, end in pairwise(edges))
 
 
-@settings(derandomize=True, max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(pieces(ROWS, 3), pieces(COLUMNS, 3))
 def test_scene_and_image_are_the_same_in_any_chunks(rows, columns):
     with no_compute():
@@ -40,7 +40,7 @@ def test_scene_and_image_are_the_same_in_any_chunks(rows, columns):
     xr.testing.assert_identical(image.compute(), IMAGE)
 
 
-@settings(derandomize=True, max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(pieces(ROWS, 9), pieces(COLUMNS, 9), pieces(ROWS, 5), st.sampled_from([(2,), (1, 1)]))
 def test_chunks_may_change_on_the_way(rows, columns, later, bands):
     with no_compute():

@@ -58,7 +58,7 @@ SENSOR = table(
 PLACE = st.tuples(st.integers(-40, 900), st.integers(-40, 900))
 
 
-@settings(max_examples=DRAWS, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@settings(max_examples=DRAWS, suppress_health_check=list(HealthCheck))
 @given(GROUND, st.none() | st.fixed_dictionaries(SUN), AIR, SENSOR, PLACE)
 def test_a_drawn_realisation_has_the_bits_of_the_scene_alone(ground, sun, air, sensor, place):
     if ("leaf_reflectance" in ground) != ("leaf_transmittance" in ground):

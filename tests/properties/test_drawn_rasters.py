@@ -1,7 +1,7 @@
 """
 Whatever the file: a raster, or one line that says what is wrong with it.
 
-A thousand: ``FIFESIM_RASTERS=1000 pytest tests/properties/test_drawn_rasters.py``
+A thousand: ``FIFESIM_DRAWS=1000 pytest tests/properties/test_drawn_rasters.py``
 """
 
 import json
@@ -21,7 +21,7 @@ from rasterio.control import GroundControlPoint
 import fifesim
 from fifesim.rasters.opening import ErrorsOfGdal
 
-COUNT = int(os.environ.get("FIFESIM_RASTERS", "150"))
+COUNT = int(os.environ.get("FIFESIM_DRAWS", "150"))
 WEST, NORTH = 708000.0, 4332000.0
 GRID = fifesim.grid_at("EPSG:26914", WEST, NORTH, 240.0, 200.0, 10.0)
 
@@ -193,7 +193,7 @@ def test_drawn_rasters_are_opened_or_refused_in_one_line():
     assert {"raster", "ValueError"} <= set(SEEN)
 
 
-@settings(derandomize=COUNT <= 150, max_examples=COUNT, deadline=None, print_blob=True)
+@settings(max_examples=COUNT)
 @given(rasters(), DAMAGE, st.sampled_from(sorted(DOORS)))
 def try_a_drawn_raster(raster, broken, door):
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
