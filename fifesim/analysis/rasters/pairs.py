@@ -78,7 +78,13 @@ def sound_cells(array):
 
 def _no_fill(values):
     """Values of a block, or ValueError if the smallest or largest of them is a fill value."""
-    for end in (np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)) if values.size else ():
+    if not values.size:
+        return values
+    ends = values.min(), values.max()
+    # minimum and maximum are twice as fast as fmin and fmax, which skip NaN.
+    if np.isnan(ends[0]):
+        ends = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
+    for end in ends:
         if np.isinf(end) or float(end) in _FILLS or abs(end) > _LARGEST:
             raise ValueError(
                 f"a value of {end:g} marks missing data and would count as a measurement: set it to NaN, such as "
