@@ -202,7 +202,7 @@ ELEVATION = [
         pending="item 9",
     ),
     refused("an unknown unit", 'fifesim.fine_dem(dem, grid, vertical_units="furlong")', "'furlong'", "us-ft"),
-    refused("fill values in a DEM", "dem.where(dem.x > dem.x[3], -9999).fifesim.slope()", "-9999", "NaN"),
+    refused("fill values in a DEM", "dem.where(dem.x > dem.x[3], -9999).fifesim.slope()", "-9999", "land has"),
     refused("a declared fill value", "dem.rio.write_nodata(-9999).fifesim.slope()", "-9999", "masked=True"),
     refused(
         "fill values beside the grid",

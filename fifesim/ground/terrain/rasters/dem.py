@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.warned import warn
+from fifesim.ground.terrain.rasters.source import check_heights
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 
@@ -18,9 +19,6 @@ _FOOT = 0.3048
 _APART = 500.0
 # So far above it they may be feet of it: 150 m are 492 feet.
 _NOT_FEET = 150.0
-
-# Elevations on land, with a margin: the Dead Sea has -430 m, Mount Everest 8849 m. [m]
-LOWEST, HIGHEST = -600.0, 9000.0
 
 
 def elevation_grid(dem):
@@ -39,7 +37,7 @@ def elevation_grid(dem):
     Raises
     ------
     ValueError
-        If its units are not metres, it marks missing cells by a number, elevations in memory are not those of land, or
+        If its units are not metres, it marks missing cells by a number, land does not have its elevations in memory, or
         it does not lie north up in a projected CRS in metres.
     TypeError
         If it is no DataArray.
@@ -49,7 +47,8 @@ def elevation_grid(dem):
             f"a dem is an xarray.DataArray, got {type(dem).__name__}: bring it onto the grid with fifesim.fine_dem"
         )
     cf.check_units(dem, "dem")
-    _check_elevation(dem)
+    if dem.chunks is None:
+        check_heights("the dem", dem.values)
     grid = grids.geobox(dem)
     nodata = dem.rio.nodata
     if nodata is not None and np.isfinite(nodata):
@@ -58,18 +57,6 @@ def elevation_grid(dem):
             "open it with masked=True, or bring it onto the grid with fifesim.fine_dem"
         )
     return grid
-
-
-def _check_elevation(dem):
-    """Raise ValueError if an elevation model in memory holds elevations that the Earth does not have."""
-    if dem.chunks is not None or not dem.size:
-        return
-    for end in (np.fmin.reduce(dem.values, axis=None), np.fmax.reduce(dem.values, axis=None)):
-        if not (np.isnan(end) or LOWEST <= end <= HIGHEST):
-            raise ValueError(
-                f"the dem must have elevations of {LOWEST:g} to {HIGHEST:g} m, got {end:g}: set cells without data to "
-                "NaN, such as dem.where(dem > -600), and convert feet or decimetres to metres"
-            )
 
 
 def beside_altitude(dem, altitude):
