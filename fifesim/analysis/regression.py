@@ -30,6 +30,8 @@ class Regression:
         Standard deviation of y about the line, with n - 2 degrees of freedom.
     x_mean, x_sum_of_squares : float
         Mean of x, and the sum of its squared deviations.
+    y_name, x_name : str
+        CF standard names of y and x, empty where they are not known.
 
     Examples
     --------
@@ -50,6 +52,8 @@ class Regression:
     residual_deviation: float
     x_mean: float
     x_sum_of_squares: float
+    y_name: str = ""
+    x_name: str = ""
 
     plot = Method("plot_fit")
 

@@ -13,6 +13,9 @@ import pvlib
 from fifesim.base.annotations import Numbers
 from fifesim.base.kinds import described
 
+# Wavelengths of sunlight in micrometres are shorter than this, in nanometres longer. [um]
+LONGEST = 100.0
+
 
 class Window(NamedTuple):
     """
@@ -138,7 +141,7 @@ class Band:
     Raises
     ------
     ValueError
-        If the wavelengths do not increase, or the response is negative or zero throughout.
+        If the wavelengths do not increase or are longer than 100 um, or the response is negative or zero throughout.
 
     Examples
     --------
@@ -155,6 +158,11 @@ class Band:
         wavelength, response = (_numbers(self, name) for name in ("wavelength", "response"))
         if len(wavelength) < 2 or len(wavelength) != len(response) or np.any(np.diff(wavelength) <= 0):
             raise ValueError(f"band {self.name}: wavelengths must increase, one for each response")
+        if wavelength[-1] > LONGEST:
+            raise ValueError(
+                f"band {self.name}: wavelengths must be at most {LONGEST:g} um, got {wavelength[-1]:g}: "
+                "divide nanometres by 1000"
+            )
         if min(response) < 0 or max(response) == 0:
             raise ValueError(f"band {self.name}: the response must not be negative, nor zero everywhere")
         object.__setattr__(self, "wavelength", wavelength)

@@ -13,6 +13,7 @@ from fifesim.base import fife
 from fifesim.base.arguments import check_fields
 from fifesim.base.kinds import is_a
 from fifesim.base.times import utc
+from fifesim.base.warned import warn
 
 ANGLES = ("sza", "saa", "vza", "vaa")
 
@@ -40,6 +41,11 @@ class Geometry:
         If the sun or the sensor is not above the horizon.
     TypeError
         If an angle is no number.
+
+    Warns
+    -----
+    UserWarning
+        If the angles of the sun look like radians.
 
     Examples
     --------
@@ -77,6 +83,7 @@ class Geometry:
             raise ValueError(
                 f"earth_sun_distance is in astronomical units, 0.983 to 1.017, got {self.earth_sun_distance:g}"
             )
+        warn_of_radians(self.sza, self.saa)
 
     @property
     def raa(self) -> float:
@@ -92,6 +99,28 @@ class Geometry:
     def mu_v(self) -> float:
         """Cosine of the sensor zenith angle [1]."""
         return np.cos(np.radians(self.vza))
+
+
+def warn_of_radians(sza, saa):
+    """
+    Warn if the directions of the sun look like radians.
+
+    Parameters
+    ----------
+    sza, saa : float
+        The largest zenith and azimuth angles. [degree]
+
+    Warns
+    -----
+    UserWarning
+        If both are above 0 and at most a quarter and a whole turn in radians. The sun is rarely that near to the
+        zenith, and then seldom that near to north.
+    """
+    if 0 < sza <= np.pi / 2 and 0 < saa <= 2 * np.pi:
+        warn(
+            f"sza={sza:g} and saa={saa:g} are taken as degrees and look like radians: if they are, convert them with "
+            f"numpy.degrees, which gives sza={np.degrees(sza):.1f} and saa={np.degrees(saa):.1f}"
+        )
 
 
 def relative_azimuth(saa, vaa):

@@ -20,6 +20,7 @@ from fifesim.rasters import directions
 from fifesim.rasters.annotations import Directions, NumberOrRaster
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.sun import check_same_sun
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
@@ -306,6 +307,8 @@ def to_surface(
     """
     reflectance = as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance")
     light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time, assume=assume)
+    if not assume:
+        check_same_sun(light[-1], reflectance)
     scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
     return _of(instrument, atmosphere_raster.to_surface(directions.dated(reflectance, time), *light, **scene))
 

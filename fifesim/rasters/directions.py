@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_position
+from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_position, warn_of_radians
 from fifesim.base.times import utc
 from fifesim.base.warned import warn
 from fifesim.rasters import cf, projection, whereabouts
@@ -236,11 +236,19 @@ def checked_geometry(given):
     rasters = {name: value for name, value in values.items() if name not in numbers}
     for name, raster in rasters.items():
         cf.check_units(raster, name)
+    _warn_of_radians(values)
     uniform = Geometry(**(numbers | dict.fromkeys(rasters, 0.0)))
     if not rasters:
         return uniform
     plain = {name: raster.drop_vars(set(raster.coords) - {"y", "x", "spatial_ref"}) for name, raster in rasters.items()}
     return xr.Dataset({name: plain.get(name, getattr(uniform, name)) for name in _GEOMETRY})
+
+
+def _warn_of_radians(values):
+    """Warn if the angles of the sun by cell, in memory, look like radians."""
+    sun = [values["sza"], values["saa"]]
+    if any(angle.ndim for angle in sun) and all(angle.chunks is None and angle.size for angle in sun):
+        warn_of_radians(*(float(np.nan_to_num(angle.values).max()) for angle in sun))
 
 
 def varying(geometry):

@@ -47,6 +47,11 @@ def grid_at(crs: MaybeCRS, west: float, north: float, width: float, height: floa
     ValueError
         If there is no such CRS, it is not projected or not in metres, or the size holds no cell.
 
+    Warns
+    -----
+    UserWarning
+        If the corner looks like longitude and latitude.
+
     Examples
     --------
     >>> import fifesim
@@ -60,6 +65,7 @@ def grid_at(crs: MaybeCRS, west: float, north: float, width: float, height: floa
         raise ValueError(f"{size} no cell {of}: type a width and height of a cell or more, or a smaller cell")
     if not max(width / across, height / down) < _LONGEST:
         raise ValueError(f"{size} over {_LONGEST} cells {of} along a side: type a smaller size, or a larger cell")
+    projection.warn_of_degrees(west, north)
     shape = int(height / down + 1e-6), int(width / across + 1e-6)
     return _checked(shape, (across, 0.0, west, 0.0, -down, north), projection.horizontal(crs))
 
@@ -240,7 +246,7 @@ def aligned(grid, pixel):
     Raises
     ------
     ValueError
-        If none fits.
+        If none fits, or pixels are smaller than 1/50 of a cell.
     """
     down, across = np.broadcast_to(np.asarray(pixel, float), 2)
     a = grid.affine
@@ -248,6 +254,9 @@ def aligned(grid, pixel):
     shape = int(height / down + 1e-6), int(width / across + 1e-6)
     if not (down > 0 and across > 0 and min(shape) > 0):
         raise ValueError(f"no pixel of {down:g} x {across:g} m fits into a scene of {height:g} x {width:g} m")
+    # Pixels that are so much smaller than a cell have their size in km.
+    if min(-a.e / down, a.a / across) > 50:
+        raise ValueError(f"pixels must be at least 1/50 of a cell of {a.a:g} m, got {across:g} m: give metres, not km")
     return GeoBox(shape, Affine(across, 0.0, a.c, 0.0, -down, a.f), grid.crs)
 
 

@@ -5,16 +5,18 @@ import re
 import numpy as np
 import xarray as xr
 
+from fifesim.base.bands import LONGEST
 from fifesim.base.warned import warn
 from fifesim.rasters import cf, chunks
 from fifesim.rasters.axes import check_axes, is_scan, north_up
+from fifesim.rasters.origins import origin_of
 from fifesim.rasters.packed import STORAGE, has_no_data, scale_and_offset, unpacked
 
 # A reflectance factor beyond these is none: glint, snow and slopes in low sun stay within. [1]
 LOWEST, HIGHEST = -0.5, 5.0
 
-# Wavelengths of light that the Sun sends, in micrometres, end before they would begin in nanometres.
-LONGEST = 100.0
+# Distance of the rows in which the scale of a raster from fifesim is checked. [row]
+SAMPLED_ROWS = 16
 
 PER_MICROMETRE = dict.fromkeys(
     ("um", "µm", "μm", "micrometer", "micrometers", "micrometre", "micrometres", "micron", "microns"), 1.0
@@ -38,8 +40,8 @@ def incoming(raster, name):
     Returns
     -------
     raster : xarray.DataArray, dims ([band], y, x)
-        Lazy where it was; a reflectance beyond -0.5 to 5 is refused when it is computed. What fifesim made passes as it
-        is. [1]
+        Lazy where it was; a reflectance beyond -0.5 to 5 is refused when it is computed. Rows of a raster from fifesim
+        are sampled, because arithmetic keeps its attributes. [1]
 
     Raises
     ------
@@ -54,7 +56,9 @@ def incoming(raster, name):
         return array
     array = in_micrometres(_named(north_up(array)))
     if "atmosphere" in array.attrs and array.dtype.kind == "f":
-        return array
+        # A lazy raster with an origin is as fifesim made it.
+        known = origin_of(array) is not None
+        return array if known else chunks.pointwise(check_scale, array, dtype=array.dtype)
     return _physical(array, name)
 
 
@@ -132,6 +136,40 @@ def check_reflectance(values):
             "most values of a block are reflectances above 1, as no ground has: where they are percent, divide them by "
             "100, and where they are scaled, multiply them by their scale"
         )
+    return values
+
+
+def check_scale(values):
+    """
+    Refuse a raster from fifesim that was multiplied by 100 or 10000 afterwards.
+
+    Parameters
+    ----------
+    values : array, shape (..., y, x)
+        [1]
+
+    Returns
+    -------
+    values : array
+        The same.
+
+    Raises
+    ------
+    ValueError
+        As in `check_reflectance`.
+
+    Warns
+    -----
+    UserWarning
+        As in `check_reflectance`.
+
+    Examples
+    --------
+    >>> check_scale(np.array([[0.2, 0.3]])).shape
+    (1, 2)
+    """
+    # A scale concerns all rows: a sample of them takes 1/16 of the time.
+    check_reflectance(values[..., ::SAMPLED_ROWS, :])
     return values
 
 

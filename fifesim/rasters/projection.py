@@ -323,3 +323,24 @@ def transform_points(affine, columns, rows):
     """
     columns, rows = np.asarray(columns, float), np.asarray(rows, float)
     return affine.a * columns + affine.b * rows + affine.c, affine.d * columns + affine.e * rows + affine.f
+
+
+def warn_of_degrees(west, north):
+    """
+    Warn if a corner in metres looks like longitude and latitude.
+
+    Parameters
+    ----------
+    west, north : float
+        [m]
+
+    Warns
+    -----
+    UserWarning
+        If they are at most 180 and 90, and neither is 0.
+    """
+    if 0 < abs(west) <= 180 and 0 < abs(north) <= 90:
+        warn(
+            f"west={west:g} and north={north:g} are taken as metres and look like degrees: if they are, convert them "
+            "with pyproj.Transformer.from_crs(4326, crs, always_xy=True).transform(longitude, latitude)"
+        )

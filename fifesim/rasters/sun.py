@@ -66,3 +66,28 @@ def sun_position(
     names = "sza", "saa", "earth_sun_distance"
     data = {name: ("time", each, cf.attributes(name)) for name, each in zip(names, found, strict=True)}
     return xr.Dataset(data, {"time": ("time", utc, cf.TIME)})
+
+
+def check_same_sun(geometry, array):
+    """
+    Refuse a solar zenith angle that differs from the one for which fifesim made a raster.
+
+    Parameters
+    ----------
+    geometry : Geometry, Dataset or None
+    array : xarray.DataArray
+        Reflectance at the top of the atmosphere.
+
+    Raises
+    ------
+    ValueError
+        If both are numbers and differ by more than 0.01 degree.
+    """
+    if geometry is None or "atmosphere" not in array.attrs or "sza" not in array.coords:
+        return
+    carried, given = array["sza"], geometry.sza
+    if carried.ndim == 0 and np.ndim(given) == 0 and abs(float(carried) - float(given)) > 0.01:
+        raise ValueError(
+            f"{array.name or 'the raster'} was made for sza={float(carried):.2f}, got geometry with "
+            f"sza={float(given):.2f}: leave geometry out, or drop the coordinate with .drop_vars('sza')"
+        )

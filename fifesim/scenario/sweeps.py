@@ -14,6 +14,7 @@ import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
 from fifesim.base.annotations import Array, Pairing
+from fifesim.base.kinds import described
 from fifesim.scenario.ensemble import realise
 from fifesim.scenario.named_keys import changed, find_key, in_text
 from fifesim.scenario.scenario import Scenario
@@ -60,6 +61,8 @@ def sweep(
     ------
     ValueError
         If an axis has no values or is no key.
+    TypeError
+        If the axes are no mapping.
 
     Examples
     --------
@@ -70,6 +73,8 @@ def sweep(
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"sweep takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+    if not isinstance(axes, Mapping):
+        raise TypeError(f"axes must map keys to values, such as {{'visibility': [5, 45]}}, got {described(axes)}")
     if not axes:
         raise ValueError("a sweep needs an axis, such as {'arp': [0.05, 0.15, 0.24]}")
     steps = {name: _axis(name, given) for name, given in axes.items()}

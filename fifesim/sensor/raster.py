@@ -15,7 +15,8 @@ from fifesim.rasters import cf, chunks, directions, swaths
 from fifesim.rasters import grid as grids
 from fifesim.rasters.annotations import Directions, Image
 from fifesim.rasters.dates import by_date
-from fifesim.rasters.own_rasters import incoming
+from fifesim.rasters.own_rasters import HIGHEST, LOWEST, SAMPLED_ROWS, incoming
+from fifesim.rasters.sun import check_same_sun
 from fifesim.rasters.windows import held
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
@@ -105,7 +106,8 @@ def sense(
     ------
     ValueError
         If the instrument is unknown, has none of the bands, no such noise or no such scaling, ``onto`` is no grid of
-        the scene's CRS, or a point spread is wider than the scene.
+        the scene's CRS or lies beside the scene, a point spread is wider than the scene, or `to_toa` made the raster
+        for another sun.
 
     See Also
     --------
@@ -129,6 +131,7 @@ def sense(
     # A radiance is recorded whatever the sun.
     needed = not _is_radiance(toa) or scaling == "product"
     geometry = (directions.given_geometry if needed else directions.known_geometry)(geometry, toa, time)
+    check_same_sun(geometry, toa)
     toa = directions.dated(toa, time)
     groups = bands_by_grid(description, bands, onto, interval)
     if len(groups) > 1:
@@ -241,7 +244,7 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     Raises
     ------
     ValueError
-        If the image carries no calibration.
+        If the image carries no calibration, or a gain is not above 0.
 
     See Also
     --------
@@ -260,6 +263,8 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     missing = {"gain", "offset"} - set(image.coords)
     if missing:
         raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
+    if not np.all(image["gain"].values > 0):
+        raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.atleast_1d(image['gain'].values)}")
     names = [name for name in ("gain", "offset", "compression") if name in image.coords]
     out = chunks.pointwise(calibration.dn_to_radiance, image, *[_along_band(image, name) for name in names])
     out = swaths.placed_as(out.drop_vars(names), image)
@@ -284,7 +289,7 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     Raises
     ------
     ValueError
-        If the image carries no calibration, solar irradiance or solar zenith angle.
+        If the image carries no calibration, solar irradiance or solar zenith angle, or they give impossible values.
 
     See Also
     --------
@@ -306,9 +311,22 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     geometry = directions.geometry_of(image.drop_vars(["vza", "vaa"], errors="ignore"))
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
-    out = _by_sun(calibration.radiance_to_reflectance, radiance, _along_band(image, "solar_irradiance"), geometry)
+    out = _by_sun(_plausible_reflectance, radiance, _along_band(image, "solar_irradiance"), geometry)
     out = swaths.placed_as(out, image)
     return cf.label(out, "toa_reflectance", source=radiance, history="to_reflectance")
+
+
+def _plausible_reflectance(radiance, solar_irradiance, mu_s, earth_sun_distance):
+    """Reflectance of a block, or ValueError if half of a sample of it is impossibly bright or dark [1]."""
+    out = calibration.radiance_to_reflectance(radiance, solar_irradiance, mu_s, earth_sun_distance)
+    sample = out[..., ::SAMPLED_ROWS, :]
+    wrong = (sample > HIGHEST) | (sample < LOWEST)
+    if 2 * np.count_nonzero(wrong) > sample.size:
+        raise ValueError(
+            f"gain, offset and solar_irradiance give a reflectance of {sample[wrong].flat[0]:g}: check that radiance "
+            "is in W m-2 sr-1 um-1, solar_irradiance in W m-2 um-1 and sza in degrees"
+        )
+    return out
 
 
 def as_radiance(array, bands, geometry):

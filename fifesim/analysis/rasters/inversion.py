@@ -8,7 +8,7 @@ from typing import Literal
 import xarray as xr
 
 from fifesim.analysis import uncertainty
-from fifesim.analysis.rasters.pairs import matched
+from fifesim.analysis.rasters.pairs import check_same_quantity, matched
 from fifesim.analysis.regression import Regression, totals
 from fifesim.base.annotations import Pairing
 from fifesim.rasters import cf, chunks, swaths
@@ -43,7 +43,7 @@ def invert(
     Raises
     ------
     ValueError
-        If the quantity or the level is not one allowed.
+        If the quantity or the level is not one allowed, or the fit is of another quantity or on another index.
 
     See Also
     --------
@@ -63,6 +63,7 @@ def invert(
     """
     if quantity not in ("lai", "fpar"):
         raise ValueError(f"quantity must be 'lai' or 'fpar', got {quantity!r}")
+    _check_names(ndvi, fit, quantity)
     if not 0 < level < 1:
         raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")
     kernels = {quantity: fit.predict} | {name: _limit(fit, k, level) for k, name in enumerate(_LIMITS)}
@@ -117,6 +118,7 @@ def inversion_error(
     (0.0, 0.96)
     """
     value, low, high = [estimate] * 3 if isinstance(estimate, xr.DataArray) else _map_and_limits(estimate)
+    check_same_quantity(value, truth, ("estimate", "truth"))
     value, true = matched(value, truth, pair)
     low, _ = matched(low, truth, pair)
     high, _ = matched(high, truth, pair)
@@ -127,6 +129,18 @@ def inversion_error(
     if isinstance(estimate, xr.Dataset):
         found["coverage"] = inside / n
     return xr.Dataset(found)
+
+
+def _check_names(ndvi, fit, quantity):
+    """Raise ValueError if a regression is not of the quantity on the index, by their standard names."""
+    wanted, given = cf.QUANTITIES[quantity].standard_name, ndvi.attrs.get("standard_name", "")
+    if fit.y_name and fit.y_name != wanted:
+        raise ValueError(
+            f"fit must be of {wanted}, got one of {fit.y_name} on {fit.x_name or 'an index'}: exchange the arguments "
+            "of regress, or name the quantity"
+        )
+    if fit.x_name and given and fit.x_name != given:
+        raise ValueError(f"ndvi must be {fit.x_name}, as in the fit, got {given}: give the raster of the index")
 
 
 def _map_and_limits(estimate):

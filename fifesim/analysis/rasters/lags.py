@@ -9,7 +9,7 @@ import xarray as xr
 
 from fifesim.analysis import variogram as kernels
 from fifesim.analysis.rasters.means import aggregate
-from fifesim.analysis.rasters.pairs import check_no_counts, origins
+from fifesim.analysis.rasters.pairs import origins, sound_cells
 from fifesim.base.line_spread import Boxcar, LineSpread
 from fifesim.rasters import grid as grids
 from fifesim.rasters.reductions import extremes, sums_by_block
@@ -56,7 +56,7 @@ def autocovariance(array: xr.DataArray, reach: float) -> xr.Dataset:
     >>> dict(lags.sizes)
     {'lag_y': 4, 'lag_x': 7}
     """
-    check_no_counts(array)
+    array = sound_cells(array)
     if set(array.dims) != {"y", "x"}:
         raise ValueError(f"a variogram is of a raster over (y, x), got {array.dims}: select one band first")
     array = array.transpose("y", "x")

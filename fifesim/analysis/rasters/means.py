@@ -1,6 +1,6 @@
 """True means of labelled rasters over blocks of ground."""
 
-from fifesim.analysis.rasters.pairs import check_no_counts
+from fifesim.analysis.rasters.pairs import sound_cells
 from fifesim.rasters import grid as grids
 from fifesim.rasters.dates import by_date
 from fifesim.rasters.regularization import areas, regularized
@@ -30,7 +30,7 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     Raises
     ------
     ValueError
-        If the array has no grid, or no block fits.
+        If the array has no grid, no block fits, or a cell holds a fill value.
     TypeError
         If the size is no number.
 
@@ -38,7 +38,7 @@ def aggregate(array, pixel=30.0, *, min_valid=0.98, lsf=None):
     --------
     fifesim.base.footprints.regularize
     """
-    check_no_counts(array)
+    array = sound_cells(array)
     blocks = grids.aligned(grids.geobox(array), pixel)
     spreads = areas(blocks) if lsf is None else (lsf, lsf)
     means = regularized(array, spreads, blocks, min_valid=min_valid)

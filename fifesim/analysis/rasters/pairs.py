@@ -8,6 +8,13 @@ from fifesim.rasters.reductions import computed
 
 PAIRINGS = ("coordinates", "index")
 
+# Numbers by which files mark missing data and which no quantity here takes, and a bound that all of them keep.
+_FILLS = (-999.0, -9999.0, -99999.0, -32768.0, 65535.0)
+_LARGEST = 1e15
+
+# Pixels that count as one size: those of scanners drift against a grid by some percent, and may be oblong.
+_SAME_PIXEL = 2.0
+
 
 def matched(y, x, pair="coordinates"):
     """
@@ -31,8 +38,8 @@ def matched(y, x, pair="coordinates"):
     """
     if pair not in PAIRINGS:
         raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
+    y, x = sound_cells(y), sound_cells(x)
     for array in (y, x):
-        check_no_counts(array)
         if set(array.dims) != {"y", "x"}:
             cure = "select one band" if "time" not in array.dims else "select one date with .isel(time=0)"
             cure = "put a scan onto a map with .fifesim.grid_swath(grid)" if "line" in array.dims else cure
@@ -40,23 +47,72 @@ def matched(y, x, pair="coordinates"):
     return (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
 
 
-def check_no_counts(array):
+def sound_cells(array):
     """
-    Refuse digital numbers, which hold 0 for no data: it would be taken for dark ground.
+    A raster whose cells are values of a quantity.
 
     Parameters
     ----------
     array : xarray.DataArray
 
+    Returns
+    -------
+    array : xarray.DataArray
+        The same values; a lazy raster is checked when it computes.
+
     Raises
     ------
     ValueError
-        If it holds digital numbers.
+        If it holds digital numbers, fill values or infinity.
     """
+    # A digital number of 0 is no data and would count as dark ground.
     if "gain" in array.coords:
         raise ValueError(
             f"{array.name or 'the array'} holds digital numbers, whose 0 is no data: convert it with "
             ".fifesim.to_reflectance() or .fifesim.to_radiance() first"
+        )
+    if array.dtype.kind != "f" or not array.size:
+        return array
+    return array.copy(data=array.data.map_blocks(_no_fill, dtype=array.dtype) if array.chunks else _no_fill(array.data))
+
+
+def _no_fill(values):
+    """Values of a block, or ValueError if the smallest or largest of them is a fill value."""
+    if not values.size:
+        return values
+    ends = values.min(), values.max()
+    # minimum and maximum are twice as fast as fmin and fmax, which skip NaN.
+    if np.isnan(ends[0]):
+        ends = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
+    for end in ends:
+        if np.isinf(end) or float(end) in _FILLS or abs(end) > _LARGEST:
+            raise ValueError(
+                f"a value of {end:g} marks missing data and would count as a measurement: set it to NaN, such as "
+                f"raster.where(raster != {end:g})"
+            )
+    return values
+
+
+def check_same_quantity(one, other, names):
+    """
+    Refuse two rasters of different quantities.
+
+    Parameters
+    ----------
+    one, other : xarray.DataArray
+        What a raster does not say is taken as right.
+    names : (str, str)
+        Their arguments.
+
+    Raises
+    ------
+    ValueError
+        If their standard names differ.
+    """
+    says = [array.attrs.get("standard_name") for array in (one, other)]
+    if None not in says and says[0] != says[1]:
+        raise ValueError(
+            f"{names[0]} and {names[1]} must be the same quantity, got {says[0]} and {says[1]}: give both of one"
         )
 
 
@@ -77,6 +133,13 @@ def origins(*arrays):
 
 
 def _common_index(y, x):
+    sizes = [abs(np.diff(each[axis].values[:2])) for axis in ("y", "x") for each in (y, x) if axis in each.coords]
+    sizes = [size[0] for size in sizes if size.size]
+    if sizes and max(sizes) > _SAME_PIXEL * min(sizes):
+        raise ValueError(
+            f"pair='index' needs pixels of about one size, got {min(sizes):g} and {max(sizes):g} m: bring one raster "
+            "onto the other's grid first, for instance with .fifesim.aggregate"
+        )
     rows, columns = min(y.sizes["y"], x.sizes["y"]), min(y.sizes["x"], x.sizes["x"])
     return y.isel(y=slice(rows), x=slice(columns)), x.isel(y=slice(rows), x=slice(columns))
 

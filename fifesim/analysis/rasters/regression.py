@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import xarray as xr
 
 from fifesim.analysis import regression
@@ -50,4 +52,5 @@ def regress(y: xr.DataArray, x: xr.DataArray, *, pair: Pairing = "coordinates") 
     y, x = matched(y, x, pair)
     y_origin, x_origin = origins(y, x)
     sums = sums_by_row(regression.row_sums, y, x, count=6, y_origin=y_origin, x_origin=x_origin)
-    return regression.fit(sums, y_origin, x_origin)
+    names = [array.attrs.get("standard_name", "") for array in (y, x)]
+    return replace(regression.fit(sums, y_origin, x_origin), y_name=names[0], x_name=names[1])

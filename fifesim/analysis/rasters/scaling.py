@@ -13,7 +13,7 @@ from fifesim.analysis import density as densities
 from fifesim.analysis import scaling
 from fifesim.analysis.rasters.indices import red_and_nir
 from fifesim.analysis.rasters.means import aggregate
-from fifesim.analysis.rasters.pairs import check_no_counts
+from fifesim.analysis.rasters.pairs import check_same_quantity, sound_cells
 from fifesim.analysis.rasters.regression import regress
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
@@ -225,6 +225,11 @@ def share_kept(pixels: xr.DataArray, cells: xr.DataArray) -> xr.Dataset:
         ``range`` and ``variance``; lazy where an input is, when the chunks may change the last digit of the variance.
         [1]
 
+    Raises
+    ------
+    ValueError
+        If the rasters are of different quantities, hold digital numbers or fill values, or the pixels are finer.
+
     References
     ----------
     [Friedl1995]_, Fig. 6
@@ -242,8 +247,11 @@ def share_kept(pixels: xr.DataArray, cells: xr.DataArray) -> xr.Dataset:
     >>> bool(0 < kept["variance"] < 1)
     True
     """
-    for array in (pixels, cells):
-        check_no_counts(array)
+    pixels, cells = sound_cells(pixels), sound_cells(cells)
+    check_same_quantity(pixels, cells, ("pixels", "cells"))
+    coarse, fine = (abs(np.diff(each["x"].values[:2])) if "x" in each.coords else [] for each in (pixels, cells))
+    if len(coarse) and len(fine) and coarse[0] < 0.99 * fine[0]:
+        raise ValueError(f"pixels must not be finer than cells, got {coarse[0]:g} and {fine[0]:g} m: exchange them")
     extent = (pixels.max() - pixels.min()) / (cells.max() - cells.min())
     kept = {"range": extent, "variance": pixels.var() / cells.var()}
     # What is left of coordinates belongs to one of the two.
@@ -296,7 +304,7 @@ def density(
     >>> round(float(density.integrate("value")), 2)
     1.0
     """
-    check_no_counts(array)
+    array = sound_cells(array)
     low, high = extremes(array)
     if reflect is None:
         # A difference of two leaf areas keeps their name.

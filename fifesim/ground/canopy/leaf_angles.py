@@ -3,12 +3,15 @@
 import difflib
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
+
+from fifesim.base.kinds import described
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,8 @@ def leaf_angle_classes(distribution="spherical", classes=90):
     ------
     ValueError
         If the name is unknown, or a parameter is outside its range.
+    TypeError
+        If it is neither text nor a sequence.
 
     References
     ----------
@@ -115,6 +120,11 @@ def leaf_angle_classes(distribution="spherical", classes=90):
         distribution = _parsed(distribution)
     if isinstance(distribution, LeafAngles):
         return distribution
+    if not isinstance(distribution, Sequence | np.ndarray):
+        raise TypeError(
+            f"leaf_angles must be a name such as 'spherical' or fractions of classes, got {described(distribution)}: "
+            "for a mean inclination of 57 degrees give 'campbell(57)'"
+        )
     if len(distribution) and isinstance(distribution[0], str):
         return _named(distribution[0], tuple(float(p) for p in distribution[1:]), int(classes))
     fraction = tuple(distribution)

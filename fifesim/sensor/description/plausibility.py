@@ -9,6 +9,9 @@ from fifesim.sensor.scan.track import swath_width
 # Angles between samples above this one are degrees, or no imager's [rad].
 _WIDEST = 0.02
 
+# Smaller angles are below the diffraction limit of a mirror of 5 m: gsd is in kilometres [rad].
+_FINEST = 1e-7
+
 # A product's pixel is seldom three times smaller or larger than the interval: a ratio of these, within a factor of
 # three, is a unit that was taken for another.
 _UNITS = {
@@ -74,6 +77,11 @@ def _check_sampling(instrument, interval, gsd, key):
         if angle > _WIDEST:
             raise ValueError(
                 f"{key}interval = {angle:g}: angles are in radians (43 urad is 43e-6); degrees times pi / 180"
+            )
+        if angle < _FINEST:
+            raise ValueError(
+                f"{key}interval = {angle:g}: no telescope resolves less than {_FINEST:g} radians. gsd = {gsd:g} is in "
+                "metres; if it is kilometres, multiply by 1000"
             )
         ratio = gsd / (angle * instrument.altitude)
         for factor, (name, unit, remedy) in _UNITS.items():

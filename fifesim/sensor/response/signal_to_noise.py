@@ -30,7 +30,7 @@ def noise_equivalent_radiance(instrument: FilePath | Instrument, band: str, radi
     Raises
     ------
     ValueError
-        If there is no such instrument or band, or its description has no noise.
+        If there is no such instrument or band, its description has no noise, or a radiance is negative.
 
     Examples
     --------
@@ -38,7 +38,7 @@ def noise_equivalent_radiance(instrument: FilePath | Instrument, band: str, radi
     >>> round(fifesim.noise_equivalent_radiance("OLI", "OLI4", 22.0).item(), 3)
     0.096
     """
-    return _noise_of(instrument, band).noise_equivalent_radiance(radiance)
+    return _noise_of(instrument, band).noise_equivalent_radiance(_checked(radiance))
 
 
 def snr(instrument: FilePath | Instrument, band: str, radiance: Numbers) -> np.ndarray:
@@ -61,7 +61,7 @@ def snr(instrument: FilePath | Instrument, band: str, radiance: Numbers) -> np.n
     Raises
     ------
     ValueError
-        If there is no such instrument or band, or its description has no noise.
+        If there is no such instrument or band, its description has no noise, or a radiance is negative.
 
     Examples
     --------
@@ -69,7 +69,15 @@ def snr(instrument: FilePath | Instrument, band: str, radiance: Numbers) -> np.n
     >>> fifesim.snr("OLI", "OLI4", [22.0, 60.0]).round()
     array([230., 627.])
     """
-    return _noise_of(instrument, band).snr(radiance)
+    return _noise_of(instrument, band).snr(_checked(radiance))
+
+
+def _checked(radiance):
+    """Radiance as an array, or ValueError if a value is negative."""
+    radiance = np.asarray(radiance, float)
+    if np.any(radiance < 0):
+        raise ValueError(f"radiance must not be negative, got {radiance[radiance < 0].flat[0]:g} W m-2 sr-1 um-1")
+    return radiance
 
 
 def _noise_of(instrument, band):

@@ -5,7 +5,7 @@ import pytest
 from lazy import ODD_CHUNKS, in_chunks
 
 import fifesim
-from fifesim.analysis.rasters.pairs import check_no_counts, matched, origins
+from fifesim.analysis.rasters.pairs import matched, origins, sound_cells
 from fifesim.rasters import grid as grids
 
 CELL = 30 / 9
@@ -57,4 +57,4 @@ def test_origins_are_means_of_first_rows_where_there_is_one(lai):
 
 def test_digital_numbers_are_refused(lai):
     with pytest.raises(ValueError, match="lai holds digital numbers, whose 0 is no data: convert it with"):
-        check_no_counts(lai.assign_coords(gain=1.0))
+        sound_cells(lai.assign_coords(gain=1.0))

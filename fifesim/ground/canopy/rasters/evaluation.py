@@ -14,6 +14,9 @@ from fifesim.ground.canopy.rasters import canopy_shares
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
 from fifesim.rasters import cf, directions
 
+# Largest ratio of leaf size to canopy height. [1]
+LARGEST_HOTSPOT = 10.0
+
 
 class EvenCanopy(NamedTuple):
     """A canopy whose cells differ in their green leaf area alone."""
@@ -95,8 +98,11 @@ def canopy_kernel(
     ValueError
         As in `ground.canopy.raster.level_reflectance`.
     """
-    if not 0 <= hotspot < np.inf:
-        raise ValueError(f"hotspot must be at least 0, got {hotspot:g}: it is leaf size over canopy height")
+    if not 0 <= hotspot <= LARGEST_HOTSPOT:
+        raise ValueError(
+            f"hotspot must be in [0, {LARGEST_HOTSPOT:g}], got {hotspot:g}: "
+            "it is leaf size over canopy height, such as 0.1"
+        )
     parameters = {"leaf_angles": leaf_angle_classes(leaf_angles), "hotspot": float(hotspot)}
     parameters["crown_shape"] = float(crown_shape)
     background = _per_band(_background_bands(background, bands))

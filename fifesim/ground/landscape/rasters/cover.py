@@ -37,7 +37,18 @@ def drawn_cover(grid, patches, table, seed, chunks=None):
     -------
     cover : xarray.DataArray of int16, dims (y, x)
         Codes.
+
+    Raises
+    ------
+    ValueError
+        If patches are smaller than a cell.
     """
+    cell = min(grids.cell_size(grid))
+    if patches.size < cell:
+        raise ValueError(
+            f"the size of patches must be at least a cell of {cell:g} m, got {patches.size:g} m: "
+            "give it in metres, not km"
+        )
     shares = patches.shares_of([each.name for each in table])
     codes = np.array([each.code for each in table], np.int16)
     northing, easting = (grids.coordinates(grid)[axis].values for axis in ("y", "x"))

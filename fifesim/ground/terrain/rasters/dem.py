@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.warned import warn
+from fifesim.ground.terrain.rasters.source import check_heights
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 
@@ -36,8 +37,8 @@ def elevation_grid(dem):
     Raises
     ------
     ValueError
-        If its units are not metres, it marks missing cells by a number, or it does not lie north up in a projected CRS
-        in metres.
+        If its units are not metres, it marks missing cells by a number, land does not have its elevations in memory, or
+        it does not lie north up in a projected CRS in metres.
     TypeError
         If it is no DataArray.
     """
@@ -46,6 +47,8 @@ def elevation_grid(dem):
             f"a dem is an xarray.DataArray, got {type(dem).__name__}: bring it onto the grid with fifesim.fine_dem"
         )
     cf.check_units(dem, "dem")
+    if dem.chunks is None:
+        check_heights("the dem", dem.values)
     grid = grids.geobox(dem)
     nodata = dem.rio.nodata
     if nodata is not None and np.isfinite(nodata):

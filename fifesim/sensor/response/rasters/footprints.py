@@ -24,7 +24,7 @@ def shifts_of(offset, pixels):
     Raises
     ------
     ValueError
-        If there are not two, or one has another length than its axis.
+        If there are not two, one has another length than its axis, or all pixels lie beside the scene.
     """
     if not hasattr(offset, "__len__") or len(offset) != 2:
         raise ValueError(
@@ -72,6 +72,11 @@ def _shift(offset, size, pixel, axis):
         raise ValueError(
             f"the offset of {axis} must be a finite number of pixels, or {size} of them, one for each of the image's "
             f"{axis}, got shape {offset.shape}"
+        )
+    if np.abs(offset).min() >= size:
+        raise ValueError(
+            f"the offset of {axis} must be less than the {size} pixels of the image, got {offset.flat[0]:g}: every "
+            "pixel would lie beside the scene; give it in pixels, not metres"
         )
     return offset * pixel
 

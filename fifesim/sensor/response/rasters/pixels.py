@@ -124,7 +124,8 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
     Raises
     ------
     ValueError
-        If bands lie on different grids, both ``onto`` and ``interval`` are given, or the CRS differs.
+        If bands lie on different grids, both ``onto`` and ``interval`` are given, the CRS differs, or ``onto`` lies
+        beside the scene.
     """
     if onto is not None:
         if interval is not None:
@@ -136,6 +137,7 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
                 f"onto must be in the CRS of the scene, {wanted}, got {got}: make it there, such as "
                 f"fifesim.grid_at({wanted!r}, west, north, width, height, cell)"
             )
+        _check_overlap(pixels, scene)
         return pixels
     if interval is None:
         return grids.aligned(scene, common_size(instrument, bands, lambda band: (instrument.pixel(band),) * 2))
@@ -148,6 +150,14 @@ def pixel_grid(scene, instrument, bands, onto=None, interval=None):
             f"interval must be 'native', or positive metres between pixels, down and across, got {interval}"
         )
     return grids.aligned(scene, interval)
+
+
+def _check_overlap(pixels, scene):
+    """Raise ValueError if no pixel lies on the scene."""
+    one, two = pixels.boundingbox, scene.boundingbox
+    if one.left >= two.right or one.right <= two.left or one.bottom >= two.top or one.top <= two.bottom:
+        spans = [f"{b.left:.0f} to {b.right:.0f} E and {b.bottom:.0f} to {b.top:.0f} N" for b in (one, two)]
+        raise ValueError(f"onto must overlap the scene, which spans {spans[1]}: it spans {spans[0]}")
 
 
 def bands_by_grid(instrument, bands, onto=None, interval=None):
