@@ -56,7 +56,7 @@ def view_of_roll(roll, row):
     A descending pass that looks to its right, the west, is seen from the east-southeast:
 
     >>> [round(angle, 1) for angle in view_of_roll(-11.696, 36)]
-    [13.0, 103.9]
+    [13.0, 102.2]
     """
     if not abs(roll) <= _LARGEST_ROLL:
         raise ValueError(f"ROLL_ANGLE must be in [-{_LARGEST_ROLL:g}, {_LARGEST_ROLL:g}] degrees, got {roll:g}: {CURE}")
