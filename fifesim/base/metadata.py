@@ -1,6 +1,7 @@
 """Metadata of images: text and XML of bounded size, which leads nowhere, and the times in it."""
 
 import re
+from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -10,6 +11,9 @@ from fifesim.base.foreign import in_a_line, read_bounded, shown
 
 # Larger than the metadata of any image. [byte]
 _LARGEST = 20_000_000
+
+# Landsat 1.
+_FIRST_LAUNCH = "1972-07-23"
 
 
 def read_metadata(path):
@@ -67,16 +71,38 @@ def read_xml(path):
         raise ValueError(in_a_line(f"{name} is not valid XML: {error}")) from None
 
 
-def utc_time(text, key):
+@contextmanager
+def naming(path):
     """
-    Time of metadata, which is UTC.
+    Begin the message of a ValueError with the name of the file that is at fault.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Raises
+    ------
+    ValueError
+        The error of the block, with the name.
+    """
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{in_a_line(Path(path).name, 100)}: {error}") from None
+
+
+def utc_time(text, key, launch=_FIRST_LAUNCH):
+    """
+    Time in metadata, which is UTC.
 
     Parameters
     ----------
     text : str
-        Date and time of day, perhaps with parts of a second and a Z.
+        Date and time of day, with or without a fraction of a second and a Z.
     key : str
-        What it is called in a message.
+        Name of the quantity in messages.
+    launch : str, optional
+        Date of launch of the satellite, before which it took no image; by default the launch of the first Landsat.
 
     Returns
     -------
@@ -85,7 +111,7 @@ def utc_time(text, key):
     Raises
     ------
     ValueError
-        If it is no such time.
+        If the text is no date and time, or the time lies before the launch or in the future.
 
     Examples
     --------
@@ -94,6 +120,15 @@ def utc_time(text, key):
     """
     match = re.fullmatch(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?)Z?", text)
     try:
-        return np.datetime64(match[1] if match else "none", "ns")
+        # Nanoseconds end in 2262, beyond which numpy wraps around without an error.
+        seconds = np.datetime64(match[1][:19] if match else "none", "s")
     except ValueError:
         raise ValueError(f"{key} must be a date and time such as 1987-06-06T16:35:00Z, got {shown(text)}") from None
+    # A clock may be a day behind.
+    today = np.datetime64("now", "s")
+    if not np.datetime64(launch, "s") <= seconds <= today + np.timedelta64(1, "D"):
+        raise ValueError(
+            f"{key} must lie between the launch of the satellite, {launch}, and today, {today.astype('M8[D]')}, got "
+            f"{shown(text)}: the date was changed, so fetch the product's metadata again"
+        )
+    return np.datetime64(match[1], "ns")

@@ -29,7 +29,7 @@ from fifesim.sensor.description.rasters.carried import attributes_of, carried_in
 from fifesim.sensor.description.spectral_response import half_peak
 from fifesim.sensor.response.adjustment import band_moments, best_linear, line_between
 from fifesim.sensor.response.rasters.bands import MIN_COVERAGE
-from fifesim.sensor.response.rasters.pixels import matching_bands
+from fifesim.sensor.response.rasters.matching import matching_bands
 from fifesim.sensor.response.spectral import band_weights, covered_steps
 
 UNCERTAINTY = 0.0005

@@ -11,7 +11,7 @@ from fifesim.rasters.own_rasters import incoming
 from fifesim.rasters.sites import is_fife
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import carried_instrument
-from fifesim.sensor.response.rasters.pixels import matching_bands, warn_of_others
+from fifesim.sensor.response.rasters.matching import matching_bands, warn_of_others
 
 # Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
 # tables. [um]

@@ -11,6 +11,7 @@ from fifesim.rasters import cf
 from fifesim.rasters.dates import by_date
 from fifesim.rasters.own_rasters import incoming
 from fifesim.sensor import raster as sensor
+from fifesim.sensor.response.rasters.matching import check_wavelengths
 
 
 @by_date
@@ -113,9 +114,12 @@ def planetary_reflectance(image):
     Raises
     ------
     ValueError
-        If it carries no calibration, or values cannot be a reflectance.
+        If it carries no calibration, values cannot be a reflectance, or names of bands contradict their wavelengths.
     """
     is_radiance = image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
     if "gain" in image.coords or is_radiance:
-        return sensor.to_reflectance(image)
-    return incoming(image, "toa_reflectance")
+        reflectance = sensor.to_reflectance(image)
+    else:
+        reflectance = incoming(image, "toa_reflectance")
+    check_wavelengths(reflectance)
+    return reflectance

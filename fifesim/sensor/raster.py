@@ -23,14 +23,13 @@ from fifesim.sensor.description.rasters.carried import attributes_of, given_inst
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import NoiseModel, check_kinds
 from fifesim.sensor.response.rasters import digital_numbers
+from fifesim.sensor.response.rasters.matching import matching_bands, warn_of_others
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import (
     bands_by_grid,
     directions_on,
-    matching_bands,
     means_by_band,
     pixel_grid,
-    warn_of_others,
 )
 
 # Share of its footprint's weight that a pixel needs on valid cells. The footprint of Table 1, 30.32 m, leaves a

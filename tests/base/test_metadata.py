@@ -79,3 +79,22 @@ def test_other_times_are_refused(text):
     """numpy takes "today" for a time."""
     with pytest.raises(ValueError, match="SENSING_TIME must be a date and time such as 1987-06-06T16:35:00Z, got"):
         metadata.utc_time(text, "SENSING_TIME")
+
+
+@pytest.mark.parametrize("text", ["9999-03-12T19:54:32Z", "2300-01-01T00:00:00Z", "1972-07-22T23:59:59Z"])
+def test_times_before_the_launch_or_in_the_future_are_refused(text):
+    """Nanoseconds of the year 9999 wrap around to 1815."""
+    with pytest.raises(ValueError, match=f"T must lie between the launch .*, 1972-07-23, and today, .*, got '{text}'"):
+        metadata.utc_time(text, "T")
+
+
+def test_a_launch_may_be_given():
+    now = str(np.datetime64("now", "s"))
+    assert metadata.utc_time(now, "T", launch=now[:10]).astype("M8[s]") == np.datetime64(now)
+    with pytest.raises(ValueError, match="launch of the satellite, 2017-03-07"):
+        metadata.utc_time("2017-03-06T23:59:59Z", "T", launch="2017-03-07")
+
+
+def test_errors_are_named_after_their_file():
+    with pytest.raises(ValueError, match=r"^a\.xml: too large$"), metadata.naming("/b/a.xml"):
+        raise ValueError("too large")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import fifesim
 
@@ -29,3 +30,17 @@ def test_digital_numbers_are_no_values_to_average(lai, step):
     image = fifesim.sense(fifesim.to_toa(fifesim.surface_reflectance(lai, bands=["TM3", "TM4"])))
     with pytest.raises(ValueError, match="digital numbers"):
         step(image)
+
+
+def test_names_that_contradict_wavelengths_have_no_index():
+    """Exchanged wavelengths of TM3 and TM4 would change the sign; bands that no instrument names so may be anywhere."""
+    values = np.stack([np.full((4, 4), 0.06), np.full((4, 4), 0.30)])
+    rho = xr.DataArray(values, dims=("band", "y", "x"), coords={"wavelength": ("band", [0.83, 0.66])})
+    rho = rho.assign_coords(x=705000 + 30.0 * np.arange(4), y=4334000 - 30.0 * np.arange(4)).rio.write_crs(26914)
+    with pytest.raises(ValueError, match=r"band TM3 has the wavelength 0.83 um, .*contradict each other"):
+        fifesim.ndvi(rho.assign_coords(band=["TM3", "TM4"]))
+    with pytest.raises(ValueError, match=r"band TM3 has the wavelength 0.83 um, .*contradict each other"):
+        fifesim.index(rho.assign_coords(band=["TM3", "TM4"]), "NDVI")
+    assert float(fifesim.ndvi(rho.assign_coords(band=["first", "second"])).mean()) < 0
+    right = rho.assign_coords(band=["TM3", "TM4"], wavelength=("band", [0.66, 0.83]))
+    assert float(fifesim.ndvi(right).mean()) > 0

@@ -14,13 +14,13 @@ class ProductBand:
     Parameters
     ----------
     name : str
-        Of the instrument's band, such as ``"TM3"``.
+        Name of the instrument's band, such as ``"TM3"``.
     file : str
         Path below the folder of the metadata.
     gain, offset : float
         Reflectance of one count and of digital number 0. [1]
     largest : int
-        Digital number of what is saturated.
+        Digital number of saturation.
     solar_irradiance : float or None
         Extraterrestrial, at one astronomical unit, by which the product is scaled; None where it is not said.
         [W m-2 um-1]
@@ -78,18 +78,20 @@ def product_reflectance(dn, gain, offset, largest, flag=0, flags=0, mu_s=1.0):
     return np.where(usable, (dn * np.asarray(gain, float) + offset) / mu_s, np.nan).astype(np.float32)
 
 
-def counts(dn, nodata, largest):
+def counts(dn, nodata, largest, saturated=None):
     """
-    Digital numbers as images hold them: whole, and 0 where there are no data.
+    Digital numbers in the form of an image: whole numbers, with 0 for no data.
 
     Parameters
     ----------
     dn : array
-        Whole numbers, of any type; NaN is no data. [1]
+        Whole numbers of any type; NaN is no data. [1]
     nodata : float
         Digital number of no data.
     largest : int
-        That an instrument records.
+        Largest number that the instrument records.
+    saturated : int, optional
+        Digital number of saturation, which becomes no data.
 
     Returns
     -------
@@ -102,8 +104,8 @@ def counts(dn, nodata, largest):
 
     Examples
     --------
-    >>> counts([12.0, float("nan"), -9999.0], -9999, 255).tolist()
-    [12, 0, 0]
+    >>> counts([12.0, float("nan"), -9999.0, 255], -9999, 255, saturated=255).tolist()
+    [12, 0, 0, 0]
     """
     dn = np.asarray(dn)
     missing = (dn == nodata) | (np.isnan(dn) if dn.dtype.kind == "f" else False)
@@ -115,6 +117,8 @@ def counts(dn, nodata, largest):
             "or gain= and offset= of scaled numbers; agencies' products open with fifesim.open_landsat and "
             "fifesim.open_sentinel2"
         )
+    if saturated is not None:
+        kept = np.where(kept == saturated, 0, kept)
     return kept.astype(np.uint8 if largest < 256 else np.uint16)
 
 

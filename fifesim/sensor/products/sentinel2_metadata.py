@@ -1,14 +1,14 @@
-"""What the metadata of a Sentinel-2 product say (``MTD_MSIL1C.xml`` or ``MTD_MSIL2A.xml``, and ``MTD_TL.xml``)."""
+"""Sentinel-2 products as their metadata describe them (``MTD_MSIL1C.xml`` or ``MTD_MSIL2A.xml``)."""
 
 import re
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 
-import numpy as np
-
-from fifesim.base.foreign import in_a_line, shown
-from fifesim.base.metadata import read_xml, utc_time
+from fifesim.base.foreign import shown
+from fifesim.base.metadata import naming, read_xml
+from fifesim.sensor.products.metadata_checks import CURE, check_scale
 from fifesim.sensor.products.scaling import ProductBand
+from fifesim.sensor.products.sentinel2_files import by_band, number_of, text_of, unique
 
 _INSTRUMENTS = {"Sentinel-2A": "MSI", "Sentinel-2B": "MSI-B"}
 
@@ -18,8 +18,14 @@ _SCALES = {1: ("QUANTIFICATION_VALUE", "RADIO_ADD_OFFSET"), 2: ("BOA_QUANTIFICAT
 # The first processing baseline with offsets, and with masks that are rasters. Before, they were polygons.
 _WITH_OFFSETS = 4.0
 
-# Shows no ground.
+# The cirrus band shows no ground.
 _CIRRUS = "MSI10"
+
+# Range of the inverse square of the Earth-Sun distance over the year, with a margin of 1 %.
+_INVERSE_SQUARES = 0.956, 1.045
+
+# Reflectance that digital numbers must reach: clouds and snow are brighter than 1.
+_BRIGHTEST = 1.0
 
 
 @dataclass(frozen=True)
@@ -64,73 +70,6 @@ class Sentinel2Product:
     earth_sun_distance: float
 
 
-@dataclass(frozen=True)
-class Sentinel2Tile:
-    """
-    Time and directions of a tile.
-
-    Parameters
-    ----------
-    time : numpy.datetime64
-        UTC.
-    sza, saa : float
-        Means over the tile. [degree]
-    views : dict of str to (float, float)
-        Mean zenith and azimuth of the view, by number of band. [degree]
-    corner : (float, float)
-        Easting and northing of the first node of the grids of angles. [m]
-    step : float
-        Between their nodes. [m]
-    sun : array, shape (2, n, m)
-        Zenith and azimuth. [degree]
-    view_grids : dict of str to array, shape (detector, 2, n, m)
-        The same by number of band, NaN where a detector does not see. [degree]
-    """
-
-    time: np.datetime64
-    sza: float
-    saa: float
-    views: dict[str, tuple[float, float]]
-    corner: tuple[float, float]
-    step: float
-    sun: np.ndarray
-    view_grids: dict[str, np.ndarray]
-
-
-def metadata_file(path):
-    """
-    File of a product's metadata.
-
-    Parameters
-    ----------
-    path : str or path
-        Of the file, or of the folder ``.SAFE`` that it lies in.
-
-    Returns
-    -------
-    file : pathlib.Path
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
-    path = Path(path)
-    if path.is_dir():
-        found = sorted(each for each in path.iterdir() if re.fullmatch(r"MTD_MSIL(1C|2A)\.xml", each.name))
-        if len(found) == 1:
-            return found[0]
-        raise ValueError(
-            f"{in_a_line(path, 200)} has {'both' if found else 'no'} MTD_MSIL1C.xml {'and' if found else 'nor'} "
-            "MTD_MSIL2A.xml: give the .SAFE folder of one product, unpacked; those before December 2016 are not read"
-        )
-    if not path.exists():
-        raise ValueError(f"there is no file or folder {in_a_line(path, 200)}")
-    if path.suffix.lower() != ".xml":
-        raise ValueError(f"{in_a_line(path.name, 100)} is no .SAFE folder nor its MTD_MSIL1C.xml: unpack the product")
-    return path
-
-
 def sentinel2_product(path):
     """
     A product from its metadata.
@@ -147,13 +86,22 @@ def sentinel2_product(path):
     Raises
     ------
     ValueError
-        If it is of another level, holds not one tile, or something is missing or has a wrong value.
+        If it is of another level, holds not one tile, or something is missing, repeated or has a wrong value; the
+        message begins with the name of the file.
     """
     root = read_xml(path)
+    with naming(path):
+        return _product(root)
+
+
+def _product(root):
     tag = root.tag.rpartition("}")[2]
     level = {"Level-1C_User_Product": 1, "Level-2A_User_Product": 2}.get(tag)
     if level is None:
-        raise ValueError(f"{in_a_line(Path(path).name, 100)} is {shown(tag)}: Level-1C and Level-2A products are read")
+        raise ValueError(
+            f"it is {shown(tag)}: Level-1C and Level-2A products are read, so give their MTD_MSIL1C.xml or "
+            "MTD_MSIL2A.xml, or the .SAFE folder"
+        )
     granules = {each.get("granuleIdentifier"): each for each in root.findall(".//Granule_List/Granule")}
     if len(granules) != 1:
         raise ValueError(
@@ -165,14 +113,14 @@ def sentinel2_product(path):
             "the product names no IMAGE_FILE: Level-2A of before 2019 has another form, so take it as it was processed "
             "again (baseline 05.00)"
         )
-    spacecraft = _text(root, ".//SPACECRAFT_NAME")
+    spacecraft = text_of(root, ".//SPACECRAFT_NAME")
     numbers, sizes = _spectral(root)
     granule = PurePosixPath(*PurePosixPath(files[0]).parts[:2])
-    with_masks = level == 1 and _number(root, ".//PROCESSING_BASELINE") >= _WITH_OFFSETS
+    with_masks = level == 1 and number_of(root, ".//PROCESSING_BASELINE") >= _WITH_OFFSETS
     return Sentinel2Product(
-        product=_text(root, ".//PRODUCT_URI"),
+        product=text_of(root, ".//PRODUCT_URI"),
         spacecraft=spacecraft,
-        baseline=_text(root, ".//PROCESSING_BASELINE"),
+        baseline=text_of(root, ".//PROCESSING_BASELINE"),
         level=level,
         instrument=_INSTRUMENTS.get(spacecraft),
         bands=_bands(root, level, files, numbers, sizes),
@@ -181,46 +129,7 @@ def sentinel2_product(path):
         classes=_classes(files),
         clouds=str(granule / "QI_DATA" / "MSK_CLASSI_B00.jp2") if with_masks else None,
         tile=str(granule / "MTD_TL.xml"),
-        earth_sun_distance=_positive(root, ".//Reflectance_Conversion/U") ** -0.5,
-    )
-
-
-def sentinel2_tile(path):
-    """
-    A tile from its metadata.
-
-    Parameters
-    ----------
-    path : str or path
-        Of ``MTD_TL.xml``.
-
-    Returns
-    -------
-    tile : Sentinel2Tile
-
-    Raises
-    ------
-    ValueError
-        If something is missing or has a wrong value.
-    """
-    root = read_xml(path)
-    views = {
-        each.get("bandId"): (_number(each, "ZENITH_ANGLE"), _number(each, "AZIMUTH_ANGLE") % 360.0)
-        for each in root.findall(".//Mean_Viewing_Incidence_Angle_List/Mean_Viewing_Incidence_Angle")
-        if _text(each, "ZENITH_ANGLE") != "NaN"
-    }
-    grids = {}
-    for each in root.findall(".//Viewing_Incidence_Angles_Grids"):
-        grids.setdefault(each.get("bandId"), []).append(_grid(each))
-    return Sentinel2Tile(
-        time=utc_time(_text(root, ".//SENSING_TIME"), "SENSING_TIME"),
-        sza=_number(root, ".//Mean_Sun_Angle/ZENITH_ANGLE"),
-        saa=_number(root, ".//Mean_Sun_Angle/AZIMUTH_ANGLE") % 360.0,
-        views=views,
-        corner=(_number(root, ".//Geoposition/ULX"), _number(root, ".//Geoposition/ULY")),
-        step=_number(root, ".//Sun_Angles_Grid/Zenith/ROW_STEP"),
-        sun=_grid(_part(root, ".//Sun_Angles_Grid")),
-        view_grids={number: np.stack(detectors) for number, detectors in grids.items()},
+        earth_sun_distance=_distance(root),
     )
 
 
@@ -251,24 +160,26 @@ def _spectral(root):
     numbers, sizes = {}, {}
     for each in root.findall(".//Spectral_Information_List/Spectral_Information"):
         name = band_name(each.get("physicalBand"))
-        numbers[name], sizes[name] = each.get("bandId"), int(_number(each, "RESOLUTION"))
+        numbers[name], sizes[name] = each.get("bandId"), int(number_of(each, "RESOLUTION"))
     return numbers, sizes
 
 
 def _bands(root, level, files, numbers, sizes):
     """Bands by the size of their pixels."""
     quantification, key = _SCALES[level]
-    offsets = {each.get("band_id"): _number(each, ".") for each in root.iter(key)}
-    baseline, counts = _number(root, ".//PROCESSING_BASELINE"), _number(root, f".//{quantification}")
+    offsets = by_band(root, key, "band_id")
+    baseline, counts = number_of(root, ".//PROCESSING_BASELINE"), number_of(root, f".//{quantification}")
     if baseline >= _WITH_OFFSETS and not offsets:
         raise ValueError(f"processing baseline {baseline:05.2f} has offsets, and the metadata have no {key}")
     if not counts > 0:
         raise ValueError(f"{quantification} must be above 0, got {counts:g}")
     special = root.findall(".//Special_Values")
-    values = {_text(each, "SPECIAL_VALUE_TEXT"): _number(each, "SPECIAL_VALUE_INDEX") for each in special}
+    pairs = [(text_of(each, "SPECIAL_VALUE_TEXT"), number_of(each, "SPECIAL_VALUE_INDEX")) for each in special]
+    values = unique(pairs, "SPECIAL_VALUE_TEXT")
     if values.get("NODATA") != 0:
         raise ValueError(f"the digital number of no data is {values.get('NODATA')}: products that have 0 are read")
-    irradiance = {each.get("bandId"): _number(each, ".") for each in root.iter("SOLAR_IRRADIANCE")}
+    irradiance = by_band(root, "SOLAR_IRRADIANCE", "bandId")
+    largest = int(values.get("SATURATED", 65535))
     found = {}
     for file in files:
         match = re.search(r"_(B\w\w)(?:_(\d\d)m)?$", file)
@@ -278,9 +189,10 @@ def _bands(root, level, files, numbers, sizes):
         number, size = numbers[name], int(match[2] or sizes[name])
         if offsets and number not in offsets:
             raise ValueError(f"the metadata have no {key} of {match[1]}")
-        scale = {"gain": 1 / counts, "offset": offsets.get(number, 0.0) / counts}
-        sun, largest = irradiance.get(number), int(values.get("SATURATED", 65535))
-        band = ProductBand(name, f"{file}.jp2", **scale, largest=largest, solar_irradiance=sun)
+        offset = offsets.get(number, 0.0)
+        keys = f"{quantification} = {counts:g}, {key} = {offset:g} of {match[1]} and SATURATED = {largest}"
+        check_scale(keys, 1 / counts, offset / counts, (1, largest - 1), brightest=_BRIGHTEST)
+        band = ProductBand(name, f"{file}.jp2", 1 / counts, offset / counts, largest, irradiance.get(number))
         found.setdefault(size, {})[name] = band
     return {size: tuple(by_name[name] for name in numbers if name in by_name) for size, by_name in found.items()}
 
@@ -291,20 +203,6 @@ def _classes(files):
     return {int(match[1]): f"{file}.jp2" for match, file in found if match}
 
 
-def _grid(element):
-    """Zenith and azimuth at the nodes of a grid of angles."""
-    angles = []
-    for name in ("Zenith", "Azimuth"):
-        rows = [(each.text or "").split() for each in element.findall(f"{name}/Values_List/VALUES")]
-        try:
-            angles.append(np.array(rows, float))
-        except ValueError:
-            raise ValueError(f"a grid of {name} is no table of numbers: are the metadata whole?") from None
-    if angles[0].ndim != 2 or min(angles[0].shape) < 2 or angles[0].shape != angles[1].shape:
-        raise ValueError("a grid of angles has not two rows and columns of zenith and azimuth: are the metadata whole?")
-    return np.stack(angles)
-
-
 def _local(text):
     """A path below the product's folder."""
     name = (text or "").strip()
@@ -313,30 +211,14 @@ def _local(text):
     return name
 
 
-def _part(element, path):
-    found = element if path == "." else element.find(path)
-    if found is None:
-        raise ValueError(f"the metadata have no {path.rpartition('/')[2]}: is the file whole?")
-    return found
-
-
-def _text(element, path):
-    return (_part(element, path).text or "").strip()
-
-
-def _positive(element, path):
-    number = _number(element, path)
-    if not number > 0:
-        raise ValueError(f"{path.rpartition('/')[2]} must be above 0, got {number:g}")
-    return number
-
-
-def _number(element, path):
-    found = _part(element, path)
-    try:
-        number = float(found.text)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not np.isfinite(number):
-        raise ValueError(f"{found.tag} must be a number, got {shown((found.text or '').strip())}")
-    return number
+def _distance(root):
+    """Earth-Sun distance of the product's conversion from reflectance to radiance [astronomical unit]."""
+    inverse_square = number_of(root, ".//Reflectance_Conversion/U")
+    if not inverse_square > 0:
+        raise ValueError(f"U must be above 0, got {inverse_square:g}")
+    if not _INVERSE_SQUARES[0] <= inverse_square <= _INVERSE_SQUARES[1]:
+        raise ValueError(
+            f"U is the inverse square of the Earth-Sun distance and must be in [{_INVERSE_SQUARES[0]:g}, "
+            f"{_INVERSE_SQUARES[1]:g}], got {inverse_square:g}: {CURE}"
+        )
+    return inverse_square**-0.5

@@ -45,6 +45,11 @@ def test_counts_are_kept_and_no_data_are_0():
     assert scaling.counts(np.array([30]), 0, 255).dtype == np.uint8
 
 
+def test_saturated_counts_are_no_data():
+    np.testing.assert_array_equal(scaling.counts(np.array([7, 254, 255]), 0, 255, saturated=255), [7, 254, 0])
+    np.testing.assert_array_equal(scaling.counts(np.array([7, 254, 255]), 0, 255), [7, 254, 255])
+
+
 def test_directions_come_back_from_their_vectors():
     zenith, azimuth = np.meshgrid([0.5, 30.0, 75.0], [0.0, 95.0, 200.0, 359.0])
     found = scaling.direction_angles(3.0 * scaling.direction_vectors(zenith, azimuth))

@@ -2,11 +2,10 @@
 
 import re
 
-import numpy as np
 import products
 import pytest
 
-from fifesim.sensor.products.sentinel2_metadata import metadata_file, sentinel2_product, sentinel2_tile
+from fifesim.sensor.products.sentinel2_metadata import sentinel2_product
 
 
 def written(folder, text, name="MTD_MSIL1C.xml"):
@@ -75,7 +74,17 @@ L1C = products.product_xml(1, "04.00")
         (re.sub("<U>.*</U>", "<U>0</U>", L1C), "U must be above 0, got 0"),
         (re.sub("<U>.*</U>", "<U>-1.03</U>", L1C), "U must be above 0, got -1.03"),
         (L1C.replace("INDEX>0<", "INDEX>9<"), "no data is 9"),
-        (L1C.replace("Level-1C_User", "Level-1B_User"), "is 'Level-1B_User_Product': Level-1C"),
+        (L1C.replace("Level-1C_User", "Level-1B_User"), "MTD_MSIL1C.xml: it is 'Level-1B_User_Product': Level-1C"),
+        (L1C.replace(">10000<", ">1000<"), r"QUANTIFICATION_VALUE = 1000, .* to 64.534 .* must begin in"),
+        (L1C.replace(">10000<", ">1e-300<"), "QUANTIFICATION_VALUE = 1e-300, "),
+        (L1C.replace('band_id="3">-1000', 'band_id="3">-10000'), r"RADIO_ADD_OFFSET = -10000 of B04 .* from -0.9999"),
+        (L1C.replace('band_id="3">-1000', 'band_id="3">1000'), r"RADIO_ADD_OFFSET = 1000 of B04 .* from 0.1001"),
+        (L1C.replace("INDEX>65535<", "INDEX>1300<"), r"SATURATED = 1300 .* to 0.0299"),
+        (products.product_xml(2, "04.00").replace(">10000<", ">1000<"), "BOA_QUANTIFICATION_VALUE = 1000, "),
+        (re.sub("<U>.*</U>", "<U>1.1</U>", L1C), r"U .* must be in \[0.956, 1.045\], got 1.1"),
+        (L1C.replace("<U>", "<U>1.0</U><U>"), r"U stands 2 times with different values, 0.98\d+, 1.0: .*fetch"),
+        (L1C.replace('OFFSET band_id="4"', 'OFFSET band_id="3"'), "RADIO_ADD_OFFSET stands twice for 3"),
+        (L1C.replace("TEXT>SATURATED", "TEXT>NODATA"), "SPECIAL_VALUE_TEXT stands twice for NODATA"),
         ('<!DOCTYPE a [<!ENTITY b "c">]><a/>', "declares a document type"),
     ],
 )  # fmt: skip
@@ -90,41 +99,3 @@ def test_another_spacecraft_has_no_instrument(tmp_path):
     assert (product.spacecraft, product.instrument) == ("Sentinel-2C", None)
     product = sentinel2_product(written(tmp_path, products.product_xml(1, "05.11", spacecraft="Sentinel-2B")))
     assert product.instrument == "MSI-B"
-
-
-def test_tile_has_time_sun_and_views(tmp_path):
-    tile = sentinel2_tile(written(tmp_path, products.tile_xml(1), "MTD_TL.xml"))
-    assert tile.time == np.datetime64("2022-10-05T11:56:49.581767")
-    assert (tile.sza, tile.saa) == (57.820574357679, 172.840206897213)
-    assert tile.views == products.MEAN_VIEWS
-    assert (tile.corner, tile.step) == ((499980.0, 5900040.0), 5000.0)
-    np.testing.assert_allclose(tile.sun, products.sun_grid(), rtol=1e-5)
-    assert tile.view_grids["3"].shape == (2, 2, 23, 23)
-    assert np.isnan(tile.view_grids["3"][:, :, :, 20:]).all()
-
-
-def test_a_tile_that_is_cut_short_is_refused(tmp_path):
-    text = products.tile_xml(1)
-    with pytest.raises(ValueError, match=r"MTD_TL.xml is not valid XML"):
-        sentinel2_tile(written(tmp_path, text[: len(text) // 2], "MTD_TL.xml"))
-    with pytest.raises(ValueError, match=r"SENSING_TIME must be a date and time such as .*'today'"):
-        sentinel2_tile(written(tmp_path, text.replace("2022-10-05T11:56:49.581767Z", "today"), "MTD_TL.xml"))
-    with pytest.raises(ValueError, match="a grid of Zenith is no table"):
-        sentinel2_tile(written(tmp_path, text.replace("<VALUES>58.38", "<VALUES>58.38 much", 1), "MTD_TL.xml"))
-    with pytest.raises(ValueError, match="not two rows and columns"):
-        sentinel2_tile(written(tmp_path, text.replace("VALUES>", "VALUE>"), "MTD_TL.xml"))
-
-
-def test_the_file_is_found_in_its_folder(tmp_path):
-    with pytest.raises(ValueError, match=r"has no MTD_MSIL1C.xml nor MTD_MSIL2A.xml: give the .SAFE folder"):
-        metadata_file(tmp_path)
-    path = written(tmp_path, "<a/>", "MTD_MSIL2A.xml")
-    assert metadata_file(tmp_path) == metadata_file(path) == path
-    written(tmp_path, "<a/>")
-    with pytest.raises(ValueError, match="has both"):
-        metadata_file(tmp_path)
-    with pytest.raises(ValueError, match="there is no file or folder"):
-        metadata_file(tmp_path / "none.SAFE")
-    (tmp_path / "S2A.zip").write_text("")
-    with pytest.raises(ValueError, match=r"S2A.zip is no .SAFE folder .*unpack"):
-        metadata_file(tmp_path / "S2A.zip")

@@ -1,9 +1,10 @@
-"""Digital numbers of one's own, with the calibration that makes an image of them."""
+"""Digital numbers without metadata as a calibrated image."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -19,7 +20,7 @@ from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
 from fifesim.sensor.products.scaling import counts
 from fifesim.sensor.response.rasters import digital_numbers
-from fifesim.sensor.response.rasters.pixels import matching_bands
+from fifesim.sensor.response.rasters.matching import matching_bands
 
 
 @by_date
@@ -32,38 +33,44 @@ def calibrate(
     gain: Numbers | Mapping[str, float] | None = None,
     offset: Numbers | Mapping[str, float] | None = None,
     nodata: int = 0,
+    saturated: int | Literal["largest"] | None = "largest",
 ) -> xr.DataArray:
     """
-    Make an image of digital numbers: with calibration, wavelengths and sun, as `sense` makes one.
+    Make an image of digital numbers, with calibration, wavelengths and sun, in the form that `sense` gives.
 
     Parameters
     ----------
     dn : xarray.DataArray of whole numbers, dims ([band], y, x)
-        With a coordinate ``band`` of the instrument's names, or ``wavelength`` [um]. NaN is no data. [1]
+        Has a coordinate ``band`` of the instrument's names, or ``wavelength`` [um]. NaN is no data. [1]
     instrument : str or Instrument
     time : str or datetime, optional
-        Of the image, UTC where it names no time zone: the sun is that over the middle of the grid, the view from nadir.
-        By default the raster's coordinate ``time``.
+        Time of the image, UTC without a time zone. The sun is that over the middle of the grid, and the view is from
+        nadir. By default the raster's coordinate ``time``.
     geometry : Geometry or xarray.Dataset, optional
-        Sun and view, instead of those of the time; without both, those that the raster carries.
+        Sun and view, which replace the sun of the time. Without both, the raster's coordinates count.
     gain, offset : float, sequence over the bands, or mapping of band name to float, optional
         Radiance of one count, and of digital number 0: RADIANCE_MULT and RADIANCE_ADD of Landsat's metadata. By default
         those of the instrument's description, with its scale of square roots if it has one. [W m-2 sr-1 um-1]
     nodata : int, optional
         Digital number of no data.
+    saturated : int, "largest" or None, optional
+        Digital number of saturated pixels, which become no data, as in `open_landsat`. By default the largest number
+        of the instrument's bits, such as 255 for TM; with `gain` and `offset`, 255 for instruments of up to 8 bits and
+        rasters of one byte, 65535 otherwise. None keeps saturated pixels: their radiance is a lower limit.
 
     Returns
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x)
-        ``to_radiance``, ``to_reflectance``, ``to_surface`` and ``ndvi`` take it. 0 is no data. Lazy where the input is.
+        Input of ``to_radiance``, ``to_reflectance``, ``to_surface`` and ``ndvi``, which give NaN for 0, the number of
+        no data and saturation. Lazy where the input is.
 
     Raises
     ------
     ValueError
-        If bands, sun or one of gain and offset are not known, or a number is none that an instrument records; on lazy
-        data, when it computes.
+        If the bands, the sun, or one of gain and offset are unknown, or the instrument cannot record a number. On lazy
+        data, numbers are checked when they compute.
     TypeError
-        If it is no DataArray.
+        If `dn` is no DataArray.
 
     See Also
     --------
@@ -100,12 +107,16 @@ def calibrate(
     if gain is None:
         gain, offset, bits = digital_numbers.scale(description, bands)
         compression = [band.compressed_count(bits) for band in bands]
+        full = bits
     else:
         gain, offset = (_by_band(given, bands, name) for name, given in (("gain", gain), ("offset", offset)))
         bits = 16 if dn.dtype.itemsize > 1 else 8
+        # Products of instruments of up to 8 bits have 8, also where they are stored in wider numbers.
+        full = 8 if description.bits <= 8 else bits
         if not np.all(gain > 0):
             raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")
-    kernel = partial(counts, nodata=nodata, largest=2**bits - 1)
+    saturated = _saturation(saturated, 2**full - 1, 2**bits - 1)
+    kernel = partial(counts, nodata=nodata, largest=2**bits - 1, saturated=saturated)
     out = chunks.pointwise(kernel, dn.drop_vars("band", errors="ignore"), dtype=np.uint8 if bits <= 8 else np.uint16)
     along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
     along_band |= {"gain": gain, "offset": offset, "solar_irradiance": [band.solar_irradiance for band in bands]}
@@ -118,6 +129,15 @@ def calibrate(
     image = cf.label(out, "dn", source=dn, history=history, **attributes_of(description))
     image.attrs["_FillValue"] = image.dtype.type(0)
     return image
+
+
+def _saturation(given, full, largest):
+    """Digital number of saturated pixels, None where they are kept."""
+    if given is None or (isinstance(given, str) and given == "largest"):
+        return None if given is None else full
+    if isinstance(given, bool | str) or not 0 < given <= largest:
+        raise ValueError(f"saturated must be 'largest', None, or a digital number from 1 to {largest}, got {given!r}")
+    return given
 
 
 def _by_band(given, bands, name):

@@ -15,7 +15,8 @@ from fifesim.rasters import grid as grids
 from fifesim.sensor.description.band_names import band_called
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.products.landsat_metadata import landsat_scene, metadata_file, read_groups
+from fifesim.sensor.products.landsat_metadata import read_scene
+from fifesim.sensor.products.metadata_checks import check_irradiance
 from fifesim.sensor.products.rasters.layers import (
     as_image,
     check_same_grid,
@@ -44,28 +45,29 @@ def open_landsat(
     """
     Open a Landsat Collection-2 product: Level 1 as reflectance at the top of the atmosphere, Level 2 of the surface.
 
-    Landsat 4 and 5 TM, 7 ETM+, 8 OLI and 9 OLI-2, by the scale, sun and time of the product's own metadata.
+    MSS of Landsat 1 to 5 (Level 1), TM of Landsat 4 and 5, ETM+ of Landsat 7, OLI of Landsat 8 and OLI-2 of Landsat 9.
+    Scale, sun and time come from the product's metadata.
 
     Parameters
     ----------
     path : str or path
-        Of the unpacked product's folder, or of its metadata ``*_MTL.txt``, ``.json`` or ``.xml``.
+        Folder of the unpacked product, or its metadata file ``*_MTL.txt``, ``.json`` or ``.xml``.
     bands : str or sequence of str, optional
-        Names of the instrument's bands, such as ``["TM3", "TM4"]``, or as others call them: ``["B4", "B5"]``,
-        ``["red", "nir"]``. By default all that show the ground on the 30 m grid: not the panchromatic one, which has
-        its own grid, and not OLI's cirrus band.
-        Thermal bands are not read.
+        Names of the instrument's bands, such as ``["TM3", "TM4"]``, or other names: ``["B4", "B5"]``,
+        ``["red", "nir"]``. By default all bands that show the ground at the common pixel size, 30 m (MSS: 60 m). The
+        panchromatic band has its own grid, and OLI's cirrus band shows no ground. Thermal bands are not read.
     angles : "centre" or "pixel", optional
-        Sun and view of the scene's centre, which every step takes: its view is from nadir. Or by pixel, from the files
-        ``*_SZA.TIF``, ``*_SAA.TIF``, ``*_VZA.TIF`` and ``*_VAA.TIF``: over a scene the sun's zenith differs by some two
-        degrees, and the view's reaches 7.5 degrees at the sides.
+        Sun and view of the scene centre, which every step takes. The view is from nadir; for a scene that was acquired
+        off nadir, it follows from ROLL_ANGLE. With "pixel", angles by pixel from the files ``*_SZA.TIF``,
+        ``*_SAA.TIF``, ``*_VZA.TIF`` and ``*_VAA.TIF`` of Level 1: over a scene the solar zenith angle differs by some
+        two degrees, and the view zenith angle reaches 7.5 degrees at the sides.
     quality : bool, optional
-        Whether with QA_PIXEL as coordinate ``quality`` over (y, x), and without pixels that QA_RADSAT has as saturated.
-        Without, the two files need not be there.
+        Read QA_PIXEL as coordinate ``quality`` over (y, x), and remove pixels that QA_RADSAT marks as saturated. With
+        False, the two files need not be there.
     chunks : mapping or int or "auto", optional
-        The image is lazy; "auto" are 2048 x 2048 pixels of a band. None reads all of it at once.
+        Chunks of the lazy image; "auto" means 2048 x 2048 pixels of a band. None reads everything at once.
     instrument : str or Instrument, optional
-        Whose responses the bands have, instead of the spacecraft's.
+        Instrument whose spectral responses the bands have, instead of the spacecraft's.
 
     Returns
     -------
@@ -77,12 +79,15 @@ def open_landsat(
     Raises
     ------
     ValueError
-        If the product is of another collection or spacecraft, a file is missing or no raster, or the sun is down.
+        If the product is of another collection or spacecraft, was taken at night, a file is missing or no raster, or
+        the metadata contradict themselves: repeated keys; a scale that does not give REFLECTANCE_MINIMUM and _MAXIMUM
+        of the same file within 0.05 %; a sun that is 2 degrees away from its position at that time and place; an
+        Earth-Sun distance of another date; a date before the launch or in the future.
 
     Notes
     -----
     Level 1 is scaled by reflectance without the sun's cosine, which is divided out here, with ``angles="pixel"`` by
-    that of each pixel. Its solar irradiance follows from its scales of radiance and of reflectance, and differs from
+    the cosine of each pixel. Its solar irradiance follows from its scales of radiance and reflectance, and differs from
     the instrument's description by up to 5 % for TM. Mask clouds with ``scene.where(scene.quality & 0b11000 == 0)``:
     bit 3 is cloud, bit 4 its shadow. A GeoTIFF keeps neither quality nor angles by pixel.
 
@@ -101,11 +106,13 @@ def open_landsat(
     >>> image = fifesim.open_landsat(product)  # doctest: +SKIP
     >>> image.fifesim.to_surface().fifesim.ndvi()  # doctest: +SKIP
     """
-    file = metadata_file(path)
-    scene, folder, sizes = landsat_scene(read_groups(file)), file.parent, chunk_sizes(chunks)
+    sizes = chunk_sizes(chunks)
+    scene, folder = read_scene(path)
     if angles not in ("centre", "pixel"):
         raise ValueError(f"angles must be 'centre' or 'pixel', got {angles!r}")
     description = find_instrument(scene.instrument if instrument is None else instrument)
+    if instrument is None:
+        check_irradiance(scene.product, scene.bands, description)
     selected = _selected(scene, folder, description, bands)
     layers = [open_layer(folder, band.file, sizes, _cure(scene, folder)) for band in selected]
     stack = stacked(layers)
@@ -163,14 +170,13 @@ def _quality(scene, folder, sizes, beside):
 
 
 def _geometry(scene, folder, sizes, angles, beside):
-    sun = {"sza": scene.sza, "saa": scene.saa, "earth_sun_distance": scene.earth_sun_distance}
-    centre = Geometry(**sun)
     if angles == "centre":
-        if scene.off_nadir:
+        if scene.view is None:
             raise ValueError(
-                f"{scene.product} was seen aside of nadir: its view is known by pixel, give angles='pixel'"
+                f"{scene.product} was acquired off nadir, and its metadata have no ROLL_ANGLE with a WRS_ROW from 1 to "
+                "248, which give the view at the centre: use angles='pixel'"
             )
-        return centre
+        return Geometry(scene.sza, scene.saa, *scene.view, earth_sun_distance=scene.earth_sun_distance)
     missing = [name for name in ANGLES if name not in scene.angles]
     if missing:
         raise ValueError(f"the metadata name no files of {', '.join(missing)} by pixel: give angles='centre'")

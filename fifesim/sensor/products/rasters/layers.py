@@ -72,7 +72,7 @@ def open_layer(folder, name, chunks, cure, count=None):
                 size = source.count * source.height * source.width
                 check_memory(size, 12, f"all of {file.name}", "leave chunks out, which reads it by parts")
         plain = stored_cells(file, crs, chunks)
-    layer = xr.DataArray(plain.data, dims=("band", "y", "x"), name=file.name)
+    layer = xr.DataArray(plain.data, dims=("band", "y", "x"), name=path.name)
     layer = layer if count else layer.isel(band=0)
     return grids.place(layer, grids.geobox(plain))
 

@@ -18,6 +18,7 @@ from fifesim.sensor.description.band_names import band_called
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.products import scaling
+from fifesim.sensor.products.metadata_checks import check_irradiance
 from fifesim.sensor.products.rasters.layers import (
     CHUNK,
     as_image,
@@ -27,7 +28,9 @@ from fifesim.sensor.products.rasters.layers import (
     reflectance,
     stacked,
 )
-from fifesim.sensor.products.sentinel2_metadata import metadata_file, sentinel2_product, sentinel2_tile
+from fifesim.sensor.products.sentinel2_files import metadata_file
+from fifesim.sensor.products.sentinel2_metadata import sentinel2_product
+from fifesim.sensor.products.sentinel2_tile_metadata import sentinel2_tile
 
 _SIZES = (10, 20, 60)
 
@@ -74,8 +77,9 @@ def open_sentinel2(
         Such as ``["MSI4", "MSI8"]``, ``["B04", "B08"]`` or ``["red", "nir"]``; by default all of that size but the
         cirrus band.
     angles : "centre" or "pixel", optional
-        The metadata's means of sun and view over the tile, the view's over the bands: every step takes them. Or by
-        pixel, between the nodes of the metadata's grids of 5 km; the view is the mean of the bands and their detectors.
+        Mean sun and view of the tile, which every step takes; the view is the mean of the bands. A mean sun of NaN,
+        which tiles next to the antimeridian have, is replaced by the mean of the grid. With "pixel", angles by pixel,
+        interpolated between the nodes of the metadata's grids of 5 km; the view is the mean of bands and detectors.
     quality : bool, optional
         Whether with a coordinate ``quality`` over (y, x): the scene classification of Level-2A, for 10 m that of 20 m;
         of Level-1C since baseline 04.00 its masks of 60 m, bit 1 for opaque clouds, 2 for cirrus, 4 for snow.
@@ -94,8 +98,10 @@ def open_sentinel2(
     Raises
     ------
     ValueError
-        If the product is of another level or spacecraft, holds more than one tile, has no such band at the resolution,
-        or a file is missing or no raster.
+        If the product is of another level or spacecraft, has the layout of the AWS buckets, holds more than one tile,
+        has no such band at the resolution, a file is missing or no raster, or the metadata contradict themselves: keys
+        repeated with different values; a scale that leaves -0.25 to 10 or does not reach a reflectance of 1; a sun that
+        is 2 degrees away from its position at that time and place; a date before the launch or in the future.
 
     Notes
     -----
@@ -130,9 +136,11 @@ def open_sentinel2(
     if resolution is None:
         resolution = 20 if product.level == 2 and 20 in product.bands else 10
     selected = _selected(product, description, resolution, bands)
+    if instrument is None:
+        check_irradiance(product.product, selected, description)
     if not (folder / product.tile).is_file():
         raise ValueError(f"{product.tile} is missing in the product: is it unpacked whole?")
-    tile = sentinel2_tile(folder / product.tile)
+    tile = sentinel2_tile(folder / product.tile, product.spacecraft)
     layers = [
         open_layer(folder, band.file, sizes, "is the product unpacked whole? Or leave it out by bands=")
         for band in selected

@@ -1,108 +1,12 @@
-"""Pixels of an instrument over a labelled scene: which bands, where they lie, and the means over their footprints."""
+"""Pixels of an instrument over a labelled scene: where they lie, and the means over their footprints."""
 
 import numpy as np
 import xarray as xr
 
-from fifesim.base.warned import warn
 from fifesim.rasters import directions, projection
 from fifesim.rasters import grid as grids
 from fifesim.rasters.regularization import areas, regularized
-from fifesim.sensor.description.band_names import band_called
 from fifesim.sensor.response.rasters.footprints import check_scene, shifts_of
-
-
-def matching_bands(array, instrument):
-    """
-    Bands of an instrument that those of a raster stand for.
-
-    Parameters
-    ----------
-    array : xarray.DataArray
-        With a coordinate ``band`` of the instrument's names, or ``wavelength`` [um]; else names that
-        `fifesim.sensor.description.band_names.band_called` knows.
-    instrument : fifesim.sensor.description.instruments.Instrument
-
-    Returns
-    -------
-    bands : tuple of fifesim.sensor.description.band.InstrumentBand
-
-    Raises
-    ------
-    ValueError
-        If a band matches none of the instrument's.
-    """
-    known = {band.name.lower() for band in instrument.bands}
-    names = [str(name) for name in np.atleast_1d(array["band"].values)] if "band" in array.coords else []
-    wavelengths = np.atleast_1d(array["wavelength"].values).astype(float) if "wavelength" in array.coords else None
-    if names and {name.lower() for name in names} <= known:
-        found = instrument.select(names)
-        # The fourth band of Landsat's first scanners is green, that of the later ones near infrared.
-        if wavelengths is None or all(map(_spans, found, wavelengths)):
-            return found
-    if wavelengths is not None:
-        return instrument.select([_band_at(value, instrument).name for value in wavelengths])
-    if names:
-        called = [(name, band_called(name, instrument)) for name in names]
-        _warn_of_counted(array, instrument)
-        return instrument.select([name if band is None else band.name for name, band in called])
-    raise ValueError(
-        f"the raster's bands have neither names of {instrument.name} ({', '.join(b.name for b in instrument.bands)}) "
-        "nor a wavelength: assign a coordinate 'band' or 'wavelength' [um] along band"
-    )
-
-
-def _spans(band, wavelength):
-    """Whether a wavelength, where it is known, lies among those that a band responds to."""
-    low, high = band.response.limits
-    return not (wavelength < low or wavelength > high)
-
-
-def warn_of_others(array, instrument, bands):
-    """
-    Warn where the bands of one instrument are taken for those of another.
-
-    Parameters
-    ----------
-    array : xarray.DataArray
-    instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of fifesim.sensor.description.band.InstrumentBand
-        Of the instrument, one for each of the array.
-    """
-    carried, names = array.attrs.get("instrument"), [band.name for band in bands]
-    own = [str(name) for name in np.atleast_1d(array["band"].values)] if "band" in array.coords else names
-    if carried not in (None, instrument.name) and own != names:
-        warn(
-            f"bands {', '.join(own)} of {carried} are taken for {', '.join(names)} of {instrument.name}, as they are: "
-            f".fifesim.adjust_bands({instrument.name!r}) of surface reflectance brings them there"
-        )
-
-
-def _warn_of_counted(array, instrument):
-    """Files opened by rioxarray count their bands from 1: numbers of the instrument's bands by chance only."""
-    numbers = np.atleast_1d(array["band"].values)
-    counted = numbers.dtype.kind in "iu" and np.array_equal(numbers, np.arange(1, numbers.size + 1))
-    if counted and numbers.size < len(instrument.bands):
-        first, last = (band_called(number, instrument) for number in numbers[[0, -1]])
-        if first and last:
-            warn(
-                f"the raster counts its bands 1 to {numbers.size}, taken for {first.name} to {last.name}: name them "
-                "with .assign_coords(band=['red', 'nir']) where they are others"
-            )
-
-
-def _band_at(wavelength, instrument):
-    """The band whose centre is nearest to a wavelength, among those that respond there with half of their peak."""
-    responses = [
-        np.interp(wavelength, band.response.wavelength, band.response.response, left=0.0, right=0.0)
-        / max(band.response.response)
-        for band in instrument.bands
-    ]
-    # A panchromatic band may respond more than the narrow band that is meant.
-    found = [band for band, response in zip(instrument.bands, responses, strict=True) if response >= 0.5]
-    if not found:
-        centres = ", ".join(f"{band.name} at {band.wavelength:.3f}" for band in instrument.bands)
-        raise ValueError(f"no band of {instrument.name} responds at {wavelength:g} um: it has {centres} um")
-    return min(found, key=lambda band: abs(band.wavelength - wavelength))
 
 
 def pixel_grid(scene, instrument, bands, onto=None, interval=None):

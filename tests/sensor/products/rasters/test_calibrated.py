@@ -79,7 +79,7 @@ def test_numbers_of_a_product_take_its_scale():
     with pytest.raises(ValueError, match=r"digital number of 11000: whole ones from 0 to 4095 are recorded. .*gain="):
         fifesim.calibrate(dn, "OLI", geometry=SUN)
     image = fifesim.calibrate(dn, "OLI", geometry=SUN, gain=1.0288e-2, offset=-51.43874)
-    expected = 1.0288e-2 * np.array([11000, np.nan, 20000, 65535]) - 51.43874
+    expected = 1.0288e-2 * np.array([11000, np.nan, 20000, np.nan]) - 51.43874
     np.testing.assert_allclose(image.fifesim.to_radiance().values.ravel(), expected, rtol=1e-12)
 
 
@@ -154,3 +154,44 @@ def test_an_image_is_not_calibrated_twice(dn):
         image.fifesim.calibrate("TM")
     with pytest.raises(TypeError, match=r"dn must be an xarray\.DataArray"):
         fifesim.calibrate(dn.values, "TM")
+
+
+def test_saturated_numbers_are_no_data_as_in_a_product(dn):
+    """The largest number of TM, 255, whose radiance is a lower limit; in memory and lazily."""
+    dn[:, 1, 1] = 255
+    dn[:, 1, 2] = 254
+    for raster in (dn, in_chunks(dn, {"y": 2, "x": 3})):
+        image = fifesim.calibrate(raster, "TM", geometry=SUN)
+        np.testing.assert_array_equal(image[:, 1, 1:3], [[0, 254]] * 2)
+        reflectance = image.fifesim.to_reflectance()
+        assert np.isnan(reflectance[:, 1, 1]).all() and np.isfinite(reflectance[:, 1, 2]).all()
+        assert np.isnan(image.fifesim.ndvi()[1, 1])
+    kept = fifesim.calibrate(dn, "TM", geometry=SUN, saturated=None)
+    np.testing.assert_array_equal(kept, dn)
+    low = fifesim.calibrate(dn, "TM", geometry=SUN, saturated=254)
+    np.testing.assert_array_equal(low[:, 1, 1:3], [[255, 0]] * 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "bands", "dtype", "scale", "full"),
+    [
+        ("MSS", ["MSS5", "MSS6"], np.uint8, {}, 63),
+        ("MSS", ["MSS5", "MSS6"], np.uint8, {"gain": 0.5, "offset": 0.0}, 255),
+        # Eight bits in wider numbers, as arithmetic and rioxarray leave them.
+        ("TM", ["TM3", "TM4"], np.float32, {"gain": 0.5, "offset": 0.0}, 255),
+        ("OLI", ["OLI4", "OLI5"], np.uint16, {}, 4095),
+        ("OLI", ["OLI4", "OLI5"], np.uint16, {"gain": 0.01, "offset": -51.0}, 65535),
+    ],
+)
+def test_saturation_is_the_largest_number(name, bands, dtype, scale, full):
+    values = np.full((2, *GRID.shape), full - 1, dtype)
+    values[:, 0, 0] = full
+    dn = grids.place(xr.DataArray(values, dims=("band", "y", "x"), coords={"band": bands}), GRID)
+    image = fifesim.calibrate(dn, name, geometry=SUN, **scale)
+    assert (image[:, 0, 0] == 0).all() and (image[:, 1:] == full - 1).all()
+
+
+@pytest.mark.parametrize("saturated", [0, 256, -1, True, "255", "most"])
+def test_other_numbers_of_saturation_are_refused(dn, saturated):
+    with pytest.raises(ValueError, match="saturated must be 'largest', None, or a digital number from 1 to 255, got"):
+        fifesim.calibrate(dn, "TM", geometry=SUN, saturated=saturated)

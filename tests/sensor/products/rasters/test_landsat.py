@@ -197,7 +197,7 @@ def test_the_panchromatic_band_is_opened_by_name(folders):
     pan = fifesim.open_landsat(folder, bands="OLI8")
     assert pan.shape == (1, 23, 35) and "quality" not in pan.coords
     assert float(pan["x"][1] - pan["x"][0]) == 15.0
-    with pytest.raises(ValueError, match=r"B4\.TIF and .*B8\.TIF lie on different grids"):
+    with pytest.raises(ValueError, match=r"^LC08_\w+_B4\.TIF and LC08_\w+_B8\.TIF lie on different grids"):
         fifesim.open_landsat(folder, bands=["OLI8", "OLI4"])
     assert "OLI9" in fifesim.open_landsat(folder, bands=["OLI9"])["band"].values
 
@@ -264,16 +264,37 @@ def altered(folder, group, **values):
     return products.landsat(folder, products.OLI, groups=groups)
 
 
-def test_a_view_aside_of_nadir_is_known_by_pixel(tmp_path):
-    altered(tmp_path, "IMAGE_ATTRIBUTES", NADIR_OFFNADIR="OFFNADIR", ROLL_ANGLE="-14.2")
-    with pytest.raises(ValueError, match=r"was seen aside of nadir: .*angles='pixel'"):
+def test_an_off_nadir_view_is_known_by_its_roll_or_by_pixel(tmp_path):
+    rolled = {"NADIR_OFFNADIR": "OFFNADIR", "ROLL_ANGLE": "-14.2"}
+    altered(tmp_path / "without", "IMAGE_ATTRIBUTES", **rolled)
+    with pytest.raises(ValueError, match=r"was acquired off nadir, .*use angles='pixel'"):
+        fifesim.open_landsat(tmp_path / "without")
+    assert fifesim.open_landsat(tmp_path / "without", angles="pixel")["vza"].ndim == 2
+    altered(tmp_path / "with", "IMAGE_ATTRIBUTES", WRS_ROW="036", **rolled)
+    scene = fifesim.open_landsat(tmp_path / "with")
+    # Descending, to the right: the sensor stands in the east.
+    assert float(scene["vza"]) == pytest.approx(15.8, abs=0.1) and 90 < float(scene["vaa"]) < 110
+
+
+def test_a_product_whose_irradiance_is_impossible_is_refused(tmp_path):
+    """A product's own instrument has nearly the same; another one that is given may have any."""
+    altered(tmp_path, "LEVEL1_MIN_MAX_RADIANCE", RADIANCE_MAXIMUM_BAND_4="622768.8")
+    with pytest.raises(
+        ValueError, match=r"LC08_.*: the scale of OLI4 .*RADIANCE_MAXIMUM.* means a solar irradiance of"
+    ):
         fifesim.open_landsat(tmp_path)
-    assert fifesim.open_landsat(tmp_path, angles="pixel")["vza"].ndim == 2
+    assert fifesim.open_landsat(tmp_path, instrument="OLI2").sizes["band"] == 7
+
+
+def test_folders_with_upper_case_names_open(copy):
+    (text,) = copy.glob("*_MTL.txt")
+    text.rename(text.with_suffix(".TXT"))
+    assert fifesim.open_landsat(copy).sizes["band"] == 6
 
 
 def test_a_night_has_no_reflectance(tmp_path):
     altered(tmp_path, "IMAGE_ATTRIBUTES", SUN_ELEVATION="-41.46228969")
-    with pytest.raises(ValueError, match=r"sza must be in .*got 131.462: the sun is below the horizon"):
+    with pytest.raises(ValueError, match=r"_MTL.txt: SUN_ELEVATION must .*got -41.4623: the sun is below the horizon"):
         fifesim.open_landsat(tmp_path)
 
 

@@ -18,7 +18,7 @@ from fifesim.sensor.description.spatial_response import (
     GaussianResponse,
     TwoAxesResponse,
 )
-from fifesim.sensor.response.rasters.pixels import bands_by_grid, matching_bands, pixel_grid
+from fifesim.sensor.response.rasters.pixels import bands_by_grid, pixel_grid
 
 TM = instrument("TM")
 INTERVAL = 43e-6 * 705e3
@@ -41,17 +41,6 @@ def ramp(shape=(180, 198)):
     """Radiance that rises by one a metre eastward and by a hundredth southward."""
     y, x = np.meshgrid(np.arange(shape[0]) * 10 / 3, np.arange(shape[1]) * 10 / 3, indexing="ij")
     return scene(shape, np.stack([0.01 * y + x] * 2))
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [("ETM+", {"TM2": "ETM2", "TM3": "ETM3", "TM4": "ETM4"}), ("OLI", {"TM2": "OLI3", "TM3": "OLI4"})],
-)
-def test_a_wavelength_finds_the_narrow_band_beside_a_panchromatic_one(name, expected):
-    """The panchromatic bands, 0.52 to 0.90 and 0.50 to 0.68 um, respond there too, and at some of them more."""
-    wavelengths = [band.wavelength for band in TM.select(list(expected))]
-    array = xr.DataArray(np.zeros(len(expected)), dims="band", coords={"wavelength": ("band", wavelengths)})
-    assert [band.name for band in matching_bands(array, instrument(name))] == list(expected.values())
 
 
 @pytest.mark.parametrize("interval", [0.0, -30.0, float("nan"), (30.0, 30.0, 30.0)])
@@ -178,19 +167,3 @@ def test_point_spread_wider_than_the_scene_is_named():
     ):
         sensed(scene(), wide)
     assert np.isfinite(sensed(scene(), wide, min_valid=0.01)).all()
-
-
-def test_names_that_two_instruments_share_hold_where_the_wavelength_is_the_bands():
-    """MSS4 is green on Landsat-1, near infrared on Landsat-5; MSI4 is red on each Sentinel-2."""
-    values = xr.DataArray(np.zeros((2, 1, 1)), dims=("band", "y", "x"))
-    first = values.assign_coords(band=["MSS4", "MSS5"], wavelength=("band", [0.55, 0.65]))
-    assert [band.name for band in matching_bands(first, instrument("MSS"))] == ["MSS4", "MSS5"]
-    assert [band.name for band in matching_bands(first, instrument("MSS5"))] == ["MSS1", "MSS2"]
-    fourth = values.isel(band=[0]).assign_coords(band=["MSS4"])
-    for wavelength, names in ((0.553, ("MSS4", "MSS1")), (0.93, ("MSS7", "MSS4"))):
-        seen = fourth.assign_coords(wavelength=("band", [wavelength]))
-        assert tuple(matching_bands(seen, instrument(name))[0].name for name in ("MSS", "MSS5")) == names
-    unknown = first.assign_coords(wavelength=("band", [np.nan, np.nan]))
-    assert [band.name for band in matching_bands(unknown, instrument("MSS"))] == ["MSS4", "MSS5"]
-    nominal = values.assign_coords(band=["MSI4", "MSI8"], wavelength=("band", [0.665, 0.842]))
-    assert [band.name for band in matching_bands(nominal, instrument("MSI-B"))] == ["MSI4", "MSI8"]

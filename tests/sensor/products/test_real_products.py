@@ -1,0 +1,213 @@
+"""Metadata of real products: each opens with the numbers that it states, or is refused with reason and remedy."""
+
+import csv
+import re
+import shutil
+import tarfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import products
+import pytest
+
+import fifesim
+from fifesim.sensor.products.landsat_metadata import read_scene
+from fifesim.sensor.products.sentinel2_metadata import sentinel2_product
+
+DATA = Path(__file__).parents[2] / "data" / "real_products"
+# The rasters lie anywhere: neither scale nor sun depends on their place.
+PLACE = {"crs": "EPSG:32633", "corner": (600000.0, 5000000.0)}
+NO_TILE = "S2A_MSIL1C_20240101T102431_N0510_R065_T30NWM_20240101T122107.SAFE"
+OTHER_TILE = "S2A_MSIL1C_20210908T042701_N0301_R133_T46RER_20210908T070248.SAFE"
+NAN_SUN = "S2A_MSIL2A_20230625T234621_N0509_R073_T01WCP_20230626T022158.SAFE"
+OFF_NADIR = "LC08_L2SP_017036_20130419_20200913_02_T2"
+
+
+def expected_rows():
+    """Rows of expected.csv by product."""
+    found = {}
+    with open(DATA / "expected.csv", newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            found.setdefault(row["product"], []).append(row)
+    return found
+
+
+EXPECTED = expected_rows()
+OPENED = [product for product, rows in EXPECTED.items() if rows[0]["expect"] != "refused"]
+LANDSAT = [product for product in OPENED if product.startswith("L")]
+SENTINEL2 = [product for product in OPENED if product.startswith("S2")]
+
+
+@pytest.fixture(scope="module")
+def metadata(tmp_path_factory):
+    """Folder of all metadata, landsat/PRODUCT and sentinel2/PRODUCT."""
+    folder = tmp_path_factory.mktemp("metadata")
+    with tarfile.open(DATA / "metadata.tar.xz") as archive:
+        archive.extractall(folder, filter="data")
+    return folder
+
+
+def landsat(metadata, folder, product):
+    """Folder of a Landsat product: each band has the number of expected.csv, no data, and saturation."""
+    shutil.copytree(metadata / "landsat" / product, folder, dirs_exist_ok=True)
+    pixel = 60.0 if product.startswith("LM") else 30.0
+    for row in EXPECTED[product]:
+        dn, largest = int(row["dn"]), int(row["largest"])
+        values = np.array([[dn, 0], [largest, dn]], np.uint8 if largest == 255 else np.uint16)
+        products.write(folder / row["file"], values, pixel=pixel, **PLACE)
+    for name, value in (("PIXEL", 21824), ("RADSAT", 0)):
+        values = np.full((2, 2), value, np.uint16)
+        products.write(folder / f"{product}_QA_{name}.TIF", values, pixel=pixel, **PLACE)
+    return folder
+
+
+def sentinel2(metadata, folder, product, tile=None):
+    """Folder .SAFE of a Sentinel-2 product: each band has the number of expected.csv, no data, and saturation."""
+    path = folder / product
+    given = metadata / "sentinel2" / product
+    (file,) = given.glob("MTD_MSIL*.xml")
+    path.mkdir()
+    shutil.copy(file, path)
+    names = [each.text.strip() for each in ElementTree.parse(file).getroot().iter("IMAGE_FILE")]
+    sizes = {"01": 60, "02": 10, "03": 10, "04": 10, "08": 10, "09": 60, "10": 60}
+    lossless = {"driver": "JP2OpenJPEG", "QUALITY": "100", "REVERSIBLE": "YES"}
+    values = np.array([[10000, 0], [65535, 10000]], np.uint16)
+    for name in names:
+        band = re.search(r"_B(\w\w)(?:_(\d\d)m)?$", name)
+        if band:
+            size = float(band[2] or sizes.get(band[1], 20))
+            products.write(path / f"{name}.jp2", values, pixel=size, **PLACE, **lossless)
+    granule = path / Path(names[0]).parts[0] / Path(names[0]).parts[1]
+    if tile is None and (given / "MTD_TL.xml").exists():
+        shutil.copy(given / "MTD_TL.xml", granule)
+    elif tile is not None:
+        shutil.copy(metadata / "sentinel2" / tile / "MTD_TL.xml", granule)
+    return path
+
+
+def check_scene(scene, rows, view):
+    """Compare an opened scene with rows of expected.csv; tolerances have their reasons in the README of the data."""
+    assert scene["band"].values.tolist() == [row["band"] for row in rows]
+    first = rows[0]
+    assert abs(scene["time"].values - np.datetime64(first["time"], "ns")) < np.timedelta64(1, "us")
+    stated = [float(first["sun_zenith"]), float(first["sun_azimuth"])]
+    tolerance = 0.05 if first["product"] == NAN_SUN else 1e-8
+    np.testing.assert_allclose([scene["sza"], scene["saa"]], stated, rtol=0, atol=tolerance)
+    np.testing.assert_allclose([scene["vza"], scene["vaa"]], view, rtol=0, atol=1e-6)
+    check_scale(scene, rows)
+
+
+def check_scale(scene, rows):
+    """Compare what does not depend on the tile: distance, reflectance and solar irradiance."""
+    assert float(scene["earth_sun_distance"]) == pytest.approx(float(rows[0]["earth_sun_distance"]), abs=1e-9)
+    values = np.full((len(rows), 2, 2), np.nan)
+    values[:, [0, 1], [0, 1]] = np.array([float(row["reflectance"]) for row in rows])[:, None]
+    np.testing.assert_allclose(scene, values, rtol=0, atol=2e-7)
+    for row, irradiance in zip(rows, scene["solar_irradiance"].values, strict=True):
+        if row["solar_irradiance"]:
+            rtol = 3e-3 if row["product"].startswith("L") else 1e-9
+            assert irradiance == pytest.approx(float(row["solar_irradiance"]), rel=rtol)
+
+
+def check_bands(bands, rows):
+    """Compare the scale of bands, which the metadata state."""
+    for row in rows:
+        band = bands[row["band"]]
+        np.testing.assert_allclose([band.gain, band.offset], [float(row["scale"]), float(row["offset"])], rtol=1e-12)
+        # The number of saturation of Sentinel-2 is one above its largest valid number.
+        assert band.largest == int(row["largest"]) + row["product"].startswith("S2")
+
+
+@pytest.mark.parametrize("product", LANDSAT)
+def test_landsat_products_open_with_their_numbers(metadata, tmp_path, product):
+    folder, rows = landsat(metadata, tmp_path, product), EXPECTED[product]
+    view = (0.0, 0.0)
+    if product == OFF_NADIR:
+        # Of the orbit of 705 km and a sphere of 6371 km; the azimuth is that of the track, and of its right angle.
+        vza = np.degrees(np.arcsin(np.sin(np.radians(11.696)) * (6371 + 705) / 6371))
+        view = read_scene(folder)[0].view
+        np.testing.assert_allclose(view, (vza, 102.2), rtol=0, atol=0.1)
+    check_scene(fifesim.open_landsat(folder), rows, view)
+    for file in folder.glob("*_MTL.*"):
+        check_scene(fifesim.open_landsat(file), rows, view)
+        check_bands({band.name: band for band in read_scene(file)[0].bands}, rows)
+
+
+def mean_view(rows):
+    """Mean of the directions that are stated for some bands."""
+    stated = [(float(row["view_zenith"]), float(row["view_azimuth"])) for row in rows]
+    zenith, azimuth = np.radians([pair for pair in stated if not np.isnan(pair[0])]).T
+    x, y, z = (
+        (np.sin(zenith) * np.cos(azimuth)).mean(),
+        (np.sin(zenith) * np.sin(azimuth)).mean(),
+        np.cos(zenith).mean(),
+    )
+    return np.degrees(np.arctan2(np.hypot(x, y), z)), np.degrees(np.arctan2(y, x)) % 360
+
+
+@pytest.mark.parametrize("product", SENTINEL2)
+def test_sentinel2_products_open_with_their_numbers(metadata, tmp_path, product):
+    path = sentinel2(metadata, tmp_path, product, OTHER_TILE if product == NO_TILE else None)
+    rows = {row["band"]: row for row in EXPECTED[product]}
+    (file,) = path.glob("MTD_MSIL*.xml")
+    bands = sentinel2_product(file).bands
+    seen = set()
+    for size, at_size in bands.items():
+        names = [band.name for band in at_size if band.name != "MSI10"]
+        check_bands({band.name: band for band in at_size}, [rows[name] for name in names])
+        if size not in (10, 20, 60) or not names:
+            continue
+        scene = fifesim.open_sentinel2(path, size, quality=False)
+        found = [rows[name] for name in scene["band"].values]
+        if product == NO_TILE:
+            check_scale(scene, found)
+        else:
+            check_scene(scene, found, mean_view(found))
+        seen |= set(names)
+    assert seen == set(rows)
+
+
+@pytest.mark.parametrize("product", [NAN_SUN, OTHER_TILE])
+def test_angles_by_pixel_are_those_of_the_grid(metadata, tmp_path, product):
+    """A pixel at the first node of the grid has its angles, within 10 m of 5 km."""
+    path = sentinel2(metadata, tmp_path, product)
+    root = ElementTree.parse(next(path.rglob("MTD_TL.xml"))).getroot()
+    corner = float(root.findtext(".//Geoposition/ULX")), float(root.findtext(".//Geoposition/ULY"))
+    crs = root.findtext(".//HORIZONTAL_CS_CODE")
+    for file in path.rglob("*_B04*.jp2"):
+        file.unlink()
+        lossless = {"driver": "JP2OpenJPEG", "QUALITY": "100", "REVERSIBLE": "YES"}
+        products.write(file, np.full((2, 2), 10000, np.uint16), crs, corner, 10.0, **lossless)
+    scene = fifesim.open_sentinel2(path, 10, bands="B04", angles="pixel", quality=False)
+    for name, kind in (("sza", "Zenith"), ("saa", "Azimuth")):
+        first = float(root.find(f".//Sun_Angles_Grid/{kind}/Values_List/VALUES").text.split()[0])
+        np.testing.assert_allclose(scene[name], first, rtol=0, atol=1e-3)
+    assert np.isfinite(scene["vza"]).all() and 0 < float(scene["vza"].max()) < 15
+
+
+def test_a_product_without_its_tile_metadata_is_refused(metadata, tmp_path):
+    path = sentinel2(metadata, tmp_path, NO_TILE)
+    with pytest.raises(ValueError, match=r"MTD_TL\.xml is missing in the product: is it unpacked whole"):
+        fifesim.open_sentinel2(path, quality=False)
+
+
+REFUSED = {
+    "LC08_L1TP_026200_20240502_20240513_02_T2": r"the sun is below the horizon, .*taken at night.*take one of the day",
+    "LC80100202015018LGN00": "is of Collection 1 or older: take the scene's Collection-2 product",
+    # Named _MTL.TXT.
+    "LE07_L1TP_160031_20110416_20161210_01_T1": "is of Collection 1 or older: take the scene's Collection-2 product",
+}
+
+
+def test_every_product_has_its_test():
+    assert set(REFUSED) == set(EXPECTED) - set(OPENED) and len(EXPECTED) == 26
+
+
+@pytest.mark.parametrize("product", REFUSED)
+@pytest.mark.parametrize("angles", ["centre", "pixel"])
+def test_other_products_are_refused_with_reason_and_remedy(metadata, product, angles):
+    folder = metadata / "landsat" / product
+    for path in (folder, *folder.iterdir()):
+        with pytest.raises(ValueError, match=REFUSED[product]):
+            fifesim.open_landsat(path, angles=angles)
