@@ -22,6 +22,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters import places, projection
 from fifesim.rasters.opening import raster_file
 from fifesim.rasters.soundness import sound_raster
+from fifesim.rasters.spacing import regular_geobox
 from fifesim.rasters.whereabouts import lies_in_words
 
 # Cells are made in fixed tiles of this size, so that the warper's rounding is the same under any chunking.
@@ -209,7 +210,7 @@ class _TileReads(NamedTuple):
 def _array_source(raster):
     """An array as a source of cells, and its CRS."""
     name = str(raster.name or "the raster")
-    found = raster.odc.geobox
+    found = regular_geobox(raster)
     if found is None or raster.odc.crs is None:
         raise ValueError(f"{name} has no regular grid or no CRS: give it one with .rio.write_crs('EPSG:26914')")
     cells = raster.transpose(*raster.odc.spatial_dims).data

@@ -6,7 +6,6 @@ from uuid import uuid4
 
 import dask.array as da
 import numpy as np
-import odc.geo.xr  # noqa: F401  registers .odc
 import pyproj
 import rasterio.windows
 import rioxarray  # noqa: F401  registers .rio
@@ -19,6 +18,7 @@ from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.rasters import projection
 from fifesim.rasters.opening import ErrorsOfGdal, RasterFile, raster_file
 from fifesim.rasters.soundness import check_raster, horizontal_crs
+from fifesim.rasters.spacing import regular_geobox
 
 # Positions in another CRS are a polynomial through those at so many Chebyshev nodes along each axis of a tile.
 _NODES = 12
@@ -153,7 +153,7 @@ def _array_source(raster, vertical_units):
     if raster.ndim != 2:
         raise ValueError(f"an elevation model has one band of rows and columns, got dimensions {raster.dims}")
     crs = raster.rio.crs
-    found = raster.odc.geobox
+    found = regular_geobox(raster)
     if found is None:
         raise ValueError(f"the x and y of {name} are not the centres of a regular grid")
     scale, offset = raster.attrs.get("scale_factor", 1.0), raster.attrs.get("add_offset", 0.0)
