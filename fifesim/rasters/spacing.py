@@ -3,9 +3,9 @@
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
 
-# A coordinate may lie this share of a cell beside its place; single precision of northings needs as much for 30 m cells.
+# A coordinate may be off by this share of a cell: a northing in single precision is, for cells of 30 m.
 _TOLERANCE = 1 / 60
-# Coordinates in single precision may lie farther off, as long as they are told apart.
+# Limit for smaller cells, where the coordinates are in single precision.
 _TOLERANCE_SINGLE = 1 / 10
 
 
@@ -71,8 +71,9 @@ def along_axis(array, name, edge, cell):
         tolerance = np.clip(np.spacing(np.abs(given).max()), tolerance, _TOLERANCE_SINGLE * abs(cell))
     if not (cell and np.allclose(centres, even, rtol=0, atol=tolerance)):
         steps = np.diff(centres)
+        found = f"{np.nanmin(steps):.6g} to {np.nanmax(steps):.6g}"
         raise ValueError(
-            f"the raster's {name} is not evenly spaced, its steps are {np.nanmin(steps):.6g} to {np.nanmax(steps):.6g}: "
+            f"the raster's {name} is not evenly spaced, its steps are {found}: "
             f"sort it with .sortby({name!r}), put tiles together on one grid with .reindex, or interpolate it onto a "
             "regular grid with .interp"
         )
