@@ -77,8 +77,9 @@ def surface_reflectance(
         the FIFE site has the paper's sun.
     time : str or datetime, optional
         In the place of ``geometry``: when the sun stood over the middle of the grid, below a nadir view.
-    leaf_optics : Leaf, or mapping of str to (float, float), optional
-        A leaf by what it is made of, or its reflectance and transmittance by band name; by default green tallgrass.
+    leaf_optics : Leaf, str, path, xarray.Dataset, or mapping of str to (float, float), optional
+        A leaf by its contents; the path of a CSV file, or a Dataset, with its spectra ``wavelength`` [um],
+        ``reflectance`` and ``transmittance``; or both by band name. By default green tallgrass.
         Each number may be a raster over (y, x): SAIL is evaluated at every cell then. Where one content of the `Leaf`
         alone is a raster, its optics are from a table within 1e-8; of more, each kind of leaf is computed once. [1]
     background : optional

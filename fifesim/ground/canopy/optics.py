@@ -7,9 +7,11 @@ import numpy as np
 
 from fifesim.base import datasets
 from fifesim.base.bands import Band
+from fifesim.base.kinds import is_path
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
 from fifesim.ground.canopy.ranges import check_fraction, within
-from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, did_you_mean, is_mixture
+from fifesim.ground.canopy.spectra import Background, background_means, band_means, did_you_mean, is_mixture
+from fifesim.ground.canopy.spectrum import LeafSpectrum, Spectrum, read_spectrum
 
 LARGEST_LAI = 100.0
 """Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
@@ -35,9 +37,10 @@ def leaf_optics(bands, given=None):
     ----------
     bands : sequence of str or fifesim.base.bands.Band
         Names, such as ``["TM3", "TM4"]``, or responses, which spectra need.
-    given : Leaf, mapping, or pair of arrays, optional
-        What a leaf is made of; ``{band: (reflectance, transmittance)}``; or both as arrays of shape (band,). The
-        default is the green tallgrass of ``data/leaf_optics.csv``, for bands that are not in it that of ``Leaf()``.
+    given : Leaf, LeafSpectrum, str, path, mapping, or pair of arrays, optional
+        The contents of a leaf; its spectra, or the path of their CSV file; ``{band: (reflectance, transmittance)}``;
+        or both as arrays of shape (band,). The default is the green tallgrass of ``data/leaf_optics.csv``, and
+        ``Leaf()`` for bands that are not in it.
 
     Returns
     -------
@@ -47,7 +50,7 @@ def leaf_optics(bands, given=None):
     Raises
     ------
     ValueError
-        If a band has no optics, or they are outside their range.
+        If a band has no optics, they are outside their range, or the file holds no leaf spectra.
 
     Examples
     --------
@@ -60,6 +63,10 @@ def leaf_optics(bands, given=None):
     if given is None:
         given = _default_leaves()
         given = given | _leaf_means(_lacking(given, bands), Leaf())
+    elif is_path(given):
+        given = read_spectrum(_csv(given), LeafSpectrum)
+    if isinstance(given, LeafSpectrum):
+        given = band_means(_responses(bands, "LeafSpectrum"), given.wavelength, given.values())
     elif isinstance(given, Leaf):
         given = _leaf_means(_responses(bands, "Leaf"), given)
     if isinstance(given, Mapping):
@@ -97,8 +104,8 @@ def background(bands, given=None):
     >>> background(["TM3", "TM4"], 0.2).tolist()
     [0.2, 0.2]
     """
-    if isinstance(given, str):
-        given = Background({given: 1.0})
+    if is_path(given):
+        given = Background({str(given): 1.0})
     elif is_mixture(given) and not set(given) <= set(_names(bands)):
         given = Background(given)
     if given is None:
@@ -111,6 +118,15 @@ def background(bands, given=None):
     reflectance = _for_bands(given, bands, "background")
     check_background(reflectance)
     return reflectance
+
+
+def _csv(path):
+    if not str(path).lower().endswith(".csv"):
+        raise ValueError(
+            f"leaf_optics={str(path)!r} is not the path of a .csv file: give one with the columns wavelength [um], "
+            "reflectance and transmittance [1], or a fifesim.Leaf"
+        )
+    return path
 
 
 @lru_cache(maxsize=1)
