@@ -1,5 +1,8 @@
 """The ground of a scenario against the same written out, and limits at which it is the plain one."""
 
+import re
+import warnings
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,7 +11,7 @@ from lazy import no_compute
 
 import fifesim
 from fifesim.rasters import grid as grids
-from fifesim.scenario.ground import canopy_of, drawn_properties, ground_scene, truth_of
+from fifesim.scenario.ground import canopy_of, drawn_properties, ground_scene, truth_of, warn_of_canopy
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import setup_of
 
@@ -314,3 +317,38 @@ def test_share_that_cannot_vary_so_much_is_told_before_a_run(ground, deviation, 
     case = parse_scenario(SMALL | {"ground": ground, "landscape": {"deviations": {deviation: 0.2}}})
     with pytest.raises(ValueError, match=said):
         case.complete()
+
+
+ELSEWHERE = {
+    "grid": {"crs": "EPSG:32633", "west": 390000, "north": 5820000, "width": 600, "height": 600, "cell": 30},
+    "geometry": {"sza": 40, "saa": 150},
+    "atmosphere": {"altitude": 0.1},
+    "terrain": {"dem": "flat"},
+}
+LEAF, SOIL = {"leaf": {"chlorophyll": 40}}, {"background_spectra": {"soil_dry": 1.0}}
+
+
+@pytest.mark.parametrize(
+    ("keys", "taken"),
+    [
+        ({"grid": {"width": 600, "height": 600}}, ""),
+        (
+            {"grid": {"width": 600, "height": 600}, "ground": {"lai_file": "lai.tif"}},
+            "lai.tif: .*soil and litter, green",
+        ),
+        (ELSEWHERE, r"the scene: .*soil and litter, green leaves.*\[ground\.leaf\]"),
+        (ELSEWHERE | {"ground": SOIL}, "for green leaves; give"),
+        (ELSEWHERE | {"ground": LEAF}, "for soil and litter; give"),
+        (ELSEWHERE | {"ground": LEAF | SOIL | {"brown": 0.3}}, "for dead leaves; give"),
+        (ELSEWHERE | {"ground": LEAF | SOIL}, ""),
+        (
+            ELSEWHERE | {"ground": SOIL, "landscape": {"cover": "voronoi"}, "classes": {"grass": LEAF, "crop": {}}},
+            "for green leaves; give",
+        ),
+    ],
+)
+def test_tallgrass_in_a_scenario_from_elsewhere_is_a_warning(keys, taken):
+    scenario = parse_scenario(keys)
+    with warnings.catch_warnings(record=True, action="always", category=UserWarning) as said:
+        warn_of_canopy(scenario)
+    assert len(said) == bool(taken) and all(re.search(taken, str(each.message)) for each in said)
