@@ -50,7 +50,7 @@ _OF_QUANTITIES = (Resampling.average, Resampling.bilinear)
 _OF_CLASSES = (Resampling.mode, Resampling.nearest)
 
 
-def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False):
+def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False, check=None):
     """
     One band of a raster file on a grid.
 
@@ -67,6 +67,9 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False
         As of `fifesim.rasters.opening.raster_file`.
     classes : bool, optional
         Whether its numbers stand for classes: smaller cells then have the nearest, larger ones the most frequent.
+    check : callable, optional
+        ``check(name, values)`` raises ValueError for values that are not possible, such as undeclared marks of missing
+        data. It is called with the source cells on the grid and next to it, when a tile is made.
 
     Returns
     -------
@@ -87,7 +90,7 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False
         back, _ = projection.operation(grid.crs.to_wkt(), crs, area)
         _check_overlap(source, crs, grid, back, file.name)
     # A file that has changed is another file to the cache.
-    make_tile = partial(_warp_tile, file, file.state, grid, pipeline, back, classes)
+    make_tile = partial(_warp_tile, file, file.state, grid, pipeline, back, classes, check)
     row, column = grids.lattice_position(grid)
 
     def kernel(first_row, first_column, shape):
@@ -96,7 +99,7 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False
     return places.tiles(kernel, grid, chunks, tile=_TILE)
 
 
-def raster_onto_grid(raster, grid, chunks=None, *, classes=False):
+def raster_onto_grid(raster, grid, chunks=None, *, classes=False, check=None):
     """
     A raster on a grid, as `file_onto_grid` brings a file there.
 
@@ -107,7 +110,7 @@ def raster_onto_grid(raster, grid, chunks=None, *, classes=False):
     grid : odc.geo.geobox.GeoBox
     chunks : mapping or int, optional
         Makes the result lazy, as it is without where the raster is.
-    classes : bool, optional
+    classes, check : optional
         As in `file_onto_grid`.
 
     Returns
@@ -132,7 +135,7 @@ def raster_onto_grid(raster, grid, chunks=None, *, classes=False):
     def kernel(rows, columns, cells):
         down, across = reads.window(rows, columns)
         known = replace(reads.source, cells=cells, first=(down.start, across.start))
-        make_tile = partial(_tile, known, crs, source.name, grid, pipeline, back, classes)
+        make_tile = partial(_tile, known, crs, source.name, grid, pipeline, back, classes, check)
         shape = rows.stop - rows.start, columns.stop - columns.start
         return assemble(make_tile, _TILE, row + rows.start, column + columns.start, shape)
 
@@ -256,13 +259,13 @@ def _cells_per_cell(source, crs, grid, back):
 
 
 @lru_cache(maxsize=16)
-def _warp_tile(file, state, grid, pipeline, back, classes, tile_row, tile_column):
+def _warp_tile(file, state, grid, pipeline, back, classes, check, tile_row, tile_column):
     """One lattice tile of the file's first band, in its physical unit."""
     with sound_raster(file) as (source, crs):
-        return _tile(source, crs, file.name, grid, pipeline, back, classes, tile_row, tile_column)
+        return _tile(source, crs, file.name, grid, pipeline, back, classes, check, tile_row, tile_column)
 
 
-def _tile(source, crs, name, grid, pipeline, back, classes, tile_row, tile_column):
+def _tile(source, crs, name, grid, pipeline, back, classes, check, tile_row, tile_column):
     """One lattice tile of a file or array; blocks that do not meet the grid stay empty."""
     row, column = grids.lattice_position(grid)
     top, left = tile_row * _TILE - row, tile_column * _TILE - column
@@ -279,8 +282,15 @@ def _tile(source, crs, name, grid, pipeline, back, classes, tile_row, tile_colum
         first, start = top + down, left + across
         if -size < first < grid.shape.y and -size < start < grid.shape.x:
             block = _part(grid, first, start, size)
-            out[down : down + size, across : across + size] = _warp_block(source, name, block, back, options)
+            inside = None if check is None else _source_window(source, crs, _common(grid, first, start, size), back)
+            values = (inside, check) if inside else None
+            out[down : down + size, across : across + size] = _warp_block(source, name, block, back, options, values)
     return out
+
+
+def _common(grid, row, column, size):
+    """The part of a square of a grid's lattice that lies on the grid."""
+    return grid[max(row, 0) : min(row + size, grid.shape.y), max(column, 0) : min(column + size, grid.shape.x)]
 
 
 def _part(grid, row, column, size):
@@ -299,8 +309,8 @@ def _block_size(cells):
     return size
 
 
-def _warp_block(source, name, block, back, options):
-    """A block of cells, from one window of the file."""
+def _warp_block(source, name, block, back, options, checked=None):
+    """A block of cells, from one window of the file; ``checked`` is a part of it, and the function that checks it."""
     size, a = block.shape.x, block.affine
     out = np.full((size, size), np.nan)
     window = _source_window(source, options["src_crs"], block, back)
@@ -313,6 +323,10 @@ def _warp_block(source, name, block, back, options):
         )
     values = source.read(1, window=window, masked=True).astype(float).filled(np.nan)
     values = values * source.scales[0] + source.offsets[0]
+    if checked is not None:
+        part, check = checked
+        top, left = (max(int(at), 0) for at in (part.row_off - window.row_off, part.col_off - window.col_off))
+        check(name, values[top : top + int(part.height), left : left + int(part.width)])
     for first in range(0, size, _STRIP):
         strip = np.full((size, min(size, _STRIP)), np.nan)
         transform = Affine(a.a, 0.0, a.c + first * a.a, 0.0, a.e, a.f)

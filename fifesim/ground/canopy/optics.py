@@ -13,15 +13,6 @@ from fifesim.ground.canopy.ranges import check_fraction, within
 from fifesim.ground.canopy.spectra import Background, background_means, band_means, did_you_mean, is_mixture
 from fifesim.ground.canopy.spectrum import LeafSpectrum, Spectrum, read_spectrum
 
-LARGEST_LAI = 100.0
-"""Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
-
-LARGEST_OF_MAPS = 20.0
-"""Of measured canopies, and a little more: a map beyond is in another scale [m2 m-2]."""
-
-# Hardly a cell of a map has more. [m2 m-2]
-_COMMON = 10.0
-
 DEAD_LEAF = Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001)
 """Dead tallgrass: the default leaf without green pigments and with little water; see ``data/README.md``."""
 
@@ -265,92 +256,3 @@ def check_background(reflectance):
     values = np.asarray(reflectance, float)
     if not within(values, 0.0, 1.0):
         check_fraction("background reflectance", values[~np.isnan(values)])
-
-
-def check_lai(lai):
-    """
-    Refuse a leaf area index that is negative or above 100; NaN passes.
-
-    Parameters
-    ----------
-    lai : array
-        [m2 m-2]
-
-    Returns
-    -------
-    lai : array
-        What was given.
-
-    Raises
-    ------
-    ValueError
-        If one is negative or above 100, which no canopy has: it is a fill value, or needs a scale.
-
-    Examples
-    --------
-    >>> check_lai(2.5)
-    2.5
-    """
-    cells = np.asarray(lai, float)
-    if not within(cells, 0.0, LARGEST_LAI):
-        wrong = (cells < 0) | (cells > LARGEST_LAI)
-        scale = _of_another_scale(cells) if np.nanmax(cells) > LARGEST_LAI else ""
-        raise ValueError(
-            f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
-            f"{wrong.sum()} of {cells.size} cells: {scale}set cells without data to NaN, such as "
-            "lai.where(lai >= 0)"
-        )
-    return lai
-
-
-def check_map(lai):
-    """
-    Refuse a map of leaf area index whose numbers look like those of another scale; NaN passes.
-
-    Parameters
-    ----------
-    lai : array
-        [m2 m-2]
-
-    Returns
-    -------
-    lai : array
-        What was given.
-
-    Raises
-    ------
-    ValueError
-        As `check_lai`, or if one is above 20.
-
-    Notes
-    -----
-    The largest of some 1000 measured values is 18, once outliers are removed.
-
-    References
-    ----------
-    Asner, G.P., Scurlock, J.M.O., Hicke, J.A. (2003), Global synthesis of leaf area index observations. Global Ecology
-    and Biogeography 12, 191-205
-
-    Examples
-    --------
-    >>> check_map(2.5)
-    2.5
-    """
-    cells = np.asarray(lai, float)
-    if not within(cells, 0.0, LARGEST_OF_MAPS):
-        check_lai(lai)
-        raise ValueError(
-            f"leaf area index up to {np.nanmax(cells):g}, canopies have at most {LARGEST_OF_MAPS:g}: "
-            f"{_of_another_scale(cells)}set cells without data to NaN"
-        )
-    return lai
-
-
-def _of_another_scale(cells):
-    """What to type where numbers are scaled: by the power of ten that brings nearly all of them below 10."""
-    positive = cells[(cells > 0) & np.isfinite(cells)]
-    most = np.quantile(positive, 0.98) if positive.size else 0.0
-    if most <= _COMMON:
-        return ""
-    scale = f"{10.0 ** -np.ceil(np.log10(most / _COMMON)):g}"
-    return f"where the numbers are scaled, type lai * {scale}, or gdal_edit.py -a_scale {scale} for a file; "

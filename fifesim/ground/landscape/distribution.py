@@ -14,7 +14,7 @@ from scipy import optimize, stats
 from fifesim.base import datasets
 from fifesim.base.annotations import Distribution, FilePath
 from fifesim.base.foreign import in_a_line, read_csv
-from fifesim.ground.canopy.optics import LARGEST_OF_MAPS
+from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS
 
 # A support that starts at zero may start this far below it.
 _ROUNDING = 1e-12
