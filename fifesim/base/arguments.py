@@ -1,6 +1,7 @@
 """Arguments of public functions: of the kind that their names say, or refused in a line that names them."""
 
 import inspect
+from collections.abc import Mapping
 from functools import wraps
 
 import numpy as np
@@ -138,6 +139,18 @@ OF_FUNCTION = {
 # Take values along any dimensions.
 _ANY_DIMENSIONS = {"density", "share_kept", "to_bands"}
 
+# Average a mask of True and False to a share.
+_TAKE_MASKS = {"aggregate"}
+
+# Kinds of numpy's dtypes: integers and floating-point numbers.
+_REAL = "iuf"
+_NOT_REAL = {
+    "b": "a mask, type .astype(float) if 0 and 1 are its values",
+    "c": "complex numbers, type .real or abs(...)",
+    "M": "dates, take the variable that holds the quantity",
+    "m": "durations, take the variable that holds the quantity",
+}
+
 
 def check(name, value, kind):
     """
@@ -181,7 +194,8 @@ def checked(function, methods_of=()):
     Returns
     -------
     function : callable
-        The same name, documentation and signature. What an argument is by default, it may always be.
+        The same name, documentation and signature. What an argument is by default, it may always be. It raises
+        TypeError for an argument of another kind, or for a raster whose cells are not real numbers.
     """
     signature = inspect.signature(function)
     kinds = {name: kind for name, kind in KINDS.items() if name in signature.parameters}
@@ -204,6 +218,8 @@ def checked(function, methods_of=()):
                 check(name, given[name], kind)
                 if methods_of and name == first:
                     _check_cells(name, given[name], 0 if function.__name__ in _ANY_DIMENSIONS else 2)
+        for name, value in given.items():
+            _check_numbers(name, value, _REAL + "b" if function.__name__ in _TAKE_MASKS else _REAL)
         return function(*args, **options)
 
     return checking
@@ -241,6 +257,31 @@ def _check_cells(name, raster, dimensions=2):
     if not raster.size:
         sizes = ", ".join(f"{dim}: {size}" for dim, size in raster.sizes.items())
         raise ValueError(f"{name} has no cells, its sizes are {sizes}: does the window that was cut out overlap it?")
+
+
+def _check_numbers(name, value, allowed):
+    """Raise TypeError if the cells or wavelengths of the rasters in an argument are not real numbers."""
+    for raster in _rasters(value):
+        wavelength = (raster.coords["wavelength"],) if "wavelength" in raster.coords else ()
+        for what, each in ((name, raster), *((f"wavelength of {name}", each) for each in wavelength)):
+            if each.dtype.kind not in allowed:
+                cure = _NOT_REAL.get(each.dtype.kind, "text or objects, type .astype(float) if they stand for numbers")
+                raise TypeError(f"{what} must hold real numbers, got {each.dtype}: it holds {cure}")
+
+
+def _rasters(value):
+    """Rasters in an argument: itself, or those in a Dataset, a mapping, a pair, a Leaf or a Setup."""
+    if is_a(value, "DataArray"):
+        return [value]
+    if is_a(value, "Dataset"):
+        return [each for each in value.data_vars.values() if each.ndim >= 2]
+    if isinstance(value, Mapping):
+        parts = value.values()
+    elif isinstance(value, list | tuple) and len(value) == 2:
+        parts = value
+    else:
+        parts = vars(value).values() if is_a(value, "Leaf", "Setup") else ()
+    return [raster for part in parts for raster in _rasters(part)]
 
 
 def _cure(value, kind):

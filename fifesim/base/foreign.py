@@ -5,7 +5,10 @@ import re
 import reprlib
 import stat
 import tomllib
+import warnings
 from pathlib import Path
+
+import pandas as pd
 
 # Larger than any scenario or instrument file, and read in a second. [byte]
 _LARGEST = 1_000_000
@@ -39,6 +42,48 @@ def check_regular(path):
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode):
         raise ValueError(f"{in_a_line(str(path), 200)} is {_KINDS.get(stat.S_IFMT(mode), 'a device')}: name a file")
+
+
+def read_csv(path, what):
+    """
+    Table of a CSV file, whose name is in every message.
+
+    Parameters
+    ----------
+    path : str or path
+        Of a regular file; ``#`` starts a comment.
+    what : str
+        What the file holds, for messages, such as "the spectrum".
+
+    Returns
+    -------
+    table : pandas.DataFrame
+
+    Raises
+    ------
+    ValueError
+        If the path is an address, a folder, a pipe or a device, or if the file is missing, cannot be read as CSV or has
+        rows with more values than its first line has names.
+    """
+    name = in_a_line(str(path), 200)
+    if "://" in str(path):
+        raise ValueError(f"cannot read {what} {name}: it is an address; download the file and give its path")
+    try:
+        check_regular(path)
+        with warnings.catch_warnings():
+            # Without index_col, pandas takes surplus values for an index.
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            return pd.read_csv(path, comment="#", skipinitialspace=True, index_col=False)
+    except FileNotFoundError:
+        raise ValueError(f"cannot read {what} {name}: there is no such file") from None
+    except pd.errors.ParserWarning:
+        raise ValueError(
+            f"cannot read {what} {name}: rows have more values than the first line has names; name all columns, and "
+            "write decimals with a point"
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ValueError(f"cannot read {what} {name}: {in_a_line(reason, 150)}; it must be CSV in UTF-8") from None
 
 
 def read_bounded(path, largest, what):

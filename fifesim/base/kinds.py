@@ -193,8 +193,8 @@ HORIZON = Kind(
     lambda value: _is_raster(value) and "direction" in value.dims,
 )
 LEAF = Kind(
-    "a fifesim.Leaf, {band: (reflectance, transmittance)}, or a pair of them for all bands",
-    lambda value: is_a(value, "Leaf") or _is_mapping(value) or TWO.fits(value),
+    "a fifesim.Leaf, the path of a CSV file or a Dataset of spectra, {band: (reflectance, transmittance)}, or a pair",
+    lambda value: is_a(value, "Leaf", "Dataset") or is_path(value) or _is_mapping(value) or TWO.fits(value),
 )
 INTERVAL = Kind(
     "'native', or metres between pixels, down and across",

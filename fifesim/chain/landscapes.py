@@ -13,6 +13,7 @@ import xarray as xr
 from fifesim.analysis.rasters import means
 from fifesim.base.annotations import Time
 from fifesim.base.line_spread import LineSpread
+from fifesim.chain.stands import of_class, stands_of
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy import raster as ground
 from fifesim.ground.canopy.annotations import LeafAngles
@@ -34,9 +35,6 @@ _DEFAULTS = {"leaf_optics": None, "background": None, "leaf_angles": "spherical"
 _DEFAULTS |= {"brown": 0.0, "dissociation": 0.0, "brown_leaf": None, "crown_cover": 1.0, "crown_shape": SHAPE}
 _DEFAULTS |= {"soil": None, "moisture": None}
 """Of what a canopy is told, where nothing is said."""
-
-_OF_CLASS = {"leaf_optics": "leaf"}
-"""What `surface_reflectance` and `CoverClass` call by different names."""
 
 _RESOLVED = ("leaf_optics", "background", "brown_leaf", "soil", "moisture")
 """What is resolved into numbers of each band, or what makes them."""
@@ -111,9 +109,7 @@ def canopies_of(land, bands, canopy, exact=False):
     """
     optics = _Optics(tuple(band.response for band in bands), land.lai, exact)
     _check_used(land, canopy)
-    if land.cover is None:
-        return {None: optics.of({**canopy, **land.cells})}
-    return {each.code: optics.of(_told(each, canopy, land.cells)) for each in land.classes}
+    return {code: optics.of(stand) for code, stand in stands_of(land.classes, canopy, land.cells).items()}
 
 
 def level_reflectance(land, bands, canopies, **scene):
@@ -143,18 +139,6 @@ def level_reflectance(land, bands, canopies, **scene):
     if land.cover is None:
         return ground.level_reflectance(land.lai, **canopies[None], **named, **scene)
     return reflectance_of_classes(land.lai, land.cover, canopies, **named, **scene)
-
-
-def _told(kind, canopy, cells):
-    """What is said of the canopy of a class: by the cells, else by itself, else by the call."""
-    own = {name: getattr(kind, _OF_CLASS.get(name, name)) for name in canopy}
-    said = {name: canopy[name] if own[name] is None else own[name] for name in canopy}
-    return said | _of_cells(canopy, cells)
-
-
-def _of_cells(canopy, cells):
-    """What cells say of that which is asked of a canopy."""
-    return {name: each for name, each in cells.items() if name in canopy}
 
 
 class _Optics:
@@ -201,7 +185,7 @@ def _check_used(land, canopy):
             continue
         if name in land.cells:
             raise ValueError(f"{name} is given, and the landscape has a variable {name}: leave out one of the two")
-        if land.classes and all(getattr(each, _OF_CLASS.get(name, name)) is not None for each in land.classes):
+        if land.classes and all(of_class(each, name) is not None for each in land.classes):
             raise ValueError(
                 f"{name} is given, and all classes of the landscape say theirs: leave it out, or out of the classes"
             )
@@ -276,8 +260,8 @@ def fpar(
     canopy = {"leaf_angles": leaf_angles, "brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
     _check_used(land, canopy)
     if land.cover is None:
-        return ground.fpar(land.lai, **said, **(canopy | _of_cells(canopy, land.cells)))
-    told = {each.code: _told(each, canopy, land.cells) for each in land.classes}
+        return ground.fpar(land.lai, **said, **stands_of((), canopy, land.cells)[None])
+    told = stands_of(land.classes, canopy, land.cells)
     # Of classes with the same canopy once.
     made = {repr(each): ground.fpar(land.lai, **said, **each) for each in {repr(v): v for v in told.values()}.values()}
     taken = {text: (np.positive, [each]) for text, each in made.items()}

@@ -7,7 +7,7 @@ from numba import njit
 
 from fifesim.atmosphere.schemes.coupling import apparent_reflectance, apparent_reflectance_of_cell
 from fifesim.ground.canopy.lai_table import RUN, places_of, value_at
-from fifesim.ground.canopy.optics import LARGEST_OF_MAPS, check_map
+from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS, check_map
 from fifesim.ground.canopy.rasters.evaluation import EvenCanopy
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, even_table
 from fifesim.rasters import chunks as chunking

@@ -12,6 +12,7 @@ from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
 from fifesim.chain.seen_canopy import seen_through_air
 from fifesim.chain.slopes import sunlight
+from fifesim.chain.stands import warn_of_tallgrass
 from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
 from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.rasters import soils
@@ -20,6 +21,7 @@ from fifesim.rasters import directions
 from fifesim.rasters.annotations import Directions, NumberOrRaster
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.sites import is_fife
 from fifesim.rasters.sun import check_same_sun
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
@@ -78,8 +80,9 @@ def surface_reflectance(
         the FIFE site has the paper's sun.
     time : str or datetime, optional
         In the place of ``geometry``: when the sun stood over the middle of the grid, below a nadir view.
-    leaf_optics : Leaf, or mapping of str to (float, float), optional
-        A leaf by what it is made of, or its reflectance and transmittance by band name; by default green tallgrass.
+    leaf_optics : Leaf, str, path, xarray.Dataset, or mapping of str to (float, float), optional
+        A leaf by its contents; the path of a CSV file, or a Dataset, with its spectra ``wavelength`` [um],
+        ``reflectance`` and ``transmittance``; or both by band name. By default green tallgrass.
         Each number may be a raster over (y, x): SAIL is evaluated at every cell then. Where one content of the `Leaf`
         alone is a raster, its optics are from a table within 1e-8; of more, each kind of leaf is computed once. [1]
     background : optional
@@ -121,6 +124,11 @@ def surface_reflectance(
         If an argument is out of its range; on lazy data, a negative LAI when it computes. If the dem is not in metres,
         does not cover ``lai``, or lies on other cells. If nothing says which instrument, or where the sun stands.
 
+    Warns
+    -----
+    UserWarning
+        If atmosphere, leaf_optics or background are not given for a scene that was not made on the FIFE site.
+
     References
     ----------
     [Verhoef1984]_; [VerhoefBach2007]_; [Friedl1995]_, Fig. 1 and Eqs. 4 and 5; [Yang2020]_ for moist soil
@@ -154,6 +162,8 @@ def surface_reflectance(
     canopy |= {"brown": brown, "dissociation": dissociation, "brown_leaf": brown_leaf}
     canopy |= {"crown_cover": crown_cover, "crown_shape": crown_shape, "soil": soil, "moisture": moisture}
     land = land._replace(lai=lai)
+    if not is_fife(lai):
+        warn_of_tallgrass(lai.name or "the raster", land.classes, canopy, land.cells)
     canopies = landscapes.canopies_of(land, selected, canopy, exact)
     level = landscapes.level_reflectance(
         land,

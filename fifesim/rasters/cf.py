@@ -1,5 +1,6 @@
 """Names, units and provenance of what fifesim makes, after the CF conventions."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,6 +127,13 @@ _SAME_UNITS = dict.fromkeys(("", "m2 m-2", "dimensionless", "unitless", "reflect
 )
 
 
+# Words of names and descriptions that stand for one quantity.
+_WORDS = {name: name for name in ("lai", "ndvi", "evi", "evi2", "savi", "msavi", "ndwi", "ndmi", "nirv", "fpar", "dem")}
+_WORDS |= {"fapar": "fpar", "elevation": "dem", "altitude": "dem", "reflectance": "surface_reflectance"}
+_WORDS |= {"radiance": "toa_radiance"} | dict.fromkeys(("quality", "qa", "qc", "flag", "flags", "mask"), "quality")
+_OTHER_UNITS = {"%", "percent", "m", "metre", "metres", "meter", "meters", "ft", "feet", "degree", "degrees", "k"}
+
+
 # What leads from a standard name to a quantity.
 _STEPS = {
     ("toa_bidirectional_reflectance", "surface_reflectance"): ".fifesim.to_surface(atmosphere) of it first",
@@ -215,6 +223,46 @@ def check_quantity(array, *names):
             f"{array.name or 'the array'} is {known[says]} by its standard_name, where "
             f"{QUANTITIES[names[0]].long_name} is needed: take {_STEPS.get((says, names[0]), 'the step between')}, or "
             "drop .attrs['standard_name'] if it is mistaken"
+        )
+
+
+def check_words(raster, texts, name, units=""):
+    """
+    Raise ValueError if metadata clearly name another quantity; quantities that are not known pass.
+
+    Parameters
+    ----------
+    raster : str
+        Name of the raster, for messages.
+    texts : iterable of str
+        Names and descriptions of the raster.
+    name : str
+        Key of `QUANTITIES` of the quantity that is needed.
+    units : str, optional
+        Units of the raster.
+
+    Raises
+    ------
+    ValueError
+        If a word stands for another quantity, none stands for the right one, or the unit is that of another quantity.
+
+    Examples
+    --------
+    >>> check_words("map.tif", ["LAI_500m"], "lai")
+    """
+    for text in texts:
+        words = re.findall("[a-z]+[0-9]?", text.lower().replace("leaf area", "lai"))
+        found = {_WORDS[word] for word in words if word in _WORDS}
+        if (found and name not in found) or found & {"quality"}:
+            raise ValueError(
+                f"{raster} is named {text!r}, where {QUANTITIES[name].long_name} is needed: take the raster or band of "
+                f"that quantity, or, if the name is wrong, correct it (.rename({name!r}) and .attrs, or the band "
+                "description of the file)"
+            )
+    if units.strip().lower() in _OTHER_UNITS - {QUANTITIES[name].units}:
+        raise ValueError(
+            f"{raster} has units {units!r}, where {QUANTITIES[name].long_name} is needed, in "
+            f"{QUANTITIES[name].units!r}: take the raster of that quantity, or correct .attrs['units']"
         )
 
 

@@ -83,16 +83,38 @@ def in_micrometres(array):
     if "wavelength" not in array.coords:
         return array
     given = array.coords["wavelength"]
-    unit = str(given.attrs.get("units", "um")).strip()
+    return array.assign_coords(wavelength=(given.dims, micrometres(given), cf.attributes("wavelength")))
+
+
+def micrometres(wavelength):
+    """
+    Wavelengths in micrometres.
+
+    Parameters
+    ----------
+    wavelength : xarray.DataArray
+        In um, or in the unit that its attribute ``units`` states.
+
+    Returns
+    -------
+    values : array
+        [um]
+
+    Raises
+    ------
+    ValueError
+        If they have no unit and are too long to be in micrometres, or have another unit.
+    """
+    unit = str(wavelength.attrs.get("units", "um")).strip()
     if unit.lower() not in PER_MICROMETRE:
         raise ValueError(f"wavelength has units {unit!r}: they are to be um or nm")
-    values = np.asarray(given.values, float) / PER_MICROMETRE[unit.lower()]
+    values = np.asarray(wavelength.values, float) / PER_MICROMETRE[unit.lower()]
     if values.size and not np.max(values) <= LONGEST:
         raise ValueError(
             f"wavelength reaches {np.max(values):g} um: where these are nanometres, say so by "
             "raster.wavelength.attrs['units'] = 'nm'"
         )
-    return array.assign_coords(wavelength=(given.dims, values, cf.attributes("wavelength")))
+    return values
 
 
 def check_reflectance(values):

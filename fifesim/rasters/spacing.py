@@ -1,23 +1,57 @@
-"""Cells of a raster by its coordinates, and by what its transform says of them."""
+"""Spacing of the coordinates of a raster, and the cell size that its transform states."""
 
 import numpy as np
+import odc.geo.xr  # noqa: F401  registers .odc
+
+# A coordinate may be off by this share of a cell: a northing in single precision is, for cells of 30 m.
+_TOLERANCE = 1 / 60
+# Limit for smaller cells, where the coordinates are in single precision.
+_TOLERANCE_SINGLE = 1 / 10
 
 
-def along_axis(array, name, edge, cell):
+def regular_geobox(array):
     """
-    Outer edge and cell along an axis, from all coordinates; odc-geo looks at two.
+    Grid of a raster in any CRS and orientation, whose coordinates are evenly spaced.
+
+    odc-geo reads the first and the last coordinates only.
 
     Parameters
     ----------
     array : xarray.DataArray
-    name : {"x", "y"}
+
+    Returns
+    -------
+    grid : odc.geo.geobox.GeoBox or None
+        None if odc-geo finds no grid.
+
+    Raises
+    ------
+    ValueError
+        If the coordinates are not evenly spaced.
+    """
+    found = array.odc.geobox
+    if found is not None:
+        for name in array.odc.spatial_dims:
+            along_axis(array, name, 0.0, 0.0)
+    return found
+
+
+def along_axis(array, name, edge, cell):
+    """
+    Outer edge and cell size along an axis, from all coordinates.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+    name : str
+        Dimension, such as ``"x"``.
     edge, cell : float
-        As odc-geo has them. [m]
+        Values of odc-geo, which are returned if there are no coordinates. [unit of the CRS]
 
     Returns
     -------
     edge, cell : float
-        [m]
+        [unit of the CRS]
 
     Raises
     ------
@@ -26,14 +60,23 @@ def along_axis(array, name, edge, cell):
     """
     if name not in array.coords:
         return edge, cell
+    given = array.coords[name].values
     if array.sizes[name] == 1:
-        # Of a part, the GeoTransform is that of the whole: its cell holds, its corner does not.
-        return float(array.coords[name].values[0] - cell / 2), cell
-    centres = array.coords[name].values.astype(float)
+        # The GeoTransform of a part is that of the whole raster: its cell size holds, its corner does not.
+        return float(given[0] - cell / 2), cell
+    centres = given.astype(float)
     even, cell = np.linspace(centres[0], centres[-1], centres.size, retstep=True)
-    # Single precision resolves half a metre of a northing, a sixtieth of a 30 m cell.
-    if not np.allclose(centres, even, rtol=0, atol=abs(cell) / 60):
-        raise ValueError(f"the raster's {name} is not evenly spaced: interpolate it onto a regular grid with .interp")
+    tolerance = _TOLERANCE * abs(cell)
+    if given.dtype == np.float32:
+        tolerance = np.clip(np.spacing(np.abs(given).max()), tolerance, _TOLERANCE_SINGLE * abs(cell))
+    if not (cell and np.allclose(centres, even, rtol=0, atol=tolerance)):
+        steps = np.diff(centres)
+        found = f"{np.nanmin(steps):.6g} to {np.nanmax(steps):.6g}"
+        raise ValueError(
+            f"the raster's {name} is not evenly spaced, its steps are {found}: "
+            f"sort it with .sortby({name!r}), put tiles together on one grid with .reindex, or interpolate it onto a "
+            "regular grid with .interp"
+        )
     return float(centres[0] - cell / 2), float(cell)
 
 

@@ -24,6 +24,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters import places, projection
 from fifesim.rasters.opening import raster_file
 from fifesim.rasters.soundness import sound_raster
+from fifesim.rasters.spacing import regular_geobox
 from fifesim.rasters.whereabouts import lies_in_words
 
 # Cells are made in fixed tiles of this size, so that the warper's rounding is the same under any chunking.
@@ -54,7 +55,7 @@ _SOURCE_MARGIN = 4
 _MOST_SAMPLES = 64
 
 
-def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False):
+def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False, check=None):
     """
     One band of a raster file on a grid.
 
@@ -71,6 +72,9 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False
         As of `fifesim.rasters.opening.raster_file`.
     classes : bool, optional
         Whether its numbers stand for classes: smaller cells then have the nearest, larger ones the most frequent.
+    check : callable, optional
+        ``check(name, values)`` raises ValueError for values that are not possible, such as undeclared marks of missing
+        data. It is called with the source cells on the grid and next to it, when a tile is made.
 
     Returns
     -------
@@ -91,7 +95,7 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False
         back, _ = projection.operation(grid.crs.to_wkt(), crs, area)
         _check_overlap(source, crs, grid, back, file.name)
     # A file that has changed is another file to the cache.
-    make_tile = partial(_warp_tile, file, file.state, grid, pipeline, back, classes)
+    make_tile = partial(_warp_tile, file, file.state, grid, pipeline, back, classes, check)
     row, column = grids.lattice_position(grid)
 
     def kernel(first_row, first_column, shape):
@@ -100,7 +104,7 @@ def file_onto_grid(path, grid, chunks=None, allow_remote=False, *, classes=False
     return places.tiles(kernel, grid, chunks, tile=_TILE)
 
 
-def raster_onto_grid(raster, grid, chunks=None, *, classes=False):
+def raster_onto_grid(raster, grid, chunks=None, *, classes=False, check=None):
     """
     A raster on a grid, as `file_onto_grid` brings a file there.
 
@@ -111,7 +115,7 @@ def raster_onto_grid(raster, grid, chunks=None, *, classes=False):
     grid : odc.geo.geobox.GeoBox
     chunks : mapping or int, optional
         Makes the result lazy, as it is without where the raster is.
-    classes : bool, optional
+    classes, check : optional
         As in `file_onto_grid`.
 
     Returns
@@ -136,7 +140,7 @@ def raster_onto_grid(raster, grid, chunks=None, *, classes=False):
     def kernel(rows, columns, cells):
         down, across = reads.window(rows, columns)
         known = replace(reads.source, cells=cells, first=(down.start, across.start))
-        make_tile = partial(_tile, known, crs, source.name, grid, pipeline, back, classes)
+        make_tile = partial(_tile, known, crs, source.name, grid, pipeline, back, classes, check)
         shape = rows.stop - rows.start, columns.stop - columns.start
         return assemble(make_tile, _TILE, row + rows.start, column + columns.start, shape)
 
@@ -214,7 +218,7 @@ class _TileReads(NamedTuple):
 def _array_source(raster):
     """An array as a source of cells, and its CRS."""
     name = str(raster.name or "the raster")
-    found = raster.odc.geobox
+    found = regular_geobox(raster)
     if found is None or raster.odc.crs is None:
         raise ValueError(f"{name} has no regular grid or no CRS: give it one with .rio.write_crs('EPSG:26914')")
     cells = raster.transpose(*raster.odc.spatial_dims).data
@@ -260,13 +264,13 @@ def _cells_per_cell(source, crs, grid, back):
 
 
 @lru_cache(maxsize=16)
-def _warp_tile(file, state, grid, pipeline, back, classes, tile_row, tile_column):
+def _warp_tile(file, state, grid, pipeline, back, classes, check, tile_row, tile_column):
     """One lattice tile of the file's first band, in its physical unit."""
     with sound_raster(file) as (source, crs):
-        return _tile(source, crs, file.name, grid, pipeline, back, classes, tile_row, tile_column)
+        return _tile(source, crs, file.name, grid, pipeline, back, classes, check, tile_row, tile_column)
 
 
-def _tile(source, crs, name, grid, pipeline, back, classes, tile_row, tile_column):
+def _tile(source, crs, name, grid, pipeline, back, classes, check, tile_row, tile_column):
     """One lattice tile of a file or array; blocks that do not meet the grid stay empty."""
     row, column = grids.lattice_position(grid)
     top, left = tile_row * _TILE - row, tile_column * _TILE - column
@@ -284,8 +288,16 @@ def _tile(source, crs, name, grid, pipeline, back, classes, tile_row, tile_colum
         first, start = top + down, left + across
         if -size < first < grid.shape.y and -size < start < grid.shape.x:
             block = _part(grid, first, start, size)
-            out[down : down + size, across : across + size] = _warp_block(source, name, block, back, options, samples)
+            inside = None if check is None else _source_window(source, crs, _common(grid, first, start, size), back)
+            checked = (inside, check) if inside else None
+            filled = _warp_block(source, name, block, back, options, samples, checked)
+            out[down : down + size, across : across + size] = filled
     return out
+
+
+def _common(grid, row, column, size):
+    """The part of a square of a grid's lattice that lies on the grid."""
+    return grid[max(row, 0) : min(row + size, grid.shape.y), max(column, 0) : min(column + size, grid.shape.x)]
 
 
 def _part(grid, row, column, size):
@@ -339,8 +351,13 @@ def _most_frequent(values, samples):
     return out
 
 
-def _warp_block(source, name, block, back, options, samples):
-    """A block of cells, from one window of the file; the most frequent of samples x samples values where asked."""
+def _warp_block(source, name, block, back, options, samples, checked):
+    """
+    A block of cells, from one window of the file.
+
+    With several samples a cell has the most frequent value of samples x samples; ``checked`` is a part of the window,
+    and the function that checks it.
+    """
     size, a = block.shape.x, block.affine
     out = np.full((size, size), np.nan)
     window = _source_window(source, options["src_crs"], block, back)
@@ -353,6 +370,10 @@ def _warp_block(source, name, block, back, options, samples):
         )
     values = source.read(1, window=window, masked=True).astype(float).filled(np.nan)
     values = values * source.scales[0] + source.offsets[0]
+    if checked is not None:
+        part, check = checked
+        top, left = (max(int(at), 0) for at in (part.row_off - window.row_off, part.col_off - window.col_off))
+        check(name, values[top : top + int(part.height), left : left + int(part.width)])
     for first in range(0, size, _STRIP):
         strip = np.full((size * samples, min(size, _STRIP) * samples), np.nan)
         transform = Affine(a.a / samples, 0.0, a.c + first * a.a, 0.0, a.e / samples, a.f)

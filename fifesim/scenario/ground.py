@@ -1,15 +1,19 @@
 """The ground of a scenario: leaf area or a landscape, its canopies, and what of it an image is compared with."""
 
+from pathlib import Path
+
 import xarray as xr
 
 from fifesim.chain.landscapes import fpar
+from fifesim.chain.stands import warn_of_tallgrass
 from fifesim.ground.canopy.crowns import check_crowns
-from fifesim.ground.landscape.classes import CoverClass
+from fifesim.ground.landscape.classes import CoverClass, class_table
 from fifesim.ground.landscape.cover import PATTERNS, Patches
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.drawn import Field
 from fifesim.ground.landscape.raster import lai_scene, lai_window
 from fifesim.ground.landscape.rasters.scenes import landscape
+from fifesim.rasters.sites import on_fife_site
 from fifesim.scenario.ground_keys import COVARIATES
 from fifesim.scenario.land import cut
 
@@ -73,6 +77,27 @@ def _landscape(scenario, grid, chunks, dem):
         chunks=chunks,
         **properties,
     )
+
+
+def warn_of_canopy(scenario):
+    """
+    Warn if optics of FIFE's tallgrass are taken for a map of leaf area, or for another site.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+        As it was written, without completed keys.
+
+    Warns
+    -----
+    UserWarning
+        As `fifesim.chain.stands.warn_of_tallgrass`.
+    """
+    own = scenario.ground.lai_file
+    if own or not on_fife_site(scenario.geobox()):
+        canopy = {"leaf_optics": None, "background": None, "brown_leaf": None, "brown": 0.0} | canopy_of(scenario)
+        classes = class_table(_classes(scenario)) if _classes(scenario) else ()
+        warn_of_tallgrass(Path(own).name if own else "the scene", classes, canopy, drawn_properties(scenario))
 
 
 def drawn_properties(scenario):

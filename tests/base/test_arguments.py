@@ -177,6 +177,53 @@ def test_a_wrong_argument_is_named_in_a_line(calls, wrong, name, tmp_path, monke
     assert found == []
 
 
+NOT_REAL = ["bool", "complex64", "datetime64[s]", "timedelta64[s]", "str", "object"]
+
+
+@pytest.mark.parametrize("name", sorted(set(PUBLIC) - LEFT_OUT))
+def test_rasters_must_hold_real_numbers(calls, name):
+    """A mask, dates, text and complex numbers convert to floating point, so that they would pass for a quantity."""
+    if name not in calls:
+        pytest.skip("has tests of its own")
+    function, given = getattr(fifesim, name), calls[name]
+    for argument, raster in given.items():
+        for dtype in NOT_REAL if isinstance(raster, xr.DataArray) else ():
+            if (name, dtype) == ("aggregate", "bool"):
+                continue
+            with pytest.raises(TypeError, match=f"^{argument} must hold real numbers, got .*: it holds "):
+                function(**(given | {argument: raster.astype(dtype)}))
+
+
+def test_rasters_within_an_argument_must_hold_real_numbers(calls):
+    given = calls["surface_reflectance"]
+    lai, rho = given["lai"], calls["to_toa"]["reflectance"]
+    mask = lai > 1
+    within = {
+        "background": {"TM3": mask, "TM4": 0.2},
+        "leaf_optics": {"TM3": (mask, 0.1), "TM4": (0.4, 0.4)},
+        "brown_leaf": fifesim.Leaf(chlorophyll=mask),
+        "soil": mask,
+        "lai": xr.Dataset({"lai": lai, "brown": mask}),
+    }
+    for argument, value in within.items():
+        with pytest.raises(
+            TypeError, match=rf"^{argument} must hold real numbers, got bool: it holds a mask, type \.ast"
+        ):
+            fifesim.surface_reflectance(**(given | {argument: value}))
+    with pytest.raises(TypeError, match=r"^setup must hold real numbers"):
+        fifesim.compare(lai, ["TM"], fifesim.Setup(dem=mask))
+    for wavelength in (["red", "nir"], np.array(["2001-01-01", "2001-01-02"], "datetime64[s]")):
+        for function, of in ((fifesim.to_bands, {"instrument": "TM"}), (fifesim.ndvi, {})):
+            with pytest.raises(TypeError, match=r"^wavelength of \w+ must hold real numbers"):
+                function(rho.assign_coords(wavelength=("band", wavelength)), **of)
+
+
+def test_a_mask_is_averaged_to_a_share(calls):
+    lai = calls["fpar"]["lai"]
+    share = fifesim.aggregate(lai > 1, 120.0)
+    assert float(share.squeeze()) == pytest.approx(float((lai > 1).mean()), rel=1e-12)
+
+
 @pytest.mark.parametrize("name", ["ndvi", "sense", "grid_at"])
 def test_a_function_that_looks_is_still_a_function(name):
     """Its name, documentation and signature stay, and it goes to other processes."""

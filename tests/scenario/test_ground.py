@@ -1,5 +1,8 @@
 """The ground of a scenario against the same written out, and limits at which it is the plain one."""
 
+import re
+import warnings
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,7 +11,7 @@ from lazy import no_compute
 
 import fifesim
 from fifesim.rasters import grid as grids
-from fifesim.scenario.ground import canopy_of, drawn_properties, ground_scene, truth_of
+from fifesim.scenario.ground import canopy_of, drawn_properties, ground_scene, truth_of, warn_of_canopy
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import setup_of
 
@@ -326,3 +329,38 @@ def test_crowns_that_cannot_hold_the_leaves_are_refused_before_a_run(place, cove
     with pytest.raises(ValueError, match=rf"{place}\.crown_cover = {cover:g}: .* at most 100, got up to "):
         parse_scenario(SMALL | keys).complete()
     assert parse_scenario(SMALL | {"ground": {"crown_cover": 0.05}}).complete().ground.crown_cover == 0.05
+
+
+ELSEWHERE = {
+    "grid": {"crs": "EPSG:32633", "west": 390000, "north": 5820000, "width": 600, "height": 600, "cell": 30},
+    "geometry": {"sza": 40, "saa": 150},
+    "atmosphere": {"altitude": 0.1},
+    "terrain": {"dem": "flat"},
+}
+LEAF, SOIL = {"leaf": {"chlorophyll": 40}}, {"background_spectra": {"soil_dry": 1.0}}
+
+
+@pytest.mark.parametrize(
+    ("keys", "taken"),
+    [
+        ({"grid": {"width": 600, "height": 600}}, ""),
+        (
+            {"grid": {"width": 600, "height": 600}, "ground": {"lai_file": "lai.tif"}},
+            "lai.tif: .*soil and litter, green",
+        ),
+        (ELSEWHERE, r"the scene: .*soil and litter, green leaves.*\[ground\.leaf\]"),
+        (ELSEWHERE | {"ground": SOIL}, "for green leaves; give"),
+        (ELSEWHERE | {"ground": LEAF}, "for soil and litter; give"),
+        (ELSEWHERE | {"ground": LEAF | SOIL | {"brown": 0.3}}, "for dead leaves; give"),
+        (ELSEWHERE | {"ground": LEAF | SOIL}, ""),
+        (
+            ELSEWHERE | {"ground": SOIL, "landscape": {"cover": "voronoi"}, "classes": {"grass": LEAF, "crop": {}}},
+            "for green leaves; give",
+        ),
+    ],
+)
+def test_tallgrass_in_a_scenario_from_elsewhere_is_a_warning(keys, taken):
+    scenario = parse_scenario(keys)
+    with warnings.catch_warnings(record=True, action="always", category=UserWarning) as said:
+        warn_of_canopy(scenario)
+    assert len(said) == bool(taken) and all(re.search(taken, str(each.message)) for each in said)

@@ -17,6 +17,7 @@ grid = fifesim.grid_at(
 leaf_area = np.linspace(0, 6, 121)
 lai = wrap_xr(leaf_area[None], grid)
 sun, air = fifesim.fife_geometry(), fifesim.Atmosphere()  # the paper's case
+grass = {"leaf_optics": fifesim.Leaf(), "background": {"soil_dry": 0.475, "shade": 0.525}}
 
 # %%
 # Red light falls and near infrared light rises with leaf area, until more leaves change nothing. Flat (planophile)
@@ -25,7 +26,12 @@ sun, air = fifesim.fife_geometry(), fifesim.Atmosphere()  # the paper's case
 figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
 for leaves, style in (("planophile", "--"), ("spherical", "-"), ("erectophile", ":")):
     rho = lai.fifesim.surface_reflectance(
-        "TM", bands=["TM3", "TM4"], geometry=sun, atmosphere=air, leaf_angles=leaves
+        "TM",
+        bands=["TM3", "TM4"],
+        geometry=sun,
+        atmosphere=air,
+        leaf_angles=leaves,
+        **grass,
     )
     for band, color in (("TM3", "#b2182b"), ("TM4", "#542788")):
         axes[0].plot(
@@ -67,7 +73,7 @@ for hotspot, style in ((0.0, "-"), (0.05, "--"), (0.2, ":")):
         side = sun.saa if view <= 0 else sun.saa + 180
         geometry = fifesim.Geometry(sun.sza, sun.saa, vza=abs(view), vaa=side)
         case = {"geometry": geometry, "atmosphere": air, "hotspot": hotspot}
-        rho = two.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **case)
+        rho = two.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **case, **grass)
         values.append(rho.values.ravel())
     for axis, band in zip(axes, np.transpose(values), strict=True):
         axis.plot(views, band, style, color="black", label=f"hotspot {hotspot:g}")

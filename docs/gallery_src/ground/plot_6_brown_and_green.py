@@ -19,7 +19,10 @@ lai = wrap_xr(np.full((1, 101), 2.0), grid)
 case = {
     "geometry": fifesim.fife_geometry(),
     "atmosphere": fifesim.Atmosphere(),
-}  # the paper's case
+    "leaf_optics": fifesim.Leaf(),
+    "background": {"soil_dry": 0.475, "shade": 0.525},
+    "brown_leaf": fifesim.Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001),
+}  # the paper's case, and dead tallgrass
 bands = ["TM3", "TM4"]
 
 # %%

@@ -16,7 +16,11 @@ away = {"nadir_offset": 500e3, "heading": 0.0}
 lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.248, seed=7)
 view = fifesim.scan_geometry("AVHRR", grid, **away).assign(sza=40.0, saa=150.0)
 rho = lai.fifesim.surface_reflectance(
-    "AVHRR", geometry=view, atmosphere=fifesim.Atmosphere(visibility=30)
+    "AVHRR",
+    geometry=view,
+    atmosphere=fifesim.Atmosphere(visibility=30),
+    leaf_optics=fifesim.Leaf(),
+    background={"soil_dry": 0.475, "shade": 0.525},
 )
 image = rho.fifesim.to_toa().fifesim.sense_swath("AVHRR", **away)
 ndvi = image.fifesim.ndvi()

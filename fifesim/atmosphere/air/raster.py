@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from fifesim.atmosphere.air import aerosols, components
 from fifesim.atmosphere.air.own_aerosol import Aerosol, phase_of_moments
 from fifesim.base.annotations import FilePath
+from fifesim.base.foreign import read_csv
 
 # What may stand in the place of each name: Eradiate's, libRadtran's and AERONET's.
 _NAMES = {
@@ -172,7 +172,7 @@ def _opened(path):
 
 
 def _read_csv(path):
-    table = pd.read_csv(path, comment="#", skipinitialspace=True)
+    table = read_csv(path, "the aerosol")
     if any(_AERONET.fullmatch(column) for column in table):
         return _of_aeronet(table, path.stem)
     table = table.rename(columns=lambda column: _CANONICAL.get(column.strip().lower(), column.strip()))

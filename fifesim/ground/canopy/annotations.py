@@ -9,8 +9,8 @@ from fifesim.base.annotations import Array, FilePath, NumberOrArray
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background
 
-# Reflectance and transmittance, for all bands or by band, or a leaf by what it is made of.
-LeafOptics: TypeAlias = Leaf | Mapping[str, Sequence[NumberOrArray]] | Sequence[NumberOrArray]
+# A leaf by its contents, a file or Dataset of its spectra, or reflectance and transmittance, by band or for all bands.
+LeafOptics: TypeAlias = Leaf | FilePath | Mapping | Sequence[NumberOrArray]
 LeafAngles: TypeAlias = str | Sequence[float] | np.ndarray
 # A number or raster, by band or spectrum, shares of spectra, or a file or Dataset of a spectrum.
 BelowLeaves: TypeAlias = float | Array | Background | Mapping | FilePath

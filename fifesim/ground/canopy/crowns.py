@@ -8,7 +8,7 @@ from numba.extending import register_jitable
 
 from fifesim.ground.canopy.background import over_background
 from fifesim.ground.canopy.hot_spot import apart
-from fifesim.ground.canopy.optics import LARGEST_LAI
+from fifesim.ground.canopy.leaf_area import LARGEST_LAI
 from fifesim.ground.canopy.ranges import check_share
 
 SHAPE = 1.0

@@ -7,7 +7,7 @@ from numba.extending import register_jitable
 from fifesim.ground.canopy.background import over_background
 from fifesim.ground.canopy.crowns import crowns_over_background
 from fifesim.ground.canopy.foliage_table import LIMIT, TERMS
-from fifesim.ground.canopy.optics import LARGEST_LAI
+from fifesim.ground.canopy.leaf_area import LARGEST_LAI
 
 # Cells whose places in a table are found together: with their terms, in single precision as the table is, they stay in
 # the nearest cache.

@@ -8,7 +8,7 @@ from numba.extending import register_jitable
 from scipy.interpolate import CubicSpline
 
 from fifesim.ground.canopy.background import over_background
-from fifesim.ground.canopy.optics import LARGEST_LAI
+from fifesim.ground.canopy.leaf_area import LARGEST_LAI
 
 LIMIT = LARGEST_LAI
 """Largest leaf area index in a table."""

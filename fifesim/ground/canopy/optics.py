@@ -7,18 +7,11 @@ import numpy as np
 
 from fifesim.base import datasets
 from fifesim.base.bands import Band
+from fifesim.base.kinds import is_path
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
 from fifesim.ground.canopy.ranges import check_fraction, within
-from fifesim.ground.canopy.spectra import Background, Spectrum, background_means, band_means, did_you_mean, is_mixture
-
-LARGEST_LAI = 100.0
-"""Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
-
-LARGEST_OF_MAPS = 20.0
-"""Of measured canopies, and a little more: a map beyond is in another scale [m2 m-2]."""
-
-# Hardly a cell of a map has more. [m2 m-2]
-_COMMON = 10.0
+from fifesim.ground.canopy.spectra import Background, background_means, band_means, did_you_mean, is_mixture
+from fifesim.ground.canopy.spectrum import LeafSpectrum, Spectrum, read_spectrum
 
 DEAD_LEAF = Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001)
 """Dead tallgrass: the default leaf without green pigments and with little water; see ``data/README.md``."""
@@ -35,9 +28,10 @@ def leaf_optics(bands, given=None):
     ----------
     bands : sequence of str or fifesim.base.bands.Band
         Names, such as ``["TM3", "TM4"]``, or responses, which spectra need.
-    given : Leaf, mapping, or pair of arrays, optional
-        What a leaf is made of; ``{band: (reflectance, transmittance)}``; or both as arrays of shape (band,). The
-        default is the green tallgrass of ``data/leaf_optics.csv``, for bands that are not in it that of ``Leaf()``.
+    given : Leaf, LeafSpectrum, str, path, mapping, or pair of arrays, optional
+        The contents of a leaf; its spectra, or the path of their CSV file; ``{band: (reflectance, transmittance)}``;
+        or both as arrays of shape (band,). The default is the green tallgrass of ``data/leaf_optics.csv``, and
+        ``Leaf()`` for bands that are not in it.
 
     Returns
     -------
@@ -47,7 +41,7 @@ def leaf_optics(bands, given=None):
     Raises
     ------
     ValueError
-        If a band has no optics, or they are outside their range.
+        If a band has no optics, they are outside their range, or the file holds no leaf spectra.
 
     Examples
     --------
@@ -60,6 +54,10 @@ def leaf_optics(bands, given=None):
     if given is None:
         given = _default_leaves()
         given = given | _leaf_means(_lacking(given, bands), Leaf())
+    elif is_path(given):
+        given = read_spectrum(_csv(given), LeafSpectrum)
+    if isinstance(given, LeafSpectrum):
+        given = band_means(_responses(bands, "LeafSpectrum"), given.wavelength, given.values())
     elif isinstance(given, Leaf):
         given = _leaf_means(_responses(bands, "Leaf"), given)
     if isinstance(given, Mapping):
@@ -97,8 +95,8 @@ def background(bands, given=None):
     >>> background(["TM3", "TM4"], 0.2).tolist()
     [0.2, 0.2]
     """
-    if isinstance(given, str):
-        given = Background({given: 1.0})
+    if is_path(given):
+        given = Background({str(given): 1.0})
     elif is_mixture(given) and not set(given) <= set(_names(bands)):
         given = Background(given)
     if given is None:
@@ -111,6 +109,15 @@ def background(bands, given=None):
     reflectance = _for_bands(given, bands, "background")
     check_background(reflectance)
     return reflectance
+
+
+def _csv(path):
+    if not str(path).lower().endswith(".csv"):
+        raise ValueError(
+            f"leaf_optics={str(path)!r} is not the path of a .csv file: give one with the columns wavelength [um], "
+            "reflectance and transmittance [1], or a fifesim.Leaf"
+        )
+    return path
 
 
 @lru_cache(maxsize=1)
@@ -249,92 +256,3 @@ def check_background(reflectance):
     values = np.asarray(reflectance, float)
     if not within(values, 0.0, 1.0):
         check_fraction("background reflectance", values[~np.isnan(values)])
-
-
-def check_lai(lai):
-    """
-    Refuse a leaf area index that is negative or above 100; NaN passes.
-
-    Parameters
-    ----------
-    lai : array
-        [m2 m-2]
-
-    Returns
-    -------
-    lai : array
-        What was given.
-
-    Raises
-    ------
-    ValueError
-        If one is negative or above 100, which no canopy has: it is a fill value, or needs a scale.
-
-    Examples
-    --------
-    >>> check_lai(2.5)
-    2.5
-    """
-    cells = np.asarray(lai, float)
-    if not within(cells, 0.0, LARGEST_LAI):
-        wrong = (cells < 0) | (cells > LARGEST_LAI)
-        scale = _of_another_scale(cells) if np.nanmax(cells) > LARGEST_LAI else ""
-        raise ValueError(
-            f"leaf area index must not be negative nor above {LARGEST_LAI:g}, got {cells[wrong].flat[0]:g} in "
-            f"{wrong.sum()} of {cells.size} cells: {scale}set cells without data to NaN, such as "
-            "lai.where(lai >= 0)"
-        )
-    return lai
-
-
-def check_map(lai):
-    """
-    Refuse a map of leaf area index whose numbers look like those of another scale; NaN passes.
-
-    Parameters
-    ----------
-    lai : array
-        [m2 m-2]
-
-    Returns
-    -------
-    lai : array
-        What was given.
-
-    Raises
-    ------
-    ValueError
-        As `check_lai`, or if one is above 20.
-
-    Notes
-    -----
-    The largest of some 1000 measured values is 18, once outliers are removed.
-
-    References
-    ----------
-    Asner, G.P., Scurlock, J.M.O., Hicke, J.A. (2003), Global synthesis of leaf area index observations. Global Ecology
-    and Biogeography 12, 191-205
-
-    Examples
-    --------
-    >>> check_map(2.5)
-    2.5
-    """
-    cells = np.asarray(lai, float)
-    if not within(cells, 0.0, LARGEST_OF_MAPS):
-        check_lai(lai)
-        raise ValueError(
-            f"leaf area index up to {np.nanmax(cells):g}, canopies have at most {LARGEST_OF_MAPS:g}: "
-            f"{_of_another_scale(cells)}set cells without data to NaN"
-        )
-    return lai
-
-
-def _of_another_scale(cells):
-    """What to type where numbers are scaled: by the power of ten that brings nearly all of them below 10."""
-    positive = cells[(cells > 0) & np.isfinite(cells)]
-    most = np.quantile(positive, 0.98) if positive.size else 0.0
-    if most <= _COMMON:
-        return ""
-    scale = f"{10.0 ** -np.ceil(np.log10(most / _COMMON)):g}"
-    return f"where the numbers are scaled, type lai * {scale}, or gdal_edit.py -a_scale {scale} for a file; "

@@ -8,7 +8,7 @@ import xarray as xr
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.optics import check_map
+from fifesim.ground.canopy.leaf_area import check_map, warn_of_large
 from fifesim.ground.canopy.rasters import canopy_shares
 from fifesim.ground.canopy.rasters.evaluation import canopy_kernel, even_canopy
 from fifesim.rasters import cf, directions
@@ -253,15 +253,29 @@ def checked_scene(lai):
     Raises
     ------
     ValueError
-        If it is another quantity, has other dimensions or no grid; of what is in memory, if it has no data.
+        If it is another quantity, also by its name or long_name, has other dimensions or no grid; in memory, if it has
+        no data.
+
+    Warns
+    -----
+    UserWarning
+        If the mean of a raster in memory that fifesim did not make exceeds 8.
     """
     cf.check_quantity(lai, "lai")
     if set(lai.dims) != {"y", "x"}:
         raise ValueError(f"leaf area index has dimensions (y, x), got {lai.dims}: select one layer with .isel or .sel")
     grids.geobox(lai)
+    said = [each for each in (lai.name, lai.attrs.get("long_name")) if isinstance(each, str)]
+    cf.check_words(str(lai.name or "the raster"), said, "lai")
     lai = unpacked(lai)
-    if lai.chunks is None and lai.size and not np.isfinite(lai.values).any():
-        raise ValueError("all cells of the leaf area index are NaN: look at the nodata value and the place of its map")
+    if lai.chunks is None and lai.size:
+        if not np.isfinite(lai.values).any():
+            raise ValueError(
+                "all cells of the leaf area index are NaN: look at the nodata value and the place of its map"
+            )
+        # Scenes and maps of fifesim carry their distribution, and were looked at when they were made.
+        if "lai_distribution" not in lai.attrs:
+            warn_of_large(lai.values)
     return lai
 
 

@@ -9,7 +9,8 @@ from fifesim.ground.canopy.background import reflectance_factor, with_background
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, clumped, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.layers import two_layers
 from fifesim.ground.canopy.leaf_angles import LeafAngles
-from fifesim.ground.canopy.optics import check_background, check_lai
+from fifesim.ground.canopy.leaf_area import check_lai
+from fifesim.ground.canopy.optics import check_background
 from fifesim.ground.canopy.ranges import check_share
 from fifesim.ground.canopy.sail_model import sail
 

@@ -4,62 +4,23 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from fifesim.base import datasets
 from fifesim.base.annotations import NumberOrArray
 from fifesim.base.bands import solar_spectrum
 from fifesim.base.kinds import described
+from fifesim.ground.canopy.spectrum import Spectrum, read_spectrum
 
 SHADE = "shade"
 """Part of a mixture that reflects nothing."""
 
 # Decimal fractions may miss 1 by rounding.
 _WHOLE = 1e-6
-
-
-@dataclass(frozen=True)
-class Spectrum:
-    """
-    A reflectance spectrum.
-
-    Parameters
-    ----------
-    wavelength : sequence of float, shape (n,)
-        Increasing. [um]
-    reflectance : sequence of float, shape (n,)
-        [1]
-
-    Raises
-    ------
-    ValueError
-        If the wavelengths do not increase or are not in micrometres, or a reflectance is outside 0 to 1.
-    """
-
-    wavelength: tuple = field(repr=False)
-    reflectance: tuple = field(repr=False)
-
-    def __post_init__(self):
-        wavelength, reflectance = (np.asarray(each, float) for each in (self.wavelength, self.reflectance))
-        if wavelength.ndim != 1 or wavelength.shape != reflectance.shape or wavelength.size < 2:
-            raise ValueError("a spectrum needs two wavelengths or more, and one reflectance for each")
-        if not np.all(np.diff(wavelength) > 0):
-            raise ValueError("the wavelengths of a spectrum must increase, and none be missing: sort them")
-        if wavelength[-1] > 100:
-            raise ValueError(f"wavelengths are in um, got {wavelength[-1]:g}: divide nanometres by 1000")
-        wrong = ~((reflectance >= 0) & (reflectance <= 1))
-        if wrong.any():
-            raise ValueError(
-                f"the reflectance of a spectrum must be in [0, 1], got {reflectance[wrong][0]:g} at "
-                f"{wavelength[wrong][0]:g} um: give a fraction, not percent"
-            )
-        object.__setattr__(self, "wavelength", tuple(wavelength.tolist()))
-        object.__setattr__(self, "reflectance", tuple(reflectance.tolist()))
 
 
 @dataclass(frozen=True)
@@ -304,22 +265,7 @@ def _is_file(name):
 
 
 def _spectrum(name):
-    if not _is_file(name):
-        return _known_spectrum(name)
-    try:
-        table = pd.read_csv(name, comment="#", skipinitialspace=True)
-    except OSError as error:
-        raise ValueError(f"cannot read the spectrum {name}: {error.strerror}") from None
-    missing = {"wavelength", "reflectance"} - set(table.columns)
-    if missing:
-        raise ValueError(
-            f"{name} has no column {' nor '.join(sorted(missing))}: its first line must name wavelength [um] and "
-            f"reflectance [1], it has {', '.join(map(str, table.columns))}"
-        )
-    try:
-        return Spectrum(table["wavelength"], table["reflectance"])
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+    return read_spectrum(name) if _is_file(name) else _known_spectrum(name)
 
 
 @lru_cache(maxsize=16)

@@ -8,7 +8,8 @@ import numpy as np
 from scipy import stats
 
 from fifesim.ground.canopy.prospect import Leaf
-from fifesim.ground.canopy.spectra import Background, Spectrum
+from fifesim.ground.canopy.spectra import Background
+from fifesim.ground.canopy.spectrum import Spectrum
 from fifesim.ground.landscape.classes import CoverClass
 
 _KINDS = {kind.__name__: kind for kind in (Leaf, Background, Spectrum)}

@@ -12,7 +12,7 @@ from fifesim.base.annotations import Distribution, FilePath
 from fifesim.base.kinds import LEAF, described
 from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.optics import check_map
+from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp

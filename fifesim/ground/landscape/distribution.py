@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from difflib import get_close_matches
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -12,6 +13,8 @@ from scipy import optimize, stats
 
 from fifesim.base import datasets
 from fifesim.base.annotations import Distribution, FilePath
+from fifesim.base.foreign import in_a_line, read_csv
+from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS
 
 # A support that starts at zero may start this far below it.
 _ROUNDING = 1e-12
@@ -46,8 +49,8 @@ def lai_distribution(source: FilePath | Distribution) -> Distribution:
     Parameters
     ----------
     source : str, path or frozen scipy distribution
-        A treatment of `treatments`, a CSV file whose column ``lai`` (or whose only column) holds samples, or any frozen
-        continuous distribution of `scipy.stats` without negative values.
+        A treatment of `treatments`, a CSV file whose column ``lai`` (or whose only column) holds samples from 0 to 20,
+        or any frozen continuous distribution of `scipy.stats` without negative values.
 
     Returns
     -------
@@ -102,7 +105,8 @@ def read_samples(path):
     Parameters
     ----------
     path : str or path
-        A table with a column ``lai``, or with one column of any name; ``#`` starts a comment.
+        A table with one column ``lai``, or with a single column of any name. ``#`` starts a comment, and empty cells
+        are skipped.
 
     Returns
     -------
@@ -112,20 +116,49 @@ def read_samples(path):
     Raises
     ------
     ValueError
-        If the file is missing, has no such column, or holds fewer than five samples or negative ones.
+        If the file cannot be read, if it is unclear which column holds LAI, if a cell is not a number from 0 to 20, or
+        if there are fewer than five samples. The message names the line and the value.
     """
-    if not Path(path).is_file():
-        raise ValueError(f"no file of LAI samples at {str(path)!r}")
-    table = pd.read_csv(path, comment="#")
-    column = "lai" if "lai" in table.columns else table.columns[0]
-    if column != "lai" and len(table.columns) > 1:
-        raise ValueError(f"{path} needs a column 'lai', it has {', '.join(map(str, table.columns))}")
-    samples = pd.to_numeric(table[column], errors="coerce").dropna().to_numpy(float)
+    table = read_csv(path, "the LAI samples")
+    cells = table.iloc[:, _lai_column(table.columns, path)]
+    samples = pd.to_numeric(cells, errors="coerce")
+    # A comparison with NaN is false, so that text counts as wrong; empty cells were NaN before.
+    wrong = cells.notna() & ~((samples >= 0) & (samples <= LARGEST_OF_MAPS))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ValueError(
+            f"{path}, line {_line_of(path, row)}: {in_a_line(str(cells.iloc[row]), 60)!r} is not a leaf area index, "
+            f"which is a number from 0 to {LARGEST_OF_MAPS:g} m2 m-2: multiply scaled values by their scale, write "
+            "decimals with a point, and leave the cell empty if the sample is missing"
+        )
+    samples = samples.dropna().to_numpy(float)
     if samples.size < 5:
         raise ValueError(f"{path} holds {samples.size} LAI samples, at least 5 are needed for a density")
-    if samples.min() < 0:
-        raise ValueError(f"{path} holds a negative LAI, {samples.min():g}: leaf area index is at least 0")
     return samples
+
+
+def _lai_column(names, path):
+    """Position of the column that holds LAI."""
+    # pandas numbers columns of the same name: lai, lai.1
+    plain = [re.sub(r"\.\d+$", "", str(name)).strip().lower() for name in names]
+    found = [position for position, name in enumerate(plain) if name == "lai"] or list(range(len(plain)))
+    if len(found) > 1:
+        raise ValueError(
+            f"{path} needs a column 'lai', it has {', '.join(map(str, names))}: name the column of LAI samples lai, "
+            "and no other column"
+        )
+    try:
+        float(names[found[0]])
+    except ValueError:
+        return found[0]
+    raise ValueError(f"{path} begins with the number {names[found[0]]}: type lai as its first line")
+
+
+def _line_of(path, row):
+    """Line in a CSV file of a row of its table, counted from 1."""
+    with open(path, encoding="utf-8") as file:
+        lines = [number for number, line in enumerate(file, 1) if line.partition("#")[0].strip()]
+    return lines[row + 1]
 
 
 def kernel_density(samples):

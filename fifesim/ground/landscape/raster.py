@@ -13,7 +13,8 @@ from odc.geo.geobox import GeoBox
 from fifesim.base.annotations import Chunks, Distribution, FilePath
 from fifesim.base.foreign import in_a_line
 from fifesim.base.seeds import check_seed
-from fifesim.ground.canopy.optics import check_map
+from fifesim.base.warned import warn
+from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_large
 from fifesim.ground.landscape.autoregression import check_arp
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
@@ -21,8 +22,10 @@ from fifesim.ground.landscape.quantiles import quantile_map, quantile_table, ran
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-from fifesim.rasters.packed import unpacked
+from fifesim.rasters.opening import raster_file
+from fifesim.rasters.packed import scale_and_offset, unpacked
 from fifesim.rasters.sites import made_on_site
+from fifesim.rasters.soundness import sound_raster
 from fifesim.rasters.warp import file_onto_grid, raster_onto_grid
 
 FIELD_METHODS = ("streaming", "periodic")
@@ -131,7 +134,13 @@ def open_lai(
     ValueError
         If the file is missing or not of a format that is opened, has no CRS, does not overlap the grid, or needs a
         change of datum whose accuracy is unknown; if it has no data on the grid, known at once where the result is in
-        memory; and, when computed, if LAI is negative or above what canopies have, where it lacks its scale.
+        memory; if its name, description or units are those of another quantity; and, when computed, if LAI on the grid
+        or next to it is negative or above 20.
+
+    Warns
+    -----
+    UserWarning
+        If the map holds integers without a scale; when computed, if the mean LAI of a chunk exceeds 8.
 
     Examples
     --------
@@ -174,12 +183,45 @@ def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
     """
     if isinstance(path_or_raster, xr.DataArray):
         name = in_a_line(str(path_or_raster.name or "raster"), 150)
-        found = raster_onto_grid(one_layer(unpacked(path_or_raster)), grid, chunks)
+        _check_array(path_or_raster)
+        found = raster_onto_grid(one_layer(unpacked(path_or_raster)), grid, chunks, check=check_source)
     else:
         name = in_a_line(Path(path_or_raster).name, 150)
-        found = file_onto_grid(path_or_raster, grid, chunks, allow_remote)
-    lai = chunking.pointwise(check_map, found)
+        _check_band(path_or_raster, name, allow_remote)
+        found = file_onto_grid(path_or_raster, grid, chunks, allow_remote, check=check_source)
+    lai = chunking.pointwise(_plausible, found)
     return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
+
+
+def _check_array(raster):
+    """Raise ValueError if an array is named as another quantity, and warn if it holds integers without a scale."""
+    name, whole = str(raster.name or "the raster"), raster.dtype.kind in "iu"
+    said = [raster.name, *(raster.attrs.get(key) for key in ("long_name", "standard_name"))]
+    _check_metadata(name, said, raster.attrs.get("units"), whole and scale_and_offset(raster) == (1.0, 0.0))
+
+
+def _check_band(path, name, allow_remote):
+    """The same for the first band of a file."""
+    with sound_raster(raster_file(path, allow_remote)) as (source, _):
+        tags = source.tags(1)
+        said = [source.descriptions[0], *(tags.get(key) for key in ("NETCDF_VARNAME", "long_name", "standard_name"))]
+        scaled = (source.scales[0], source.offsets[0]) != (1.0, 0.0)
+        counts = np.dtype(source.dtypes[0]).kind in "iu" and not scaled
+        _check_metadata(name, said, source.units[0], counts)
+
+
+def _check_metadata(name, said, units, counts):
+    cf.check_words(name, [each for each in said if isinstance(each, str)], "lai", str(units or ""))
+    if counts:
+        warn(
+            f"{name} holds integers without a scale, which are taken as leaf area index: if they are counts, set their "
+            "scale (.assign_attrs(scale_factor=0.1), or gdal_edit.py -a_scale 0.1 for a file), else convert them with "
+            ".astype(float)"
+        )
+
+
+def _plausible(lai):
+    return warn_of_large(check_map(lai))
 
 
 def one_layer(raster):

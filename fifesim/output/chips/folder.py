@@ -27,6 +27,7 @@ from fifesim.output.run.identity import STATE, begin, inputs_of
 from fifesim.output.run.saved import has_blocks, save_block, saved_block
 from fifesim.rasters.clients import found_client
 from fifesim.scenario.chips import chips_of
+from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.studies import Study, read_study
 
 _FILES = DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.toml"
@@ -191,6 +192,7 @@ def study_to_resume(folder):
 def _look_at(chips):
     """Scenarios of some chips, so that one that cannot be is found before a day of work."""
     last = len(chips) - 1
+    warn_of_canopy(chips.scenario(0))
     for chip in (*range(min(last, _LOOKED_AT)), last):
         scenario = chips.scenario(chip)
         if chip < _CLOSELY:

@@ -29,6 +29,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
 from fifesim.rasters.files import to_geotiff
 from fifesim.rasters.reductions import computed
+from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.simulation import simulate
 from fifesim.scenario.sweeps import VARIABLES
 from fifesim.scenario.toml import write_scenario
@@ -101,6 +102,7 @@ def simulate_to_folder(
     """
     folder = Path(folder)
     check_folder(folder, overwrite, resume)
+    warn_of_canopy(scenario)
     complete = scenario.complete()
     check_size(complete, folder)
     identity, names = identity_of(complete, scene), FILES + (SCENE,) * scene

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy.optics import background, check_background, check_lai, check_leaf_optics, leaf_optics
+from fifesim.ground.canopy.leaf_area import check_lai
+from fifesim.ground.canopy.optics import background, check_background, check_leaf_optics, leaf_optics
 
 TM = ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
 

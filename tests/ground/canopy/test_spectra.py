@@ -145,5 +145,5 @@ def test_spectra_need_responses():
 
 
 def test_dataset_without_reflectance_is_refused(lai):
-    with pytest.raises(ValueError, match="background's Dataset has no reflectance"):
+    with pytest.raises(ValueError, match="background: the Dataset has no reflectance"):
         fifesim.surface_reflectance(lai, "TM", background=xr.Dataset(coords={"wavelength": [0.4, 2.5]}))

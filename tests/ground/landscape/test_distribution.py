@@ -79,12 +79,19 @@ def write(path, table):
     return path
 
 
+def test_samples_of_the_densest_canopies_are_taken(tmp_path):
+    samples = np.linspace(0, 20, 30)
+    path = write(tmp_path / "dense.csv", "LAI\n" + "\n".join(map(str, samples)))
+    assert lai_distribution(path).mean() == pytest.approx(kernel_density(samples).mean(), rel=1e-9)
+
+
 def test_samples_come_from_a_csv(tmp_path):
     samples = pd.DataFrame({"plot": range(60), "lai": SAMPLES})
     several, one = tmp_path / "several.csv", tmp_path / "one.CSV"
     samples.to_csv(several, index=False)
     samples[["lai"]].rename(columns={"lai": "anything"}).to_csv(one, index=False)
-    for path in (several, str(several), one):
+    gaps = write(tmp_path / "gaps.csv", several.read_text() + "60,\n61,NA\n")
+    for path in (several, str(several), one, gaps):
         assert lai_distribution(path).pdf(0.7) == pytest.approx(kernel_density(SAMPLES).pdf(0.7), rel=1e-9)
 
 
@@ -93,7 +100,15 @@ def test_samples_come_from_a_csv(tmp_path):
     [
         ("a,b\n1,2\n", "needs a column 'lai', it has a, b"),
         ("lai\n1\n2\n3\n", "holds 3 LAI samples, at least 5"),
-        ("lai\n1\n2\n3\n4\n-0.5\n", r"negative LAI, -0\.5"),
+        ("lai\n1\n2\n3\n4\n-0.5\n", r"samples\.csv, line 6: '-0\.5' is not a leaf area index"),
+        ("lai\n1\n2\n3\n4\n20.5\n", r"line 6: '20\.5' is not.*from 0 to 20 .*multiply scaled values"),
+        ("# mine\n\nlai\n1\n2 # wet\n3\n#\n4\n1e308\n", r"line 9: '1e\+308' is not"),
+        ("plot,lai\na,1\nb,2\nc,3\nd,4\ne,x\n", "line 6: 'x' is not a leaf area index"),
+        ("lai\n1\n2\n3\n4\n1.5 m2\n", "line 6: '1.5 m2' is not"),
+        ('lai\n1\n2\n3\n4\n"1,5"\n', "line 6: '1,5' is not.*decimals with a point"),
+        ("lai\n1,5\n2,5\n3,5\n4,5\n5,5\n", "rows have more values than.*decimals with a point"),
+        ("lai,lai\n1,2\n2,3\n", "needs a column 'lai', it has lai, lai.1: name the column"),
+        ("1.0\n2\n3\n4\n5\n6\n", "begins with the number 1.0: type lai as its first line"),
     ],
 )
 def test_unusable_samples_are_refused(tmp_path, table, message):
@@ -105,7 +120,7 @@ def test_unusable_samples_are_refused(tmp_path, table, message):
     "source, error, message",
     [
         ("burnt-grazed", ValueError, "did you mean 'burned-grazed'.*or a .csv of samples"),
-        ("missing.csv", ValueError, r"no file of LAI samples at 'missing\.csv'"),
+        ("missing.csv", ValueError, r"cannot read the LAI samples missing\.csv: there is no such file"),
         (stats.norm(1.0, 0.5), ValueError, "cannot be negative.*truncnorm"),
         (3.0, TypeError, "a name, a CSV file or a frozen scipy distribution"),
     ],

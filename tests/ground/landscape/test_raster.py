@@ -1,7 +1,10 @@
 """Leaf area of the ground scene on labelled rasters: labels, laziness, and the kernel's numbers."""
 
+import warnings
+
 import numpy as np
 import pytest
+import rasterio
 import rioxarray
 import xarray as xr
 from elevations import write
@@ -105,3 +108,84 @@ def test_map_that_is_open_is_taken_as_its_file(tmp_path, site):
     assert np.isnan(lai[0, 0]) and np.allclose(lai[1:], 3.5, rtol=1e-15, atol=0)
     with pytest.raises(ValueError, match="select one layer"):
         fifesim.open_lai(xr.concat([opened, opened], "band"), site)
+
+
+MAP = fifesim.fife_site(10, window=((0, 60), (0, 60)))
+WEST = fifesim.fife_site(5, window=((0, 120), (0, 60)))
+
+
+def own_map(values=2.0, **attrs):
+    cells = np.broadcast_to(np.asarray(values), MAP.shape).copy()
+    return grids.place(xr.DataArray(cells, dims=("y", "x"), attrs=attrs), MAP)
+
+
+@pytest.mark.parametrize("fill", [-1.0, -9999.0, 255.0, 32767.0])
+@pytest.mark.parametrize("form", ["file", "array", "lazy"])
+def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, form):
+    """Interpolated with 2, -1 in the first column outside would give 1.25 at the edge of the grid."""
+    values = np.full(MAP.shape, 2.0)
+    values[20:25, 30:] = fill
+    path = write(tmp_path / "map.tif", values, MAP.affine, nodata=None)
+    given = path if form == "file" else own_map(values)
+    chunks = 25 if form == "lazy" else None
+    with pytest.raises(ValueError, match=rf"on the grid or next to it: .*got {fill:g} |up to {fill:g}, .*-a_nodata"):
+        fifesim.open_lai(given, WEST, chunks=chunks).compute()
+    declared = own_map(values).rio.write_nodata(fill)
+    assert float(abs(fifesim.open_lai(declared, WEST, chunks=chunks) - 2.0).max()) == 0
+    values[20:25, 30:40] = 2.0
+    assert float(abs(fifesim.open_lai(own_map(values), WEST, chunks=chunks) - 2.0).max()) == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "attrs", "message"),
+    [
+        ("ndvi", {}, "ndvi is named 'ndvi', where leaf area index is needed"),
+        ("NDVI_2020", {}, "named 'NDVI_2020'"),
+        (None, {"long_name": "MOD15A2H Fpar_500m"}, "named 'MOD15A2H Fpar_500m'"),
+        ("b1", {"standard_name": "surface_altitude"}, "named 'surface_altitude'"),
+        ("b1", {"long_name": "Surface reflectance band 4"}, "named 'Surface reflectance band 4'"),
+        ("FparLai_QC", {"long_name": "quality flags of LAI"}, "named 'FparLai_QC'|named 'quality flags of LAI'"),
+        ("b1", {"units": "%"}, "has units '%', where leaf area index is needed, in '1'"),
+    ],
+)
+def test_a_map_that_is_named_as_another_quantity_is_refused(tmp_path, name, attrs, message):
+    given = own_map(**attrs).rename(name)
+    with pytest.raises(ValueError, match=message):
+        fifesim.open_lai(given, WEST)
+    if "units" not in attrs and "standard_name" not in attrs:
+        with pytest.raises(ValueError, match=message):
+            given.fifesim.fpar(geometry=fifesim.Geometry(30, 120))
+        path = write(tmp_path / "map.tif", given.values, MAP.affine)
+        with rasterio.open(path, "r+") as file:
+            file.set_band_description(1, attrs.get("long_name", name))
+        with pytest.raises(ValueError, match=r"map\.tif is named"):
+            fifesim.open_lai(path, WEST)
+
+
+@pytest.mark.parametrize("name", ["lai", "Lai_500m", "Leaf area index", "b1", "MOD15A2H Fpar and Lai", None])
+def test_a_map_that_is_named_as_leaf_area_or_not_at_all_is_taken(name):
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        fifesim.open_lai(own_map(long_name=str(name), units="m2 m-2").rename(name), WEST)
+
+
+def test_integers_without_a_scale_are_a_warning(tmp_path):
+    counts = own_map(np.full(MAP.shape, 4, np.int16))
+    path = tmp_path / "counts.tif"
+    counts.rio.to_raster(path)
+    for given, name in ((counts, "the raster"), (path, "counts.tif")):
+        with pytest.warns(UserWarning, match=f"{name} holds integers without a scale.*scale_factor=0.1.*-a_scale 0.1"):
+            fifesim.open_lai(given, WEST)
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        assert float(fifesim.open_lai(counts.assign_attrs(scale_factor=0.5), WEST).mean()) == 2
+
+
+def test_leaf_area_in_tenths_is_a_warning_also_when_it_is_lazy():
+    tenths = own_map(np.linspace(0, 18, 3600).reshape(MAP.shape))
+    known = {"geometry": fifesim.Geometry(30, 120)}
+    lazy = fifesim.open_lai(tenths, MAP, chunks=60)
+    for function in (lambda: fifesim.open_lai(tenths, MAP), lazy.compute, lambda: tenths.fifesim.fpar(**known)):
+        with pytest.warns(UserWarning, match=r"mean leaf area index is 9, dense.*such as lai \* 0\.1"):
+            function()
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        fifesim.open_lai(tenths * 0.1, MAP)
+        (tenths * 0.1).fifesim.fpar(**known)

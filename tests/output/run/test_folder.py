@@ -215,3 +215,12 @@ def test_a_chunk_that_changed_is_made_again(tmp_path, monkeypatch):
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True, resume=True)
     found, whole = (xr.open_zarr(tmp_path / name / "scene.zarr")["lai"].values for name in ("out", "whole"))
     np.testing.assert_array_equal(found, whole)
+
+
+def test_a_run_on_a_map_says_that_tallgrass_is_taken(tmp_path):
+    values = np.linspace(0.5, 3, 600).reshape(20, 30)
+    scenario = parse_scenario({**SMALL, **lai_map(tmp_path / "lai.tif", values)})
+    with pytest.warns(
+        UserWarning, match="grows on lai.tif: FIFE's tallgrass is taken for soil and litter, green leaves"
+    ):
+        simulate_to_folder(scenario, tmp_path / "run")

@@ -9,7 +9,7 @@ import xarray as xr
 from fifesim.base.geometry import relative_azimuth
 from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.optics import check_map
+from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.rasters import canopy_shares
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
 from fifesim.rasters import cf, directions

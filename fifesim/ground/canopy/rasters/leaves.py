@@ -9,6 +9,8 @@ import xarray as xr
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.leaf_table import leaf_means
 from fifesim.ground.canopy.prospect import Leaf
+from fifesim.ground.canopy.rasters.soils import spectrum_of
+from fifesim.ground.canopy.spectrum import LeafSpectrum
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.layers import by_band, layers_of
@@ -22,8 +24,9 @@ def leaf_optics(bands, given, lai, *, exact=False):
     ----------
     bands : sequence of fifesim.base.bands.Band
     given
-        As `ground.canopy.optics.leaf_optics` takes it. In the place of a number there may be a raster over (y, x): in a
-        `Leaf`, and in ``{band: (reflectance, transmittance)}``; or a pair of rasters over ([band], y, x).
+        As `ground.canopy.optics.leaf_optics` takes it, or a Dataset with ``wavelength`` [um], ``reflectance`` and
+        ``transmittance`` [1]. In the place of a number there may be a raster over (y, x): in a `Leaf`, and in ``{band:
+        (reflectance, transmittance)}``; or a pair of rasters over ([band], y, x).
     lai : xarray.DataArray, dims (y, x)
         Whose CRS the rasters have where they lost theirs.
     exact : bool, optional
@@ -43,6 +46,8 @@ def leaf_optics(bands, given, lai, *, exact=False):
     --------
     fifesim.ground.canopy.optics.leaf_optics, fifesim.ground.canopy.leaf_table.leaf_means
     """
+    if isinstance(given, xr.Dataset):
+        given = spectrum_of(given, "leaf_optics", LeafSpectrum)
     names = [band.name for band in bands]
     if isinstance(given, Leaf) and given.varying():
         return _of_contents(bands, given, lai, exact)

@@ -8,11 +8,13 @@ import xarray as xr
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.soil import brightened, soil_line
 from fifesim.ground.canopy.soil_water import moistened, water_films
-from fifesim.ground.canopy.spectra import Spectrum, check_shares, is_mixture
+from fifesim.ground.canopy.spectra import check_shares, is_mixture
+from fifesim.ground.canopy.spectrum import Spectrum
 from fifesim.rasters import cf
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters.crs import with_crs_of
 from fifesim.rasters.layers import by_band, layers_of
+from fifesim.rasters.own_rasters import micrometres
 
 
 def background(bands, given, lai):
@@ -46,16 +48,48 @@ def background(bands, given, lai):
     if isinstance(given, xr.DataArray):
         return given.rename("background")
     if isinstance(given, xr.Dataset):
-        missing = {"wavelength", "reflectance"} - set(given.variables)
-        if missing:
-            raise ValueError(f"the background's Dataset has no {' nor '.join(sorted(missing))}: it is to have both")
-        given = Spectrum(given["wavelength"].values, given["reflectance"].values)
+        given = spectrum_of(given, "background")
     if isinstance(given, Mapping) and any(isinstance(value, xr.DataArray) for value in given.values()):
         names = [band.name for band in bands]
         if is_mixture(given) and not set(given) <= set(names):
             return _mixed(bands, given, lai)
         return by_band({name: optics.of_band(given, name, "background") for name in names}, lai)
     return optics.background(bands, given)
+
+
+def spectrum_of(dataset, what, kind=Spectrum):
+    """
+    Spectrum of a Dataset.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With ``wavelength`` in um or in the unit of its attribute ``units``, ``reflectance`` and, for a leaf,
+        ``transmittance`` [1].
+    what : str
+        Name of the argument, for messages.
+    kind : type, optional
+        `Spectrum` or `LeafSpectrum`.
+
+    Returns
+    -------
+    spectrum : Spectrum
+
+    Raises
+    ------
+    ValueError
+        If a variable is missing, or the values are no such spectrum.
+    """
+    missing = [name for name in ("wavelength", *kind.names()) if name not in dataset.variables]
+    if missing:
+        raise ValueError(
+            f"{what}: the Dataset has no {' nor '.join(missing)}; a spectrum has wavelength [um] and "
+            f"{' and '.join(kind.names())} [1], rename them with .rename"
+        )
+    try:
+        return kind(micrometres(dataset["wavelength"]), *(dataset[name].values for name in kind.names()))
+    except ValueError as error:
+        raise ValueError(f"{what}: {error}") from None
 
 
 def as_it_lies(bands, below, lai, soil=None, moisture=None):

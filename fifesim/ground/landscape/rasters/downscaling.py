@@ -14,7 +14,7 @@ from odc.geo.geobox import GeoBox
 from fifesim.base.annotations import Chunks, Distribution, FilePath
 from fifesim.base.lattice import assemble
 from fifesim.base.seeds import check_seed
-from fifesim.ground.canopy.optics import check_map
+from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
 from fifesim.ground.landscape.block_kriging import by_pixel
 from fifesim.ground.landscape.dispersion import deviation_table, kept_variance, level_deviations

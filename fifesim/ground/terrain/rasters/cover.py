@@ -4,8 +4,8 @@ import numpy as np
 from scipy import ndimage
 
 from fifesim.base.warned import warn
+from fifesim.ground.terrain.gaps import block_means
 from fifesim.ground.terrain.rasters.model import looked_up
-from fifesim.ground.terrain.rasters.source import check_heights
 from fifesim.ground.terrain.units import terrace_step
 from fifesim.rasters import grid as grids
 from fifesim.rasters import projection
@@ -17,6 +17,9 @@ _STRIP = 256
 
 # Of what is looked at cell by cell, so many rows and columns at a time.
 _PART = 512
+
+# Relief with a larger mean slope, of cells of about this size, is rare. [degree], [m]
+_STEEP, _SLOPE_SCALE = 20.0, 30.0
 
 # A model that ends this far inside the grid is better exchanged than carried on. [m]
 _NEAR = 150
@@ -40,11 +43,10 @@ def known_elevation(model, make_tile, first_row, first_column, shape):
     Raises
     ------
     ValueError
-        If some is unknown, or no height that land has.
+        If some is unknown, or the model holds a height that land does not have.
     """
     values = model.elevation(make_tile, first_row, first_column, shape)
     unknown = ~np.isfinite(values)
-    check_heights(model.source.name, values)
     if unknown.any():
         grid = model.place.grid[first_row : first_row + shape[0], first_column : first_column + shape[1]]
         _raise_for_gaps(model, grid, unknown, np.arange(shape[0]), np.arange(shape[1]))
@@ -194,14 +196,21 @@ def _holes(grid, unknown, rows, columns, height, width):
     yield f"it has {number} of {tall:.0f} x {wide:.0f} m at {east:.0f} E {north:.0f} N: fill={fill} interpolates it"
 
 
-def warn_of_terraces(model, grid):
+def warn_of_relief(model, grid, unit_is_given):
     """
-    Warn of elevations in whole numbers that lie in terraces, from a look at the middle of a grid.
+    Warn of terraces of whole numbers, and of implausibly steep relief, in the middle of a grid.
 
     Parameters
     ----------
     model : fifesim.ground.terrain.rasters.model.Model
     grid : odc.geo.geobox.GeoBox
+    unit_is_given : bool
+        Whether the user gave the unit of the elevations, which may be steep then.
+
+    Warns
+    -----
+    UserWarning
+        If elevations are whole numbers in terraces, or if the mean slope at 30 m exceeds 20 degrees.
     """
     middle = [np.array([size // 2]) for size in grid.shape]
     top, left, height, width = model.window(*model.place.positions(*middle))
@@ -213,3 +222,23 @@ def warn_of_terraces(model, grid):
             f"the elevations of {model.source.name} are whole numbers that lie in terraces, with a vertical resolution "
             f"of {step * model.source.metres:g} m: slope and aspect will show the terraces' edges"
         )
+    slope = _mean_slope(values, model.place.cell_size())
+    if slope > _STEEP and not unit_is_given:
+        warn(
+            f"the mean slope of {model.source.name} is {slope:.1f} degrees at {_SLOPE_SCALE:g} m, which only high "
+            "mountains have: if its elevations are feet or decimetres, give vertical_units='ft' or 'dm'; if they are "
+            "metres, give vertical_units='m'"
+        )
+
+
+def _mean_slope(values, sizes):
+    """Mean slope of elevations averaged to cells of about 30 m, NaN if there are too few. [degree]"""
+    counts = [max(1, round(_SLOPE_SCALE / size)) for size in sizes]
+    rows, columns = (size // count * count for size, count in zip(values.shape, counts, strict=True))
+    means = block_means(values[:rows, :columns], *counts)
+    if min(means.shape) < 2:
+        return np.nan
+    down, across = np.gradient(means, *(count * size for count, size in zip(counts, sizes, strict=True)))
+    slopes = np.degrees(np.arctan(np.hypot(down, across)))
+    known = np.isfinite(slopes)
+    return float(slopes[known].mean()) if known.any() else np.nan

@@ -13,7 +13,7 @@ from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.base.annotations import Chunks, FilePath
-from fifesim.ground.terrain.rasters.cover import check_cover, known_cells, known_elevation, warn_of_terraces
+from fifesim.ground.terrain.rasters.cover import check_cover, known_cells, known_elevation, warn_of_relief
 from fifesim.ground.terrain.rasters.model import TILE, Model, model_under
 from fifesim.ground.terrain.rasters.source import placement
 from fifesim.rasters import cf, places
@@ -60,7 +60,15 @@ def fine_dem(
     ------
     ValueError
         If the model does not cover the grid, has holes, no CRS, or other units than metres that are not given, or needs
-        a change of datum whose accuracy is unknown. For a lazy raster what it covers is known when computed.
+        a change of datum whose accuracy is unknown. If the part that is read, on the grid and around it, holds heights
+        below -500 m or above 9000 m, such as undeclared marks of missing data. For a lazy raster this is known when
+        computed.
+
+    Warns
+    -----
+    UserWarning
+        If elevations lie in terraces of whole numbers, are 0 m where all others are far from it, or have a mean slope
+        above 20 degrees at 30 m while ``vertical_units`` is not given. A lazy raster is checked for 0 m only.
 
     Notes
     -----
@@ -85,7 +93,7 @@ def fine_dem(
         out = _from_lazy(model, grid, "auto" if chunks is None else chunks)
     else:
         check_cover(model, grid)
-        warn_of_terraces(model, grid)
+        warn_of_relief(model, grid, vertical_units is not None)
         out = places.tiles(partial(known_elevation, model, model.tiles()), grid, chunks, tile=TILE)
     history = f"fine_dem: {model.source.name}, cells of {model.resolution:.4g} m, quintic spline"
     return cf.label(out, "dem", history=history, source_resolution=model.resolution)

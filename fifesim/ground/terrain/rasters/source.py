@@ -6,7 +6,6 @@ from uuid import uuid4
 
 import dask.array as da
 import numpy as np
-import odc.geo.xr  # noqa: F401  registers .odc
 import pyproj
 import rasterio.windows
 import rioxarray  # noqa: F401  registers .rio
@@ -15,16 +14,21 @@ from affine import Affine
 
 from fifesim.base.foreign import in_a_line
 from fifesim.base.lattice import centres
+from fifesim.base.warned import warn
 from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.rasters import projection
 from fifesim.rasters.opening import ErrorsOfGdal, RasterFile, raster_file
 from fifesim.rasters.soundness import check_raster, horizontal_crs
+from fifesim.rasters.spacing import regular_geobox
 
 # Positions in another CRS are a polynomial through those at so many Chebyshev nodes along each axis of a tile.
 _NODES = 12
 
 # Heights that land has, with room to spare. [m]
 LAND = (-500, 9000)
+
+# Elevations of exactly 0 among others that are all farther from it may be voids. [m]
+_CLIFF = 50.0
 
 # A window of more cells takes several GB with what is made of it.
 _MOST_CELLS = 2**27
@@ -83,7 +87,7 @@ class Source:
         Raises
         ------
         ValueError
-            If the window is larger than what is read at once.
+            If the window is larger than what is read at once, or holds heights that land does not have.
         """
         if rows * columns > _MOST_CELLS:
             raise ValueError(
@@ -101,6 +105,7 @@ class Source:
                 _file_window(self.cells, *window) if isinstance(self.cells, RasterFile) else self._array_window(*window)
             )
             out[first - top : last - top, west - left : east - left] = found * self.metres
+            check_heights(self.name, found * self.metres)
         return out
 
     def _array_window(self, rows, columns):
@@ -153,7 +158,7 @@ def _array_source(raster, vertical_units):
     if raster.ndim != 2:
         raise ValueError(f"an elevation model has one band of rows and columns, got dimensions {raster.dims}")
     crs = raster.rio.crs
-    found = raster.odc.geobox
+    found = regular_geobox(raster)
     if found is None:
         raise ValueError(f"the x and y of {name} are not the centres of a regular grid")
     scale, offset = raster.attrs.get("scale_factor", 1.0), raster.attrs.get("add_offset", 0.0)
@@ -293,7 +298,7 @@ def _chebyshev(values):
 
 def check_heights(name, values):
     """
-    Refuse heights that land does not have.
+    Raise ValueError for heights that land does not have, and warn of voids of 0.
 
     Parameters
     ----------
@@ -306,11 +311,22 @@ def check_heights(name, values):
     ------
     ValueError
         If one is below the Dead Sea or above Mount Everest: a mark for no data, or another unit.
+
+    Warns
+    -----
+    UserWarning
+        If some are exactly 0 and all others are above 50 m, or below -50 m.
     """
     low, high = LAND
     wrong = values[(values < low) | (values > high)]
     if wrong.size:
         raise ValueError(
             f"{name} holds elevations such as {wrong.flat[0]:.0f} m, land has {low} to {high} m: if it marks no data, "
-            "declare it (gdal_edit.py -a_nodata); if the unit is another, give vertical_units="
+            "declare it (gdal_edit.py -a_nodata, .rio.write_nodata); if the unit is another, give vertical_units="
+        )
+    void = values == 0
+    if void.any() and np.fmin.reduce(np.abs(values[~void]), initial=np.inf) > _CLIFF:
+        warn(
+            f"{name} holds elevations of exactly 0 m beside others that all differ from it by more than {_CLIFF:g} m: "
+            "if 0 marks no data, declare it (gdal_edit.py -a_nodata 0, .rio.write_nodata(0))"
         )

@@ -1,5 +1,7 @@
 """Elevation models of any resolution on the fine grid, and around it."""
 
+import warnings
+
 import numpy as np
 import pyproj
 import pytest
@@ -9,6 +11,7 @@ from elevations import AMPLITUDE, CRS, NORTH, WEST, grid, model, surface, tilted
 from lazy import check_place, no_compute
 
 import fifesim
+from fifesim.ground.terrain.rasters.cover import _mean_slope
 from fifesim.rasters import cf
 
 
@@ -104,3 +107,59 @@ def test_source_reaches_as_far_as_its_data(tmp_path):
         fifesim.source_dem(tmp_path / "cut.tif", grid(west=WEST + 90000), 100.0)
     with pytest.raises(ValueError, match="margin must be 0 m or more"):
         fifesim.source_dem(tmp_path / "cut.tif", grid(), -1.0)
+
+
+FINE = fifesim.fife_site(10, window=((120, 180), (120, 180)))
+
+
+def hills(cell=30):
+    return fifesim.flint_hills(fifesim.fife_site(cell, window=((0, 100), (0, 100))), seed=7)
+
+
+@pytest.mark.parametrize("fill", [-9999.0, -32768.0, 32767.0, 9999.0, -3.4e38])
+@pytest.mark.parametrize("form", ["file", "array", "lazy"])
+def test_undeclared_fill_values_next_to_the_grid_are_refused(tmp_path, fill, form):
+    """The spline would carry them into the grid: 210 to 650 m instead of 338 to 412 m."""
+    dem = hills()
+    dem[40:60, 61:] = fill
+    path = write(tmp_path / "dem.tif", dem.values, dem.odc.geobox.affine, nodata=None)
+    given = {"file": path, "array": dem, "lazy": dem.chunk(x=50)}[form]
+    with pytest.raises(ValueError, match=rf"elevations such as {fill:.0f} m.*-a_nodata, \.rio\.write_nodata"):
+        fifesim.fine_dem(given, FINE).compute()
+    with pytest.raises(ValueError, match=f"elevations such as {fill:.0f} m"):
+        fifesim.source_dem(given, FINE, margin=500.0)
+    if form != "lazy":
+        declared = dem.rio.write_nodata(fill)
+        expected = fifesim.fine_dem(dem.where(dem > 0).where(dem < 9000), FINE)
+        np.testing.assert_array_equal(fifesim.fine_dem(declared, FINE), expected)
+
+
+@pytest.mark.parametrize("cell", [10, 30])
+def test_feet_without_a_unit_are_a_warning_by_their_slope(cell):
+    dem = hills(cell)
+    grid = fifesim.fife_site(10, window=((20, 80), (20, 80)))
+    steep = 300 + 12 * (dem - 300)
+    with pytest.warns(
+        UserWarning, match="mean slope of dem is .* degrees at 30 m.*feet or decimetres.*vertical_units='m'"
+    ):
+        fifesim.fine_dem(steep.rename("dem"), grid)
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        fifesim.fine_dem(dem, grid)
+        fifesim.fine_dem(steep, grid, vertical_units="m")
+
+
+def test_mean_slope_is_that_of_a_plane_at_30_m():
+    """Roughness below 30 m is averaged away."""
+    rows, columns = np.mgrid[:90, :120]
+    rough = 10 * (rows * np.tan(np.radians(25)) + 0.5 * ((rows + columns) % 2))
+    assert _mean_slope(rough, (10.0, 10.0)) == pytest.approx(25, abs=0.1)
+    assert np.isnan(_mean_slope(rough[:3], (10.0, 10.0)))
+
+
+def test_voids_of_zero_are_a_warning():
+    dem = hills()
+    dem[48:50, 48:50] = 0.0
+    with pytest.warns(UserWarning, match=r"elevations of exactly 0 m beside others.*-a_nodata 0"):
+        fifesim.fine_dem(dem, FINE)
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        fifesim.fine_dem(hills() - float(hills()[48, 48]), FINE)

@@ -1,0 +1,91 @@
+"""Canopies of a scene as they are given: by the call, by classes of cover and by cells; and the defaults among them."""
+
+from numbers import Number
+from types import MappingProxyType
+
+from fifesim.base.warned import warn
+
+_TALLGRASS = {"background": "soil and litter", "brown_leaf": "dead leaves", "leaf_optics": "green leaves"}
+"""Optics that are those of FIFE's tallgrass by default."""
+
+_CURES = {
+    "background": "give background={'soil_dry': 1.0} or your own ([ground.background_spectra] of a scenario)",
+    "brown_leaf": "give brown_leaf=fifesim.Leaf(...) ([ground.brown_leaf])",
+    "leaf_optics": "give leaf_optics=fifesim.Leaf(...) ([ground.leaf])",
+}
+
+
+def stands_of(classes, canopy, cells=MappingProxyType({})):
+    """
+    Canopies of a scene as they are given, by codes of the classes; None is the code without classes.
+
+    Parameters
+    ----------
+    classes : sequence of CoverClass
+    canopy : dict of str
+        Canopy arguments of `fifesim.surface_reflectance`.
+    cells : mapping of str, optional
+        Variables of the landscape, which win.
+
+    Returns
+    -------
+    stands : dict of int to dict
+    """
+    of_cells = {name: each for name, each in cells.items() if name in canopy}
+    if not classes:
+        return {None: canopy | of_cells}
+    own = {kind.code: {name: of_class(kind, name) for name in canopy} for kind in classes}
+    given = {code: {name: each for name, each in stand.items() if each is not None} for code, stand in own.items()}
+    return {code: canopy | stand | of_cells for code, stand in given.items()}
+
+
+def of_class(kind, name):
+    """
+    Value of a canopy argument in a class of cover.
+
+    Parameters
+    ----------
+    kind : CoverClass
+    name : str
+        Argument of `fifesim.surface_reflectance`.
+
+    Returns
+    -------
+    value : object
+        None if the class does not have one.
+    """
+    return getattr(kind, "leaf" if name == "leaf_optics" else name)
+
+
+def warn_of_tallgrass(scene, classes, canopy, cells=MappingProxyType({})):
+    """
+    Warn if optics of FIFE's tallgrass, the defaults, are taken for a scene from elsewhere.
+
+    Parameters
+    ----------
+    scene : str
+        Name of the scene, for the message.
+    classes, canopy, cells
+        As in `stands_of`.
+
+    Warns
+    -----
+    UserWarning
+        If leaves, background or dead leaves are not given.
+    """
+    bare = {kind.code for kind in classes if isinstance(kind.lai, Number) and kind.lai == 0}
+    stands = stands_of(classes, canopy, cells)
+    taken = {name for code, stand in stands.items() for name in _defaults(stand, has_leaves=code not in bare)}
+    if taken:
+        warn(
+            f"nothing says what grows on {scene}: FIFE's tallgrass is taken for "
+            f"{', '.join(_TALLGRASS[name] for name in sorted(taken))}; "
+            f"{'; '.join(_CURES[name] for name in sorted(taken))}"
+        )
+
+
+def _defaults(stand, has_leaves):
+    """Names of the optics that a stand leaves to the defaults."""
+    dead = not isinstance(stand["brown"], Number) or stand["brown"] != 0
+    needed = {"background": True, "leaf_optics": has_leaves, "brown_leaf": has_leaves and dead}
+    return [name for name, need in needed.items() if need and stand[name] is None]

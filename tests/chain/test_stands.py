@@ -1,0 +1,71 @@
+"""Canopies as they are given, and the warning about those of FIFE's tallgrass on other ground."""
+
+import warnings
+
+import pytest
+
+import fifesim
+from fifesim.chain.stands import of_class, stands_of
+
+GRID = fifesim.fife_site(30, window=((0, 12), (0, 12)))
+ELSEWHERE = fifesim.grid_at("EPSG:32633", 390000, 5820000, 360, 360, 30)
+KNOWN = {"atmosphere": fifesim.Atmosphere(altitude=0.1), "geometry": fifesim.Geometry(40.0, 150.0)}
+BARE = {"background": {"soil_dry": 1.0}}
+GREEN = {"leaf_optics": fifesim.Leaf()}
+
+
+def own_map(grid=GRID):
+    return fifesim.open_lai(fifesim.lai_scene(grid, seed=7), grid)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "tallgrass is taken for soil and litter, green leaves; give background=.*give leaf_optics="),
+        (BARE, "what grows on lai: FIFE's tallgrass is taken for green leaves; give leaf_optics="),
+        (GREEN, r"taken for soil and litter; give background=\{'soil_dry': 1.0\}"),
+        (GREEN | BARE | {"brown": 0.2}, "taken for dead leaves; give brown_leaf="),
+    ],
+)
+def test_tallgrass_on_a_map_of_ones_own_is_a_warning(given, message):
+    lai = own_map()
+    for function in (
+        lambda: lai.fifesim.surface_reflectance("TM", **KNOWN, **given),
+        lambda: fifesim.compare(lai, ["TM"], fifesim.Setup(**KNOWN, **given)),
+    ):
+        with pytest.warns(UserWarning, match=message) as said:
+            function()
+        assert len([each for each in said if "grows" in str(each.message)]) == 1
+        assert {each.filename for each in said if each.category is UserWarning} == {__file__}
+
+
+def test_a_canopy_that_is_given_is_no_warning():
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        own_map().fifesim.surface_reflectance("TM", **KNOWN, **GREEN, **BARE)
+        dead = {"brown": 0.2, "brown_leaf": fifesim.Leaf(chlorophyll=0, brown=1)}
+        own_map().fifesim.surface_reflectance("TM", **KNOWN, **GREEN, **BARE, **dead)
+        fifesim.lai_scene(GRID, seed=7).fifesim.surface_reflectance("TM")
+        fifesim.landscape(GRID, seed=7).fifesim.surface_reflectance("TM")
+
+
+def test_classes_with_leaves_need_optics():
+    """Water needs no leaves, and the call stands in for what a class does not have."""
+    water = fifesim.CoverClass(lai=0, background=0.03)
+    forest = fifesim.CoverClass(lai=4.0, leaf=fifesim.Leaf(chlorophyll=50))
+    patches = fifesim.Patches("voronoi", 100)
+    land = fifesim.landscape(ELSEWHERE, cover=patches, classes={"water": water, "forest": forest}, seed=7)
+    with pytest.warns(
+        UserWarning, match="grows on lai: FIFE's tallgrass is taken for soil and litter; give background"
+    ):
+        land.fifesim.surface_reflectance("TM", **KNOWN)
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        land.fifesim.surface_reflectance("TM", **KNOWN, background=0.1)
+
+
+def test_cells_win_over_classes_and_classes_over_the_call():
+    kind = fifesim.CoverClass("grass", lai=1.0, hotspot=0.1, brown=0.3, code=4)
+    canopy = {"leaf_optics": None, "hotspot": 0.0, "brown": 0.0, "crown_cover": 0.9}
+    assert stands_of((), canopy, {"brown": 0.5, "soil": 0.1}) == {None: canopy | {"brown": 0.5}}
+    found = {"leaf_optics": None, "hotspot": 0.1, "brown": 0.5, "crown_cover": 0.9}
+    assert stands_of((kind,), canopy, {"brown": 0.5}) == {4: found}
+    assert of_class(kind, "leaf_optics") is kind.leaf and of_class(kind, "brown") == 0.3
