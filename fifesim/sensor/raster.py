@@ -241,7 +241,8 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     Raises
     ------
     ValueError
-        If the image carries no calibration.
+        If the image carries no calibration, its units are not those of digital numbers, or a value is negative,
+        fractional or above the largest digital number; for lazy data, when they are computed.
 
     See Also
     --------
@@ -261,7 +262,7 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     if missing:
         raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
     names = [name for name in ("gain", "offset", "compression") if name in image.coords]
-    out = chunks.pointwise(calibration.dn_to_radiance, image, *[_along_band(image, name) for name in names])
+    out = digital_numbers.radiance_of(image, [_along_band(image, name) for name in names])
     out = swaths.placed_as(out.drop_vars(names), image)
     return cf.label(out, "toa_radiance", source=image, history="to_radiance")
 
@@ -284,7 +285,8 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     Raises
     ------
     ValueError
-        If the image carries no calibration, solar irradiance or solar zenith angle.
+        If the image carries no calibration, solar irradiance or solar zenith angle, or a value cannot be a digital
+        number, as in `to_radiance`.
 
     See Also
     --------

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 
 import numpy as np
 import xarray as xr
 
 from fifesim.base.annotations import FilePath, Numbers, Time
+from fifesim.base.digital_numbers import counts
 from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
 from fifesim.rasters.annotations import Directions
@@ -17,9 +17,13 @@ from fifesim.rasters.dates import by_date
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
-from fifesim.sensor.products.scaling import counts
 from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.pixels import matching_bands
+
+_CURE = (
+    "give nodata=, or gain= and offset= for scaled numbers; products of agencies open with fifesim.open_landsat and "
+    "fifesim.open_sentinel2"
+)
 
 
 @by_date
@@ -67,7 +71,7 @@ def calibrate(
 
     See Also
     --------
-    fifesim.sensor.products.scaling.counts
+    fifesim.base.digital_numbers.counts
 
     Examples
     --------
@@ -105,8 +109,8 @@ def calibrate(
         bits = 16 if dn.dtype.itemsize > 1 else 8
         if not np.all(gain > 0):
             raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")
-    kernel = partial(counts, nodata=nodata, largest=2**bits - 1)
-    out = chunks.pointwise(kernel, dn.drop_vars("band", errors="ignore"), dtype=np.uint8 if bits <= 8 else np.uint16)
+    dtype, plain = np.uint8 if bits <= 8 else np.uint16, dn.drop_vars("band", errors="ignore")
+    out = chunks.pointwise(counts, plain, dtype=dtype, nodata=nodata, largest=2**bits - 1, cure=_CURE)
     along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
     along_band |= {"gain": gain, "offset": offset, "solar_irradiance": [band.solar_irradiance for band in bands]}
     along_band |= {"compression": compression} if any(compression) else {}
