@@ -117,7 +117,7 @@ def located(fingerprint, order, source):
 
 def changed_cell(cells, block, corner, marks):
     """
-    First cell of a block whose value is not that of the fingerprint.
+    First cell of a block whose value differs from the fingerprint.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def changed_cell(cells, block, corner, marks):
     corner : (int, int, int)
         First band, row and column of the block in the file.
     marks : sequence of float
-        Values that stand for no data, beside NaN. Data may be masked after the file was written, but not made.
+        Values that stand for no data, in addition to NaN. Data may be masked after the file was written, but not made.
 
     Returns
     -------
