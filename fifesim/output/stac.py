@@ -17,9 +17,10 @@ from fifesim.scenario.toml import write_scenario
 
 VERSION = "1.1.0"
 
+# odc-stac finds names of bands only in eo:bands, which version 2 of its extension forbids.
 _EXTENSIONS = [
     f"https://stac-extensions.github.io/{name}/schema.json"
-    for name in ("projection/v2.0.0", "eo/v2.0.0", "raster/v2.0.0", "view/v1.0.0", "processing/v1.2.0")
+    for name in ("projection/v2.0.0", "eo/v1.1.0", "raster/v2.0.0", "view/v1.0.0", "processing/v1.2.0")
 ]
 _COG = "image/tiff; application=geotiff; profile=cloud-optimized"
 
@@ -33,6 +34,9 @@ _ASSETS = {
     "report.html": ("report", "Report of the run", "text/html", ["metadata"]),
     "scenario.toml": ("scenario", "All that the run needs to be made again", "application/toml", ["metadata"]),
 }
+
+# Fields of a band that the extension for electro-optical bands has too.
+_EO_FIELDS = ("name", "description", "eo:common_name", "eo:center_wavelength", "eo:solar_illumination")
 
 # Names of the same bands that STAC has not.
 _ALIASES = {"rededge1", "rededge2", "rededge3", "swir1", "swir2"}
@@ -219,7 +223,9 @@ def _asset(path, title, kind, roles):
     if kind != _COG:
         return asset
     with rasterio.open(path) as source:
-        box = source.bounds
+        box, kept = source.bounds, read_tag(source, path.name)
+        coords = {} if kept is None else kept["coords"]
+        bands = [_band(source, number, coords) for number in source.indexes]
         return asset | {
             **_crs(source),
             "proj:shape": list(source.shape),
@@ -228,11 +234,14 @@ def _asset(path, title, kind, roles):
             "data_type": source.dtypes[0],
             "raster:spatial_resolution": source.res[0],
             "raster:sampling": "area",
-            "bands": [_band(source, number) for number in source.indexes],
+            "bands": bands,
+            "eo:bands": [
+                {key.removeprefix("eo:"): value for key, value in band.items() if key in _EO_FIELDS} for band in bands
+            ],
         }
 
 
-def _band(source, number):
+def _band(source, number, coords):
     """A band of a file, as its own metadata have it."""
     name, nodata, unit = source.descriptions[number - 1], source.nodata, source.units[number - 1]
     band = {"name": name, "data_type": source.dtypes[number - 1]}
@@ -245,13 +254,11 @@ def _band(source, number):
     scale, offset = source.scales[number - 1], source.offsets[number - 1]
     if (scale, offset) != (1, 0):
         band |= {"raster:scale": scale, "raster:offset": offset}
-    return band | _spectral(source, number)
+    return band | _spectral(coords, number)
 
 
-def _spectral(source, number):
-    """Where a band lies in the spectrum, and the sunlight in it."""
-    kept = read_tag(source, source.name)
-    coords = {} if kept is None else kept["coords"]
+def _spectral(coords, number):
+    """Wavelength, common name and solar irradiance of a band."""
     fields = {}
     if "wavelength" in coords:
         wavelength = float(np.atleast_1d(coords["wavelength"])[number - 1])

@@ -282,7 +282,10 @@ def check_units(array, *names):
         If the units differ.
     """
     allowed = list(dict.fromkeys(QUANTITIES[name].units for name in names))
-    units = str(array.attrs.get("units", allowed[0])).strip()
+    units = array.attrs.get("units", allowed[0])
+    # rioxarray lists the units of the bands.
+    units = units[0] if isinstance(units, tuple | list) and len(set(units)) == 1 else units
+    units = str(units).strip()
     if not {units, _SAME_UNITS.get(units)} & set(allowed):
         wanted = " or ".join(repr(unit) for unit in allowed)
         raise ValueError(

@@ -18,20 +18,23 @@ import rasterio.errors
 import rasterio.shutil
 import xarray as xr
 from dask.utils import SerializableLock
+from rasterio.enums import ColorInterp
 from rasterio.windows import Window
 
 from fifesim.base.annotations import Chunks, FilePath
 from fifesim.base.foreign import in_a_line
 from fifesim.base.geometry import ANGLES
 from fifesim.base.warned import warn
-from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.rasters.clients import found_client
+from fifesim.rasters.fingerprint import fingerprint_of
+from fifesim.rasters.gdal_bands import gdal_description, physical
 from fifesim.rasters.gis import colours, tags_of
 from fifesim.rasters.opening import ErrorsOfGdal, raster_file, stored_cells
 from fifesim.rasters.packed import no_data_of
 from fifesim.rasters.soundness import check_memory, check_raster, horizontal_crs
-from fifesim.rasters.tags import TAG, read_tag, tag_of
+from fifesim.rasters.stored_bands import DAYS, restored, with_layers
+from fifesim.rasters.tags import TAG, band_names, band_units, read_tag, tag_of
 
 # GDAL's own block size for cloud-optimised files.
 _BLOCK = 512
@@ -84,7 +87,8 @@ def to_geotiff(
     wavelength; attributes and the sun are tags, the latter also as Landsat's metadata spell them (``SUN_ELEVATION``), a
     coordinate ``time`` is ``TIFFTAG_DATETIME`` and ``ACQUISITIONDATETIME``. Red, green, blue and near infrared are
     what the wavelengths say, not the order of the bands. Angles that vary over the cells are not written, which is a
-    warning.
+    warning. Dates of cells, as of a composite, become a band in days since 1970-01-01. The tag ``FIFESIM`` has the
+    values of up to 64 cells per band, with which `open_image` compares the file.
 
     Examples
     --------
@@ -111,17 +115,21 @@ def to_geotiff(
     array = array if "band" in array.dims else array.expand_dims("band")
     array = array.transpose("band", "y", "x")
     grid = grids.geobox(array)
-    _check_room(array, path)
+    dates = [name for name, value in array.coords.items() if value.dtype.kind == "M" and {"y", "x"} <= set(value.dims)]
+    layers = dates if array.dtype.kind == "f" else []
     varying = [name for name in ANGLES if name in array.coords and array.coords[name].ndim]
+    varying += [name for name in dates if name not in layers]
+    cells = with_layers(array, layers)
+    _check_room(cells, path)
     if varying:
         warn(
             f"{path.name} leaves out {', '.join(varying)}, which vary over the cells, and another geometry would be "
             "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()"
         )
     with _whole(path) as (streamed, finished), ErrorsOfGdal(f"cannot write {path}"):
-        _stream(array, grid, streamed, raster, tags or {})
+        _stream(array, cells, layers, grid, streamed, raster, tags or {})
         rasterio.shutil.copy(streamed, finished, blocksize=_BLOCK, **_COG)
-        _check_written(streamed, finished, array)
+        _check_written(streamed, finished, cells)
     return path
 
 
@@ -141,14 +149,16 @@ def open_image(path: FilePath, chunks: Chunks | None = None, *, allow_remote: bo
     Returns
     -------
     raster : xarray.DataArray, dims ([band], y, x)
-        As it was written. Digital numbers are not masked: 0 is no data. Of other files, values in their physical unit,
-        NaN where there are no data; digital numbers only where the file says that they scale to radiance.
+        As it was written, with the bands that the file has, in its order: each keeps its name and calibration. Digital
+        numbers are not masked: 0 is no data. For other files, values in their physical unit, NaN where there are no
+        data; digital numbers only where the file says that they scale to radiance.
 
     Raises
     ------
     ValueError
         If the file cannot be read as a raster, is of a format that is not opened, has no north-up grid in metres, or
-        takes more memory than there is.
+        takes more memory than there is; if another program changed its values, or it is not certain which band is
+        which. Values of a lazy result are checked when they are computed.
     OSError
         If its cells cannot be read.
 
@@ -176,17 +186,16 @@ def open_image(path: FilePath, chunks: Chunks | None = None, *, allow_remote: bo
             description = read_tag(source, file.name)
             written_here = description is not None
             if not written_here:
-                description, storage = _gdal_description(source, file.name)
+                description, storage = gdal_description(source, file.name)
         plain = stored_cells(file, crs, chunks)
     try:
         grid = grids.geobox(plain)
     except ValueError as error:
         raise ValueError(f"cannot place {file.name}: {in_a_line(error, 250)}") from None
     array = xr.DataArray(plain.data, dims=("band", "y", "x"), name=description["name"])
-    if not written_here:
-        array = _physical(array, **storage)
+    array = restored(array, description) if written_here else physical(array, storage)
     array = grids.place(array.assign_coords(description["coords"]), grid)
-    array.attrs = dict(description["attrs"])
+    array.attrs = dict(description["attrs"]) | array.attrs
     if "gain" in array.coords:
         array.attrs["_FillValue"] = array.dtype.type(0)
     return array if "band" in description["dims"] else array.isel(band=0, drop=True)
@@ -199,8 +208,8 @@ def _stacked(dataset):
     dim = xr.DataArray(names, dims="band", name="band")
     array = xr.concat(bands, dim, combine_attrs="drop", coords="minimal", compat="override")
     histories = [dataset[name].attrs.get("history", "") for name in names]
-    array.attrs = {"history": histories[0], "long_name": ", ".join(names)}
-    return array
+    array.attrs = {"history": histories[0]}
+    return array.rename(None)
 
 
 def _streamed_bytes(array):
@@ -244,12 +253,11 @@ def _whole(path):
         path.with_name(f"{path.name}.aux.xml").unlink(missing_ok=True)
 
 
-def _stream(array, grid, path, described, further):
-    """A tiled GeoTIFF, block by block, with all metadata."""
-    dtype = array.dtype
+def _stream(array, cells, layers, grid, path, described, further):
+    """Write a tiled GeoTIFF, block by block, with all metadata of an array: its values and layers are the cells."""
     profile = {
-        "dtype": dtype.name,
-        "count": array.sizes["band"],
+        "dtype": cells.dtype.name,
+        "count": cells.sizes["band"],
         "height": grid.shape.y,
         "width": grid.shape.x,
         "crs": rasterio.crs.CRS.from_wkt(grid.crs.to_wkt()),
@@ -258,15 +266,18 @@ def _stream(array, grid, path, described, further):
         "nodata": no_data_of(array),
     }
     with rasterio.open(path, "w", **_TILED, **profile) as sink:
-        _describe(sink, array, described)
+        kept = tag_of(array, described.dims if isinstance(described, xr.DataArray) else array.dims, layers)
+        _describe(sink, array, kept)
         sink.update_tags(**{name: str(text) for name, text in further.items()})
-        if not isinstance(array.data, da.Array):
-            sink.write(array.values)
-    if isinstance(array.data, da.Array):
+        if not isinstance(cells.data, da.Array):
+            sink.write(cells.values)
+    if isinstance(cells.data, da.Array):
         # The file is opened for each block, which takes longer than to write a small one.
-        together = array.sizes["band"] * _largest_block(array) <= _AT_ONCE
-        data = array.data.rechunk({0: -1}) if together else array.data
+        together = cells.sizes["band"] * _largest_block(cells) <= _AT_ONCE
+        data = cells.data.rechunk({0: -1}) if together else cells.data
         da.store(data, _Sink(str(path)), lock=_lock(str(path)), compute=True)
+    with rasterio.open(path, "r+") as sink:
+        sink.update_tags(**{TAG: json.dumps(kept | {"cells": fingerprint_of(sink)})})
 
 
 def _largest_block(array):
@@ -296,25 +307,24 @@ def _lock(name):
     return Lock(name)
 
 
-def _describe(sink, array, described):
-    kept = tag_of(array, described.dims if isinstance(described, xr.DataArray) else array.dims)
+def _describe(sink, array, kept):
     scalars = {name: item["values"] for name, item in kept["coords"].items() if not item["dims"]}
     readable = {key: str(value) for key, value in (kept["attrs"] | scalars).items()}
     tags, imagery = tags_of(array)
-    sink.update_tags(**tags | readable, **{TAG: json.dumps(kept)}, AREA_OR_POINT="Area")
+    sink.update_tags(**tags | readable, AREA_OR_POINT="Area")
     sink.update_tags(ns="IMAGERY", **imagery)
-    sink.colorinterp = colours(array)
-    names = [str(name) for name in array["band"].values] if "band" in array.coords else [str(array.name)]
-    for number, name in enumerate(names, 1):
+    names, count = band_names(array), array.sizes["band"]
+    further = list(kept["layers"])
+    sink.colorinterp = colours(array) + [ColorInterp.undefined] * len(further)
+    for number, name in enumerate([*names, *further], 1):
         sink.set_band_description(number, name)
-        _describe_band(sink, number, array.isel(band=number - 1))
+    for number in range(count):
+        _describe_band(sink, number + 1, array.isel(band=number))
+    sink.units = band_units(names, array.coords, array.attrs) + [DAYS] * len(further)
     # A GIS has no scale of square roots.
     if "gain" in array.coords and "compression" not in array.coords:
-        sink.scales, sink.offsets = array["gain"].values.tolist(), array["offset"].values.tolist()
-        sink.units = [cf.QUANTITIES["toa_radiance"].units] * len(names)
-    else:
-        own = array.attrs.get("units", "")
-        sink.units = [cf.QUANTITIES[name].units if name in cf.QUANTITIES else own for name in names]
+        one, none = [1.0] * len(further), [0.0] * len(further)
+        sink.scales, sink.offsets = array["gain"].values.tolist() + one, array["offset"].values.tolist() + none
 
 
 def _describe_band(sink, number, band):
@@ -322,42 +332,3 @@ def _describe_band(sink, number, band):
     sink.update_tags(number, **per_band)
     if "wavelength" in per_band:
         sink.update_tags(number, ns="IMAGERY", CENTRAL_WAVELENGTH_UM=per_band["wavelength"])
-
-
-def _physical(array, scales, offsets, nodata):
-    """Values of another program's file: masked, scaled, shifted; digital numbers of radiance with 0 for no data."""
-    missing = xr.zeros_like(array, dtype=bool) if nodata is None else array == nodata
-    if scales is None:
-        return array.where(~missing, array.dtype.type(0))
-    if nodata is None and all(scale == 1 for scale in scales) and not any(offsets):
-        return array
-    gain, offset = (xr.DataArray(list(values), dims="band") for values in (scales, offsets))
-    return array.where(~missing) * gain + offset
-
-
-def _gdal_description(source, file_name):
-    """Names, calibration and wavelengths of a file that fifesim did not write, and how its values are stored."""
-    names = [name or f"band{number}" for number, name in enumerate(source.descriptions, 1)]
-    values = {"wavelength": _wavelengths(source, file_name)}
-    counts = np.dtype(source.dtypes[0]).kind == "u" and set(source.units) == {cf.QUANTITIES["toa_radiance"].units}
-    if counts:
-        values |= {"gain": list(source.scales), "offset": list(source.offsets)}
-    coords = {"band": xr.DataArray(names, dims="band")}
-    coords |= {
-        name: xr.DataArray(value, dims="band", attrs=cf.attributes(name)) for name, value in values.items() if value
-    }
-    units = {} if counts or not source.units[0] else {"units": source.units[0]}
-    storage = {"scales": None if counts else source.scales, "offsets": source.offsets, "nodata": source.nodata}
-    return {"name": "image", "dims": ["band", "y", "x"], "attrs": units, "coords": coords}, storage
-
-
-def _wavelengths(source, file_name):
-    """Of all bands in micrometres, or None."""
-    said = [source.tags(number, ns="IMAGERY").get("CENTRAL_WAVELENGTH_UM") for number in source.indexes]
-    try:
-        return [float(value) for value in said] if all(said) else None
-    except ValueError:
-        raise ValueError(
-            f"{file_name} has wavelengths such as {in_a_line(said[0], 40)!r}, not all numbers: open it with "
-            "rioxarray.open_rasterio"
-        ) from None

@@ -172,6 +172,8 @@ def coordinates(grid):
         attrs = {"standard_name": f"projection_{axis}_coordinate", "long_name": f"{axis} coordinate of projection"}
         attrs |= {"units": "m", "axis": axis.upper()}
         out[axis] = xr.DataArray(values, dims=axis, attrs=attrs)
+        # xarray would write a fill value, which CF forbids for coordinate variables (section 2.5.1).
+        out[axis].encoding = {"_FillValue": None}
     out["spatial_ref"] = reference_of(on_lattice(grid))
     return out
 

@@ -138,7 +138,7 @@ def _first_that_opens(path, formats):
     # What is wrong with a format says more than that it is not another.
     reason = min(reasons, key=lambda said: "not recognized" in said)
     if "not recognized" in reason and formats == FORMATS:
-        cure = _CURE
+        cure = f"convert a local file with gdal_translate FILE map.tif (netCDF also opens with xarray), or, {_CURE}"
         if begins := mosaics.text_of(path):
             cure = f"it is text that begins {shown(begins)}: is it another file? gdal_translate makes GeoTIFF of grids"
         reason = f"cannot read {in_a_line(path, _PATH)} as a raster of {', '.join(FORMATS)}; {cure}"

@@ -243,7 +243,8 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     Raises
     ------
     ValueError
-        If the image carries no calibration, or a gain is not above 0.
+        If the image carries no calibration, a gain is not above 0, its units are not those of digital numbers, or a
+        value is negative, fractional or above the largest digital number; for lazy data, when they are computed.
 
     See Also
     --------
@@ -265,7 +266,7 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     if not np.all(image["gain"].values > 0):
         raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.atleast_1d(image['gain'].values)}")
     names = [name for name in ("gain", "offset", "compression") if name in image.coords]
-    out = chunks.pointwise(calibration.dn_to_radiance, image, *[_along_band(image, name) for name in names])
+    out = digital_numbers.radiance_of(image, [_along_band(image, name) for name in names])
     out = swaths.placed_as(out.drop_vars(names), image)
     return cf.label(out, "toa_radiance", source=image, history="to_radiance")
 
@@ -288,7 +289,8 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     Raises
     ------
     ValueError
-        If the image carries no calibration, solar irradiance or solar zenith angle, or they give impossible values.
+        If the image carries no calibration, solar irradiance or solar zenith angle, they give impossible values, or a
+        value cannot be a digital number, as in `to_radiance`.
 
     See Also
     --------

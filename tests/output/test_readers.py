@@ -74,13 +74,25 @@ def test_odc_stac_loads_the_item(travelled):
     check_place(found)
     assert found["time"].values == np.datetime64("1987-06-06T16:35:00")
     image, truth = (fifesim.open_image(travelled / name) for name in ("image.tif", "truth.tif"))
-    for number in (1, 2, 3):
-        loaded = found[f"image.{number}"]
-        np.testing.assert_array_equal(loaded, image[number - 1])
-        assert (loaded.dtype, loaded.attrs["nodata"]) == ("uint8", 0)
-    for number, name in enumerate(("lai", "fpar"), 1):
-        np.testing.assert_array_equal(found[f"truth.{number}"], truth.sel(band=name))
-        assert np.isnan(found[f"truth.{number}"].attrs["nodata"])
+    for name in ("TM2", "TM3", "TM4"):
+        np.testing.assert_array_equal(found[name], image.sel(band=name))
+        assert (found[name].dtype, found[name].attrs["nodata"]) == ("uint8", 0)
+    for name in ("lai", "fpar"):
+        np.testing.assert_array_equal(found[name], truth.sel(band=name))
+        assert np.isnan(found[name].attrs["nodata"])
+    by_number = stac.load([item], bands=["image.2"]).isel(time=0)
+    np.testing.assert_array_equal(by_number["image.2"], found["TM3"])
+
+
+@pytest.mark.parametrize("names", [["TM3"], ["red", "nir"], ["lai"]])
+def test_odc_stac_loads_bands_by_name(travelled, names):
+    stac = pytest.importorskip("odc.stac")
+    pystac = pytest.importorskip("pystac")
+    found = stac.load([pystac.Item.from_file(str(travelled / "item.json"))], bands=names).isel(time=0)
+    files = {"TM3": ("image", "TM3"), "red": ("image", "TM3"), "nir": ("image", "TM4"), "lai": ("truth", "lai")}
+    for name in names:
+        file, band = files[name]
+        np.testing.assert_array_equal(found[name], fifesim.open_image(travelled / f"{file}.tif").sel(band=band))
 
 
 def test_gdal_opens_the_cells_with_their_crs(travelled):

@@ -79,6 +79,22 @@ def test_bands_say_what_the_file_says(item, travelled):
     assert {band["nodata"] for band in item["assets"]["truth"]["bands"]} == {"nan"}
 
 
+def test_bands_of_the_extension_are_those_of_the_core(item, pystac):
+    """Version 1.1.0 of the extension has eo:bands, by which odc-stac finds names; version 2 has none."""
+    from pystac.extensions.eo import EOExtension
+
+    found = pystac.Item.from_dict(item)
+    for name, fields in (("image", ["name", "center_wavelength", "solar_illumination"]), ("truth", ["name"])):
+        core, extension = item["assets"][name]["bands"], item["assets"][name]["eo:bands"]
+        for field in fields:
+            core_field = field if field == "name" else f"eo:{field}"
+            assert [band[field] for band in extension] == [band[core_field] for band in core]
+        assert [band.name for band in EOExtension.ext(found.assets[name]).bands] == [band["name"] for band in core]
+    assert [band.common_name for band in EOExtension.ext(found.assets["image"]).bands] == ["green", "red", "nir"]
+    allowed = {"name", "common_name", "description", "center_wavelength", "full_width_half_max", "solar_illumination"}
+    assert all(set(band) <= allowed for asset in item["assets"].values() for band in asset.get("eo:bands", []))
+
+
 def test_the_footprint_is_that_of_the_pixels(item):
     """Corners by GDAL's own transformation, to a tenth of a metre; the ring is closed and runs counterclockwise."""
     (ring,) = item["geometry"]["coordinates"]

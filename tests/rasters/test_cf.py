@@ -94,3 +94,11 @@ def test_a_raster_of_another_quantity_is_refused(step, said, cure):
     with pytest.raises(ValueError, match=f"{said}.*{cure}") as caught:
         step(lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]))
     assert len(str(caught.value)) <= 500
+
+
+def test_units_listed_by_band_are_named_once():
+    """rioxarray gives the units of bands as a tuple."""
+    listed = xr.DataArray(np.zeros((3, 2, 2)), attrs={"units": ("W m-2 sr-1 um-1",) * 3})
+    with pytest.raises(ValueError, match=r"has units 'W m-2 sr-1 um-1', toa_reflectance needs '1'"):
+        cf.check_units(listed, "toa_reflectance")
+    cf.check_units(listed, "toa_radiance")

@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 
+import netCDF4
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
 import pytest
@@ -222,3 +223,13 @@ def test_array_that_is_placed_stays_as_it_is():
     placed.coords["spatial_ref"].attrs["GeoTransform"] = ""
     assert array.attrs == {"units": "1"} and grids.geobox(grids.place(array, grid)) == grid
     assert grids.place(array, grid).sel(band="b").shape == (3, 4)
+
+
+def test_netcdf_coordinates_have_no_fill_value(lai, tmp_path):
+    """CF section 2.5.1 forbids it; xarray gives one to all floating point variables."""
+    for number, raster in enumerate((lai, lai.isel(x=slice(3, 9)), lai * 2, lai.chunk(x=20))):
+        path = tmp_path / f"{number}.nc"
+        raster.rename("lai").to_netcdf(path)
+        with netCDF4.Dataset(path) as found:
+            assert not any("_FillValue" in found[axis].ncattrs() for axis in ("x", "y"))
+            assert "_FillValue" in found["lai"].ncattrs()

@@ -133,7 +133,9 @@ def _of_date(images, chosen):
         dates = values.variable.values if dated else values.variable.values.astype(float)
         look_up = partial(_looked_up, dates, np.datetime64("NaT") if dated else np.nan)
         attrs = cf.attributes(name) if name in ANGLES else {"long_name": "date of the image that is kept"}
-        found[name] = _along_time(look_up, chosen, dtype=dates.dtype).assign_attrs(attrs)
+        found[name] = _along_time(look_up, chosen, dtype=dates.dtype)
+        # xarray may keep the attributes of the index here.
+        found[name].attrs = attrs
     return found
 
 

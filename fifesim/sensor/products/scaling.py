@@ -78,50 +78,6 @@ def product_reflectance(dn, gain, offset, largest, flag=0, flags=0, mu_s=1.0):
     return np.where(usable, (dn * np.asarray(gain, float) + offset) / mu_s, np.nan).astype(np.float32)
 
 
-def counts(dn, nodata, largest, saturated=None):
-    """
-    Digital numbers in the form of an image: whole numbers, with 0 for no data.
-
-    Parameters
-    ----------
-    dn : array
-        Whole numbers of any type; NaN is no data. [1]
-    nodata : float
-        Digital number of no data.
-    largest : int
-        Largest number that the instrument records.
-    saturated : int, optional
-        Digital number of saturation, which becomes no data.
-
-    Returns
-    -------
-    dn : array of uint8 up to 255, else of uint16
-
-    Raises
-    ------
-    ValueError
-        If a number is not whole, negative or beyond the largest.
-
-    Examples
-    --------
-    >>> counts([12.0, float("nan"), -9999.0, 255], -9999, 255, saturated=255).tolist()
-    [12, 0, 0, 0]
-    """
-    dn = np.asarray(dn)
-    missing = (dn == nodata) | (np.isnan(dn) if dn.dtype.kind == "f" else False)
-    kept = np.where(missing, 0, dn)
-    wrong = (kept < 0) | (kept > largest) | (kept != np.rint(kept))
-    if np.any(wrong):
-        raise ValueError(
-            f"a digital number of {kept[wrong].flat[0]:g}: whole ones from 0 to {largest} are recorded. Say nodata=, "
-            "or gain= and offset= of scaled numbers; agencies' products open with fifesim.open_landsat and "
-            "fifesim.open_sentinel2"
-        )
-    if saturated is not None:
-        kept = np.where(kept == saturated, 0, kept)
-    return kept.astype(np.uint8 if largest < 256 else np.uint16)
-
-
 def mask_bits(*masks):
     """
     Masks as the bits of one number, the first one as bit 0.

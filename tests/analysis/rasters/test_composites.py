@@ -106,3 +106,34 @@ def test_nothing_records_a_composite(lai):
     clear = xr.concat([toa, toa], times).fifesim.composite()
     with pytest.raises(ValueError, match="a composite is of many dates, and nothing records it"):
         clear.fifesim.sense()
+
+
+@pytest.mark.parametrize("kind", ["netcdf", "zarr"])
+@pytest.mark.parametrize("chunks", [None, ODD_CHUNKS], ids=["eager", "lazy"])
+def test_a_composite_comes_back_from_netcdf_and_zarr(stack, tmp_path, kind, chunks):
+    found = fifesim.composite(stack if chunks is None else in_chunks(stack, chunks))
+    path = tmp_path / "composite"
+    if kind == "netcdf":
+        found.to_netcdf(path)
+        again = xr.open_dataset(path, decode_coords="all")
+    else:
+        found.to_dataset().to_zarr(path, consolidated=False)
+        again = xr.open_zarr(path, decode_coords="all", consolidated=False)
+    with again:
+        xr.testing.assert_identical(again["ndvi"].load(), found.compute())
+
+
+def test_the_date_of_a_composite_has_its_own_attributes(stack):
+    found = fifesim.composite(stack)
+    assert found["date"].attrs == {"long_name": "date of the image that is kept"}
+    assert found["sza"].attrs["standard_name"] == "solar_zenith_angle" and "history" not in found["sza"].attrs
+
+
+def test_a_composite_with_angles_of_its_cells_goes_to_netcdf_as_the_warning_says(stack, tmp_path):
+    found = fifesim.composite(stack)
+    with pytest.warns(UserWarning, match="leaves out sza, .* or write a netCDF with"):
+        again = fifesim.open_image(found.fifesim.to_geotiff(tmp_path / "composite.tif"))
+    xr.testing.assert_identical(again, found.drop_vars("sza"))
+    found.to_netcdf(tmp_path / "composite.nc")
+    with xr.open_dataset(tmp_path / "composite.nc", decode_coords="all") as opened:
+        xr.testing.assert_identical(opened["ndvi"].load(), found)

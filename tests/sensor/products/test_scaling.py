@@ -33,23 +33,6 @@ def test_angles_are_hundredths_from_0_to_360():
     assert scaling.hundredths(np.int16(-10), False) == -0.1
 
 
-@pytest.mark.parametrize(("dn", "said"), [(-1.0, "-1"), (256, "256"), (1.5, "1.5")])
-def test_what_no_instrument_records_is_refused(dn, said):
-    with pytest.raises(ValueError, match=f"digital number of {said}: .*nodata="):
-        scaling.counts(np.array([dn]), 0, 255)
-
-
-def test_counts_are_kept_and_no_data_are_0():
-    np.testing.assert_array_equal(scaling.counts(np.array([-9999, 7, 255], np.int16), -9999, 255), [0, 7, 255])
-    assert scaling.counts(np.array([300]), 0, 65535).dtype == np.uint16
-    assert scaling.counts(np.array([30]), 0, 255).dtype == np.uint8
-
-
-def test_saturated_counts_are_no_data():
-    np.testing.assert_array_equal(scaling.counts(np.array([7, 254, 255]), 0, 255, saturated=255), [7, 254, 0])
-    np.testing.assert_array_equal(scaling.counts(np.array([7, 254, 255]), 0, 255), [7, 254, 255])
-
-
 def test_directions_come_back_from_their_vectors():
     zenith, azimuth = np.meshgrid([0.5, 30.0, 75.0], [0.0, 95.0, 200.0, 359.0])
     found = scaling.direction_angles(3.0 * scaling.direction_vectors(zenith, azimuth))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Literal
 
 import numpy as np
 import xarray as xr
 
 from fifesim.base.annotations import FilePath, Numbers, Time
+from fifesim.base.digital_numbers import counts
 from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
 from fifesim.rasters.annotations import Directions
@@ -18,9 +18,13 @@ from fifesim.rasters.dates import by_date
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
-from fifesim.sensor.products.scaling import counts
 from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.matching import matching_bands
+
+_CURE = (
+    "give nodata=, or gain= and offset= for scaled numbers; products of agencies open with fifesim.open_landsat and "
+    "fifesim.open_sentinel2"
+)
 
 
 @by_date
@@ -74,7 +78,7 @@ def calibrate(
 
     See Also
     --------
-    fifesim.sensor.products.scaling.counts
+    fifesim.base.digital_numbers.counts
 
     Examples
     --------
@@ -116,8 +120,9 @@ def calibrate(
         if not np.all(gain > 0):
             raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")
     saturated = _saturation(saturated, 2**full - 1, 2**bits - 1)
-    kernel = partial(counts, nodata=nodata, largest=2**bits - 1, saturated=saturated)
-    out = chunks.pointwise(kernel, dn.drop_vars("band", errors="ignore"), dtype=np.uint8 if bits <= 8 else np.uint16)
+    known = {"nodata": nodata, "largest": 2**bits - 1, "cure": _CURE, "saturated": saturated}
+    plain = dn.drop_vars("band", errors="ignore")
+    out = chunks.pointwise(counts, plain, dtype=np.uint8 if bits <= 8 else np.uint16, **known)
     along_band = {"band": [band.name for band in bands], "wavelength": [band.wavelength for band in bands]}
     along_band |= {"gain": gain, "offset": offset, "solar_irradiance": [band.solar_irradiance for band in bands]}
     along_band |= {"compression": compression} if any(compression) else {}

@@ -1,5 +1,7 @@
 """Files of a product as layers on one grid, and what makes an image of them."""
 
+import os
+
 import numpy as np
 import xarray as xr
 
@@ -117,8 +119,9 @@ def check_same_grid(layer, other):
     """
     one, two = grids.geobox(layer), grids.geobox(other)
     if not grids.same_grid(one, two):
+        names = " and ".join(os.path.basename(each.name) for each in (layer, other))
         raise ValueError(
-            f"{layer.name} and {other.name} lie on different grids, {grids.in_words(one)} and {grids.in_words(two)}: "
+            f"{names} lie on different grids, {grids.in_words(one)} and {grids.in_words(two)}: "
             "open them one at a time with bands="
         )
 

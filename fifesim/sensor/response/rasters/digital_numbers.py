@@ -3,9 +3,15 @@
 import numpy as np
 import xarray as xr
 
+from fifesim.base.digital_numbers import check_counts
 from fifesim.rasters import cf, chunks, directions
-from fifesim.sensor.response.calibration import gain_offset, radiance_to_dn
+from fifesim.sensor.response.calibration import dn_to_radiance, gain_offset, radiance_to_dn
 from fifesim.sensor.response.product_scaling import product_gain_offset
+
+_CALIBRATE_FIRST = (
+    "calibrate with .fifesim.to_radiance() or .fifesim.to_reflectance() before you compute or resample. If the values "
+    "are radiance already, type .drop_vars(['gain', 'offset']).assign_attrs(units='W m-2 sr-1 um-1')"
+)
 
 
 def check_scaling(scaling, description, quantise=True):
@@ -108,3 +114,43 @@ def recorded(radiance, description, bands, quantise, product_geometry=None):
 def _compressed(radiance, gain, offset, compression, bits):
     """Digital numbers of bands of which some have a scale of square roots."""
     return radiance_to_dn(radiance, gain, offset, bits, compression)
+
+
+def radiance_of(image, scale):
+    """
+    Radiance of digital numbers, whose values are checked where their type also holds other values.
+
+    Parameters
+    ----------
+    image : xarray.DataArray
+        Digital numbers. [1]
+    scale : sequence of xarray.DataArray
+        Gain, offset, and the compression if there is one.
+
+    Returns
+    -------
+    radiance : xarray.DataArray
+        [W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    ValueError
+        If the units are not those of digital numbers, or a value is negative, fractional or above the largest digital
+        number; for lazy data, when they are computed.
+    """
+    units = image.attrs.get("units", "1")
+    if units == cf.QUANTITIES["toa_radiance"].units:
+        raise ValueError(f"the image has the calibration of digital numbers and units {units!r}: {_CALIBRATE_FIRST}")
+    cf.check_units(image, "dn")
+    fill = image.attrs.get("_FillValue", image.encoding.get("_FillValue"))
+    # The fill value has the type in which the image was recorded.
+    recorded = fill.dtype if isinstance(fill, np.generic) and fill.dtype.kind == "u" else None
+    if image.dtype.kind == "u" and recorded in (None, image.dtype):
+        return chunks.pointwise(dn_to_radiance, image, *scale)
+    largest = int(np.iinfo(np.uint16 if recorded is None else recorded).max)
+    return chunks.pointwise(_checked_radiance, image, *scale, largest=largest)
+
+
+def _checked_radiance(dn, *scale, largest):
+    check_counts(dn, largest, _CALIBRATE_FIRST)
+    return dn_to_radiance(dn, *scale)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from lazy import in_chunks, no_compute
 
 import fifesim
 from fifesim.base.geometry import Geometry
@@ -89,3 +90,74 @@ def test_detector_counts_span_its_radiances():
     gain, offset, bits = scale(fifesim.instrument("TM"), band)
     np.testing.assert_allclose([gain[0] * 255 + offset[0], offset[0]], [204.3, -1.2])
     assert bits == 8
+
+
+@pytest.fixture(scope="module")
+def image(toa):
+    dn = np.random.default_rng(8).integers(1, 256, (2, *toa.shape[1:])).astype(np.uint8)
+    dn[:, 1, 1] = 0
+    raster = grids.place(xr.DataArray(dn, dims=("band", "y", "x"), coords={"band": ["TM3", "TM4"]}), grids.geobox(toa))
+    return fifesim.calibrate(raster, "TM", geometry=SUN)
+
+
+CHANGES = {
+    "radiance": lambda image: image * image.gain + image.offset,
+    "half": lambda image: image * 0.5,
+    "doubled": lambda image: image.astype(np.int32) * 2,
+    "negative": lambda image: image.astype(np.int16) - 100,
+    "wider": lambda image: image.astype(np.uint16) * np.uint16(2),
+}
+VERBS = {
+    "radiance": fifesim.to_radiance,
+    "reflectance": fifesim.to_reflectance,
+    "ndvi": fifesim.ndvi,
+    "index": lambda image: fifesim.index(image, "EVI2"),
+    "surface": lambda image: fifesim.to_surface(image, fifesim.Atmosphere()),
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("change", CHANGES)
+def test_values_that_are_no_digital_numbers_are_refused(image, change, verb):
+    with xr.set_options(keep_attrs=True):
+        changed = CHANGES[change](image).assign_attrs(units="1")
+    with pytest.raises(ValueError, match=r"is not a whole number from 0 to (255|65535): calibrate with .*drop_vars"):
+        VERBS[verb](changed)
+    with no_compute():
+        lazy = VERBS[verb](in_chunks(changed, {"y": 5, "x": 7}))
+    with pytest.raises(ValueError, match="is not a whole number"):
+        lazy.compute()
+
+
+def test_the_block_that_is_computed_is_checked(image):
+    changed = image.astype(np.float32)
+    changed[0, 0, 0] = 7.5
+    lazy = fifesim.to_radiance(in_chunks(changed, {"y": 5, "x": 7}))
+    np.testing.assert_array_equal(lazy[:, -1, -1], fifesim.to_radiance(image)[:, -1, -1])
+    with pytest.raises(ValueError, match=r"digital number of 7\.5 is not"):
+        lazy[:, 0, 0].compute()
+
+
+@pytest.mark.parametrize("change", ["kept", "dropped"])
+def test_radiance_computed_by_hand_is_not_calibrated_again(image, change):
+    """Arithmetic keeps attributes since xarray 2025.11; before, it dropped them."""
+    with xr.set_options(keep_attrs=change == "kept"):
+        radiance = image * image.gain + image.offset
+    radiance = radiance.assign_attrs(units="W m-2 sr-1 um-1") if change == "kept" else radiance
+    with pytest.raises(ValueError, match=r"type \.drop_vars\(\['gain', 'offset'\]\)\.assign_attrs"):
+        fifesim.ndvi(radiance.rio.write_crs(image.rio.crs))
+    remedied = radiance.where(image > 0).drop_vars(["gain", "offset"]).assign_attrs(units="W m-2 sr-1 um-1")
+    found = fifesim.ndvi(remedied.rio.write_crs(image.rio.crs))
+    np.testing.assert_allclose(found, fifesim.ndvi(image), rtol=1e-12)
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.int16, np.float32, np.float64])
+def test_digital_numbers_of_another_type_are_calibrated(image, dtype):
+    np.testing.assert_array_equal(fifesim.to_radiance(image.astype(dtype)), fifesim.to_radiance(image))
+    masked = image.astype(np.float32).where(image > 0)
+    np.testing.assert_array_equal(fifesim.to_radiance(masked), fifesim.to_radiance(image))
+
+
+def test_units_of_something_else_are_refused(image):
+    with pytest.raises(ValueError, match="units 'm', dn needs '1'"):
+        fifesim.to_radiance(image.assign_attrs(units="m"))
