@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
@@ -142,13 +141,12 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, wo
         _look_at(chips)
         _warn_of_empty_parts(chips)
         layout = layout_of(chips)
-        # By its root a store is one: it comes last.
+        # The root makes the folder a store: it comes last.
         names = [*stored_names(chips, layout), *_FILES, ROOT]
-        kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks)
+        stale = _other_arrays(folder, names) if overwrite or resume else ()
+        kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks, stale=stale)
         with errors_with_their_file(folder), kept as unfinished:
             _make(chips, layout, unfinished, as_json, way)
-            if overwrite:
-                _remove_other_arrays(folder, names)
     return [folder, *(folder / name for name in _FILES)]
 
 
@@ -262,8 +260,7 @@ def _is_written(folder, blocks, names, shard):
         return False
 
 
-def _remove_other_arrays(folder, names):
-    """Arrays of an earlier dataset, which would look like some of this one's."""
-    for path in folder.iterdir():
-        if path.name not in (UNFINISHED, *names) and (path / ROOT).is_file():
-            shutil.rmtree(path)
+def _other_arrays(folder, names):
+    """Names of arrays of an earlier dataset that the new one does not have."""
+    paths = folder.iterdir() if folder.is_dir() else ()
+    return [path.name for path in paths if path.name not in (UNFINISHED, *names) and (path / ROOT).is_file()]

@@ -69,7 +69,7 @@ def simulate_to_folder(
     folder : str or path
         Made where it does not exist.
     overwrite : bool, optional
-        Replace these files where the folder holds something; other files stay.
+        Replace the files of an earlier run, and remove its cells unless ``scene`` replaces them. Other files stay.
     resume : bool, optional
         Go on with a run of the same scenario that was stopped in this folder; begin where there is none.
     scene : bool, optional
@@ -104,7 +104,8 @@ def simulate_to_folder(
     complete = scenario.complete()
     check_size(complete, folder)
     identity, names = identity_of(complete, scene), FILES + (SCENE,) * scene
-    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks)
+    stale = () if scene else (SCENE,)
+    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks, stale=stale)
     with errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
         begin(unfinished, identity)
         run_engine(complete)

@@ -3,6 +3,7 @@
 import os
 import random
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -157,6 +158,39 @@ def test_an_earlier_dataset_is_replaced_with_all_its_arrays(whole, study, tmp_pa
         dataset_to_folder(study, folder, COUNT)
     dataset_to_folder(study, folder, COUNT, overwrite=True)
     assert contents(folder) == contents(whole) | {"notes.txt": b"mine"}
+
+
+@pytest.fixture(scope="module")
+def earlier(study, tmp_path_factory):
+    """A dataset of another seed, with the same arrays."""
+    folder = tmp_path_factory.mktemp("earlier") / "chips.zarr"
+    dataset_to_folder(Study(study.scenario, DRAWS, landscapes=3, seed=6), folder, COUNT)
+    return folder
+
+
+@pytest.mark.parametrize("number", [1, 2, 8, 20, 40])
+def test_a_run_killed_between_its_moves_leaves_no_store_of_two_datasets(
+    earlier, whole, study, tmp_path, monkeypatch, number
+):
+    folder, replace, moved = tmp_path / "chips.zarr", os.replace, []
+    shutil.copytree(earlier, folder)
+
+    def killed(source, target):
+        moved.extend([target] * (folder in (Path(source).parent, Path(target).parent)))
+        if len(moved) >= number:
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(os, "replace", killed)
+        dataset_to_folder(study, folder, COUNT, overwrite=True)
+    if number == 1:
+        xr.testing.assert_identical(xr.open_zarr(folder), xr.open_zarr(earlier))
+    else:
+        with pytest.raises(FileNotFoundError):
+            xr.open_zarr(folder)
+    dataset_to_folder(study, folder, COUNT, resume=True)
+    assert contents(folder) == contents(whole)
 
 
 def test_what_a_study_cannot_be_is_told_before_anything_is_written(study, tmp_path, monkeypatch):
