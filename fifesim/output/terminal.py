@@ -180,7 +180,7 @@ def kept(output):
         stop(f"interrupted; {left}", Exit.INTERRUPTED)
 
 
-def report(files, seconds, look, as_json=False):
+def report(files, seconds, look, as_json=False, finished=False):
     """
     Say which files a command has made, how long it took, and where to look first, unless it is to be quiet.
 
@@ -192,11 +192,14 @@ def report(files, seconds, look, as_json=False):
         What to open, such as ``"out/report.html in a browser"``.
     as_json : bool, optional
         A line of JSON instead.
+    finished : bool, optional
+        The files were complete before the command began.
     """
     if as_json:
         say(json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)}))
     elif not is_quiet():
-        say(*files, f"done in {in_time(seconds)}: open {look}")
+        done = "this run was finished before, nothing is left to do" if finished else f"done in {in_time(seconds)}"
+        say(*files, f"{done}: open {look}")
 
 
 def in_time(seconds):

@@ -108,6 +108,29 @@ def test_a_stopped_run_goes_on_to_the_same_bits(after, study, whole, tmp_path, m
     assert contents(folder) == contents(whole)
 
 
+@pytest.mark.parametrize("text", ["[]", "{", '{"chips": "many"}', "[" * 100_000])
+def test_a_state_that_no_run_wrote_gives_no_number_of_chips(study, tmp_path, text):
+    (tmp_path / UNFINISHED).mkdir()
+    (tmp_path / UNFINISHED / "run.toml").write_text(study.to_toml())
+    (tmp_path / UNFINISHED / "run.json").write_text(text)
+    assert study_to_resume(tmp_path) == (study, None)
+
+
+def test_a_finished_dataset_is_resumed_without_work(study, whole, tmp_path, monkeypatch):
+    folder = tmp_path / "chips.zarr"
+    shutil.copytree(whole, folder)
+    made = stopping(monkeypatch, 0)
+    dataset_to_folder(study, folder, COUNT, resume=True)
+    assert not made and contents(folder) == contents(whole)
+    assert study_to_resume(folder) == (study, COUNT)
+    with pytest.raises(ValueError, match=r"dataset of 7 chips, not 8: give that number.*--overwrite"):
+        dataset_to_folder(study, folder, 8, resume=True)
+    other = Study(study.scenario, DRAWS, landscapes=3, seed=6)
+    with pytest.raises(ValueError, match=r"of another scenario, with seed = 5.*--overwrite"):
+        dataset_to_folder(other, folder, COUNT, resume=True)
+    assert contents(folder) == contents(whole)
+
+
 def test_half_written_shards_do_not_count(study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
     with monkeypatch.context() as patch:
