@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 
 from fifesim.base.foreign import in_a_line
 from fifesim.base.logs import LOG, is_quiet, quiet
-from fifesim.output.memory import keep_freed
+from fifesim.output.process import interrupts_blocked, keep_freed
 
 # Of a message, and of a line in one of many. [character]
 _LONGEST, _SHORTEST = 500, 50
@@ -35,31 +35,20 @@ class Exit(IntEnum):
 
 
 class Door(TyperGroup):
-    """The one way out of all commands: a mistake is a line, and the exit code says whose it is."""
-
-    def invoke(self, context):
-        """
-        Run a command; Ctrl-C ends it with a line.
-
-        Parameters
-        ----------
-        context : typer.Context
-
-        Returns
-        -------
-        result : object
-        """
-        try:
-            return super().invoke(context)
-        except KeyboardInterrupt:
-            stop("interrupted; nothing is written", Exit.INTERRUPTED)
+    """The one way out of all commands: a mistake or Ctrl-C is one line, and the exit code tells the kind."""
 
     def main(self, *arguments, **options):
         """Run the command line, and end with its exit code."""
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = tell
-                sys.exit(super().main(*arguments, **options | {"standalone_mode": False}))
+                code = super().main(*arguments, **options | {"standalone_mode": False})
+            if code == Exit.INTERRUPTED:
+                # typer turns Ctrl-C into this code.
+                raise KeyboardInterrupt
+            sys.exit(code)
+        except (KeyboardInterrupt, typer.Abort):
+            stop("interrupted; nothing is written", Exit.INTERRUPTED)
         except _UsageError as error:
             error.message = in_a_line(error.message)
             error.show()
@@ -130,7 +119,8 @@ def importing():
     atexit.register(gc.freeze)
     gc.disable()
     try:
-        yield
+        with interrupts_blocked():
+            yield
     finally:
         gc.freeze()
         gc.enable()

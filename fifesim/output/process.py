@@ -1,8 +1,10 @@
-"""Memory that a command frees stays with it."""
+"""The process of a command: memory that it frees, and Ctrl-C at moments that cannot be interrupted."""
 
 import ctypes
 import os
+import signal
 import sys
+from contextlib import contextmanager
 
 # What mallopt calls them: so much free memory at the end of a heap goes back, blocks of such a size always do, and how
 # many heaps there are: one, as those of threads go back when they are empty.
@@ -26,3 +28,21 @@ def keep_freed():
         mallopt(_TRIM_THRESHOLD, _KEPT)
         mallopt(_MMAP_THRESHOLD, _KEPT)
         mallopt(_ARENA_MAX, 1)
+
+
+@contextmanager
+def interrupts_blocked():
+    """
+    A context within which Ctrl-C waits: KeyboardInterrupt is raised at its end.
+
+    An import that is interrupted fails in ways of its own, and processes that are started within the context never get
+    the Ctrl-C of their terminal.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
