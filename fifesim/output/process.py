@@ -4,6 +4,7 @@ import ctypes
 import os
 import signal
 import sys
+import threading
 from contextlib import contextmanager
 
 # What mallopt calls them: so much free memory at the end of a heap goes back, blocks of such a size always do, and how
@@ -37,12 +38,28 @@ def interrupts_blocked():
 
     An import that is interrupted fails in ways of its own, and processes that are started within the context never get
     the Ctrl-C of their terminal.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        At the end, if Ctrl-C was pressed.
     """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
+    handler = signal.getsignal(signal.SIGINT)
+    if not hasattr(signal, "pthread_sigmask") or handler is not signal.default_int_handler:
+        # On Windows, and where Ctrl-C is ignored or somebody else handles it.
         yield
         return
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    # The mask is for processes that are started. In this one, another thread may take the signal.
+    pressed = []
+    signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, handler)
+    if pressed:
+        raise KeyboardInterrupt

@@ -38,7 +38,14 @@ class Door(TyperGroup):
     """The one way out of all commands: a mistake or Ctrl-C is one line, and the exit code tells the kind."""
 
     def main(self, *arguments, **options):
-        """Run the command line, and end with its exit code."""
+        """
+        Run the command line, and end with its exit code.
+
+        Raises
+        ------
+        SystemExit
+            Always.
+        """
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = tell
