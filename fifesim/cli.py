@@ -27,7 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _Paper = Annotated[bool, typer.Option("--paper", help="The paper's one stand, in the place of the landscape.")]
 _Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files of an earlier run.")]
-_Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")]
+_Resume = Annotated[bool, typer.Option("--resume", help="Resume an interrupted run; nothing to do if it is finished.")]
 _Scheduler = Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")]
 _AsJson = Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")]
 _AllowRemote = Annotated[
@@ -78,14 +78,14 @@ def simulate(
         from fifesim.output.folders import check_folder
         from fifesim.output.progress import since_start
         from fifesim.output.run.estimates import estimate, estimate_in_words
-        from fifesim.output.run.folder import simulate_to_folder
+        from fifesim.output.run.folder import names_of, simulate_to_folder
         from fifesim.output.run.identity import scenario_to_resume
         from fifesim.output.run.workers import cluster
         from fifesim.scenario.scenario import read_scenario
 
     if allow_remote:
         _open_remote(context)
-    check_folder(output, overwrite, resume)
+    finished = check_folder(output, overwrite, resume, names_of(scene))
     if paper and scenario:
         raise ValueError("--paper stands for a scenario of its own: type either that or a file")
     found = scenario_to_resume(output) if resume and scenario is None and not paper else None
@@ -99,7 +99,7 @@ def simulate(
         options = {"overwrite": overwrite, "resume": resume, "scene": scene, "as_json": as_json}
         files = simulate_to_folder(found, output, threads=threads, client=client, **options)
     look = f"{output / 'report.html'} in a browser, {output / 'image.tif'} in a GIS"
-    report(files, time.monotonic() - start, look, as_json)
+    report(files, time.monotonic() - start, look, as_json, finished)
 
 
 @app.command()
@@ -140,10 +140,12 @@ def dataset(
     """Make a training set. Images and truth of many chips, as sharded Zarr with a datasheet."""
     start = time.monotonic()
     with _importing():
-        from fifesim.output.chips.folder import dataset_to_folder, study_to_resume
+        from fifesim.output.chips.folder import WHOLE, dataset_to_folder, study_to_resume
+        from fifesim.output.folders import check_folder
         from fifesim.output.run.workers import cluster, usable_cores
         from fifesim.scenario.studies import read_study
 
+    finished = check_folder(output, overwrite, resume, WHOLE)
     found, count = study_to_resume(output) if resume else (None, None)
     if study is None and found is None:
         raise ValueError("a dataset is of a study: type its file, such as study.toml; to go on, --resume and -o")
@@ -157,7 +159,8 @@ def dataset(
     with kept(output), cluster(scheduler=scheduler) as client:
         options = {"overwrite": overwrite, "resume": resume, "workers": workers, "client": client, "as_json": as_json}
         files = dataset_to_folder(found, output, chips or count or 1000, **options)
-    report(files, time.monotonic() - start, f"{output / 'datasheet.html'} in a browser", as_json)
+    look = f"{output / 'datasheet.html'} in a browser"
+    report(files, time.monotonic() - start, look, as_json, finished)
 
 
 @app.command()

@@ -234,6 +234,20 @@ def test_a_folder_in_use_is_not_touched_without_overwrite(invoke, small, tmp_pat
     assert (tmp_path / "out" / "image.tif").exists()
 
 
+def test_resuming_a_finished_run_reports_its_files(first, invoke):
+    """A batch system that queues a run again does not take a finished one for a failure."""
+    out = first[0]
+    before = {path.name: path.stat().st_mtime_ns for path in out.iterdir()}
+    for scenario in ([], [out.parent / "small.toml"]):
+        result = invoke("simulate", *scenario, "-o", out, "--resume")
+        assert result.exit_code == 0, result.stderr
+        assert all(name in result.stdout for name in FILES)
+        assert "this run was finished before, nothing is left to do: open" in result.stdout
+    assert {path.name: path.stat().st_mtime_ns for path in out.iterdir()} == before
+    other = invoke("simulate", "--paper", "-o", out, "--resume")
+    assert other.exit_code == 2 and "--overwrite" in other.stderr
+
+
 def test_negative_lai_leaves_no_output_behind(invoke, tmp_path):
     profile = {"driver": "GTiff", "width": 30, "height": 30, "count": 1, "dtype": "float32", "crs": "EPSG:26914"}
     transform = rasterio.transform.from_origin(705000, 4334100, 30, 30)
@@ -295,6 +309,8 @@ def test_dataset_makes_chips_and_names_what_people_read(invoke, tmp_path):
     assert all((tmp_path / name).exists() for name in last["files"])
     again = invoke("dataset", "study.toml", "-n", 4, "--workers", 1)
     assert again.exit_code == 2 and "is not empty" in again.stderr
+    finished = invoke("dataset", "--resume")
+    assert finished.exit_code == 0 and "nothing is left to do" in finished.stdout
 
 
 @pytest.mark.parametrize(

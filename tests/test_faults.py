@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -18,8 +19,11 @@ from fifesim.output.folders import UNFINISHED
 from fifesim.output.run.folder import FILES
 
 COMMAND = [sys.executable, "-c", "from fifesim.cli import app; app()", "simulate"]
+# Whoever starts tests in the background of a script has them ignore SIGINT, which programs that they start inherit.
+HEARS_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 # A run that gets a signal as soon as the first block of its image is saved, however quick the rest is.
-SIGNALLED = """
+SIGNALLED = f"""
+{HEARS_CTRL_C}
 import os
 from fifesim.cli import app
 from fifesim.output.run import folder
@@ -30,7 +34,7 @@ def and_signal(blocks, name, *given):
     save(blocks, name, *given)
     if name == "image":
         folder.save_block = save
-        os.kill(os.getpid(), {:d})
+        os.kill(os.getpid(), SIGNAL)
 
 folder.save_block = and_signal
 app()
@@ -75,7 +79,13 @@ def wait_for_a_block(folder, process):
 
 def signalled(signal_number, *arguments):
     """A run that a signal ended after its first block."""
-    command = [sys.executable, "-c", SIGNALLED.format(signal_number), "simulate", *map(str, arguments)]
+    command = [
+        sys.executable,
+        "-c",
+        SIGNALLED.replace("SIGNAL", str(int(signal_number))),
+        "simulate",
+        *map(str, arguments),
+    ]
     return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
 
 
@@ -212,6 +222,60 @@ def test_ctrl_c_ends_a_run_that_can_go_on(scenario, whole, tmp_path, options):
     assert "--resume" in process.stderr and "Traceback" not in process.stderr
     assert [path.name for path in out.iterdir()] == [UNFINISHED]
     assert resumed(scenario, out)[0] == whole
+
+
+@pytest.fixture
+def ignored_here():
+    """SIGINT ignored in this process, as where a script starts it in the background."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_is_heard_where_the_tests_run_in_the_background(ignored_here):
+    code = HEARS_CTRL_C + "import os; os.kill(os.getpid(), signal.SIGINT)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "KeyboardInterrupt" in done.stderr
+
+
+STUDY = """
+[grid]
+width = 600
+height = 600
+
+[terrain]
+dem = "flat"
+
+[dataset]
+landscapes = 4
+
+[draw]
+visibility = { uniform = ["10 km", 60] }
+"""
+
+
+@pytest.mark.parametrize(
+    "delay", [0.0, 0.5, *(pytest.param(0.3 * number, marks=pytest.mark.slow) for number in range(1, 9))]
+)
+def test_ctrl_c_in_a_terminal_ends_all_processes_of_a_dataset_with_one_line(tmp_path, delay):
+    """It reaches each process of the group, from the moment at which there is a second one."""
+    (tmp_path / "study.toml").write_text(STUDY)
+    code = f"{HEARS_CTRL_C}from fifesim.cli import app; app()"
+    command = [sys.executable, "-c", code, "dataset", "study.toml", "-n", "4000", "--workers", "2"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, cwd=tmp_path, start_new_session=True, **pipes)
+    try:
+        while not (children := psutil.Process(process.pid).children(recursive=True)):
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.01)
+        time.sleep(delay)
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
+    assert process.returncode == 130, errors
+    assert re.fullmatch(r"fifesim: interrupted; [^\n]*\n", errors), errors
+    assert not psutil.wait_procs(children, timeout=30)[1]
 
 
 @pytest.fixture

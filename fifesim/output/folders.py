@@ -3,19 +3,21 @@
 import os
 import shutil
 import socket
+import stat
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 
 from filelock import FileLock, Timeout
 
-# Folder of a run that is not finished, in the folder of its results.
+# Hidden folder of an unfinished run, in the folder of its results.
 UNFINISHED = ".unfinished"
 
-# In it: the lock that ends with its process, who has it, and the file by which a run has begun.
-_LOCK, _HOLDER, BEGUN = "lock", "holder", "run.toml"
+# In the hidden folder: a lock that ends with its process, the name of its holder, the file that marks a run as begun,
+# and earlier results that the run has replaced.
+_LOCK, _HOLDER, BEGUN, _REPLACED = "lock", "holder", "run.toml", "replaced"
 
 
-def check_folder(folder, overwrite, resume=False):
+def check_folder(folder, overwrite, resume=False, names=None):
     """
     Refuse an output folder that is in use.
 
@@ -23,21 +25,35 @@ def check_folder(folder, overwrite, resume=False):
     ----------
     folder : pathlib.Path
     overwrite, resume : bool
+    names : sequence of str, optional
+        Files of the run, by which ``resume`` recognises a finished run.
+
+    Returns
+    -------
+    finished : bool
+        Whether a run is to be resumed that is finished already.
 
     Raises
     ------
     ValueError
-        If it is a file, another run is writing into it, or it holds something and ``overwrite`` is off, unless
-        ``resume`` is on and there is a run to go on with.
+        If the folder is a file, if another run is writing into it, or if it is not empty and neither ``overwrite``
+        allows that nor ``resume`` finds an unfinished or a finished run.
     """
     if os.path.lexists(folder) and not folder.is_dir():
         raise ValueError(f"the output folder {str(folder)!r} is a file: name another with -o")
     if not folder.is_dir():
-        return
+        return False
+    begun = (folder / UNFINISHED / BEGUN).is_file()
+    whole = bool(names) and not begun and all((folder / name).exists() for name in names)
+    finished = resume and not overwrite and whole
     if (folder / UNFINISHED).is_dir():
-        with _held(folder):
-            pass
-    _check_contents(folder, overwrite, resume)
+        with _held(folder) as hidden:
+            if finished:
+                # The remains of a run that was killed after its last file was in place.
+                _empty(hidden)
+    if not finished:
+        _check_contents(folder, overwrite, resume)
+    return finished
 
 
 def _check_contents(folder, overwrite, resume):
@@ -55,30 +71,33 @@ def _check_contents(folder, overwrite, resume):
 
 
 @contextmanager
-def results(folder, names, *, overwrite=False, resume=False, worth_keeping=None):
+def results(folder, names, *, overwrite=False, resume=False, worth_keeping=None, stale=()):
     """
-    A hidden folder to write results into, which come into place when all of them are whole; a context manager.
+    Hidden folder to write results into, which are moved into place when all of them are whole; a context manager.
 
     The folder is held meanwhile: no other run can begin in it, on this machine or on another that sees it.
 
     Parameters
     ----------
     folder : pathlib.Path
-        Made where it does not exist, and removed again where nothing comes of it.
-    names : iterable of str
-        Files and folders that come into place, and replace what has their names.
+        Made if it does not exist, and removed again if the run leaves nothing in it.
+    names : sequence of str
+        Files and folders that are moved into place, and replace earlier ones. The last one marks the results as
+        complete.
     overwrite : bool, optional
-        Also where the folder holds something.
+        Accept a folder that is not empty.
     resume : bool, optional
-        Go on with what was kept.
+        Go on with what an earlier run kept.
     worth_keeping : callable, optional
-        ``worth_keeping(hidden, error)`` says whether the hidden folder outlives an error, for another run to go on
-        with. It is always removed without.
+        ``worth_keeping(hidden, error)`` tells whether the hidden folder is kept after an error, so that another run
+        can go on with it. It is always removed by default.
+    stale : sequence of str, optional
+        Files and folders of an earlier run that this run does not replace. They are removed.
 
     Yields
     ------
     hidden : pathlib.Path
-        Empty but for what was kept, and for who holds it.
+        Empty apart from what was kept, and the name of the process that holds the folder.
 
     Raises
     ------
@@ -90,12 +109,13 @@ def results(folder, names, *, overwrite=False, resume=False, worth_keeping=None)
     try:
         with _held(folder) as hidden:
             _check_contents(folder, overwrite, resume)
-            if not resume:
+            if resume:
+                _remove_links_and_devices(hidden)
+            else:
                 _empty(hidden)
             try:
                 yield hidden
-                for name in names:
-                    _replace(hidden / name, folder / name)
+                _move_into_place(hidden, folder, names, stale)
             except BaseException as error:
                 if not (worth_keeping and worth_keeping(hidden, error)):
                     _empty(hidden)
@@ -103,7 +123,7 @@ def results(folder, names, *, overwrite=False, resume=False, worth_keeping=None)
             _empty(hidden)
     finally:
         if not existed:
-            # Not where somebody else's files have come in the meantime.
+            # Fails if somebody else has written files into it in the meantime.
             with suppress(OSError):
                 folder.rmdir()
 
@@ -134,9 +154,12 @@ def errors_with_their_file(folder):
 
 @contextmanager
 def _held(folder):
-    """The hidden folder of a run, held by a lock that ends with this process, however that ends; gone where empty."""
+    """Hidden folder of a run, held by a lock that ends with this process, and removed if nothing is left in it."""
     hidden = folder / UNFINISHED
     holder = hidden / _HOLDER
+    if hidden.is_symlink():
+        raise ValueError(f"{str(hidden)!r} is a link: remove it, or name another folder with -o")
+    _remove_unless_plain(hidden / _LOCK)
     try:
         taken = FileLock(hidden / _LOCK).acquire(timeout=0)
     except (Timeout, FileNotFoundError):
@@ -147,6 +170,7 @@ def _held(folder):
     with taken:
         began = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
         try:
+            _remove_unless_plain(holder)
             holder.write_text(f"process {os.getpid()} on {socket.gethostname()}, begun {began}", encoding="utf-8")
             yield hidden
         finally:
@@ -157,20 +181,47 @@ def _held(folder):
         hidden.rmdir()
 
 
+def _remove_unless_plain(path):
+    """Remove a link, pipe, socket or device, which a run would follow, or wait for without end."""
+    if os.path.lexists(path) and stat.S_IFMT(os.lstat(path).st_mode) not in (stat.S_IFREG, stat.S_IFDIR):
+        os.unlink(path)
+
+
+def _remove_links_and_devices(hidden):
+    """Remove from a hidden folder what no run writes; the run makes those files again."""
+    for parent, folders, files in os.walk(hidden):
+        for name in (*folders, *files):
+            _remove_unless_plain(os.path.join(parent, name))
+
+
 def _empty(hidden):
-    """Remove all of a hidden folder but its lock and the name of who holds it."""
+    """Remove everything in a hidden folder except the lock and the name of its holder."""
+    # Without the mark of a run that has begun, nothing tries to go on with the remains.
+    (hidden / BEGUN).unlink(missing_ok=True)
     for path in hidden.iterdir():
         if path.name not in (_LOCK, _HOLDER):
-            _remove(path)
+            shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
 
 
-def _remove(path):
-    shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+def _move_into_place(hidden, folder, names, stale):
+    """
+    Replace earlier results with new ones.
 
-
-def _replace(source, target):
-    if target.is_dir() and not target.is_symlink():
-        shutil.rmtree(target)
-    os.replace(source, target)
-    # What GDAL, or a GIS, kept of a raster that was there before: it would be taken for that of this one.
-    target.with_name(f"{target.name}.aux.xml").unlink(missing_ok=True)
+    The last name marks results as complete. The earlier mark is moved out of the way first and the new one comes last.
+    A process that is killed in between leaves files of one run only, without the mark. An error undoes all moves.
+    """
+    replaced = hidden / _REPLACED
+    shutil.rmtree(replaced, ignore_errors=True)
+    replaced.mkdir()
+    # GDAL and GIS keep statistics of a raster in a file beside it, which do not hold for the new raster.
+    earlier = [each for name in reversed([*stale, *names]) for each in (name, f"{name}.aux.xml")]
+    moves = [(folder / name, replaced / name) for name in earlier if os.path.lexists(folder / name)]
+    moves += [(hidden / name, folder / name) for name in names]
+    try:
+        for source, target in moves:
+            os.replace(source, target)
+    except BaseException:
+        for source, target in reversed(moves):
+            if os.path.lexists(target) and not os.path.lexists(source):
+                os.replace(target, source)
+        raise

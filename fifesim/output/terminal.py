@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 
 from fifesim.base.foreign import in_a_line
 from fifesim.base.logs import LOG, is_quiet, quiet
-from fifesim.output.memory import keep_freed
+from fifesim.output.process import interrupts_blocked, keep_freed
 
 # Of a message, and of a line in one of many. [character]
 _LONGEST, _SHORTEST = 500, 50
@@ -35,31 +35,27 @@ class Exit(IntEnum):
 
 
 class Door(TyperGroup):
-    """The one way out of all commands: a mistake is a line, and the exit code says whose it is."""
-
-    def invoke(self, context):
-        """
-        Run a command; Ctrl-C ends it with a line.
-
-        Parameters
-        ----------
-        context : typer.Context
-
-        Returns
-        -------
-        result : object
-        """
-        try:
-            return super().invoke(context)
-        except KeyboardInterrupt:
-            stop("interrupted; nothing is written", Exit.INTERRUPTED)
+    """The one way out of all commands: a mistake or Ctrl-C is one line, and the exit code tells the kind."""
 
     def main(self, *arguments, **options):
-        """Run the command line, and end with its exit code."""
+        """
+        Run the command line, and end with its exit code.
+
+        Raises
+        ------
+        SystemExit
+            Always.
+        """
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = tell
-                sys.exit(super().main(*arguments, **options | {"standalone_mode": False}))
+                code = super().main(*arguments, **options | {"standalone_mode": False})
+            if code == Exit.INTERRUPTED:
+                # typer turns Ctrl-C into this code.
+                raise KeyboardInterrupt
+            sys.exit(code)
+        except (KeyboardInterrupt, typer.Abort):
+            stop("interrupted; nothing is written", Exit.INTERRUPTED)
         except _UsageError as error:
             error.message = in_a_line(error.message)
             error.show()
@@ -130,7 +126,8 @@ def importing():
     atexit.register(gc.freeze)
     gc.disable()
     try:
-        yield
+        with interrupts_blocked():
+            yield
     finally:
         gc.freeze()
         gc.enable()
@@ -180,7 +177,7 @@ def kept(output):
         stop(f"interrupted; {left}", Exit.INTERRUPTED)
 
 
-def report(files, seconds, look, as_json=False):
+def report(files, seconds, look, as_json=False, finished=False):
     """
     Say which files a command has made, how long it took, and where to look first, unless it is to be quiet.
 
@@ -192,11 +189,14 @@ def report(files, seconds, look, as_json=False):
         What to open, such as ``"out/report.html in a browser"``.
     as_json : bool, optional
         A line of JSON instead.
+    finished : bool, optional
+        The files were complete before the command began.
     """
     if as_json:
         say(json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)}))
     elif not is_quiet():
-        say(*files, f"done in {in_time(seconds)}: open {look}")
+        done = "this run was finished before, nothing is left to do" if finished else f"done in {in_time(seconds)}"
+        say(*files, f"{done}: open {look}")
 
 
 def in_time(seconds):

@@ -168,12 +168,31 @@ def _check_virtual(path):
     systems = re.findall(r"/vsi\w*", path)
     if refused := [name for name in systems if name not in _LOCAL_SYSTEMS]:
         raise ValueError(f"{in_a_line(path, _PATH)} lies in {in_a_line(refused[0], 40)}, which is not opened: {_CURE}")
-    # The archive is whichever part of the path is there.
-    parts = path.rpartition(systems[-1])[2].removeprefix("/").split("/")
+    if archive := archive_of(path):
+        _check_regular(archive, path)
+
+
+def archive_of(path):
+    """
+    File on disk that holds a file of GDAL's virtual file systems.
+
+    Parameters
+    ----------
+    path : str
+        Such as ``/vsizip/maps.zip/lai.tif``.
+
+    Returns
+    -------
+    archive : str or None
+        None if no part of the path is a file on disk, as for ``/vsimem/``.
+    """
+    parts = path.rpartition(re.findall(r"/vsi\w*", path)[-1])[2].removeprefix("/").removeprefix("{").split("/")
     for length in range(1, len(parts) + 1):
-        part = "/".join(parts[:length])
+        # GDAL takes braces around an archive of any suffix.
+        part = "/".join(parts[:length]).removesuffix("}")
         if part and os.path.exists(part) and not os.path.isdir(part):
-            _check_regular(part, path)
+            return part
+    return None
 
 
 def _check_regular(path, said):

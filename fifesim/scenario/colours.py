@@ -1,7 +1,7 @@
 """The bands of a scenario whose file names none: those of a picture in false colours."""
 
+import os
 from collections.abc import Mapping
-from pathlib import Path
 
 from fifesim.sensor.description.choices import false_colour_bands
 from fifesim.sensor.description.instruments import instrument
@@ -45,7 +45,7 @@ def with_false_colour(values):
 
 def _found(name):
     """Bands of an instrument; none where there is none, which is told when the scenario is made."""
-    if not isinstance(name, str) or (name.endswith(".toml") and not Path(name).is_file()):
+    if not isinstance(name, str) or (name.endswith(".toml") and not os.path.isfile(name)):
         return ()
     try:
         return false_colour_bands(instrument(name))

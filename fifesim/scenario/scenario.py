@@ -24,7 +24,7 @@ from fifesim.scenario.ground import check_crown_cover, drawn_properties
 from fifesim.scenario.ground_keys import COVARIATES
 from fifesim.scenario.keys import EXTENT, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
-from fifesim.scenario.toml import load_values, mistakes
+from fifesim.scenario.toml import full_path, load_values, mistakes
 
 # Shares of classes may miss 1 by rounding.
 _WHOLE = 1e-6
@@ -188,7 +188,7 @@ class Scenario(Keys):
         own_time = self.geometry.model_copy(update={"time": self._time()})
         known = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor}
         found = self.model_copy(update=known)
-        return found.with_paths(os.path.abspath)
+        return found.with_paths(full_path)
 
     def with_paths(self, change: Callable[[str], str]) -> Self:
         """

@@ -1,7 +1,7 @@
 """What the values of a scenario mean, section by section, and what physics refuses of them."""
 
+import os
 from dataclasses import asdict, fields
-from pathlib import Path
 
 from pydantic import field_validator, model_validator
 
@@ -210,7 +210,7 @@ class Sensor(SensorKeys):
         """Without names the red and near infrared band are meant, which scenes of vegetation are seen in."""
         if not isinstance(values, dict) or "bands" in values or not isinstance(values.get("instrument"), str):
             return values
-        if cls.names_a_file("instrument", values["instrument"]) and not Path(values["instrument"]).is_file():
+        if cls.names_a_file("instrument", values["instrument"]) and not os.path.isfile(values["instrument"]):
             return values
         bands = instrument(values["instrument"]).red_and_near_infrared()
         return values | {"bands": [band.name for band in bands]}

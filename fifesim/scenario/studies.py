@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -21,7 +20,7 @@ from fifesim.scenario.keys import LAND_FORMS
 from fifesim.scenario.named_keys import find_key, put, values_of
 from fifesim.scenario.scenario import Scenario, grid_keys, parse_scenario
 from fifesim.scenario.sequences import SEQUENCES
-from fifesim.scenario.toml import load_values, plain_table
+from fifesim.scenario.toml import full_path, load_values, plain_table
 
 _HEADING = "# Study of a fifesim dataset. Make it with: fifesim dataset THIS_FILE -o chips.zarr -n 1000"
 _SPLIT = MappingProxyType({"train": 0.8, "validation": 0.1, "test": 0.1})
@@ -119,7 +118,7 @@ class Study:
         plan = {"sequence": self.sequence, "seed": self.seed, "landscapes": self.landscapes, "split": dict(self.split)}
         tables = {("dataset",): plan, ("draw",): self.draws}
         for place, section in self.scenario.sections().items():
-            tables[place] = section.with_paths(os.path.abspath).model_dump(exclude_unset=True)
+            tables[place] = section.with_paths(full_path).model_dump(exclude_unset=True)
         written = ("\n".join(plain_table(place, values)) for place, values in tables.items() if values)
         return "\n\n".join([_HEADING, *written]) + "\n"
 
@@ -178,7 +177,7 @@ def read_study(path: FilePath) -> Study:
             hint = nearest(str(name), known)
             raise ValueError(f"unknown key dataset.{name}: {hint}allowed are {', '.join(known)}")
     if isinstance(draws, Mapping):
-        draws = {name: _with_whole_paths(name, table, Path(path).parent.absolute()) for name, table in _flat(draws)}
+        draws = {name: _with_whole_paths(name, table, Path(path).parent) for name, table in _flat(draws)}
     return Study(parse_scenario(values), draws, **plan)
 
 
@@ -187,7 +186,7 @@ def _with_whole_paths(name, table, folder):
     key = find_key(name, called="draw:")
     if not isinstance(table, Mapping) or not isinstance(table.get("choice"), list) or key.entry:
         return table
-    choices = [str(folder / each) if key.section.names_a_file(key.key, each) else each for each in table["choice"]]
+    choices = [full_path(each, folder) if key.section.names_a_file(key.key, each) else each for each in table["choice"]]
     return table | {"choice": choices}
 
 

@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import os
 import re
 from pathlib import Path
 
@@ -61,11 +62,33 @@ def with_folder(values, folder):
     values : dict
         The same, changed.
     """
-    folder = Path(folder).absolute()
-    # A link stays one: what it leads to may have another suffix.
     for _, table, key in list(named_files(values)):
-        table[key] = str(folder / table[key])
+        table[key] = full_path(table[key], folder)
     return values
+
+
+def full_path(path, folder="."):
+    """
+    Full path of a file that a scenario names.
+
+    Parameters
+    ----------
+    path : str
+    folder : str or path, optional
+        Folder that the path is relative to.
+
+    Returns
+    -------
+    path : str
+        Links are not resolved: the file that one leads to may have another suffix. Paths of GDAL's virtual file
+        systems do not change, since they are no paths of this machine.
+
+    Examples
+    --------
+    >>> full_path("../lai.tif", "/data/runs"), full_path("/vsizip//data/maps.zip/lai.tif", "/data/runs")
+    ('/data/lai.tif', '/vsizip//data/maps.zip/lai.tif')
+    """
+    return path if path.startswith("/vsi") else os.path.abspath(os.path.join(folder, path))
 
 
 def named_files(values):

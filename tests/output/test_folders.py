@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+from pathlib import Path
 
 import pytest
 
@@ -51,6 +52,84 @@ def test_a_folder_replaces_a_folder(tmp_path):
             (hidden / "store").mkdir()
             (hidden / "store" / text).touch()
     assert [path.name for path in (tmp_path / "store").iterdir()] == ["new"]
+
+
+class Killed(BaseException):
+    """Stands for a signal that ends the process at once."""
+
+
+def failing_moves(monkeypatch, folder, number, error, forever):
+    """Let moves out of a folder or into it fail, from the given one on, or that one alone."""
+    moved, replace = [], os.replace
+
+    def move(source, target):
+        if folder in (Path(source).parent, Path(target).parent):
+            moved.append(target)
+            if len(moved) == number or (forever and len(moved) > number):
+                raise error
+        return replace(source, target)
+
+    monkeypatch.setattr(os, "replace", move)
+
+
+def replaced_run(folder, **options):
+    """New results in the place of old ones, with the last name as the mark of a whole run."""
+    with results(folder, ["store", "one.txt", "mark"], stale=["stale"], **options) as hidden:
+        (hidden / BEGUN).touch()
+        (hidden / "store").mkdir(exist_ok=True)
+        (hidden / "store" / "part").write_text("new")
+        for name in ("one.txt", "mark"):
+            (hidden / name).write_text("new")
+
+
+def old_run(folder):
+    (folder / "store").mkdir(parents=True)
+    for name in ("store/part", "one.txt", "mark", "stale", "one.txt.aux.xml"):
+        (folder / name).write_text("old")
+    return all_files(folder)
+
+
+def all_files(folder):
+    found = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+    return {name: path.read_text() for name, path in found.items() if not name.startswith(UNFINISHED)}
+
+
+NEW = {"store/part": "new", "one.txt": "new", "mark": "new"}
+
+
+@pytest.mark.parametrize("number", range(1, 9))
+def test_a_run_killed_between_its_moves_leaves_no_mix_of_two_runs(tmp_path, monkeypatch, number):
+    out = tmp_path / "out"
+    old_run(out)
+    with monkeypatch.context() as patch, pytest.raises(Killed):
+        failing_moves(patch, out, number, Killed, forever=True)
+        replaced_run(out, overwrite=True, worth_keeping=lambda hidden, error: True)
+    found = all_files(out)
+    assert len(set(found.values())) <= 1
+    # The first move takes the old mark away, and the last one brings the new one.
+    assert ("mark" in found) == (number == 1)
+    replaced_run(out, resume=True)
+    assert all_files(out) == NEW and not (out / UNFINISHED).exists()
+
+
+@pytest.mark.parametrize("error", [OSError, KeyboardInterrupt])
+@pytest.mark.parametrize("number", range(1, 9))
+def test_an_error_between_the_moves_leaves_the_old_results(tmp_path, monkeypatch, number, error):
+    out = tmp_path / "out"
+    old = old_run(out)
+    with monkeypatch.context() as patch, pytest.raises(error):
+        failing_moves(patch, out, number, error, forever=False)
+        replaced_run(out, overwrite=True)
+    assert all_files(out) == old and not (out / UNFINISHED).exists()
+
+
+def test_eight_moves_replace_a_run(tmp_path, monkeypatch):
+    """The tests of killed runs know each of them."""
+    out = tmp_path / "out"
+    old_run(out)
+    failing_moves(monkeypatch, out, 9, Killed, forever=True)
+    replaced_run(out, overwrite=True)
+    assert all_files(out) == NEW
 
 
 @pytest.mark.parametrize("error", [ValueError, OSError, KeyboardInterrupt])
@@ -177,6 +256,45 @@ def test_a_second_run_in_a_folder_is_refused_with_the_name_of_the_first(tmp_path
     end.set()
     process.join(60)
     assert contents(tmp_path / "out") == dict.fromkeys(NAMES, "first")
+
+
+@pytest.mark.parametrize("name", ["lock", "holder", "block", "blocks/dn"])
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes in its folders")
+def test_links_and_pipes_in_an_unfinished_run_are_not_followed(tmp_path, name, kind):
+    elsewhere, hidden = tmp_path / "elsewhere", tmp_path / "out" / UNFINISHED
+    elsewhere.write_text("mine")
+    (hidden / name).parent.mkdir(parents=True)
+    (hidden / BEGUN).touch()
+    os.symlink(elsewhere, hidden / name) if kind == "link" else os.mkfifo(hidden / name)
+    with results(tmp_path / "out", NAMES, resume=True, worth_keeping=lambda hidden, error: True) as again:
+        assert name in ("lock", "holder") or not os.path.lexists(again / name)
+        for each in NAMES:
+            (again / each).write_text("new")
+    assert elsewhere.read_text() == "mine"
+
+
+def test_a_link_in_the_place_of_the_hidden_folder_is_refused(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    os.symlink(tmp_path / "elsewhere", tmp_path / "out" / UNFINISHED)
+    with pytest.raises(ValueError, match=r"\.unfinished' is a link: remove it"):
+        write(tmp_path / "out", "new", overwrite=True)
+    assert not list((tmp_path / "elsewhere").iterdir())
+
+
+def test_a_finished_run_is_recognised_by_all_its_files(tmp_path):
+    write(tmp_path, "1")
+    assert check_folder(tmp_path, overwrite=False, resume=True, names=NAMES)
+    assert not check_folder(tmp_path, overwrite=True, resume=True, names=NAMES)
+    with pytest.raises(ValueError, match="is not empty"):
+        check_folder(tmp_path, overwrite=False, names=NAMES)
+    with pytest.raises(ValueError, match="nothing to resume"):
+        check_folder(tmp_path, overwrite=False, resume=True, names=(*NAMES, "three.txt"))
+    (tmp_path / UNFINISHED).mkdir()
+    (tmp_path / UNFINISHED / "replaced").touch()
+    assert check_folder(tmp_path, overwrite=False, resume=True, names=NAMES)
+    assert not (tmp_path / UNFINISHED).exists()
 
 
 def test_a_dead_run_holds_nothing(tmp_path, rival):

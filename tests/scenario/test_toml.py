@@ -29,6 +29,18 @@ def test_files_lie_beside_the_text(tmp_path):
     assert values["sensor"]["instrument"] == str(tmp_path.resolve() / "mine.toml")
 
 
+def test_files_in_archives_keep_their_paths(tmp_path):
+    """A path of GDAL is no path of this machine."""
+    path = written(tmp_path, "[ground]\nlai_file = '/vsizip//data/maps.zip/lai.tif'\n[terrain]\ndem = 'flat'\n")
+    assert load_values(path)["ground"]["lai_file"] == "/vsizip//data/maps.zip/lai.tif"
+
+
+def test_a_name_that_no_file_can_have_is_a_mistake(tmp_path):
+    path = written(tmp_path, f"[sensor]\ninstrument = '{'a' * 5000}.toml'\n")
+    with pytest.raises(ValueError, match="instrument"):
+        read_scenario(path)
+
+
 def test_spelling_tells_each_mistake_in_a_line(tmp_path):
     path = written(tmp_path, "[sensor]\nbandz = ['TM3']\npixel = -1\n[ground]\narp = 0.3\n")
     with pytest.raises(ValueError) as caught:

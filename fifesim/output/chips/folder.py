@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import shutil
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +18,19 @@ from fifesim.output.chips import datasheet
 from fifesim.output.chips.arrays import layout_of
 from fifesim.output.chips.makers import makers_of
 from fifesim.output.chips.making import made_shards
-from fifesim.output.chips.store import ROOT, Shards, checksums, make_store, stored_names, write_shard
+from fifesim.output.chips.store import ROOT, Shards, checksums, chips_in, make_store, stored_names, write_shard
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
 from fifesim.output.progress import ChipProgress
 from fifesim.output.provenance import versions
-from fifesim.output.run.identity import STATE, begin, inputs_of
+from fifesim.output.run.identity import (
+    STATE,
+    begin,
+    check_finished,
+    check_inputs,
+    inputs_of,
+    kept_state,
+    with_checksums,
+)
 from fifesim.output.run.saved import has_blocks, save_block, saved_block
 from fifesim.rasters.clients import found_client
 from fifesim.scenario.chips import chips_of
@@ -31,6 +38,9 @@ from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.studies import Study, read_study
 
 _FILES = DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.toml"
+
+WHOLE = (*_FILES, ROOT)
+"""Files by which a dataset is known to be whole."""
 
 # Of shards that are written, what their files' checksums are saved by.
 _SAVED = "chips"
@@ -62,7 +72,8 @@ def dataset(
     overwrite : bool, optional
         Replace an earlier dataset where the folder holds one.
     resume : bool, optional
-        Go on with a run of the same study that was stopped in this folder; begin where there is none.
+        Go on with an interrupted run of the same study in this folder, or begin if there is none. Nothing is made if
+        the dataset is finished.
     workers : int, optional
         Make chips in so many processes of this machine. In a script, call it below ``if __name__ == "__main__":``, as
         the processes import it.
@@ -79,8 +90,8 @@ def dataset(
     Raises
     ------
     ValueError
-        If the study cannot be, the folder holds something, or both workers and a client are given; nothing is written
-        then.
+        If the study is not possible, the folder holds something else, or both workers and a client are given. Nothing
+        is written then.
     OSError
         If a file cannot be read or written. Shards that are finished are kept.
 
@@ -136,21 +147,32 @@ def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, wo
         As in `dataset`.
     """
     folder = Path(folder)
-    check_folder(folder, overwrite, resume)
+    if check_folder(folder, overwrite, resume, WHOLE):
+        _check_finished(folder, chips_of(study, count))
+        return [folder, *(folder / name for name in _FILES)]
     with makers_of(study, count, workers) if workers else nullcontext() as makers:
         way = {"makers": makers, "client": client or found_client()}
         chips = chips_of(study, count)
         _look_at(chips)
         _warn_of_empty_parts(chips)
         layout = layout_of(chips)
-        # By its root a store is one: it comes last.
+        # The root makes the folder a store: it comes last.
         names = [*stored_names(chips, layout), *_FILES, ROOT]
-        kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks)
+        stale = _other_arrays(folder, names) if overwrite or resume else ()
+        kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks, stale=stale)
         with errors_with_their_file(folder), kept as unfinished:
             _make(chips, layout, unfinished, as_json, way)
-            if overwrite:
-                _remove_other_arrays(folder, names)
     return [folder, *(folder / name for name in _FILES)]
+
+
+def _check_finished(folder, chips):
+    """Refuse a finished dataset that is not the one asked for."""
+    check_finished(folder / STUDY, read_study(folder / STUDY).to_toml(), chips.study.to_toml(), _inputs(chips))
+    if (found := chips_in(folder)) != len(chips):
+        raise ValueError(
+            f"{folder} holds a finished dataset of {found} chips, not {len(chips)}: give that number, name another "
+            "folder with -o, or make it again with --overwrite"
+        )
 
 
 def _make(chips, layout, folder, as_json, way):
@@ -162,31 +184,31 @@ def _make(chips, layout, folder, as_json, way):
     _compute(chips, layout, shards, folder, as_json, way)
     datasheet.write(folder, chips, shards, DATASHEET, CONTACT_SHEET)
     (folder / STUDY).write_text(chips.study.to_toml(), encoding="utf-8")
-    if _inputs(chips) != json.loads(identity[STATE])["inputs"]:
-        raise ValueError("a file that the study names changed while it was read: begin again when it is whole")
+    check_inputs(json.loads(identity[STATE])["inputs"], _inputs(chips))
 
 
 def study_to_resume(folder):
     """
-    Study of a run that was stopped, and how many chips it makes.
+    Study of an unfinished or finished run, and how many chips it makes.
 
     Parameters
     ----------
     folder : path
-        Of its results.
+        Folder of the results.
 
     Returns
     -------
     study : fifesim.scenario.studies.Study or None
-        None where no run was stopped.
+        None if there is no run in the folder.
     count : int or None
     """
-    path = Path(folder) / UNFINISHED
-    if not (path / BEGUN).is_file():
-        return None, None
-    with suppress(OSError, ValueError):
-        return read_study(path / BEGUN), json.loads((path / STATE).read_text(encoding="utf-8")).get("chips")
-    return read_study(path / BEGUN), None
+    folder = Path(folder)
+    if (folder / UNFINISHED / BEGUN).is_file():
+        count = kept_state(folder / UNFINISHED).get("chips")
+        return read_study(folder / UNFINISHED / BEGUN), count if isinstance(count, int) else None
+    if all((folder / name).is_file() for name in (STUDY, ROOT)):
+        return read_study(folder / STUDY), chips_in(folder)
+    return None, None
 
 
 def _look_at(chips):
@@ -231,7 +253,7 @@ def _together(study):
 
 def _identity_of(chips):
     """What must be the same for shards of two runs to fit together."""
-    state = {"versions": versions(), "inputs": _inputs(chips), "chips": len(chips)}
+    state = {"versions": versions(), "inputs": with_checksums(_inputs(chips)), "chips": len(chips)}
     return {STATE: json.dumps(state), BEGUN: chips.study.to_toml()}
 
 
@@ -264,8 +286,7 @@ def _is_written(folder, blocks, names, shard):
         return False
 
 
-def _remove_other_arrays(folder, names):
-    """Arrays of an earlier dataset, which would look like some of this one's."""
-    for path in folder.iterdir():
-        if path.name not in (UNFINISHED, *names) and (path / ROOT).is_file():
-            shutil.rmtree(path)
+def _other_arrays(folder, names):
+    """Names of arrays of an earlier dataset that the new one does not have."""
+    paths = folder.iterdir() if folder.is_dir() else ()
+    return [path.name for path in paths if path.name not in (UNFINISHED, *names) and (path / ROOT).is_file()]

@@ -13,12 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fifesim.output.chips.arrays import chip_arrays
+from fifesim.output.process import interrupts_blocked
 from fifesim.scenario.chips import chips_of
 
 # Not on Windows.
 _FORKS = "forkserver" in multiprocessing.get_all_start_methods()
 if _FORKS:
-    from multiprocessing import forkserver
+    from multiprocessing import forkserver, resource_tracker
 
 # Landscapes of a process in so many groups: when others are done they take over some of them.
 _GROUPS = 4
@@ -146,7 +147,10 @@ def makers_of(study, count, number):
     with _environment(dict.fromkeys(_THREADS, "1")):
         if _FORKS:
             context.set_forkserver_preload([__name__])
-            forkserver.ensure_running()
+            # The tracker ignores Ctrl-C by itself, but lets it in again here.
+            resource_tracker.ensure_running()
+            with interrupts_blocked():
+                forkserver.ensure_running()
         try:
             yield Makers(number, partial(_begun, context, study, count, number, makers))
         finally:

@@ -143,6 +143,23 @@ def stored_names(chips, layout):
     return [*_known(chips, layout, chips.table()), *layout.variables]
 
 
+def chips_in(folder):
+    """
+    Number of chips in a store.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+
+    Returns
+    -------
+    count : int
+    """
+    import zarr  # slow, and few runs write chips
+
+    return zarr.open_array(folder, path="chip", mode="r").shape[0]
+
+
 def write_shard(folder, first, arrays):
     """
     Write a shard.

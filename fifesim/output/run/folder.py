@@ -1,5 +1,6 @@
 """A run: a scenario simulated into a folder of files, block by block, which can be stopped and gone on with."""
 
+import json
 import os
 from pathlib import Path
 
@@ -17,7 +18,15 @@ from fifesim.output import report, stac
 from fifesim.output.folders import check_folder, errors_with_their_file, results
 from fifesim.output.progress import CellProgress, doing
 from fifesim.output.run.engine import run_engine
-from fifesim.output.run.identity import begin, check_inputs, identity_of
+from fifesim.output.run.identity import (
+    SCENARIO,
+    STATE,
+    begin,
+    check_finished,
+    check_inputs,
+    identity_of,
+    inputs_of,
+)
 from fifesim.output.run.origin import origin_tags
 from fifesim.output.run.products import chunk_checksum, make_scene_store, products_of, wanted_blocks
 from fifesim.output.run.saved import has_blocks, save_block, saved_array, saved_block, saved_blocks
@@ -30,12 +39,13 @@ from fifesim.rasters.clients import found_client
 from fifesim.rasters.files import to_geotiff
 from fifesim.rasters.reductions import computed
 from fifesim.scenario.ground import warn_of_canopy
+from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
 from fifesim.scenario.sweeps import VARIABLES
 from fifesim.scenario.toml import write_scenario
 
 FILES = (
-    "image.tif", "image.qml", "truth.tif", "truth.qml", "quicklook.png", "report.html", "scenario.toml", "item.json",
+    "image.tif", "image.qml", "truth.tif", "truth.qml", "quicklook.png", "report.html", SCENARIO, "item.json",
 )  # fmt: skip
 SCENE = "scene.zarr"
 
@@ -70,9 +80,10 @@ def simulate_to_folder(
     folder : str or path
         Made where it does not exist.
     overwrite : bool, optional
-        Replace these files where the folder holds something; other files stay.
+        Replace the files of an earlier run, and remove its cells unless ``scene`` replaces them. Other files stay.
     resume : bool, optional
-        Go on with a run of the same scenario that was stopped in this folder; begin where there is none.
+        Go on with an interrupted run of the same scenario in this folder, or begin if there is none. Nothing is
+        computed if the run is finished.
     scene : bool, optional
         Write leaf area index, elevation and reflectance of the cells too, as Zarr.
     threads : int, optional
@@ -91,7 +102,7 @@ def simulate_to_folder(
     Raises
     ------
     ValueError
-        If the scenario cannot be simulated, or the folder holds something; nothing is written then.
+        If the scenario cannot be simulated, or the folder holds something else; nothing is written then.
     OSError
         If a file cannot be read or written. No half-written file is left; blocks that are finished are kept.
 
@@ -100,13 +111,18 @@ def simulate_to_folder(
     Blocks are saved as they are finished, and the files made of them appear when all of them are whole. Memory does not
     grow with the scene.
     """
-    folder = Path(folder)
-    check_folder(folder, overwrite, resume)
+    folder, names = Path(folder), names_of(scene)
+    finished = check_folder(folder, overwrite, resume, names)
     warn_of_canopy(scenario)
     complete = scenario.complete()
+    if finished:
+        old = write_scenario(read_scenario(folder / SCENARIO).complete())
+        check_finished(folder / SCENARIO, old, write_scenario(complete), inputs_of(complete))
+        return [folder / name for name in names]
     check_size(complete, folder)
-    identity, names = identity_of(complete, scene), FILES + (SCENE,) * scene
-    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks)
+    identity = identity_of(complete, scene)
+    stale = () if scene else (SCENE,)
+    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks, stale=stale)
     with errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
         begin(unfinished, identity)
         run_engine(complete)
@@ -121,9 +137,26 @@ def simulate_to_folder(
         scheduler = {"scheduler": dask.threaded.get, "num_workers": threads or usable_cores()}
         with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}), doing("writing files and report"):
             _write_files(complete, tree, found, unfinished, folder if home is None else home)
-        check_inputs(complete, identity)
+        check_inputs(json.loads(identity[STATE])["inputs"], inputs_of(complete))
     LOG.info("wrote %s into %s", ", ".join(names), folder)
     return [folder / name for name in names]
+
+
+def names_of(scene):
+    """
+    Names of the files of a run.
+
+    Parameters
+    ----------
+    scene : bool
+        With the products of the scene.
+
+    Returns
+    -------
+    names : tuple of str
+        The last one marks the run as complete.
+    """
+    return FILES + (SCENE,) * scene
 
 
 def _compute(found, lai, folder, client, threads, as_json):
@@ -193,7 +226,7 @@ def _write_files(scenario, tree, found, folder, home):
     quicklook, page = report.run_page(scenario, image, truth, detail, terrain, level, *_fits(image, truth))
     (folder / "quicklook.png").write_bytes(quicklook)
     (folder / "report.html").write_text(page, encoding="utf-8")
-    (folder / "scenario.toml").write_text(write_scenario(scenario), encoding="utf-8")
+    (folder / SCENARIO).write_text(write_scenario(scenario), encoding="utf-8")
     stac.write(stac.item(scenario, folder, report.title(scenario)), folder / "item.json")
 
 

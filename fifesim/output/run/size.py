@@ -64,12 +64,15 @@ def check_size(scenario, folder):
     ValueError
         If memory does not suffice; the message says what is needed, what is free, and what fits.
     OSError
-        The same of the disk, which others may empty.
+        If the disk does not suffice; other programs may free some of it.
     """
     grid, cells = scenario.grid, _cells(scenario)
     at_once = cells if scenario.ground.method == "periodic" else min(cells, TILE**2)
     memory = cells / TILE**2 * _GRAPH + at_once * _CELL, psutil.virtual_memory().available / 2
-    disk = disk_of(scenario)[0], shutil.disk_usage(_existing(folder)).free
+    place = _existing(folder)
+    disk = disk_of(scenario)[0], shutil.disk_usage(place).free
+    if not disk[1]:
+        raise OSError(f"{os.strerror(errno.ENOSPC)} in {place}: name another output folder with -o")
     for kind, said, (needed, free) in (
         (ValueError, "too large for the memory", memory),
         (OSError, os.strerror(errno.ENOSPC), disk),

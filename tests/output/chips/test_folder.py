@@ -3,6 +3,7 @@
 import os
 import random
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -107,6 +108,29 @@ def test_a_stopped_run_goes_on_to_the_same_bits(after, study, whole, tmp_path, m
     assert contents(folder) == contents(whole)
 
 
+@pytest.mark.parametrize("text", ["[]", "{", '{"chips": "many"}', "[" * 100_000])
+def test_a_state_that_no_run_wrote_gives_no_number_of_chips(study, tmp_path, text):
+    (tmp_path / UNFINISHED).mkdir()
+    (tmp_path / UNFINISHED / "run.toml").write_text(study.to_toml())
+    (tmp_path / UNFINISHED / "run.json").write_text(text)
+    assert study_to_resume(tmp_path) == (study, None)
+
+
+def test_a_finished_dataset_is_resumed_without_work(study, whole, tmp_path, monkeypatch):
+    folder = tmp_path / "chips.zarr"
+    shutil.copytree(whole, folder)
+    made = stopping(monkeypatch, 0)
+    dataset_to_folder(study, folder, COUNT, resume=True)
+    assert not made and contents(folder) == contents(whole)
+    assert study_to_resume(folder) == (study, COUNT)
+    with pytest.raises(ValueError, match=r"dataset of 7 chips, not 8: give that number.*--overwrite"):
+        dataset_to_folder(study, folder, 8, resume=True)
+    other = Study(study.scenario, DRAWS, landscapes=3, seed=6)
+    with pytest.raises(ValueError, match=r"of another scenario, with seed = 5.*--overwrite"):
+        dataset_to_folder(other, folder, COUNT, resume=True)
+    assert contents(folder) == contents(whole)
+
+
 def test_half_written_shards_do_not_count(study, whole, tmp_path, monkeypatch):
     folder = tmp_path / "chips.zarr"
     with monkeypatch.context() as patch:
@@ -157,6 +181,39 @@ def test_an_earlier_dataset_is_replaced_with_all_its_arrays(whole, study, tmp_pa
         dataset_to_folder(study, folder, COUNT)
     dataset_to_folder(study, folder, COUNT, overwrite=True)
     assert contents(folder) == contents(whole) | {"notes.txt": b"mine"}
+
+
+@pytest.fixture(scope="module")
+def earlier(study, tmp_path_factory):
+    """A dataset of another seed, with the same arrays."""
+    folder = tmp_path_factory.mktemp("earlier") / "chips.zarr"
+    dataset_to_folder(Study(study.scenario, DRAWS, landscapes=3, seed=6), folder, COUNT)
+    return folder
+
+
+@pytest.mark.parametrize("number", [1, 2, 8, 20, 40])
+def test_a_run_killed_between_its_moves_leaves_no_store_of_two_datasets(
+    earlier, whole, study, tmp_path, monkeypatch, number
+):
+    folder, replace, moved = tmp_path / "chips.zarr", os.replace, []
+    shutil.copytree(earlier, folder)
+
+    def killed(source, target):
+        moved.extend([target] * (folder in (Path(source).parent, Path(target).parent)))
+        if len(moved) >= number:
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(os, "replace", killed)
+        dataset_to_folder(study, folder, COUNT, overwrite=True)
+    if number == 1:
+        xr.testing.assert_identical(xr.open_zarr(folder), xr.open_zarr(earlier))
+    else:
+        with pytest.raises(FileNotFoundError):
+            xr.open_zarr(folder)
+    dataset_to_folder(study, folder, COUNT, resume=True)
+    assert contents(folder) == contents(whole)
 
 
 def test_what_a_study_cannot_be_is_told_before_anything_is_written(study, tmp_path, monkeypatch):

@@ -1,6 +1,8 @@
 """Estimates count what a run has, in words and as JSON."""
 
 import json
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -53,6 +55,41 @@ def test_time_is_that_of_the_whole_run_with_start_and_report(tmp_path):
     taken = time.monotonic() - begun
     assert 0.2 * taken < estimate(scenario, threads=1)["seconds"] < 5 * taken
     assert estimate(scenario, threads=1, start=1000.0)["seconds"] > 1000
+
+
+PEAK = """
+import json, resource, sys
+from fifesim.cli import app
+try:
+    app(sys.argv[1:])
+finally:
+    # Of Linux, in kB. [byte]
+    print(json.dumps(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024))
+"""
+
+
+def last_line(folder, *arguments, line=-1):
+    command = [sys.executable, "-c", PEAK, "simulate", "scenario.toml", "--threads", "2", "--json", *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout.splitlines()[line])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is measured in kB on Linux alone")
+@pytest.mark.parametrize(
+    ("size", "dem"), [(300, "flat"), (15_000, "flat"), pytest.param(15_000, "flint-hills", marks=pytest.mark.slow)]
+)
+def test_memory_that_is_promised_suffices(tmp_path, size, dem):
+    """And it is not more than half as much again as a run takes."""
+    text = f'[grid]\nwidth = {size}\nheight = {size}\n[terrain]\ndem = "{dem}"\n'
+    (tmp_path / "scenario.toml").write_text(text)
+    # Kernels that are compiled in the run would count.
+    last_line(tmp_path, "--dry-run")
+    promised, taken = last_line(tmp_path, "--dry-run", line=-2)["memory"], last_line(tmp_path, "-o", "out")
+    assert taken <= promised <= 1.5 * taken
+
+
+def test_memory_grows_with_the_chunks_in_a_row():
+    assert [estimates._growth(columns) for columns in (1, 2, 5, 15)] == pytest.approx([1, 1, 1.75, 2.05])
 
 
 def test_words_have_units():

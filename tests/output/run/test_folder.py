@@ -2,6 +2,7 @@
 
 import html
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -199,6 +200,35 @@ def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"lai\.tif changed while it was read"):
         simulate_to_folder(scenario, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_cells_of_an_earlier_run_do_not_stay_beside_a_new_image(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True)
+    (tmp_path / "out" / "notes.txt").touch()
+    simulate_to_folder(parse_scenario(SMALL | {"ground": {"seed": 4}}), tmp_path / "out", overwrite=True)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "notes.txt"}
+
+
+def test_a_finished_run_is_resumed_without_work(folder, tmp_path, monkeypatch):
+    shutil.copytree(folder, tmp_path / "out")
+    monkeypatch.setattr(run_folder, "simulate", None)
+    scenario = parse_scenario(SMALL)
+    assert simulate_to_folder(scenario, tmp_path / "out", resume=True) == [tmp_path / "out" / name for name in FILES]
+    with pytest.raises(ValueError, match=r"of another scenario, with arp = 0\.24, seed = 3: name another.*--overwrite"):
+        simulate_to_folder(parse_scenario({**SMALL, "ground": {}}), tmp_path / "out", resume=True)
+    with pytest.raises(ValueError, match="nothing to resume"):
+        simulate_to_folder(scenario, tmp_path / "out", resume=True, scene=True)
+
+
+def test_a_finished_run_with_a_newer_input_is_not_taken_for_the_same(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    scenario = parse_scenario(lai_map(tmp_path / "lai.tif", 2.0))
+    simulate_to_folder(scenario, tmp_path / "out")
+    simulate_to_folder(scenario, tmp_path / "out", resume=True)
+    lai_map(tmp_path / "lai.tif", 3.0)
+    with pytest.raises(ValueError, match=r"older than its input .*lai\.tif.*--overwrite"):
+        simulate_to_folder(scenario, tmp_path / "out", resume=True)
 
 
 def test_a_chunk_that_changed_is_made_again(tmp_path, monkeypatch):

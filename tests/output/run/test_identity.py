@@ -2,6 +2,7 @@
 
 import json
 import os
+import zipfile
 
 import numpy as np
 import pytest
@@ -10,7 +11,18 @@ import rasterio.shutil
 
 from fifesim.base import datasets
 from fifesim.output.folders import BEGUN
-from fifesim.output.run.identity import NotThisRun, begin, check_inputs, identity_of, inputs_of
+from fifesim.output.run import identity as run_identity
+from fifesim.output.run.identity import (
+    NotThisRun,
+    begin,
+    changed_inputs,
+    check_finished,
+    check_inputs,
+    identity_of,
+    inputs_of,
+    scenario_to_resume,
+    with_checksums,
+)
 from fifesim.scenario.scenario import parse_scenario
 
 SMALL = {"grid": {"width": 90, "height": 90}, "terrain": {"dem": "flat"}}
@@ -55,17 +67,100 @@ def scenario_of(lai_file):
 
 def test_a_source_that_changed_is_told_at_resume_and_at_the_end(lai_file, tmp_path):
     identity = identity_of(scenario_of(lai_file), False)
+    before = json.loads(identity["run.json"])["inputs"]
     begin(tmp_path, identity)
-    check_inputs(scenario_of(lai_file), identity)
+    check_inputs(before, inputs_of(scenario_of(lai_file)))
     with rasterio.open(tmp_path / "source.tif", "r+") as sink:
         sink.write(np.full((1, 9, 9), 3.0, "float32"))
     with pytest.raises(ValueError, match=r"source\.tif changed while it was read"):
-        check_inputs(scenario_of(lai_file), identity)
+        check_inputs(before, inputs_of(scenario_of(lai_file)))
     with pytest.raises(NotThisRun, match=r"an input file that has changed.*--overwrite"):
         begin(tmp_path, identity_of(scenario_of(lai_file), False))
 
 
-@pytest.mark.parametrize("text", ["[]", "{}", "{", "1", '{"versions": []}'])
+def written_again(path, value, way):
+    """Write a map anew with the size and time of modification that it had."""
+    status = path.stat()
+    target = path if way == "in place" else path.with_suffix(".new")
+    content = path.read_bytes()
+    target.write_bytes(content.replace(np.float32(2.0).tobytes(), np.float32(value).tobytes()))
+    os.utime(target, ns=(status.st_atime_ns, status.st_mtime_ns))
+    os.replace(target, path)
+    assert path.stat().st_size == status.st_size and path.stat().st_mtime_ns == status.st_mtime_ns
+
+
+@pytest.mark.parametrize("way", ["in place", "by a copy"])
+def test_a_changed_input_of_the_same_size_and_time_is_found(lai_file, tmp_path, way):
+    identity = identity_of(scenario_of(lai_file), False)
+    begin(tmp_path, identity)
+    written_again(tmp_path / "source.tif", 3.0, way)
+    with pytest.raises(ValueError, match=r"source\.tif changed while it was read"):
+        check_inputs(json.loads(identity["run.json"])["inputs"], inputs_of(scenario_of(lai_file)))
+    with pytest.raises(NotThisRun, match="an input file that has changed"):
+        begin(tmp_path, identity_of(scenario_of(lai_file), False))
+
+
+def chmod(path):
+    path.chmod(0o600)
+
+
+def move_away_and_back(path):
+    """As a backup that is restored."""
+    written_again(path, 2.0, "by a copy")
+
+
+def link(path):
+    os.link(path, path.with_suffix(".link"))
+
+
+@pytest.mark.parametrize("change", [chmod, link, move_away_and_back])
+@pytest.mark.parametrize(("largest", "found"), [(2**30, []), (100, ["source.tif"])])
+def test_other_attributes_of_the_same_content_are_no_change_where_it_can_be_compared(
+    lai_file, tmp_path, monkeypatch, change, largest, found
+):
+    """Larger files are compared by their attributes alone."""
+    monkeypatch.setattr(run_identity, "_COMPARED", largest)
+    before = with_checksums(inputs_of(scenario_of(lai_file)))
+    change(tmp_path / "source.tif")
+    changed = changed_inputs(json.loads(json.dumps(before)), inputs_of(scenario_of(lai_file)))
+    assert [os.path.basename(path) for path in changed] == found
+
+
+@pytest.mark.parametrize("braces", [False, True])
+def test_the_archive_of_an_input_is_watched(lai_file, tmp_path, braces):
+    archive = tmp_path / "maps.zip"
+    with zipfile.ZipFile(archive, "w") as packed:
+        packed.write(tmp_path / "source.tif", "lai.tif")
+    inside = f"/vsizip/{{{archive}}}/lai.tif" if braces else f"/vsizip/{archive}/lai.tif"
+    before = with_checksums(inputs_of(scenario_of(inside)))
+    assert list(before) == [str(archive)]
+    with zipfile.ZipFile(archive, "a") as packed:
+        packed.writestr("more.txt", "more")
+    assert changed_inputs(before, inputs_of(scenario_of(inside))) == [str(archive)]
+
+
+def test_a_file_that_comes_or_goes_is_a_change():
+    assert changed_inputs({"a": [1, 2, 3, 4, "c"]}, {"b": [1, 2, 3, 4]}) == ["a", "b"]
+
+
+def test_a_finished_run_is_that_of_its_scenario_and_older_than_its_results(tmp_path):
+    (tmp_path / "scenario.toml").write_text("seed = 3  # of the ground\n")
+    written = (tmp_path / "scenario.toml").stat().st_mtime_ns
+    check_finished(tmp_path / "scenario.toml", "a", "a", {"lai.tif": [9, written, written, 1]})
+    with pytest.raises(ValueError, match=r"of another scenario, with seed = 3:.*--overwrite"):
+        check_finished(tmp_path / "scenario.toml", "seed = 3  # of the ground", "seed = 4", {})
+    for times in ((written + 1, 0), (0, written + 1)):
+        with pytest.raises(ValueError, match=r"older than its input lai\.tif:.*--overwrite"):
+            check_finished(tmp_path / "scenario.toml", "a", "a", {"lai.tif": [9, *times, 1]})
+
+
+def test_a_finished_scenario_is_the_one_to_resume(tmp_path):
+    assert scenario_to_resume(tmp_path) is None
+    (tmp_path / "scenario.toml").write_text("[ground]\nseed = 3\n")
+    assert scenario_to_resume(tmp_path).ground.seed == 3
+
+
+@pytest.mark.parametrize("text", ["[]", "{}", "{", "1", '{"versions": []}', "[" * 100_000])
 def test_a_state_that_no_run_wrote_is_named(tmp_path, text):
     identity = identity_of(parse_scenario(SMALL).complete(), False)
     begin(tmp_path, identity)

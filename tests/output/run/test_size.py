@@ -46,6 +46,13 @@ def test_a_disk_that_is_too_small_is_named(tmp_path, monkeypatch, free, refused)
         check_size(scenario, tmp_path)
 
 
+def test_a_place_without_any_space_is_named(tmp_path, monkeypatch):
+    """No scene fits there, however small."""
+    monkeypatch.setattr(size.shutil, "disk_usage", lambda path: namedtuple("Usage", "free")(0))
+    with pytest.raises(OSError, match=f"No space left on device in {tmp_path}: name another output folder with -o"):
+        check_size(complete(), tmp_path / "out")
+
+
 def test_the_cells_of_a_scene_are_on_the_disk_too(tmp_path):
     scenario = complete()
     assert disk_of(scenario, scene=True)[1] - disk_of(scenario)[1] > 4 * 8 * 4000**2
