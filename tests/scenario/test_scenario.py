@@ -49,7 +49,15 @@ def test_default_is_the_paper_case_on_the_whole_site():
         {"grid": {"cell": 1 / 3, "width": 60.0, "height": 60.0}},
         {"ground": {"leaf": {"chlorophyll": 40.0}, "background_spectra": {"soil_wet": 0.5, "shade": 0.5}}},
         {"sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}},
-        {"sensor": {"instrument": "L4TM", "interval": "native", "offset": [0.5, -1.0], "noise": ["shot"], "seed": 4}},
+        {
+            "sensor": {
+                "instrument": "L4TM",
+                "interval": "native",
+                "offset": [0.5, -1.0],
+                "noise": ["thermal"],
+                "seed": 4,
+            }
+        },
         {"sensor": {"interval": "30.5 m"}},
     ],
 )
