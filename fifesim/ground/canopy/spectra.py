@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -15,6 +14,7 @@ from fifesim.base import datasets
 from fifesim.base.annotations import NumberOrArray
 from fifesim.base.bands import solar_spectrum
 from fifesim.base.kinds import described
+from fifesim.base.spelling import closest
 
 SHADE = "shade"
 """Part of a mixture that reflects nothing."""
@@ -285,8 +285,8 @@ def did_you_mean(name, allowed):
     >>> did_you_mean("TM33", ["TM3", "TM4"])
     ", did you mean 'TM3'?"
     """
-    near = difflib.get_close_matches(str(name), map(str, allowed), n=1, cutoff=0.4)
-    return f", did you mean {near[0]!r}?" if near else "."
+    near = closest(name, allowed)
+    return f", did you mean {near!r}?" if near else "."
 
 
 def _share(name, value):
