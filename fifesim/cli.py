@@ -341,8 +341,13 @@ def _default(paper):
 
 
 def _check_spelling(scenario):
-    """A typing error is told before anything slow is imported."""
+    """Report a misspelt key, with all other mistakes, before anything else is imported."""
     from fifesim.scenario.toml import check_spelling
 
     if scenario is not None:
-        check_spelling(scenario)
+        try:
+            check_spelling(scenario)
+        except ValueError:
+            from fifesim.scenario.scenario import read_scenario
+
+            read_scenario(scenario)

@@ -81,13 +81,42 @@ class Regression:
 
         Parameters
         ----------
+        x : float, sequence of float or array
+
+        Returns
+        -------
+        y : float or array, shape of x
+            Not limited to the physical range of y; `fifesim.invert` clips and flags.
+
+        Examples
+        --------
+        >>> line = Regression(2.0, 1.0, 0.9, 10, 0.1, x_mean=0.5, x_sum_of_squares=1.0)
+        >>> line.predict([0.25, 0.5]).tolist()
+        [1.5, 2.0]
+        """
+        x = np.asarray(x, float) if isinstance(x, list | tuple) else x
+        return self.intercept + self.slope * x
+
+    def extrapolates(self, x: Numbers) -> np.ndarray:
+        """
+        Whether x lies far from the data that the line was fitted to.
+
+        Parameters
+        ----------
         x : array
 
         Returns
         -------
-        y : array
+        far : array of bool, shape of x
+            True where x is more than 3 standard deviations of the fitted x from their mean; False where x is NaN.
+
+        Examples
+        --------
+        >>> line = Regression(2.0, 1.0, 0.9, 11, 0.1, x_mean=0.5, x_sum_of_squares=0.1)
+        >>> line.extrapolates([0.75, 0.85]).tolist()
+        [False, True]
         """
-        return self.intercept + self.slope * x
+        return (np.asarray(x, float) - self.x_mean) ** 2 > 9 * self.x_sum_of_squares / (self.n - 1)
 
     def confidence_interval(self, x: Numbers, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
         """

@@ -80,7 +80,7 @@ KINDS = (
     | _of(LEAF, "leaf_optics brown_leaf")
     | _of(HORIZON, "horizon")
     | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality reflect")
-    | _of(FLAG, "resume")
+    | _of(FLAG, "resume complete")
     | _of(TEXT, "angles scaling pair quantity method datum vertical_units engine profile along band leaves")
     | _of(NAMES, "bands engines")
     | _of(NOISE, "noise")

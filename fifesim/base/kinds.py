@@ -138,7 +138,7 @@ PAIR = Kind("a number, or two: down and across", _is_pair)
 FLAG = Kind("True or False", lambda value: isinstance(value, bool | np.bool_))
 TEXT = Kind("a name", lambda value: isinstance(value, str))
 NAMES = Kind("a list of names", lambda value: isinstance(value, str) or (_is_plain(value) and np.iterable(value)))
-NOISE = Kind("a list of kinds of noise, such as ['shot', 'thermal'], or () for none", NAMES.fits)
+NOISE = Kind("a list of kinds of noise, such as ['shot', 'thermal'], 'all', or () for none", NAMES.fits)
 NUMBER_OR_RASTER = Kind(
     "a number, or an xarray.DataArray over (y, x)", lambda value: _is_number(value) or _is_raster(value)
 )

@@ -5,6 +5,29 @@ from difflib import get_close_matches
 from functools import wraps
 
 
+def closest(value, allowed):
+    """
+    The name that a misspelt one stands for.
+
+    Parameters
+    ----------
+    value : str
+    allowed : iterable of str
+
+    Returns
+    -------
+    name : str
+        Empty where no spelling is close; capitals do not count.
+
+    Examples
+    --------
+    >>> closest("maritme", ["continental", "maritime"]), closest("desert", ["continental", "maritime"])
+    ('maritime', '')
+    """
+    names = {str(name).lower(): str(name) for name in allowed}
+    return next((names[found] for found in get_close_matches(str(value).lower(), names, n=1)), "")
+
+
 def nearest(value, allowed):
     """
     The beginning of a message that names the nearest of what is allowed.
@@ -24,8 +47,8 @@ def nearest(value, allowed):
     >>> nearest("visibilty", ["visibility", "aot"])
     "did you mean 'visibility'? "
     """
-    near = get_close_matches(value, list(allowed), n=1)
-    return f"did you mean {near[0]!r}? " if near else ""
+    near = closest(value, allowed)
+    return f"did you mean {near!r}? " if near else ""
 
 
 def unknown_argument(name, signature, options):

@@ -42,7 +42,7 @@ QUANTITIES = {
         "degree",
         "ground_slope_direction",
         "aspect of the ground",
-        "down the slope, clockwise from north; 0 where level",
+        "down the slope, clockwise from true north; 0 where level",
     ),
     "horizon": Quantity(
         "degree", "", "zenith angle of the horizon", "of the land around, 90 where open; direction clockwise from north"

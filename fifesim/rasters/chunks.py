@@ -230,7 +230,7 @@ def in_blocks(kernel, reads, shape, size, dtype=float):
     return out
 
 
-def neighbourhood(kernel, array, depth, bands=0):
+def neighbourhood(kernel, array, depth, bands=0, *, located=False):
     """
     Apply a kernel that needs cells around each.
 
@@ -243,6 +243,8 @@ def neighbourhood(kernel, array, depth, bands=0):
         Margin. [cell]
     bands : int, optional
         The kernel makes a new leading axis ``band`` of this many.
+    located : bool, optional
+        The kernel takes the rows and columns of the block, as slices, before it.
 
     Returns
     -------
@@ -252,7 +254,8 @@ def neighbourhood(kernel, array, depth, bands=0):
     array = array.transpose("y", "x")
     chunks = array.chunks
     shape = (bands,) * bool(bands) + array.shape
-    data = windows(lambda rows, columns, block: kernel(block), [margin_reads(array.data, depth)], shape, chunks)
+    by_place = kernel if located else lambda rows, columns, block: kernel(block)
+    data = windows(by_place, [margin_reads(array.data, depth)], shape, chunks)
     dims = ("band",) * bool(bands) + ("y", "x")
     return xr.DataArray(data, dims=dims, coords=other_coordinates(array))
 

@@ -295,10 +295,27 @@ def convergence(grid):
     angle : float
         [degree]
     """
-    text = grid.crs.to_wkt()
-    x, y = transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)
-    place = proj_objects.transformer(text, _degrees_of(text)).transform(x, y)
-    return float(proj_objects.projection_of(text).get_factors(*place).meridian_convergence)
+    return float(convergence_at(grid.crs.to_wkt(), *transform_points(grid.affine, grid.shape.x / 2, grid.shape.y / 2)))
+
+
+def convergence_at(crs, x, y):
+    """
+    Angle from true north to grid north at some places; positive where grid north lies east of true north.
+
+    Parameters
+    ----------
+    crs : str
+        Projected, as WKT.
+    x, y : array
+        Easting and northing. [m]
+
+    Returns
+    -------
+    angle : array, shape of x
+        [degree]
+    """
+    place = proj_objects.transformer(crs, _degrees_of(crs)).transform(x, y)
+    return proj_objects.projection_of(crs).get_factors(*place).meridian_convergence
 
 
 @lru_cache(maxsize=64)

@@ -3,12 +3,12 @@
 import math
 
 
-def place_of(number, size, corner, tile):
+def place_of(number, size, corner, tile, margin=(0, 0)):
     """
     First cell of a chip among those of a landscape.
 
     Chips fill one tile of the lattice after the other, in squares that grow about the tile of the corner: those of a
-    tile follow each other, and none overlap.
+    tile follow each other, and none overlap. A tile also holds the margin around its chips, so that no chip needs two.
 
     Parameters
     ----------
@@ -19,7 +19,9 @@ def place_of(number, size, corner, tile):
     corner : (int, int)
         Row and column on the lattice about which chips lie.
     tile : int
-        Rows and columns of a tile. Chips that are larger lie by their own size.
+        Rows and columns of a tile. Chips that do not fit with their margin lie by their own size.
+    margin : (int, int), optional
+        Rows and columns of ground around a chip that its pixels see; margins of chips overlap.
 
     Returns
     -------
@@ -32,8 +34,13 @@ def place_of(number, size, corner, tile):
 
     >>> [place_of(number, (4, 5), (0, 0), 10) for number in range(5)]
     [(0, 0), (0, 5), (4, 0), (4, 5), (0, 10)]
+
+    One chip fits with a margin of two cells:
+
+    >>> [place_of(number, (4, 5), (0, 0), 10, (2, 2)) for number in range(2)]
+    [(2, 2), (2, 12)]
     """
-    fitting = [tile // length for length in size]
+    fitting = [max(tile - 2 * around, 0) // length for length, around in zip(size, margin, strict=True)]
     if not all(fitting):
         down, across = ring_place(number)
         return corner[0] + down * size[0], corner[1] + across * size[1]
@@ -41,8 +48,8 @@ def place_of(number, size, corner, tile):
     down, across = ring_place(at)
     row, column = divmod(inside, fitting[1])
     return (
-        (corner[0] // tile + down) * tile + row * size[0],
-        (corner[1] // tile + across) * tile + column * size[1],
+        (corner[0] // tile + down) * tile + margin[0] + row * size[0],
+        (corner[1] // tile + across) * tile + margin[1] + column * size[1],
     )
 
 

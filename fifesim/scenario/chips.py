@@ -14,6 +14,7 @@ from fifesim.rasters import grid as grids
 from fifesim.scenario.chip_places import place_of
 from fifesim.scenario.named_keys import NamedKey, in_text
 from fifesim.scenario.sequences import points
+from fifesim.scenario.simulation import setup_of, with_margin
 from fifesim.scenario.studies import Study
 
 # Streams of random numbers, as `fifesim.base.seeds` lists them.
@@ -58,7 +59,7 @@ class Chips:
         Returns
         -------
         scenario : fifesim.scenario.scenario.Scenario
-            `fifesim.simulate` of it gives the chip.
+            ``fifesim.simulate(scenario, complete=True)`` gives the chip.
 
         Raises
         ------
@@ -160,7 +161,9 @@ def _corners(study, rounds):
     """Upper left corners of the chips of a landscape. [m]"""
     grid = study.scenario.geobox()
     here, (down, across) = np.array(grids.lattice_position(grid)), grids.cell_size(grid)
-    places = [place_of(number, tuple(grid.shape), tuple(here.tolist()), TILE) for number in range(rounds)]
+    _, _, inside = with_margin(study.scenario, setup_of(study.scenario))
+    tiling = tuple(grid.shape), tuple(here.tolist()), TILE, tuple(each.start for each in inside.values())
+    places = [place_of(number, *tiling) for number in range(rounds)]
     rows, columns = (np.array(places) - here).T
     return np.stack([grid.affine.c + across * columns, grid.affine.f - down * rows], axis=1)
 

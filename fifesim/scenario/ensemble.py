@@ -20,7 +20,7 @@ from fifesim.rasters import grid as grids
 from fifesim.scenario.ground import fpar_kinds, ground_scene, truth_of
 from fifesim.scenario.land import elevation, in_memory, light_on_hills
 from fifesim.scenario.scenario import Scenario
-from fifesim.scenario.simulation import setup_of, simulate
+from fifesim.scenario.simulation import setup_of, simulate, with_margin
 from fifesim.sensor.description.rasters.carried import attributes_of
 
 # Of a run, what a regression takes.
@@ -33,7 +33,7 @@ LIGHT = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
 _LARGEST = 4_000_000
 
 
-def realise(scenario, keep=KEPT):
+def realise(scenario, keep=KEPT, *, complete=False):
     """
     Nodes of a scenario's run, in memory.
 
@@ -45,6 +45,8 @@ def realise(scenario, keep=KEPT):
     scenario : fifesim.scenario.scenario.Scenario
     keep : sequence of str, optional
         Among ``scene``, ``image``, ``truth``, ``terrain`` and ``level``; the others are not computed.
+    complete : bool, optional
+        As in `fifesim.simulate`.
 
     Returns
     -------
@@ -65,21 +67,23 @@ def realise(scenario, keep=KEPT):
         raise TypeError(f"realise takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, setup = scenario.geobox(), setup_of(scenario)
     if _is_small(grid) and set(keep) <= set(KEPT) and not labelled_only(setup):
-        return _of_arrays(scenario, grid, setup, keep)
-    run = simulate(scenario, chunks=None if _is_small(grid) else "auto")
+        return _of_arrays(scenario, grid, setup, keep, complete)
+    run = simulate(scenario, chunks=None if _is_small(grid) else "auto", complete=complete)
     missing = [name for name in keep if name not in run.children]
     if missing:
         raise ValueError(f"keep names {', '.join(missing)}, and this run has {', '.join(run.children)}")
     return {name: run[name].to_dataset().compute(scheduler="synchronous") for name in keep}
 
 
-def realise_arrays(scenario):
+def realise_arrays(scenario, *, complete=False):
     """
-    Image and truth of a scenario's run as arrays, for whom labels of each take longer than they are worth.
+    Image and truth of a scenario's run as arrays; for many small scenes, labels would take longer than the simulation.
 
     Parameters
     ----------
     scenario : fifesim.scenario.scenario.Scenario
+    complete : bool, optional
+        As in `fifesim.simulate`.
 
     Returns
     -------
@@ -95,10 +99,10 @@ def realise_arrays(scenario):
     """
     grid, setup = scenario.geobox(), setup_of(scenario)
     if not _is_small(grid) or labelled_only(setup):
-        image, truth = realise(scenario).values()
+        image, truth = realise(scenario, complete=complete).values()
         return _values(image) | {name: image[name].values for name in LIGHT}, _values(truth)
-    chain, land, reflectance = _scene(scenario, grid, setup, True)
-    truth = _truth(scenario, chain, land)
+    chain, blocks, land, reflectance = _scene(scenario, grid, setup, True, complete)
+    truth = _truth(scenario, blocks, land)
     light = {name: getattr(setup.geometry, name) for name in LIGHT}
     return _image(chain, reflectance) | light, truth if isinstance(truth, dict) else _values(truth)
 
@@ -111,20 +115,28 @@ def _is_small(grid):
     return grid.shape.x * grid.shape.y <= _LARGEST
 
 
-def _of_arrays(scenario, grid, setup, keep):
+def _of_arrays(scenario, grid, setup, keep, complete):
     """Image and truth by the kernels alone, with the labels that they have."""
-    chain, land, reflectance = _scene(scenario, grid, setup, "image" in keep)
+    chain, blocks, land, reflectance = _scene(scenario, grid, setup, "image" in keep, complete)
     made = {}
     if "image" in keep:
         made["image"] = _labelled_image(chain, _image(chain, reflectance))
     if "truth" in keep:
-        made["truth"] = _labelled_truth(scenario, chain, _truth(scenario, chain, land))
+        made["truth"] = _labelled_truth(scenario, blocks, _truth(scenario, blocks, land))
     return made
 
 
-def _scene(scenario, grid, setup, lit):
-    """A chain, the ground, and if it is lit the reflectance; of one stand as arrays."""
-    chain, own = ArrayChain(setup, grid, _kernels(scenario, setup)), scenario.ground
+def _scene(scenario, grid, setup, lit, complete):
+    """
+    Chains of the image and of the truth, the ground of the truth, and if lit the reflectance; of one stand as arrays.
+
+    The chains differ where the image sees ground around the scene.
+    """
+    blocks, own, inside = ArrayChain(setup, grid, _kernels(scenario, setup)), scenario.ground, {}
+    chain = blocks
+    if complete:
+        grid, setup, inside = with_margin(scenario, setup)
+        chain = ArrayChain(setup, grid, blocks.kernels)
     is_one, dem, horizon = scenario.landscape.is_one() and not own.lai_file, None, None
     light = light_on_hills(scenario, grid, setup.geometry) if is_one and lit else None
     if light is None and scenario.terrain.dem != "flat" and (lit or not is_one):
@@ -134,7 +146,7 @@ def _scene(scenario, grid, setup, lit):
     if not is_one:
         land = ground_scene(scenario, grid, dem=dem)
         lit = lit and reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
-        return chain, land, lit
+        return chain, blocks, land.isel(inside), lit
     land, reflectance = scene_cells(grid, own.distribution, own.arp, own.seed, own.method), None
     if lit:
         reflectance = chain.kernels.reflectance(land)
@@ -142,7 +154,7 @@ def _scene(scenario, grid, setup, lit):
             on_cells = beside_altitude(dem, chain.kernels.air.altitude), chain.grid, setup.geometry, horizon
             light = light_on_slopes(*on_cells)
         reflectance = reflectance if light is None else chain.kernels.on_slopes(reflectance, light)
-    return chain, land, reflectance
+    return chain, blocks, land[tuple(inside.values())], reflectance
 
 
 def _image(chain, reflectance):

@@ -144,7 +144,9 @@ class SensorKeys(Section):
         max_length=2,
     )
     response: str | None = text(None, "spatial: system, what is known of the instrument; detector; or paper, for TM")
-    noise: list[str] = text([], "of the detectors: shot, thermal, fixed-pattern")
+    noise: list[str] = text(
+        [], "of the detectors: shot, thermal, fixed-pattern; or all, the kinds that the instrument has"
+    )
     noise_model: ByName = text(
         {},
         "of every band, instead of the instrument's: thermal [W m-2 sr-1 um-1], shot [W m-2 sr-1 um-1], detectors, "

@@ -62,7 +62,7 @@ class Scenario(Keys):
         try:
             super().__init__(**sections)
         except ValidationError as error:
-            raise ValueError(mistakes(error)) from None
+            raise ValueError(mistakes(error, sections, type(self))) from None
 
     @model_validator(mode="after")
     def _classes_of_a_cover(self):

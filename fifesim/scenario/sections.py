@@ -19,8 +19,9 @@ from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.terrain.units import metres_per_unit
 from fifesim.scenario.ground_keys import ClassKeys, GroundKeys, StandKeys
 from fifesim.scenario.keys import AirKeys, SensorKeys, TerrainKeys
-from fifesim.sensor.description.instruments import instrument, noise_of
+from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.noise import NoiseModel, check_kinds
+from fifesim.sensor.response.rasters.noise import noise_models
 
 # Keys of a stand that a class of cover has by the same names.
 _OF_A_CLASS = ("arp", "leaf_angles", "hotspot", "brown", "dissociation", "crown_cover", "crown_shape")
@@ -222,9 +223,9 @@ class Sensor(SensorKeys):
 
     @model_validator(mode="after")
     def _known_bands(self):
-        for band in self.description.select(self.bands):
-            if self.noise and not self.noise_model:
-                noise_of(self.description, band)
+        bands = self.description.select(self.bands)
+        if self.noise:
+            noise_models(self.description, bands, self.noise, self.given_noise())
         if self.pixel is None:
             _shared_pixel(self.description, self.bands)
         return self

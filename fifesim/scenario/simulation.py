@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import xarray as xr
+from affine import Affine
+from odc.geo.geobox import GeoBox
 
 from fifesim.base.annotations import Chunks
 from fifesim.chain.comparison import shows_ndvi
@@ -15,9 +20,11 @@ from fifesim.rasters import grid as grids
 from fifesim.scenario.ground import canopy_of, ground_scene, truth_of
 from fifesim.scenario.land import cut, elevation
 from fifesim.scenario.scenario import Scenario
+from fifesim.sensor.response.rasters.footprints import shifts_of
+from fifesim.sensor.response.rasters.pixels import pixel_grid
 
 
-def simulate(scenario: Scenario, chunks: Chunks = "auto") -> xr.DataTree:
+def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = False) -> xr.DataTree:
     """
     Scene, image and truth of a scenario.
 
@@ -25,7 +32,10 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto") -> xr.DataTree:
     ----------
     scenario : fifesim.scenario.scenario.Scenario
     chunks : mapping or int, optional
-        Of the scene; by default whole tiles of the random field.
+        Chunks of the scene; by default whole tiles of the random field.
+    complete : bool, optional
+        Simulate ground around the scene, as far as the footprints of its pixels reach, so that the image has no missing
+        pixels along its edge. Scene, truth and pixels keep their place. Chips of `fifesim.dataset` are complete.
 
     Returns
     -------
@@ -39,7 +49,8 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto") -> xr.DataTree:
     Raises
     ------
     ValueError
-        If the scenario asks for what cannot be.
+        If the scenario asks for what cannot be, or a field of ``method = "periodic"`` is to be complete: it ends at the
+        edge of the scene.
 
     Examples
     --------
@@ -52,23 +63,24 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto") -> xr.DataTree:
     if not isinstance(scenario, Scenario):
         raise TypeError(f"simulate takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, setup = scenario.geobox(), setup_of(scenario)
+    ground, setup, inside = with_margin(scenario, setup) if complete else (grid, setup, {})
 
     def means(rasters):
         return aggregate(rasters, scenario.sensor.size, min_valid=setup.min_valid)
 
-    dem, horizon, reach = elevation(scenario, grid, chunks)
-    land = ground_scene(scenario, grid, chunks, dem)
-    level = reflectance_of(setup, land)
-    nodes = {"scene": dict(land.data_vars), "truth": dict(means(truth_of(scenario, setup, land)).data_vars)}
+    dem, horizon, reach = elevation(scenario, ground, chunks)
+    land = ground_scene(scenario, ground, chunks, dem)
+    level, scene = reflectance_of(setup, land), land.isel(inside)
+    nodes = {"scene": dict(scene.data_vars), "truth": dict(means(truth_of(scenario, setup, scene)).data_vars)}
     if dem is None:
         reflectance = level
     else:
         kt, reflectance = kt_and_reflectance(level, dem, horizon, setup.upwelling)
         dem, slope = cut(dem, grid), cut(slopes.slope(dem), grid)
         nodes["scene"]["dem"] = dem
-        nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt)}
+        nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt.isel(inside))}
         nodes["level"] = {"dn": image_of(setup, level)}
-    nodes["scene"]["surface_reflectance"] = reflectance
+    nodes["scene"]["surface_reflectance"] = reflectance.isel(inside)
     image = image_of(setup, reflectance)
     nodes["image"] = {"dn": image} | ({"ndvi": ndvi(image)} if shows_ndvi(image) else {})
     tree = xr.DataTree.from_dict({name: xr.Dataset(arrays) for name, arrays in nodes.items()})
@@ -113,3 +125,43 @@ def setup_of(scenario):
         noise_models=own.given_noise(),
         seed=own.seed,
     )
+
+
+def with_margin(scenario, setup):
+    """
+    Ground that the footprints of all pixels of a scenario's image cover.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario
+    setup : fifesim.chain.setup.Setup
+        From `setup_of`.
+
+    Returns
+    -------
+    ground : odc.geo.geobox.GeoBox
+        The grid of the scenario and whole cells around it.
+    setup : fifesim.chain.setup.Setup
+        The same, with pixels where they lie over the grid of the scenario.
+    inside : dict of str to slice
+        Rows and columns of the scenario's grid among those of the ground.
+
+    Raises
+    ------
+    ValueError
+        If the random field is periodic.
+    """
+    if scenario.ground.method == "periodic":
+        raise ValueError('ground.method = "periodic" has no ground beyond the scene: type method = "streaming"')
+    grid, bands = scenario.geobox(), setup.instrument.select(setup.bands)
+    pixels = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
+    spreads = zip(*map(setup.instrument.line_spreads, bands), strict=True)
+    sizes = zip(spreads, grids.cell_size(pixels), shifts_of(setup.offset, pixels), grids.cell_size(grid), strict=True)
+    down, across = (
+        max(int(np.ceil((max(one.half_width for one in along) - pixel / 2 + np.abs(shift).max()) / cell - 1e-9)), 0)
+        for along, pixel, shift, cell in sizes
+    )
+    inside = {"y": slice(down, down + grid.shape.y), "x": slice(across, across + grid.shape.x)}
+    a, shape = grid.affine, (grid.shape.y + 2 * down, grid.shape.x + 2 * across)
+    ground = GeoBox(shape, Affine(a.a, 0.0, a.c - across * a.a, 0.0, a.e, a.f - down * a.e), grid.crs)
+    return ground, replace(setup, onto=pixels, interval=None), inside

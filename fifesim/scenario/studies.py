@@ -172,13 +172,20 @@ def read_study(path: FilePath) -> Study:
     values = load_values(path)
     plan, draws = values.pop("dataset", {}), values.pop("draw", None)
     known = ("sequence", "seed", "landscapes", "split")
-    for name in plan if isinstance(plan, dict) else [plan]:
-        if name not in known:
-            hint = nearest(str(name), known)
-            raise ValueError(f"unknown key dataset.{name}: {hint}allowed are {', '.join(known)}")
+    wrong = [
+        f"unknown key dataset.{name}: {nearest(str(name), known)}allowed are {', '.join(known)}"
+        for name in (plan if isinstance(plan, dict) else [plan])
+        if name not in known
+    ]
+    try:
+        scenario = parse_scenario(values)
+    except ValueError as error:
+        wrong.append(str(error))
+    if wrong:
+        raise ValueError("\n".join(wrong))
     if isinstance(draws, Mapping):
         draws = {name: _with_whole_paths(name, table, Path(path).parent) for name, table in _flat(draws)}
-    return Study(parse_scenario(values), draws, **plan)
+    return Study(scenario, draws, **plan)
 
 
 def _with_whole_paths(name, table, folder):

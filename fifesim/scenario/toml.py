@@ -4,13 +4,15 @@ import inspect
 import json
 import os
 import re
+from copy import deepcopy
+from functools import reduce
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from fifesim.base.foreign import in_a_line, read_toml, shown
 from fifesim.base.refusals import in_own_words
-from fifesim.base.spelling import nearest
+from fifesim.base.spelling import closest, nearest
 from fifesim.scenario.keys import Keys
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -146,23 +148,45 @@ def validated(model, values):
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise ValueError(mistakes(error)) from None
+        raise ValueError(mistakes(error, values, model)) from None
 
 
-def mistakes(error):
+def mistakes(error, values, model):
     """
     Mistakes of a scenario, a line each.
+
+    A section with an unknown key is not checked as a whole, so the values are checked again with these keys corrected
+    where their spelling is close to a key, and without the others.
 
     Parameters
     ----------
     error : pydantic.ValidationError
+    values : mapping
+        From which the model was made.
+    model : type
+        As in `validated`.
 
     Returns
     -------
     lines : str
         As many as can be read at once.
     """
-    return _shortened([_explain(item) for item in error.errors()])
+    found = error.errors()
+    lines, unknown = [_explain(item) for item in found], [each for each in found if each["type"] == "extra_forbidden"]
+    if unknown:
+        rest = deepcopy(dict(values))
+        for item in unknown:
+            *place, key = item["loc"]
+            table = reduce(lambda found, name: found[name], place, rest)
+            table.setdefault(closest(key, _known(item["loc"])) or key, table.pop(key))
+            table.pop(key, None)
+        try:
+            model(**rest)
+        except ValidationError as others:
+            lines += [_explain(item) for item in others.errors()]
+        except ValueError as others:
+            lines += str(others).splitlines()
+    return _shortened(list(dict.fromkeys(lines)))
 
 
 def _shortened(lines):
@@ -275,13 +299,17 @@ def _meaning(place):
     return f" ({known.description})" if known else ""
 
 
+def _known(place):
+    """Names of the keys in the section of a key."""
+    return list(((Keys.section(place[:-1]) if len(place) > 1 else None) or Keys).model_fields)
+
+
 def _explain(error):
     """One line that names the key, the value and what is allowed."""
     place, value = [str(part) for part in error["loc"]], error["input"]
     key = in_a_line(".".join(place), 100)
     if error["type"] == "extra_forbidden":
-        section = Keys.section(place[:-1]) if len(place) > 1 else None
-        known = list((section or Keys).model_fields)
+        known = _known(place)
         hint = nearest(place[-1], known)
         return in_a_line(f"unknown key {key} = {shown(value)}: {hint}allowed are {', '.join(known)}")
     message = str(error["ctx"]["error"]) if error["type"] == "value_error" else in_own_words(error)
@@ -290,4 +318,6 @@ def _explain(error):
     if isinstance(value, str):
         # What others say of a value repeats it whole.
         message = message.replace(repr(value), shown(value))
-    return in_a_line(f"{key}: {message}" if isinstance(value, dict) else f"{key} = {shown(value)}: {message}")
+    if isinstance(value, dict):
+        return in_a_line(": ".join(filter(None, (key, message))))
+    return in_a_line(f"{key} = {shown(value)}: {message}")

@@ -74,7 +74,8 @@ def sense(
         Registration error southward and eastward, a number or a drift of one for each row and each column. The pixels
         see the ground beside them; the coordinates stay nominal. [pixel]
     noise : str or sequence of str, optional
-        Among "shot", "thermal" and "fixed-pattern"; the instrument's description has their size.
+        Among "shot", "thermal" and "fixed-pattern", or "all" for the kinds that the instrument has. Its description
+        has their size; a kind that it lacks is refused.
     seed : int, optional
         Of the noise.
     noise_models : fifesim.sensor.response.noise.NoiseModel, or mapping of str to NoiseModel, optional

@@ -130,6 +130,17 @@ def test_impossible_levels_are_refused(level):
         line(Y, X).confidence_interval(0.5, level)
 
 
+def test_line_takes_numbers_of_any_kind():
+    ours = line(Y, X)
+    expected = ours.intercept + ours.slope * np.array([0.3, 0.4])
+    for x in ([0.3, 0.4], (0.3, 0.4), np.array([0.3, 0.4])):
+        np.testing.assert_array_equal(ours.predict(x), expected)
+        assert not ours.extrapolates(x).any()
+    assert ours.predict(0.3) == expected[0]
+    far = X.mean() + 3 * X.std(ddof=1) * np.array([-1.01, -0.99, 0.99, 1.01])
+    np.testing.assert_array_equal(ours.extrapolates([*far, np.nan]), [True, False, False, True, False])
+
+
 def test_regression_is_told_in_two_lines():
     line = Regression(-2.0, 1.25, 0.9, 10, 0.1, 0.5, 4.0)
     first, second = repr(line).splitlines()

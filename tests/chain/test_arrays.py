@@ -25,7 +25,7 @@ def scene():
     [
         {},
         {"interval": "native", "offset": (0.4, -0.3)},
-        {"instrument": "OLI", "bands": ("B4", "B5"), "noise": ("shot", "thermal"), "seed": 5},
+        {"instrument": "OLI", "bands": ("B4", "B5"), "noise": ("thermal",), "seed": 5},
         {"quantise": False, "interval": 45.0, "min_valid": 0.8},
     ],
 )

@@ -33,3 +33,11 @@ def test_chips_fill_a_tile_before_the_next():
     for number in range(9):
         row, column = place_of(number, (333, 333), (211491, 5000), 1008)
         assert (row + 332) // 1008 == row // 1008 and (column + 332) // 1008 == column // 1008
+
+
+def test_a_tile_holds_the_margins_of_its_chips():
+    """With 24 cells around them only four chips of 333 fit into a tile of 1008."""
+    places = [place_of(number, (333, 333), (211491, 5000), 1008, (24, 24)) for number in range(8)]
+    for row, column in places:
+        assert (row - 24) // 1008 == (row + 356) // 1008 and (column - 24) // 1008 == (column + 356) // 1008
+    assert len({(row // 1008, column // 1008) for row, column in places}) == 2

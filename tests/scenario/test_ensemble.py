@@ -7,7 +7,7 @@ from fifesim.scenario.simulation import simulate
 
 SMALL = {"width": 300.0, "height": 240.0, "west": 708000.0, "north": 4331000.0}
 FLAT = {"dem": "flat"}
-NOISE = {"noise": ["shot", "thermal"], "seed": 3}
+NOISE = {"noise": ["thermal"], "seed": 3}
 
 # Each changes what others leave at its default.
 CASES = {

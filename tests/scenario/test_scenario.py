@@ -49,7 +49,15 @@ def test_default_is_the_paper_case_on_the_whole_site():
         {"grid": {"cell": 1 / 3, "width": 60.0, "height": 60.0}},
         {"ground": {"leaf": {"chlorophyll": 40.0}, "background_spectra": {"soil_wet": 0.5, "shade": 0.5}}},
         {"sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}},
-        {"sensor": {"instrument": "L4TM", "interval": "native", "offset": [0.5, -1.0], "noise": ["shot"], "seed": 4}},
+        {
+            "sensor": {
+                "instrument": "L4TM",
+                "interval": "native",
+                "offset": [0.5, -1.0],
+                "noise": ["thermal"],
+                "seed": 4,
+            }
+        },
         {"sensor": {"interval": "30.5 m"}},
     ],
 )
@@ -175,7 +183,7 @@ def test_every_mistake_is_told_at_once(tmp_path):
 @pytest.mark.parametrize(
     ("sections", "said"),
     [
-        ({"ground": {"ARP": 0.1}}, "unknown key ground.ARP = 0.1: allowed are distribution, "),
+        ({"ground": {"ARP": 0.1}}, "unknown key ground.ARP = 0.1: did you mean 'arp'? allowed are distribution, "),
         ({"atmosphere": {"visibility": 2}}, "atmosphere.visibility = 2: "),
         ({"atmosfere": {}}, "unknown key atmosfere = {}: did you mean 'atmosphere'?"),
         ({"sensor": {"instrument": "TN"}}, "unknown instrument 'TN'"),
@@ -349,3 +357,20 @@ def test_a_class_without_leaf_area_has_that_of_the_ground():
     grass, own = (stand.cover_class(name, scenario.ground) for name, stand in scenario.classes.items())
     assert (grass.lai, grass.arp, grass.brown) == ("unburned-ungrazed", None, None)
     assert (own.lai, own.brown) == ("burned-grazed", 0.3)
+
+
+@pytest.mark.parametrize(
+    ("text", "second"),
+    [
+        ("[sensor]\ninstrment = 'TM'\nbands = ['XX']\n", "sensor: unknown band of TM 'XX'"),
+        ("[sensor]\npixl = 30\nnoise = ['shot']\n", "has no noise for TM3"),
+        ("[landscap]\ncover = 'pastures'\n[classes.a]\nshare = 0.3\n[classes.b]\n", "classes: b has no share"),
+        ("[sensor]\nxyzzy = 1\nbands = ['XX']\n", "sensor: unknown band of TM 'XX'"),
+    ],
+)
+def test_a_misspelt_key_does_not_hide_another_mistake(text, second, tmp_path):
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(ValueError, match="unknown key") as caught:
+        fifesim.read_scenario(tmp_path / "mine.toml")
+    first, *others = str(caught.value).splitlines()
+    assert first.startswith("unknown key") and len(others) == 1 and second in others[0]

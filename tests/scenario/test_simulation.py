@@ -163,11 +163,11 @@ def test_what_is_for_a_file_is_refused_without_one(options):
 
 
 def test_keys_of_the_sensor_are_those_of_sense():
-    keys = {"instrument": "L4TM", "interval": 31.0, "offset": [0.25, -0.5], "noise": ["shot", "thermal"], "seed": 3}
+    keys = {"instrument": "L4TM", "interval": 31.0, "offset": [0.25, -0.5], "noise": ["thermal"], "seed": 3}
     case = parse_scenario({"grid": GRID, "terrain": {"dem": "flat"}, "sensor": keys})
     lai = fifesim.lai_scene(case.geobox(), "burned-grazed", arp=0.15, seed=7)
     toa = fifesim.to_toa(fifesim.surface_reflectance(lai, "L4TM", bands=["TM3", "TM4"]), instrument="L4TM")
-    image = fifesim.sense(toa, "L4TM", interval=31.0, offset=(0.25, -0.5), noise=("shot", "thermal"), seed=3)
+    image = fifesim.sense(toa, "L4TM", interval=31.0, offset=(0.25, -0.5), noise="all", seed=3)
     xr.testing.assert_identical(fifesim.simulate(case)["image"]["dn"].drop_attrs(), image.drop_attrs())
 
 

@@ -96,9 +96,9 @@ def test_sweep_takes_a_scenario():
 def test_values_of_an_axis_may_be_lists(small, offsets):
     sensor = {"sensor": {"instrument": "L4TM", "bands": ["TM3", "TM4"]}}
     scenario = parse_scenario(small.model_dump(exclude_unset=True) | sensor)
-    found = fifesim.sweep(scenario, {"offset": offsets, "noise": [[], ["shot", "thermal"]]})
+    found = fifesim.sweep(scenario, {"offset": offsets, "noise": [[], ["all"]]})
     assert found["offset"].values.tolist() == ["0.0, 0.0", "0.3, 0.0"]
-    assert found["noise"].values.tolist() == ["none", "shot, thermal"]
+    assert found["noise"].values.tolist() == ["none", "all"]
     r2 = found.r2.sel(variable="lai", noise="none")
     assert float(r2.sel(offset="0.3, 0.0")) < float(r2.sel(offset="0.0, 0.0"))
 

@@ -12,7 +12,7 @@ import numpy as np
 import fifesim
 
 arps = (0.05, 0.15, 0.24)
-sensor = {"instrument": "L4TM", "interval": "native", "noise": ["shot", "thermal"]}
+sensor = {"instrument": "L4TM", "interval": "native", "noise": ["all"]}
 budgets = {
     arp: fifesim.budget(
         fifesim.Scenario(ground={"arp": arp}, sensor=sensor), realisations=3, cells=333

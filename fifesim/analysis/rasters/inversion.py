@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+import numpy as np
 import xarray as xr
 
 from fifesim.analysis import uncertainty
@@ -16,12 +17,21 @@ from fifesim.rasters.reductions import sums_by_row
 
 _LIMITS = ("low", "high")
 
+# Physical range by quantity; maps above an LAI of 20 are refused elsewhere as wrongly scaled.
+_RANGES = {"lai": (0.0, 20.0), "fpar": (0.0, 1.0)}
+
+# Meanings of the flag by value.
+_FLAGS = {-1: "no_data", 0: "as_fitted", 1: "extrapolated", 2: "clipped_to_minimum", 3: "clipped_to_maximum"}
+
 
 def invert(
     ndvi: xr.DataArray, fit: Regression, quantity: Literal["lai", "fpar"] = "lai", *, level: float = 0.95
 ) -> xr.Dataset:
     """
     Map of a variable from an index by a regression, with its prediction interval.
+
+    The line may leave the physical range, 0 to 20 for LAI and 0 to 1 for FPAR. Such values and the ends of their
+    interval are clipped to it and flagged.
 
     Parameters
     ----------
@@ -37,8 +47,10 @@ def invert(
     Returns
     -------
     estimate : xarray.Dataset, dims (y, x)
-        The variable, and ``low`` and ``high``, the ends of its interval. Lazy where ``ndvi`` is. Values are as the line
-        gives them, and may be negative.
+        The variable, ``low`` and ``high``, the ends of its interval, and ``flag``. Lazy where ``ndvi`` is. The flag is
+        2 or 3 where the variable was clipped to its minimum or maximum, 1 where the index is more than 3 standard
+        deviations from the mean of the fitted data, -1 without data, else 0; its attributes are CF's ``flag_values``
+        and ``flag_meanings``.
 
     Raises
     ------
@@ -47,7 +59,8 @@ def invert(
 
     See Also
     --------
-    fifesim.analysis.regression.Regression.prediction_interval
+    fifesim.analysis.regression.Regression.prediction_interval,
+    fifesim.analysis.regression.Regression.extrapolates
 
     Examples
     --------
@@ -59,24 +72,34 @@ def invert(
     >>> ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
     >>> estimate = ndvi.fifesim.invert(fifesim.regress(truth, ndvi))
     >>> sorted(estimate.data_vars)
-    ['high', 'lai', 'low']
+    ['flag', 'high', 'lai', 'low']
+    >>> clear = estimate["lai"].where(estimate["flag"] == 0)  # without clipped and extrapolated pixels
     """
-    if quantity not in ("lai", "fpar"):
+    if quantity not in _RANGES:
         raise ValueError(f"quantity must be 'lai' or 'fpar', got {quantity!r}")
     _check_names(ndvi, fit, quantity)
     if not 0 < level < 1:
         raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")
-    kernels = {quantity: fit.predict} | {name: _limit(fit, k, level) for k, name in enumerate(_LIMITS)}
-    found = {}
-    for name, kernel in kernels.items():
-        values = swaths.placed_as(chunks.pointwise(kernel, ndvi), ndvi)
-        line = f"invert: {fit.intercept:.6g} + {fit.slope:.6g} x {ndvi.name or 'index'}"
-        found[name] = cf.label(values, quantity, source=ndvi, history=line).rename(name)
+    line = f"invert: {fit.intercept:.6g} + {fit.slope:.6g} x {ndvi.name or 'index'}"
+    known = {"fit": fit, "allowed": _RANGES[quantity]}
+    found = {quantity: chunks.pointwise(_clipped, ndvi, **known)}
+    found |= {name: chunks.pointwise(_limit, ndvi, end=k, level=level, **known) for k, name in enumerate(_LIMITS)}
+    for name, values in found.items():
+        found[name] = cf.label(swaths.placed_as(values, ndvi), quantity, source=ndvi, history=line).rename(name)
         # A standard name says that the values are the quantity, which the ends of an interval are not.
         if name in _LIMITS:
             found[name].attrs.pop("standard_name", None)
             found[name].attrs["long_name"] += f", {name} end of the {100 * level:g} % prediction interval"
-    return xr.Dataset(found)
+    flag = swaths.placed_as(chunks.pointwise(_flag, ndvi, dtype=np.int8, **known), ndvi).rename("flag")
+    flag.attrs = {
+        "standard_name": f"{found[quantity].attrs['standard_name']} status_flag",
+        "long_name": f"flag of the {found[quantity].attrs['long_name']}",
+        "flag_values": np.array(list(_FLAGS), np.int8),
+        "flag_meanings": " ".join(_FLAGS.values()),
+        "history": found[quantity].attrs["history"],
+    }
+    found[quantity].attrs["ancillary_variables"] = "flag"
+    return xr.Dataset(found | {"flag": flag})
 
 
 def inversion_error(
@@ -145,7 +168,7 @@ def _check_names(ndvi, fit, quantity):
 
 def _map_and_limits(estimate):
     """Variable of an estimate, and the ends of its interval."""
-    variables = [name for name in estimate.data_vars if name not in _LIMITS]
+    variables = [name for name in estimate.data_vars if name not in (*_LIMITS, "flag")]
     if len(variables) != 1 or not set(_LIMITS) <= set(estimate.data_vars):
         raise ValueError(
             f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
@@ -154,5 +177,18 @@ def _map_and_limits(estimate):
     return [estimate[name] for name in (*variables, *_LIMITS)]
 
 
-def _limit(fit, end, level):
-    return lambda values: fit.prediction_interval(values, level)[end]
+def _clipped(index, fit, allowed):
+    """Value of the line, clipped to its physical range."""
+    return np.clip(fit.predict(index), *allowed)
+
+
+def _limit(index, fit, allowed, end, level):
+    """One end of the prediction interval, clipped to the physical range."""
+    return np.clip(fit.prediction_interval(index, level)[end], *allowed)
+
+
+def _flag(index, fit, allowed):
+    """Flag of each pixel, a key of `_FLAGS`."""
+    line, (lowest, highest) = fit.predict(index), allowed
+    reasons = [np.isnan(line), line < lowest, line > highest, fit.extrapolates(index)]
+    return np.select(reasons, [-1, 2, 3, 1], 0)

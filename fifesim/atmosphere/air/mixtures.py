@@ -1,13 +1,13 @@
 """Names of aerosols: mixtures of components, by their volume."""
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from numbers import Real
 from pathlib import PurePath
 
 import numpy as np
 
 from fifesim.atmosphere.air.components import COMPONENTS
+from fifesim.base.spelling import closest
 
 # Volume fractions of the components. [1] World Climate Programme WCP-55 (1983); Tanre et al. (1990).
 MODELS = {
@@ -62,10 +62,11 @@ def mixture(aerosol):
     if aerosol in MODELS:
         return dict(MODELS[aerosol])
     if ":" not in aerosol:
-        nearest = get_close_matches(aerosol, MODELS, n=1, cutoff=0.0)[0]
+        name = closest(aerosol, [*MODELS, *COMPONENTS])
+        hint = f": type aerosol={f'{name}:1' if name in COMPONENTS else name!r}" if name else ""
         raise ValueError(
-            f"aerosol must be one of {', '.join(MODELS)}, or a mixture such as {_EXAMPLE}, got {aerosol!r}: "
-            f"type aerosol={nearest!r}"
+            f"aerosol must be one of {', '.join(MODELS)}, or a mixture of {', '.join(COMPONENTS)}, such as dust:1 or "
+            f"{_EXAMPLE}, got {aerosol!r}{hint}"
         )
     return _checked_fractions(_parsed(aerosol), aerosol)
 
@@ -124,9 +125,9 @@ def _parsed(text):
 def _checked_fractions(fractions, given):
     for name, value in fractions.items():
         if name not in COMPONENTS:
-            nearest = get_close_matches(str(name), COMPONENTS, n=1, cutoff=0.0)[0]
+            hint = f": type {near!r}" if (near := closest(name, COMPONENTS)) else ""
             raise ValueError(
-                f"aerosol component must be one of {', '.join(COMPONENTS)}, got {name!r} in {given!r}: type {nearest!r}"
+                f"aerosol component must be one of {', '.join(COMPONENTS)}, got {name!r} in {given!r}{hint}"
             )
         if not isinstance(value, Real) or isinstance(value, bool):
             raise TypeError(f"aerosol fraction of {name} must be a number from 0 to 1, got {value!r}: type 0.5")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from typing import Self
 
 import numpy as np
@@ -25,6 +24,7 @@ from fifesim.atmosphere.air.summary import atmosphere_in_words
 from fifesim.base.annotations import Numbers
 from fifesim.base.arguments import check_fields
 from fifesim.base.kinds import described
+from fifesim.base.spelling import closest
 
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
@@ -320,8 +320,8 @@ def _shortest(value):
 def _check_name(what, value, allowed):
     if value in allowed:
         return
-    nearest = get_close_matches(str(value), allowed, n=1, cutoff=0.0)[0]
-    raise ValueError(f"{what} must be one of {', '.join(allowed)}, got {value!r}: type {what}={nearest!r}")
+    hint = f": type {what}={near!r}" if (near := closest(value, allowed)) else ""
+    raise ValueError(f"{what} must be one of {', '.join(allowed)}, got {value!r}{hint}")
 
 
 def _checked(what, value, low, high, unit):
@@ -335,8 +335,5 @@ def _checked(what, value, low, high, unit):
                 f"{what} must be from {low} to {high} {unit}, got {value:g}: where that is metres, type "
                 f"{what}={value / 1000:g}"
             )
-        nearest = low if value < low else high
-        raise ValueError(
-            f"{what} must be from {low} to {high} {unit}, got {value:g}: type {what}={nearest}, the nearest allowed"
-        )
+        raise ValueError(f"{what} must be from {low} to {high} {unit}, got {value:g}")
     return float(value)

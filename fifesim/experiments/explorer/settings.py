@@ -250,7 +250,7 @@ def _sensor_keys(scenario, name):
         return own
     kept = {key: own[key] for key in ("seed", "min_valid") if key in own}
     if scenario.sensor.noise and all(band.noise for band in instrument(name).red_and_near_infrared()):
-        kept["noise"] = scenario.sensor.noise
+        kept["noise"] = ["all"]
     return {"instrument": name} | kept
 
 

@@ -38,7 +38,7 @@ def instrument_scenario(name, *, arp=0.15):
     description = instrument(name)
     bands = description.red_and_near_infrared()
     shift = (description.geolocation or 0.0) / description.pixel(bands[0])
-    noise = ["shot", "thermal"] if all(band.noise for band in bands) else []
+    noise = ["all"] if all(band.noise for band in bands) else []
     sensor = {"instrument": name, "bands": [band.name for band in bands], "noise": noise, "offset": [shift, shift]}
     return Scenario(sensor=sensor, ground={"arp": arp}, terrain={"dem": "flat"})
 

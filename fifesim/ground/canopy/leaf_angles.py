@@ -1,6 +1,5 @@
 """Leaf angle distributions as fractions of the leaf area in classes of inclination."""
 
-import difflib
 import math
 import re
 from collections.abc import Sequence
@@ -12,6 +11,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from fifesim.base.kinds import described
+from fifesim.base.spelling import closest
 
 
 @dataclass(frozen=True)
@@ -151,8 +151,8 @@ def _parsed(text):
 
 def _unknown(text):
     allowed = [*_CUMULATIVE, "verhoef(a, b)", "campbell(mean angle)"]
-    near = difflib.get_close_matches(text.lower(), allowed, n=1, cutoff=0.4)
-    nearest = f", did you mean {near[0]!r}?" if near else "."
+    near = closest(text.lower(), allowed)
+    nearest = f", did you mean {near!r}?" if near else "."
     return (
         f"unknown leaf angle distribution {text!r}{nearest} "
         f"Allowed: {', '.join(allowed)}, or 'inclination: fraction, ...'"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -14,6 +13,7 @@ from fifesim.base import datasets
 from fifesim.base.annotations import NumberOrArray
 from fifesim.base.bands import solar_spectrum
 from fifesim.base.kinds import described
+from fifesim.base.spelling import closest
 from fifesim.ground.canopy.spectrum import Spectrum, read_spectrum
 
 SHADE = "shade"
@@ -246,8 +246,8 @@ def did_you_mean(name, allowed):
     >>> did_you_mean("TM33", ["TM3", "TM4"])
     ", did you mean 'TM3'?"
     """
-    near = difflib.get_close_matches(str(name), map(str, allowed), n=1, cutoff=0.4)
-    return f", did you mean {near[0]!r}?" if near else "."
+    near = closest(name, allowed)
+    return f", did you mean {near!r}?" if near else "."
 
 
 def _share(name, value):

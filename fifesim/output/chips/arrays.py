@@ -117,7 +117,7 @@ def _fullest(study):
         drawn[key.path] = max(ends) if numbers and min(ends) == 0 else distribution.usual
     side = 2 * study.scenario.sensor.size
     small = {("grid", "width"): side, ("grid", "height"): side}
-    return realise(study.scenario_with(drawn | small), ("truth",))["truth"].data_vars
+    return realise(study.scenario_with(drawn | small), ("truth",), complete=True)["truth"].data_vars
 
 
 def chip_arrays(chips, numbers, layout):
@@ -148,7 +148,7 @@ def chip_arrays(chips, numbers, layout):
         chip = int(numbers[at])
         scenario = chips.scenario(chip)
         try:
-            _put(found, at, *realise_arrays(scenario), layout)
+            _put(found, at, *realise_arrays(scenario, complete=True), layout)
         except ValueError as error:
             raise ValueError(f"chip {chip}: {error}") from error
     for start in range(0, count, _AT_ONCE):

@@ -3,6 +3,7 @@
 from fifesim.sensor.description.fields import TwoAxes, by_axes
 from fifesim.sensor.description.responses import knows_blur, with_response
 from fifesim.sensor.description.spectral_response import half_peak
+from fifesim.sensor.response.noise import ALL
 
 
 def list_instruments(instruments):
@@ -212,7 +213,7 @@ def noise_in_words(instrument, bands, kinds=()):
     'none is added; that of I1 is not known, by band: Twedt, Lei and Xiong (2017), doi:10.1117/12.2274025'
     """
     if kinds:
-        return ", ".join(kinds)
+        return "all kinds that are described" if tuple(kinds) == (ALL,) else ", ".join(kinds)
     unknown = [band.name for band in instrument.select(bands) if band.noise is None]
     if not unknown:
         return "none is added"

@@ -11,8 +11,11 @@ from fifesim.base.annotations import Names, Numbers
 from fifesim.base.arguments import check_fields
 from fifesim.base.seeds import generator
 
-# What can be switched on by name.
+# Kinds of noise that can be requested by name.
 KINDS = ("shot", "thermal", "fixed-pattern")
+
+# Requests every kind that the noise model of a band has.
+ALL = "all"
 
 # Pixels of a scan line that are drawn together; a line's place in the counter is (0, 0, tile, line).
 _TILE = 1024
@@ -143,6 +146,12 @@ class NoiseModel:
                 )
         return cls(float(np.sqrt(thermal)), float(shot), **fixed_pattern)
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of noise that are not zero, among "shot", "thermal" and "fixed-pattern"."""
+        sizes = (self.shot, self.thermal, self.gain_spread + self.offset_spread)
+        return tuple(kind for kind, size in zip(KINDS, sizes, strict=True) if size > 0)
+
     def noise_equivalent_radiance(self, radiance: Numbers, kinds: Names = ("shot", "thermal")) -> np.ndarray:
         """
         Standard deviation of the noise of a detector.
@@ -183,12 +192,12 @@ class NoiseModel:
 
 def check_kinds(kinds):
     """
-    Kinds of noise by name.
+    Check the names of kinds of noise.
 
     Parameters
     ----------
     kinds : str or sequence of str
-        Among `KINDS`.
+        Among `KINDS`, or `ALL` alone.
 
     Returns
     -------
@@ -197,12 +206,16 @@ def check_kinds(kinds):
     Raises
     ------
     ValueError
-        If a name is unknown.
+        If a name is unknown, or "all" is combined with another name.
     """
     kinds = (kinds,) if isinstance(kinds, str) else tuple(kinds)
-    unknown = [str(kind) for kind in kinds if kind not in KINDS]
+    unknown = [str(kind) for kind in kinds if kind not in (*KINDS, ALL)]
     if unknown:
-        raise ValueError(f"unknown noise {', '.join(unknown)}: there are {', '.join(KINDS)}")
+        raise ValueError(
+            f"unknown noise {', '.join(unknown)}: there are {', '.join(KINDS)}, or {ALL!r} for all of them"
+        )
+    if ALL in kinds and len(kinds) > 1:
+        raise ValueError(f"noise must be {ALL!r} alone or a list of kinds, got {', '.join(kinds)}")
     return kinds
 
 

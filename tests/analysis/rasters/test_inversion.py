@@ -10,7 +10,7 @@ import fifesim
 
 def test_inversion_holds_its_share_and_has_the_residual_as_error(scattered):
     """On the pixels that it was fitted to: no bias, and the residual deviation but for n - 2; 95 % within 4 errors."""
-    lai, ndvi = scattered
+    lai, ndvi = scattered[0] + 1.0, scattered[1]  # so that no value is clipped
     fit = fifesim.regress(lai, ndvi)
     estimate = fifesim.invert(ndvi, fit)
     error = fifesim.inversion_error(estimate, lai)
@@ -22,7 +22,7 @@ def test_inversion_holds_its_share_and_has_the_residual_as_error(scattered):
 
 
 def test_map_is_lazy_labelled_and_as_the_line_says(scattered):
-    lai, ndvi = scattered
+    lai, ndvi = scattered[0] + 1.0, scattered[1]  # so that no value is clipped
     fit = fifesim.regress(lai, ndvi)
     lazy = fifesim.invert(in_chunks(ndvi, ODD_CHUNKS | {"y": 100, "x": 99}), fit, level=0.5)
     assert lazy["low"].chunks is not None
@@ -31,6 +31,37 @@ def test_map_is_lazy_labelled_and_as_the_line_says(scattered):
     assert lazy["lai"].attrs["standard_name"] == "leaf_area_index"
     assert "standard_name" not in lazy["low"].attrs
     assert lazy["lai"].rio.crs.to_epsg() == 26914
+
+
+def test_values_outside_the_physical_range_are_clipped_and_flagged(scattered):
+    """NDVI on a line through LAI 0.2 to 2.2, with a mean of 0.46 and a standard deviation of 0.18."""
+    lai, ndvi = scattered
+    fit = fifesim.regress(lai, ndvi)
+    odd = ndvi.copy(deep=True)
+    odd[0, :6] = [-0.4, 0.97, 12.0, np.nan, 0.46, 1.02]
+    for index in (odd, in_chunks(odd, ODD_CHUNKS | {"y": 100, "x": 99})):
+        estimate = fifesim.invert(index, fit)
+        np.testing.assert_array_equal(estimate["flag"][0, :6], [2, 0, 3, -1, 0, 1])
+        np.testing.assert_array_equal(estimate["lai"][0, [0, 2, 3]], [0.0, 20.0, np.nan])
+        np.testing.assert_array_equal(estimate["lai"][0, 4:6], fit.predict(odd.values[0, 4:6]))
+        np.testing.assert_array_equal(estimate["low"][0, :4], [0.0, fit.prediction_interval(0.97)[0], 20.0, np.nan])
+        assert (estimate["low"] >= 0).sum() == (estimate["lai"] <= estimate["high"]).sum() == lai.size - 1
+        assert estimate["flag"].dtype == np.int8 and estimate["flag"].chunks == index.chunks
+    meanings = dict(
+        zip(estimate["flag"].attrs["flag_values"], estimate["flag"].attrs["flag_meanings"].split(), strict=True)
+    )
+    assert meanings[2] == "clipped_to_minimum" and meanings[1] == "extrapolated"
+    fpar = fifesim.invert(odd, fit, "fpar")["fpar"]
+    assert float(fpar.min()) == 0.0 and float(fpar.max()) == 1.0
+
+
+def test_a_clipped_map_goes_on_to_reflectance(scattered):
+    lai, ndvi = scattered
+    odd = ndvi.copy(deep=True)
+    odd[0, :2] = [-0.4, 12.0]
+    estimate = fifesim.invert(odd, fifesim.regress(lai, ndvi))
+    reflectance = estimate["lai"].fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    assert np.isfinite(reflectance).all()
 
 
 def test_error_of_a_map_alone_and_of_nothing(scattered):

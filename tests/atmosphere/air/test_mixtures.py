@@ -51,3 +51,13 @@ def test_giving_a_mapping_leaves_it_untouched():
     mixture(given)["dust"] = 7
     mixture("urban")["dust"] = 7
     assert given == {"soot": 0.0, "dust": 1.0} and MODELS["urban"]["dust"] == 0.17
+
+
+def test_a_name_is_suggested_only_where_the_spelling_is_close():
+    for given, said in (("dust", "type aerosol='dust:1'"), ("maritme", "type aerosol='maritime'")):
+        with pytest.raises(ValueError, match=f"such as dust:1 or .*{said}"):
+            mixture(given)
+    with pytest.raises(ValueError, match=r"a mixture of dust, water_soluble, oceanic, soot.*got 'sulphate'$"):
+        mixture("sulphate")
+    with pytest.raises(ValueError, match=r"got 'sand' in 'sand:1'$"):
+        mixture("sand:1")

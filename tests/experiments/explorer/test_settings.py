@@ -48,9 +48,7 @@ def test_a_setting_is_the_scenario_with_its_values(small):
     assert own.ground.seed == 3 and own.geobox() == sweep.scenario.geobox()
     assert sweep.at(Setting(0.24, 10.0, 60.0, "HRV")).sensor.noise == []
     other = sweep.at(Setting(0.24, 10.0, 60.0, "MSI"))
-    assert (
-        other.sensor.bands == ["MSI4", "MSI8"] and other.sensor.noise == ["thermal"] and other.sensor.min_valid == 0.9
-    )
+    assert other.sensor.bands == ["MSI4", "MSI8"] and other.sensor.noise == ["all"] and other.sensor.min_valid == 0.9
 
 
 def test_instruments_fit_the_ground_and_its_cells(small):

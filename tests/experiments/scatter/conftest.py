@@ -21,5 +21,5 @@ def scenario():
 @pytest.fixture(scope="session")
 def rough(scenario):
     """A scenario with every stage at work."""
-    sensor = {"instrument": "L4TM", "interval": "native", "offset": [0.1, 0.0], "noise": ["shot", "thermal"]}
+    sensor = {"instrument": "L4TM", "interval": "native", "offset": [0.1, 0.0], "noise": ["thermal"]}
     return scenario(sensor, dem="flint-hills")

@@ -10,7 +10,7 @@ from fifesim.experiments.scatter.instruments import compare_instruments, instrum
 def test_an_instrument_is_flown_with_all_that_is_known_of_it():
     msi = instrument_scenario("Sentinel-2", arp=0.24)
     assert msi.sensor.bands == ["MSI4", "MSI8"] and msi.sensor.size == 10.0 and msi.ground.arp == 0.24
-    assert msi.sensor.offset == pytest.approx([0.33, 0.33]) and msi.sensor.noise == ["shot", "thermal"]
+    assert msi.sensor.offset == pytest.approx([0.33, 0.33]) and msi.sensor.noise == ["all"]
     hrv = instrument_scenario("HRV")
     assert hrv.sensor.offset == [0.0, 0.0] and hrv.sensor.noise == [] and hrv.terrain.dem == "flat"
 

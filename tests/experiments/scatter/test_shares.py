@@ -39,7 +39,7 @@ def test_stage_that_is_ideal_already_has_exactly_nothing(scenario):
     [
         ({"offset": [0.0, 2 / 9]}, "registration"),
         ({"interval": 31.0}, "registration"),
-        ({"instrument": "L4TM", "noise": ["shot", "thermal"]}, "noise"),
+        ({"instrument": "L4TM", "noise": ["all"]}, "noise"),
     ],
 )
 def test_what_is_added_to_a_scenario_has_a_share_beyond_its_error(sensor, stage, scenario):

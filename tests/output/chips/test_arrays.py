@@ -31,7 +31,7 @@ def arrays(chips, layout):
 
 @pytest.mark.parametrize("chip", [2, 5])
 def test_a_chip_has_the_bits_of_its_scenario(chip, chips, arrays):
-    run = fifesim.simulate(chips.scenario(chip))
+    run = fifesim.simulate(chips.scenario(chip), complete=True)
     at = chip - 2
     np.testing.assert_array_equal(arrays["dn"][at], run["image"]["dn"])
     np.testing.assert_array_equal(arrays["ndvi"][at], run["image"]["ndvi"].values.astype(np.float32))
@@ -41,7 +41,7 @@ def test_a_chip_has_the_bits_of_its_scenario(chip, chips, arrays):
 
 
 def test_reflectance_is_that_of_the_image(chips, arrays):
-    image = fifesim.simulate(chips.scenario(3))["image"]["dn"]
+    image = fifesim.simulate(chips.scenario(3), complete=True)["image"]["dn"]
     expected = fifesim.sensor.raster.to_reflectance(image).values
     np.testing.assert_array_equal(arrays["toa_reflectance"][1], expected.astype(np.float32))
 
@@ -70,3 +70,50 @@ def test_a_truth_that_others_have_not_names_its_chip(chips, layout):
     without = layout._replace(truth=("lai", "fpar"))
     with pytest.raises(ValueError, match=r"chip \d: has a truth that others have not, green_fpar"):
         chip_arrays(chips, range(0, 7), without)
+
+
+GRASS = {"landscape": {"cover": "voronoi"}, "classes": {"grass": {}, "burned": {"distribution": "burned-grazed"}}}
+
+
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {"sensor": {"instrument": "MSI"}},
+        {"sensor": {"instrument": "L4TM", "offset": [0.5, -1.2], "noise": ["all"]}},
+        {"sensor": {"instrument": "L4TM", "interval": 30.0}, **GRASS},
+        {"sensor": {"instrument": "MSI"}, "terrain": {"dem": "flint-hills"}},
+        {"sensor": {"instrument": "MSI"}, "atmosphere": {"adjacency": True}},
+    ],
+    ids=["blur", "offset", "cover", "hills", "adjacency"],
+)
+def test_chips_have_no_missing_pixels(sections):
+    """Their edges see the ground around; each chip has the bits of its scenario, simulated with that ground."""
+    study = Study(parse_scenario(SMALL | sections), {"visibility": {"uniform": [10, 60]}}, landscapes=3)
+    chips = chips_of(study, 3)
+    found = chip_arrays(chips, range(3), layout_of(chips))
+    for name in ("toa_reflectance", "ndvi", "lai", "fpar"):
+        assert np.isfinite(found[name]).all(), name
+    assert (found["dn"] > 0).all()
+    run = fifesim.simulate(chips.scenario(2), complete=True)
+    np.testing.assert_array_equal(found["dn"][2], run["image"]["dn"])
+    np.testing.assert_array_equal(found["lai"][2], run["truth"]["lai"].values.astype(np.float32))
+    bare = fifesim.simulate(chips.scenario(2))
+    assert run["scene"].sizes == bare["scene"].sizes
+    np.testing.assert_array_equal(run["truth"]["lai"], bare["truth"]["lai"])
+    if "atmosphere" not in sections:
+        # Nearer to the edge, a pixel of the bare scene sees between 98 % and all of its footprint.
+        middle = (..., slice(size := bare["image"].sizes["y"] // 2 - 1, -size), slice(size, -size))
+        assert (run["image"]["dn"].values[middle] > 0).all()
+        np.testing.assert_array_equal(run["image"]["dn"].values[middle], bare["image"]["dn"].values[middle])
+
+
+def test_pixels_at_the_edge_are_those_of_a_larger_scene():
+    scenario = parse_scenario(SMALL | {"sensor": {"instrument": "L4TM"}})
+    image = fifesim.simulate(scenario, complete=True)["image"]["dn"]
+    grid = scenario.geobox().pad(90)
+    larger = {"west": grid.affine.c, "north": grid.affine.f, "width": 780.0, "height": 780.0}
+    whole = fifesim.simulate(parse_scenario({**SMALL, "grid": larger, "sensor": {"instrument": "L4TM"}}))["image"]["dn"]
+    np.testing.assert_array_equal(image, whole.sel(y=image.y, x=image.x, method="nearest", tolerance=0.01))
+    periodic = parse_scenario(SMALL | {"ground": {"method": "periodic"}})
+    with pytest.raises(ValueError, match=r"no ground beyond the scene: type method = \"streaming\""):
+        fifesim.simulate(periodic, complete=True)

@@ -59,11 +59,11 @@ def stopping(monkeypatch, after, error=KeyboardInterrupt):
     """Have the making of chips end with an error."""
     made, realise = [], arrays.realise_arrays
 
-    def stop(*arguments):
+    def stop(*arguments, **options):
         made.append(1)
         if len(made) > after:
             raise error
-        return realise(*arguments)
+        return realise(*arguments, **options)
 
     monkeypatch.setattr(arrays, "realise_arrays", stop)
     return made
@@ -79,7 +79,7 @@ def test_the_function_gives_what_it_wrote(study, whole, tmp_path):
 
 
 def test_a_chip_is_its_scenario_simulated(study, whole):
-    run = fifesim.simulate(fifesim.chips_of(study, COUNT).scenario(4))
+    run = fifesim.simulate(fifesim.chips_of(study, COUNT).scenario(4), complete=True)
     chip = xr.open_zarr(whole, mask_and_scale=False).isel(chip=4)
     np.testing.assert_array_equal(chip.dn, run["image"]["dn"])
     assert float(chip["atmosphere.visibility"]) == fifesim.chips_of(study, 40).scenario(4).atmosphere.visibility

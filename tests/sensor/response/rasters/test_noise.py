@@ -108,10 +108,39 @@ def test_noise_that_is_not_described_is_refused():
     with pytest.raises(ValueError, match="unknown noise thermic"):
         fifesim.sense(uniform((90, 99)), NOISY, noise="thermic")
     bare = NoiseModel(0.5, 0.0)
-    with pytest.raises(ValueError, match=r"TM has no fixed-pattern noise for TM3.*noise_models=\{'TM3'"):
+    with pytest.raises(ValueError, match=r"TM has no shot and no fixed-pattern noise for TM3.*noise_models=\{'TM3'"):
         fifesim.sense(uniform((90, 99)), NOISY, noise=ALL, noise_models=bare)
     with pytest.raises(ValueError, match="TM has no shot noise for TM4"):
         fifesim.sense(uniform((90, 99)), NOISY, noise="shot", noise_models={"TM4": bare})
+
+
+def test_each_requested_kind_must_exist_in_every_band():
+    """L4TM states one ratio without a share of shot noise; the other verbs refuse it as `sense` does."""
+    lai = fifesim.lai_scene(fifesim.fife_site(cell=10, window=((0, 60), (0, 60))), "burned-grazed", seed=7)
+    said = "L4TM has no shot noise for TM3, only thermal; type noise='all'"
+    with pytest.raises(ValueError, match=said):
+        fifesim.compare(lai, ["MSI", "L4TM"], fifesim.Setup(noise=("shot", "thermal")))
+    sensor = {"instrument": "L4TM", "noise": ["shot", "thermal"]}
+    with pytest.raises(ValueError, match=said):
+        fifesim.Scenario(sensor=sensor)
+    with pytest.raises(ValueError, match="TM has no fixed-pattern noise for TM3, only thermal"):
+        fifesim.Scenario(sensor={"noise": ["thermal", "fixed-pattern"], "noise_model": {"thermal": 0.4}})
+    with pytest.raises(ValueError, match="'all' alone"):
+        fifesim.sense(uniform((90, 99)), NOISY, noise=["all", "shot"])
+
+
+def test_all_noise_is_every_kind_that_a_band_has():
+    scene = uniform((90, 99))
+    whole = fifesim.sense(scene, NOISY, noise="all", seed=3)
+    np.testing.assert_array_equal(whole, fifesim.sense(scene, NOISY, noise=ALL, seed=3))
+    thermal = {"noise_models": {"TM3": NoiseModel(0.8, 0.0)}, "seed": 3}
+    mixed = fifesim.sense(scene, NOISY, noise="all", **thermal)
+    np.testing.assert_array_equal(mixed.sel(band="TM4"), whole.sel(band="TM4"))
+    alone = fifesim.sense(scene.sel(band=["TM3"]), NOISY, noise="thermal", **thermal)
+    np.testing.assert_array_equal(mixed.sel(band=["TM3"]), alone)
+    lai = fifesim.lai_scene(fifesim.fife_site(cell=10, window=((0, 60), (0, 60))), "burned-grazed", seed=7)
+    images = fifesim.compare(lai, ["MSI", "L4TM"], fifesim.Setup(noise="all"))
+    assert images["L4TM"]["dn"].attrs["history"].endswith("noise all, seed 0")
 
 
 def test_noise_may_be_given():
