@@ -274,7 +274,7 @@ def test_ctrl_c_in_a_terminal_ends_all_processes_of_a_dataset_with_one_line(tmp_
     finally:
         process.kill()
     assert process.returncode == 130, errors
-    assert re.fullmatch(r"fifesim: interrupted; [^\n]*\n", errors), errors
+    assert re.fullmatch(r"(fifesim: warning: [^\n]*\n)*fifesim: interrupted; [^\n]*\n", errors), errors
     assert not psutil.wait_procs(children, timeout=30)[1]
 
 

@@ -142,6 +142,9 @@ _ANY_DIMENSIONS = {"density", "share_kept", "to_bands"}
 # Average a mask of True and False to a share.
 _TAKE_MASKS = {"aggregate"}
 
+# Arguments that are no rasters of a quantity: dates, and results that hold masks.
+_NO_QUANTITIES = {"time", "found"}
+
 # Kinds of numpy's dtypes: integers and floating-point numbers.
 _REAL = "iuf"
 _NOT_REAL = {
@@ -219,6 +222,8 @@ def checked(function, methods_of=()):
                 if methods_of and name == first:
                     _check_cells(name, given[name], 0 if function.__name__ in _ANY_DIMENSIONS else 2)
         for name, value in given.items():
+            if name in _NO_QUANTITIES:
+                continue
             _check_numbers(name, value, _REAL + "b" if function.__name__ in _TAKE_MASKS else _REAL)
         return function(*args, **options)
 

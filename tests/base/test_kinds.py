@@ -16,7 +16,7 @@ from fifesim.base import kinds
         (kinds.PAIR, [30, (30, 15)], [(1, 2, 3), "30", np.ones((2, 2)), ("a", "b")]),
         (kinds.FLAG, [True, np.bool_(False)], [1, 0, None, "no"]),
         (kinds.CHUNKS, [256, "auto", "64MB", {"y": 2}, (2, 2), None], ["many", xr.Dataset(), np.ones(2)]),
-        (kinds.LEAF, [fifesim.Leaf(), {"TM3": (0.1, 0.1)}, (0.1, 0.1)], ["leaf", 0.1, (0.1,), xr.Dataset({"a": 1})]),
+        (kinds.LEAF, [fifesim.Leaf(), {"TM3": (0.1, 0.1)}, (0.1, 0.1)], [0.1, (0.1,), 5]),
         (kinds.INSTRUMENT, ["TM", fifesim.instrument("TM")], [None, ["TM"], 5]),
     ],
 )

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 import psutil
+import pyproj
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
@@ -207,7 +208,9 @@ def _check_band(path, name, allow_remote):
         said = [source.descriptions[0], *(tags.get(key) for key in ("NETCDF_VARNAME", "long_name", "standard_name"))]
         scaled = (source.scales[0], source.offsets[0]) != (1.0, 0.0)
         counts = np.dtype(source.dtypes[0]).kind in "iu" and not scaled
-        _check_metadata(name, said, source.units[0], counts)
+        # GDAL gives the unit of the heights of a compound CRS to bands without a unit.
+        units = None if len(pyproj.CRS(source.crs).axis_info) > 2 else source.units[0]
+        _check_metadata(name, said, units, counts)
 
 
 def _check_metadata(name, said, units, counts):

@@ -55,5 +55,5 @@ def test_background_of_the_same_bands_is_taken_as_it_lies_in_memory(lai):
 
 
 def test_hot_spot_below_zero_is_refused(lai):
-    with pytest.raises(ValueError, match="hotspot must be at least 0"):
+    with pytest.raises(ValueError, match=r"hotspot must be in \[0, 10\], got -0\.1"):
         canopy_kernel(lai, BANDS, **CANOPY, **LIGHT, hotspot=-0.1)
