@@ -614,6 +614,7 @@ LANDSCAPES = [
     refused("a correlation of 5", 'fifesim.landscape(grid, dem=dem, covary={"wetness": 5}, seed=7)', "[-1, 1], got 5"),
     refused("a correlation without a DEM", 'fifesim.landscape(grid, covary={"wetness": 0.5}, seed=7)', "give dem="),
     refused("variation in percent", "fine(cv=40)", "cv", "got 40"),
+    warned("variation that is not reached", "fine(cv=0.4, arp=0.24)", "0.4"),
 ]
 
 ANALYSIS = [

@@ -14,6 +14,7 @@ from odc.geo.geobox import GeoBox
 from fifesim.base.annotations import Chunks, Distribution, FilePath
 from fifesim.base.lattice import assemble
 from fifesim.base.seeds import check_seed
+from fifesim.base.warned import warn
 from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
 from fifesim.ground.landscape.block_kriging import by_pixel
@@ -73,7 +74,14 @@ def downscale(
     -------
     lai : xarray.DataArray, dims ([time], y, x)
         NaN in pixels that are NaN and beyond the map, 0 in pixels of 0. A function of the map, the seed and the place:
-        a window is a slice of the whole, and chunks change nothing. [m2 m-2]
+        a window is a slice of the whole, and chunks change nothing. The attribute ``cv_within_pixels`` has the realised
+        coefficient of variation [1]; a lazy result has none. [m2 m-2]
+
+    Warns
+    -----
+    UserWarning
+        If ``cv`` is a number, and the cells within pixels have one that is off by more than 5 % and by more than three
+        standard errors; by chunk, when it computes, if lazy.
 
     Raises
     ------
@@ -130,8 +138,12 @@ def downscale(
     model = _model(float(arp), distribution, cv, lattice.ratio)
     reads = PixelReads(chunking.pointwise(check_map, pixels).transpose("y", "x").data, lattice)
 
+    number = None if callable(cv) else cv
+
     def kernel(rows, columns, known):
-        return _cells(model, seed, lattice, rows, columns, known)
+        made = _cells(model, seed, lattice, rows, columns, known)
+        _realised_variation(made, lattice, (rows.start, columns.start), number)
+        return made
 
     lazy = chunks is not None or isinstance(reads.array, da.Array)
     sizes = places.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=lattice.tile) if lazy else None
@@ -139,7 +151,37 @@ def downscale(
     cells = xr.DataArray(made, dims=("y", "x"), coords=chunking.other_coordinates(pixels))
     said = f"downscale: {lattice.ratio[0]} x {lattice.ratio[1]} cells a pixel, {model.words}, arp {arp:g}, seed {seed}"
     words = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": model.words, "method": "downscaled"}
+    if not lazy:
+        words["cv_within_pixels"] = _realised_variation(made, lattice, (0, 0))
     return cf.label(grids.place(cells, grid), "lai", history=said, source=lai, **words, references=_REFERENCES)
+
+
+def _realised_variation(cells, lattice, first, wanted=None):
+    """
+    Coefficient of variation of the cells within whole pixels, the root of the mean of variance over squared mean.
+
+    With ``wanted``, a value that is off by more than 5 %, and by more than three standard errors, is warned of.
+    """
+    down, across = lattice.ratio
+    top, left = (-(place + at) % size for place, at, size in zip(lattice.cell, first, lattice.ratio, strict=True))
+    rows, columns = (cells.shape[0] - top) // down, (cells.shape[1] - left) // across
+    if min(rows, columns) < 1 or down * across < 2:
+        return np.nan
+    whole = cells[top : top + rows * down, left : left + columns * across].reshape(rows, down, columns, across)
+    means = whole.mean(axis=(1, 3))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        squares = (whole.var(axis=(1, 3)) / means**2)[means > 0]
+    if not squares.size:
+        return np.nan
+    found = float(np.sqrt(squares.mean()))
+    # By the delta method: half the standard error of the mean of the squares, over the root of that mean.
+    error = squares.std() / np.sqrt(squares.size) / (2 * found) if found else 0.0
+    if wanted and abs(found - wanted) > max(0.05 * wanted, 3 * error):
+        warn(
+            f"cv={wanted:g} was asked for, and the cells within pixels have {found:.3g}: at this arp, neighbours in a "
+            "pixel are too much alike for the texture of the map; use a smaller arp, or accept the lower cv"
+        )
+    return found
 
 
 @dataclass(frozen=True, eq=False)

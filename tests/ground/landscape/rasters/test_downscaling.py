@@ -1,5 +1,7 @@
 """A map of leaf area made a ground scene: labels, the same bits in any chunks and windows, and what is refused."""
 
+import warnings
+
 import dask.array as da
 import numpy as np
 import pytest
@@ -63,13 +65,35 @@ def test_scene_is_labelled_and_placed(scene):
 @pytest.mark.parametrize("chunks", [{"y": 40, "x": 70}, 100, "auto", {"y": -1}])
 def test_scene_has_the_same_bits_in_any_chunks(scene, lai_map, chunks):
     lazy_map = lai_map.copy(data=lai_map.variable.chunk(ODD_CHUNKS).data)
+    # The realised variation is known only once the cells are.
+    expected = scene.assign_attrs()
+    del expected.attrs["cv_within_pixels"]
     for given in (lai_map, lazy_map):
         with no_compute():
             lazy = fifesim.downscale(given, GRID, arp=0.2, cv=0.3, seed=7, chunks=chunks)
         assert lazy.chunks is not None
-        xr.testing.assert_identical(lazy.compute(), scene)
+        xr.testing.assert_identical(lazy.compute(), expected)
     with no_compute():
         assert fifesim.downscale(lazy_map, GRID, arp=0.2, cv=0.3, seed=7).chunks is not None
+
+
+@pytest.mark.parametrize(("arp", "short"), [(0.15, False), (0.24, True)])
+def test_variation_that_is_not_realised_is_warned_of(arp, short):
+    """A map whose own texture leaves the cells less room at a high arp."""
+    coarse = fifesim.lai_scene(fifesim.fife_site(10, window=((0, 80), (0, 90))), "burned-ungrazed", arp=0.24, seed=7)
+    grid = fifesim.fife_site(10 / 3, window=((0, 240), (0, 270)))
+    for chunks in (None, 120):
+        with warnings.catch_warnings(record=True, action="always", category=UserWarning) as said:
+            cells = fifesim.downscale(coarse, grid, cv=0.4, arp=arp, seed=1, chunks=chunks).compute()
+        assert any("cv=0.4 was asked for" in str(each.message) for each in said) == short
+        blocks = cells.values.reshape(80, 3, 90, 3)
+        realised = np.sqrt(np.mean(blocks.var(axis=(1, 3)) / blocks.mean(axis=(1, 3)) ** 2))
+        if chunks is None:
+            np.testing.assert_allclose(cells.attrs["cv_within_pixels"], realised, rtol=1e-12)
+    part = fifesim.downscale(coarse, fifesim.fife_site(10 / 3, window=((1, 240), (2, 270))), cv=0.3, arp=0.1, seed=1)
+    inside = part.values[2:, 1:].reshape(79, 3, 89, 3)
+    realised = np.sqrt(np.mean(inside.var(axis=(1, 3)) / inside.mean(axis=(1, 3)) ** 2))
+    np.testing.assert_allclose(part.attrs["cv_within_pixels"], realised, rtol=1e-12)
 
 
 def test_window_is_a_slice_of_the_whole_also_where_it_begins_in_a_pixel(scene, lai_map):
