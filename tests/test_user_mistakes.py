@@ -464,6 +464,10 @@ DIGITAL_NUMBERS = [
     refused("too large digital numbers", 'own(image.values * np.uint16(4)).fifesim.calibrate("TM", geometry=sun)',
             "0 to 255"),
     refused("reflectance for digital numbers", 'own(rho.values).fifesim.calibrate("TM", geometry=sun)', "0 to 255"),
+    refused("a scale of reflectance as that of radiance", 'own(image.values.astype("uint16")).fifesim.calibrate("TM", '
+            'geometry=sun, gain=2.75e-5, offset=-0.2)', "reflectance of", "TM3"),
+    refused("a gain per nm", 'own(image.values).fifesim.calibrate("TM", geometry=sun, gain=8e-4, offset=-1e-3)',
+            "radiance in this unit"),
     refused("a gain alone", 'own(image.values).fifesim.calibrate("TM", geometry=sun, gain=0.8)', "gain and offset"),
     refused("calibration without a sun", 'own(image.values).fifesim.calibrate("TM")', "sun", "time="),
     right(

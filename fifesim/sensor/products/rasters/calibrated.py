@@ -26,6 +26,10 @@ _CURE = (
     "fifesim.open_sentinel2"
 )
 
+# Reflectance under an overhead sun at which an imager saturates, with a wide margin: Landsat, Sentinel-2 and the
+# instruments of this package have 0.24 to 2.7.
+_DIMMEST, _BRIGHTEST = 0.02, 20.0
+
 
 @by_date
 def calibrate(
@@ -71,8 +75,8 @@ def calibrate(
     Raises
     ------
     ValueError
-        If the bands, the sun, or one of gain and offset are unknown, or the instrument cannot record a number. On lazy
-        data, numbers are checked when they compute.
+        If the bands, the sun, or one of gain and offset are unknown, gain and offset are not those of radiance in W m-2
+        sr-1 um-1, or the instrument cannot record a number. On lazy data, numbers are checked when they compute.
     TypeError
         If `dn` is no DataArray.
 
@@ -119,6 +123,7 @@ def calibrate(
         full = 8 if description.bits <= 8 else bits
         if not np.all(gain > 0):
             raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")
+        _check_scale(gain * (2**full - 1) + offset, bands)
     saturated = _saturation(saturated, 2**full - 1, 2**bits - 1)
     known = {"nodata": nodata, "largest": 2**bits - 1, "cure": _CURE, "saturated": saturated}
     plain = dn.drop_vars("band", errors="ignore")
@@ -134,6 +139,18 @@ def calibrate(
     image = cf.label(out, "dn", source=dn, history=history, **attributes_of(description))
     image.attrs["_FillValue"] = image.dtype.type(0)
     return image
+
+
+def _check_scale(radiance, bands):
+    """Raise ValueError if the radiance of the largest digital number is far from any that the Sun can cause."""
+    for largest, band in zip(radiance, bands, strict=True):
+        reflectance = np.pi * largest / band.solar_irradiance
+        if not _DIMMEST <= reflectance <= _BRIGHTEST:
+            raise ValueError(
+                f"gain and offset give {band.name} a radiance of {largest:.3g} W m-2 sr-1 um-1 at the largest digital "
+                f"number, a reflectance of {reflectance:.2g} under an overhead sun: give those of radiance in this "
+                "unit. Convert scaled reflectance by dn * gain + offset instead, and do not calibrate it"
+            )
 
 
 def _saturation(given, full, largest):
