@@ -9,6 +9,7 @@ import numpy as np
 from fifesim.base.kinds import (
     ANYTHING,
     ATMOSPHERE,
+    CANOPY,
     CHUNKS,
     CRS,
     DISTRIBUTION,
@@ -63,21 +64,16 @@ def _of(kind, names):
 
 
 KINDS = (
-    _of(NUMBER, "arp height width west north altitude hotspot fpar_inf min_valid nadir_offset heading level increment")
+    _of(NUMBER, "arp height width west north altitude fpar_inf min_valid nadir_offset heading level increment")
     | _of(NUMBER, "bandwidth points reach extinction latitude longitude margin fill resolution directions min_count")
     | _of(NUMBER, "cell scale_height sza saa vza vaa earth_sun_distance thermal shot detectors gain_spread slope")
     | _of(NUMBER, "visibility aot h2o o3 residual_deviation realisations spacing offset_spread")
     | _of(NUMBER, "uncertainty min_coverage view_tolerance")
-    | _of(NUMBER, "crown_shape")
-    | _of(NUMBER_OR_RASTER, "brown dissociation crown_cover")
-    | _of(NUMBER_OR_RASTER, "soil moisture")
     | _of(NUMBERS, "radiance")
     | _of(LIST, "frequency")
     | _of(METRES, "pixel")
     | _of(INTERVAL, "interval")
-    | _of(ANYTHING, "background")
     | _of(SURROUNDINGS, "surroundings")
-    | _of(LEAF, "leaf_optics brown_leaf")
     | _of(HORIZON, "horizon")
     | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality reflect")
     | _of(FLAG, "resume complete")
@@ -96,6 +92,7 @@ KINDS = (
     | _of(GEOMETRY, "geometry")
     | _of(ATMOSPHERE, "atmosphere")
     | _of(SETUP, "setup")
+    | _of(CANOPY, "canopy")
     | _of(TRACK, "track")
     | _of(REGRESSION, "fit")
     | _of(SCENARIO, "scenario")
@@ -103,7 +100,6 @@ KINDS = (
     | _of(FUNCTION, "algorithm")
     | _of(PLAIN, "noise_models aerosol axes")
     | _of(DISTRIBUTION, "distribution")
-    | _of(LEAF_ANGLES, "leaf_angles")
     | _of(VARIATION, "cv")
 )
 """What an argument may be, by its name, which means the same everywhere."""
@@ -285,7 +281,7 @@ def _rasters(value):
     elif isinstance(value, list | tuple) and len(value) == 2:
         parts = value
     else:
-        parts = vars(value).values() if is_a(value, "Leaf", "Setup") else ()
+        parts = vars(value).values() if is_a(value, "Leaf", "Setup", "Canopy") else ()
     return [raster for part in parts for raster in _rasters(part)]
 
 

@@ -172,6 +172,7 @@ GEOMETRY = Kind(
     lambda value: is_a(value, "Geometry") or (is_a(value, "Dataset") and "sza" in value.variables),
 )
 ATMOSPHERE = Kind("a fifesim.Atmosphere", lambda value: is_a(value, "Atmosphere"))
+CANOPY = Kind("a fifesim.Canopy, such as fifesim.Canopy(brown=0.2)", lambda value: is_a(value, "Canopy"))
 SETUP = Kind("a fifesim.Setup", lambda value: is_a(value, "Setup"))
 TRACK = Kind("a fifesim.Track", lambda value: is_a(value, "Track"))
 REGRESSION = Kind("a fifesim.Regression, as fifesim.regress gives it", lambda value: is_a(value, "Regression"))

@@ -13,17 +13,14 @@ from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.base.annotations import FilePath, Names, Numbers, Pair
 from fifesim.base.foreign import in_a_line
 from fifesim.chain import steps
-from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
-from fifesim.ground.canopy.crowns import SHAPE
-from fifesim.rasters.annotations import Directions, NumberOrRaster
+from fifesim.ground.canopy.description import TALLGRASS, Canopy
+from fifesim.rasters.annotations import Directions
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.instruments import Instrument
 from fifesim.sensor.response.noise import NoiseModel
 
 # What surface_reflectance and sense take of a setup, by the same names.
-_GROUND = ("bands", "dem", "horizon", "upwelling", "atmosphere", "leaf_optics", "background", "leaf_angles", "hotspot")
-_GROUND += ("brown", "dissociation", "brown_leaf", "crown_cover", "crown_shape")
-_GROUND += ("soil", "moisture")
+_GROUND = ("canopy", "bands", "dem", "horizon", "upwelling", "atmosphere")
 _SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
 
 
@@ -41,9 +38,7 @@ class Setup:
         By default midlatitude summer, continental aerosol, 45 km visibility.
     geometry : Geometry or xarray.Dataset, optional
         Of sun and sensor; by default that of the leaf area, else the paper's.
-    leaf_optics, background, soil, moisture, leaf_angles, hotspot : optional
-        As in `fifesim.surface_reflectance`.
-    brown, dissociation, brown_leaf, crown_cover, crown_shape : optional
+    canopy : Canopy, optional
         As in `fifesim.surface_reflectance`.
     dem, horizon, upwelling : optional
         As in `fifesim.surface_reflectance`; without a dem the ground is level.
@@ -69,17 +64,7 @@ class Setup:
     bands: Names | None = None
     atmosphere: Atmosphere | None = None
     geometry: Directions | None = None
-    leaf_optics: LeafOptics | None = None
-    background: BelowLeaves | None = None
-    soil: NumberOrRaster | None = None
-    moisture: NumberOrRaster | None = None
-    leaf_angles: LeafAngles = "spherical"
-    hotspot: float = 0.0
-    brown: NumberOrRaster = 0.0
-    dissociation: NumberOrRaster = 0.0
-    brown_leaf: LeafOptics | None = None
-    crown_cover: NumberOrRaster = 1.0
-    crown_shape: float = SHAPE
+    canopy: Canopy = TALLGRASS
     dem: xr.DataArray | None = None
     horizon: xr.DataArray | None = None
     upwelling: bool = True

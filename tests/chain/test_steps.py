@@ -95,22 +95,28 @@ def test_bare_ground_is_the_background(lai):
 
 def test_background_is_a_number_a_mapping_or_a_raster(lai):
     number, mapping = (
-        lai.fifesim.surface_reflectance("TM", bands=TM34, background=value) for value in (0.2, {"TM3": 0.2, "TM4": 0.2})
+        lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=value))
+        for value in (0.2, {"TM3": 0.2, "TM4": 0.2})
     )
     raster = xr.full_like(lai, 0.2)
     np.testing.assert_array_equal(number, mapping)
-    from_raster = lai.fifesim.surface_reflectance("TM", bands=TM34, background=raster)
+    from_raster = lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=raster))
     np.testing.assert_allclose(from_raster, number, rtol=0, atol=1e-6)
-    exact = [lai.fifesim.surface_reflectance("TM", bands=TM34, background=value, exact=True) for value in (0.2, raster)]
+    exact = [
+        lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=value), exact=True)
+        for value in (0.2, raster)
+    ]
     np.testing.assert_allclose(exact[0], exact[1], rtol=1e-12)
 
 
 def test_raster_of_background_stays_lazy(lai):
     soil = in_chunks(xr.full_like(lai, 0.2).expand_dims(band=TM34), {"band": 1, "y": 20})
     with no_compute():
-        rho = in_chunks(lai, ODD_CHUNKS).fifesim.surface_reflectance("TM", bands=TM34, background=soil)
+        rho = in_chunks(lai, ODD_CHUNKS).fifesim.surface_reflectance(
+            "TM", bands=TM34, canopy=fifesim.Canopy(background=soil)
+        )
     np.testing.assert_allclose(
-        rho, lai.fifesim.surface_reflectance("TM", bands=TM34, background=0.2), rtol=0, atol=1e-6
+        rho, lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=0.2)), rtol=0, atol=1e-6
     )
 
 

@@ -60,11 +60,12 @@ def by_hand(scenario):
         scenario.geobox(),
         cover=fifesim.Patches("voronoi", 80, {"grass": 0.7, "wood": 0.3}),
         classes={
-            "grass": fifesim.CoverClass(lai="burned-ungrazed", hotspot=0.2, arp=0.2, leaf_angles="spherical"),
-            "wood": fifesim.CoverClass(lai="unburned-ungrazed", leaf_angles="erectophile"),
+            "grass": fifesim.CoverClass(
+                lai="burned-ungrazed", canopy=fifesim.Canopy(hotspot=0.2, leaf_angles="spherical"), arp=0.2
+            ),
+            "wood": fifesim.CoverClass(lai="unburned-ungrazed", canopy=fifesim.Canopy(leaf_angles="erectophile")),
         },
         arp=0.1,
-        moisture=0.2,
         brown=fifesim.Field(mean=0.2, sd=0.06, arp=0.1, coarser=2),
         soil=fifesim.Field(sd=0.03, arp=0.24, coarser=2),
         covary={"soil": -0.3},
@@ -79,7 +80,7 @@ def scene_of(**sections):
 
 def test_landscape_of_a_scenario_is_that_written_out(scenario, by_hand):
     land = ground_scene(scenario, scenario.geobox())
-    assert set(land) == {"lai", "cover", "brown", "soil", "moisture"}
+    assert set(land) == {"lai", "cover", "brown", "soil"}
     for name in land:
         xr.testing.assert_identical(land[name].drop_attrs(), by_hand[name].drop_attrs())
         assert land[name].attrs["history"] == by_hand[name].attrs["history"]
@@ -87,20 +88,20 @@ def test_landscape_of_a_scenario_is_that_written_out(scenario, by_hand):
 
 def test_light_and_truth_of_a_scenario_are_those_written_out(scenario, by_hand):
     bands, sun = ["TM3", "TM4"], scenario.sun_and_view()
-    canopy = {"hotspot": 0.1, "dissociation": 0.5, "crown_cover": 0.8, "crown_shape": 0.7}
-    optics = {"background": BACKGROUND, "brown_leaf": fifesim.Leaf(brown=1.0)}
-    rho = fifesim.surface_reflectance(by_hand, bands=bands, geometry=sun, **canopy, **optics)
+    shares = fifesim.Canopy(dissociation=0.5, crown_cover=0.8)
+    canopy = shares.replace(hotspot=0.1, crown_shape=0.7, moisture=0.2, background=BACKGROUND)
+    canopy = canopy.replace(brown_leaf=fifesim.Leaf(brown=1.0))
+    rho = fifesim.surface_reflectance(by_hand, bands=bands, geometry=sun, canopy=canopy)
     with no_compute():
         tree = fifesim.simulate(scenario)
     np.testing.assert_array_equal(tree["scene"]["surface_reflectance"], rho)
     onto = grids.aligned(scenario.geobox(), 30.0)
     image = fifesim.sense(fifesim.to_toa(rho), onto=onto)
     np.testing.assert_array_equal(tree["image"]["dn"], image)
-    shares = {"dissociation": 0.5, "crown_cover": 0.8}
     truth = {
         "lai": by_hand["lai"],
-        "fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, **shares),
-        "green_fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, leaves="green", **shares),
+        "fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, canopy=shares),
+        "green_fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, leaves="green", canopy=shares),
         "soil": by_hand["soil"],
     }
     assert set(tree["truth"].data_vars) == {*truth, "brown"}
@@ -269,7 +270,9 @@ def test_landscape_of_soil_without_variance_is_leaf_area_alone(properties):
     given = {name: each for name, each in properties.items() if name != "dissociation"}
     land = fifesim.landscape(case.geobox(), lai=lai, **given)
     options = {"bands": ["TM3", "TM4"], "geometry": case.sun_and_view(), "exact": True}
-    found = fifesim.surface_reflectance(land, dissociation=properties.get("dissociation", 0.0), **options)
+    found = fifesim.surface_reflectance(
+        land, canopy=fifesim.Canopy(dissociation=properties.get("dissociation", 0.0)), **options
+    )
     np.testing.assert_array_equal(found, fifesim.surface_reflectance(lai, **options))
 
 

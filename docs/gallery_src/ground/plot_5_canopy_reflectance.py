@@ -30,7 +30,7 @@ for leaves, style in (("planophile", "--"), ("spherical", "-"), ("erectophile", 
         bands=["TM3", "TM4"],
         geometry=sun,
         atmosphere=air,
-        leaf_angles=leaves,
+        canopy=fifesim.Canopy(leaf_angles=leaves),
         **grass,
     )
     for band, color in (("TM3", "#b2182b"), ("TM4", "#542788")):

@@ -63,7 +63,7 @@ truth = lai.fifesim.aggregate(30)
 def ndvi_over(deviation):
     soil = deviation * score if deviation else None
     return (
-        lai.fifesim.surface_reflectance("TM", bands=bands, soil=soil)
+        lai.fifesim.surface_reflectance("TM", bands=bands, canopy=fifesim.Canopy(soil=soil))
         .fifesim.to_toa()
         .fifesim.sense("TM")
         .fifesim.ndvi()

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-
 from fifesim.ground.canopy.cell_reflectance import varied_reflectance
+from fifesim.ground.canopy.scene import Scene, cell_by_cell
+
 from fifesim.ground.canopy.foliage_table import LIMIT
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.scene import Scene, cell_by_cell
 
 OPTICS = {
     "leaf_reflectance": (0.07, 0.45),

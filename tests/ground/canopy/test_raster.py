@@ -81,7 +81,7 @@ def test_hole_in_the_background_is_a_hole_in_the_reflectance(lai):
 
 def test_fpar_keeps_its_word_and_equals_the_kernel(lai_with_hole):
     result = check_raster_function(
-        lambda lai: fifesim.fpar(lai, geometry=SUN, leaf_angles="planophile", fpar_inf=0.9),
+        lambda lai: fifesim.fpar(lai, geometry=SUN, canopy=fifesim.Canopy(leaf_angles="planophile"), fpar_inf=0.9),
         lai_with_hole,
         quantity="fpar",
     )

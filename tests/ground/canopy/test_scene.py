@@ -1,13 +1,13 @@
 """The models of a scene, chosen by what it has."""
 
 import numpy as np
+from fifesim.ground.canopy.scene import Scene, canopy_of, cell_by_cell, decay, leaves_of, reflectance_of, sky_of
 
 from fifesim.ground.canopy.background import reflectance_factor, with_background
 from fifesim.ground.canopy.crowns import clumped, crown_shares
 from fifesim.ground.canopy.layers import two_layers
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.sail_model import sail
-from fifesim.ground.canopy.scene import Scene, canopy_of, cell_by_cell, decay, leaves_of, reflectance_of, sky_of
 
 GREEN, DEAD = ((0.07, 0.45), (0.04, 0.42)), ((0.28, 0.42), (0.12, 0.3))
 BY_BAND = [np.array(each)[:, None] for each in (*GREEN, *DEAD)]

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
+from fifesim.ground.canopy.rasters.canopy_shares import in_words, share, with_shares
 from lazy import check_raster_function
 
 import fifesim
-from fifesim.ground.canopy.rasters.canopy_shares import in_words, share, with_shares
 
 TM34 = ["TM3", "TM4"]
 CELLS = [(0, 0), (10, 20), (44, 53)]
@@ -64,13 +64,13 @@ def test_rows_from_south_to_north_are_turned(lai, rasters):
 def test_green_leaves_absorb_less_than_all(lai, rasters):
     brown, cover = rasters
     green = check_raster_function(
-        lambda area, brown, cover: fifesim.fpar(area, leaves="green", brown=brown, crown_cover=cover),
+        lambda area, brown, cover: fifesim.fpar(area, leaves="green", canopy=fifesim.Canopy(brown=brown, crown_cover=cover)),
         lai, brown, cover, quantity="green_fpar",
     )  # fmt: skip
-    total = fifesim.fpar(lai, crown_cover=cover)
+    total = fifesim.fpar(lai, canopy=fifesim.Canopy(crown_cover=cover))
     np.testing.assert_allclose(green, total * (1 - brown), rtol=1e-12)
-    np.testing.assert_array_equal(fifesim.fpar(lai, brown=brown), fifesim.fpar(lai))
-    whole = fifesim.fpar(lai, crown_cover=xr.ones_like(brown).where(brown.notnull()))
+    np.testing.assert_array_equal(fifesim.fpar(lai, canopy=fifesim.Canopy(brown=brown)), fifesim.fpar(lai))
+    whole = fifesim.fpar(lai, canopy=fifesim.Canopy(crown_cover=xr.ones_like(brown).where(brown.notnull())))
     np.testing.assert_allclose(whole, fifesim.fpar(lai).where(brown.notnull()), rtol=1e-14)
 
 

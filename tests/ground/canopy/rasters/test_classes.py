@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from fifesim.ground.canopy.rasters.classes import reflectance_of_classes
 
 from fifesim.base.geometry import Geometry
 from fifesim.ground.canopy.raster import level_reflectance
 from fifesim.ground.canopy.rasters import classes
-from fifesim.ground.canopy.rasters.classes import reflectance_of_classes
 
 SCENE = {
     "bands": ["red", "nir"],

@@ -24,7 +24,7 @@ def by_cell(lai_values):
 
 
 def reflectance(lai, optics, **options):
-    return fifesim.surface_reflectance(lai, bands=TM34, leaf_optics=optics, **options)
+    return fifesim.surface_reflectance(lai, bands=TM34, canopy=fifesim.Canopy(leaf_optics=optics), **options)
 
 
 def test_optics_by_band_and_cell(lai, by_cell):

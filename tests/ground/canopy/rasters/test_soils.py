@@ -22,7 +22,7 @@ def share(lai_values):
 
 
 def reflectance(lai, background, **options):
-    return fifesim.surface_reflectance(lai, bands=TM34, background=background, **options)
+    return fifesim.surface_reflectance(lai, bands=TM34, canopy=fifesim.Canopy(background=background), **options)
 
 
 def test_by_band_numbers_and_rasters_mix(lai, share):
@@ -163,7 +163,9 @@ def test_soil_scatters_ndvi_as_much_as_its_variance_says(response):
     field = fifesim.correlated_fields(grid, {"soil": 0.24}, seed=3)["soil"]
     found = []
     for deviation in (0.0, 0.02, 0.04, 0.06):
-        rho = lai.fifesim.surface_reflectance(instrument, bands=TM34, soil=deviation * field if deviation else None)
+        rho = lai.fifesim.surface_reflectance(
+            instrument, bands=TM34, canopy=fifesim.Canopy(soil=deviation * field if deviation else None)
+        )
         found.append(fifesim.regress(truth, rho.fifesim.to_toa().fifesim.sense(instrument).fifesim.ndvi()).r2)
     np.testing.assert_allclose(found, SCATTER, rtol=0, atol=0.01)
     # Scatter grows as the variance does, so that each step is larger than the one before.

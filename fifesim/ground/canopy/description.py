@@ -1,0 +1,233 @@
+"""Description of a canopy: its leaves, their arrangement, and the ground below them."""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Any, NamedTuple, Self, get_type_hints
+
+import numpy as np
+import xarray as xr
+
+from fifesim.base.kinds import LEAF, LEAF_ANGLES, described
+from fifesim.base.spelling import PARTS
+from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
+from fifesim.ground.canopy.crowns import SHAPE, check_crowns
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.rasters.annotations import NumberOrRaster
+
+# Below it the hot spot is narrower than the sun. [1]
+LEAST_HOTSPOT = 1e-6
+
+
+class Property(NamedTuple):
+    """A property of the canopy."""
+
+    default: Any
+    meaning: str
+    unit: str = ""
+    """Empty for a property that is not a number."""
+    lowest: float = 0.0
+    highest: float = 1.0
+    by_cell: bool = False
+    """Whether it may be a raster over (y, x)."""
+    effect: str = ""
+    """Name of its variation in a budget; a property with an effect may be a random field."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Canopy:
+    """
+    A canopy: its leaves, their arrangement, and the ground below them.
+
+    A field that is not given has its default; in a class of cover it has the value of the scene.
+
+    Parameters
+    ----------
+    leaf_optics : Leaf, str, path, xarray.Dataset, or mapping of str to (float, float), optional
+        A leaf by its contents; the path of a CSV file, or a Dataset, with its spectra ``wavelength`` [um],
+        ``reflectance`` and ``transmittance``; or both by band name. By default green tallgrass.
+        Each number may be a raster over (y, x): SAIL is evaluated at every cell then. If only one content of the `Leaf`
+        is a raster, its optics are interpolated within 1e-8; otherwise each kind of leaf is computed once. [1]
+    leaf_angles : str or sequence of float, optional
+        A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions; by
+        default ``"spherical"``.
+    hotspot : float, optional
+        Leaf size over canopy height, in [0, 10]; 0, the default, is no hot spot. [1]
+    brown : float or xarray.DataArray, dims (y, x), optional
+        Dead share of the leaf area, in [0, 1]; by default 0. [1]
+    dissociation : float or xarray.DataArray, dims (y, x), optional
+        Position of dead leaves: 0 among the green ones (default), 1 below them. If it is a raster, SAIL is evaluated at
+        every cell. [1]
+    brown_leaf : optional
+        Optics of dead leaves, like ``leaf_optics``; by default dead tallgrass.
+    crown_cover : float or xarray.DataArray, dims (y, x), optional
+        Share of the ground below crowns, which hold all leaves; 0 is bare ground, 1 (default) has no gaps. [1]
+    crown_shape : float, optional
+        Crown diameter over the height of its middle, in [0, 10]; by default 1. [1]
+    background : optional
+        Reflectance below the canopy: a number, by band name, or a raster over ([band], y, x); a `Background` or
+        ``{spectrum: fraction}`` that mixes spectra; the path of a CSV file, or a Dataset, with ``wavelength`` [um] and
+        ``reflectance``. Each number by band or spectrum may be a raster over (y, x). By default soil and litter of
+        tallgrass. [1]
+    soil : float or xarray.DataArray, dims (y, x), optional
+        Brightness of the background: change of its reflectance at 0.55 um along the soil line, in [-1, 1]; by default
+        0. All bands change, and reflectance is clipped to [0, 1]. [1]
+    moisture : float or xarray.DataArray, dims (y, x), optional
+        Moisture of the background, 0 dry (default) to 1 saturated (5 and 55 percent of the volume). Films of water
+        darken it, most in the shortwave infrared. [1]
+
+    Attributes
+    ----------
+    given : frozenset of str
+        Names of the fields that were given.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, or the leaf angles are unknown.
+    TypeError
+        If a value is of another kind.
+
+    Examples
+    --------
+    >>> from fifesim import Canopy
+    >>> grass = Canopy(brown=0.2, leaf_angles="erectophile")
+    >>> grass.brown, grass.crown_cover
+    (0.2, 1.0)
+    >>> grass.replace(brown=0.4)
+    Canopy(leaf_angles='erectophile', brown=0.4)
+    >>> Canopy(brown=20)
+    Traceback (most recent call last):
+    ...
+    ValueError: brown must be in [0, 1], got 20: it is the share of dead leaf area, not percent
+    """
+
+    leaf_optics: Annotated[LeafOptics | None, Property(None, "optics of green leaves")] = None
+    leaf_angles: Annotated[LeafAngles | None, Property("spherical", "leaf angle distribution")] = None
+    hotspot: Annotated[float | None, Property(0.0, "leaf size over canopy height", "1", 0, 10)] = None
+    brown: Annotated[
+        NumberOrRaster | None, Property(0.0, "share of dead leaf area", "1", by_cell=True, effect="dead leaves")
+    ] = None
+    dissociation: Annotated[
+        NumberOrRaster | None,
+        Property(0.0, "position of dead leaves: 0 among the green ones, 1 below them", "1", by_cell=True),
+    ] = None
+    brown_leaf: Annotated[LeafOptics | None, Property(None, "optics of dead leaves")] = None
+    crown_cover: Annotated[
+        NumberOrRaster | None, Property(1.0, "share of the ground below crowns", "1", by_cell=True, effect="clumping")
+    ] = None
+    crown_shape: Annotated[
+        float | None, Property(SHAPE, "crown diameter over the height of its middle", "1", 0, 10)
+    ] = None
+    background: Annotated[BelowLeaves | None, Property(None, "reflectance below the canopy")] = None
+    soil: Annotated[
+        NumberOrRaster | None,
+        Property(
+            0.0, "change of soil reflectance at 0.55 um along the soil line", "1", -1, by_cell=True, effect="soil"
+        ),
+    ] = None
+    moisture: Annotated[
+        NumberOrRaster | None,
+        Property(0.0, "moisture of the soil, 0 dry to 1 saturated", "1", by_cell=True, effect="soil"),
+    ] = None
+    given: frozenset[str] = field(default=frozenset(), init=False)
+
+    def __post_init__(self):
+        object.__setattr__(self, "given", frozenset(name for name in PROPERTIES if getattr(self, name) is not None))
+        for name, known in PROPERTIES.items():
+            if name in self.given:
+                _check(name, getattr(self, name), known)
+            else:
+                object.__setattr__(self, name, known.default)
+
+    def __repr__(self):
+        said = (f"{name}={_brief(getattr(self, name))}" for name in PROPERTIES if name in self.given)
+        return f"Canopy({', '.join(said)})"
+
+    def replace(self, **changes: Any) -> Self:
+        """
+        Canopy with other values of some fields; other fields that were not given stay so.
+
+        Parameters
+        ----------
+        **changes
+            New values by name; None for a field that is no longer given.
+
+        Returns
+        -------
+        canopy : Canopy
+        """
+        return type(self)(**{name: getattr(self, name) for name in self.given} | changes)
+
+    def over(self, other):
+        """This canopy, with the fields that were not given taken from another one."""
+        return other.replace(**{name: getattr(self, name) for name in self.given})
+
+    def varying(self):
+        """Names of the properties that are rasters over (y, x)."""
+        return [name for name, each in PROPERTIES.items() if each.by_cell and is_raster(getattr(self, name))]
+
+    def check_lai(self, largest):
+        """Raise ValueError if crowns cannot hold a leaf area index of the ground [m2 m-2]."""
+        if not is_raster(self.crown_cover):
+            check_crowns(largest, self.crown_cover)
+
+
+PROPERTIES: dict[str, Property] = {
+    name: kind.__metadata__[0]
+    for name, kind in get_type_hints(Canopy, include_extras=True).items()
+    if hasattr(kind, "__metadata__")
+}
+"""Properties of the canopy by the names of the fields of `Canopy`."""
+
+NUMBERS = {name: each for name, each in PROPERTIES.items() if each.unit}
+"""Properties that are numbers."""
+
+DRAWN = {name: each for name, each in PROPERTIES.items() if each.effect}
+"""Properties that may be random fields of a landscape."""
+
+PARTS["canopy"] = "fifesim.Canopy", tuple(PROPERTIES)
+
+TALLGRASS = Canopy()
+"""The default canopy: green tallgrass of the FIFE site."""
+
+
+def is_raster(value):
+    """Whether a value of a field is a raster."""
+    return isinstance(value, xr.DataArray)
+
+
+def _check(name, value, known):
+    """Raise ValueError or TypeError if a field cannot have a value."""
+    if name == "leaf_angles":
+        if not LEAF_ANGLES.fits(value):
+            raise TypeError(f"leaf_angles must be {LEAF_ANGLES.words}, got {described(value)}")
+        leaf_angle_classes(value)
+    elif name in ("leaf_optics", "brown_leaf") and not LEAF.fits(value):
+        raise TypeError(f"{name} must be {LEAF.words}, got {described(value)}")
+    elif known.unit and not (known.by_cell and is_raster(value)):
+        check_number(name, value, known)
+    elif known.unit and value.dtype.kind not in "iuf":
+        raise TypeError(
+            f"{name} must hold real numbers, got {value.dtype}: type .astype(float) if 0 and 1 are its values"
+        )
+    elif known.unit and set(value.dims) - {"time"} != {"y", "x"}:
+        raise ValueError(f"{name} must be a number, or a raster over (y, x), got dimensions {value.dims}")
+
+
+def check_number(name, value, known):
+    """Raise TypeError or ValueError if a value is not a number in the range of a property."""
+    if isinstance(value, bool | str) or not np.isscalar(value):
+        raster = " or a raster over (y, x)" if known.by_cell else ""
+        raise TypeError(f"{name} must be a number{raster}, got {described(value)}")
+    if not known.lowest <= value <= known.highest:
+        percent = ", not percent" if (known.lowest, known.highest) == (0, 1) else ""
+        allowed = f"[{known.lowest:g}, {known.highest:g}]"
+        raise ValueError(f"{name} must be in {allowed}, got {value:g}: it is the {known.meaning}{percent}")
+    if name == "hotspot" and 0 < value < LEAST_HOTSPOT:
+        raise ValueError(f"hotspot must be 0, for no hot spot, or at least {LEAST_HOTSPOT:g}, got {value:g}")
+
+
+def _brief(value):
+    """A value of a field in a few words."""
+    if isinstance(value, xr.DataArray | xr.Dataset):
+        return f"<{type(value).__name__} of {' x '.join(f'{name} {size}' for name, size in value.sizes.items())}>"
+    return repr(value)
