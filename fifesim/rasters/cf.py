@@ -190,8 +190,8 @@ def label(array, name, *, history, source=None, **provenance):
     attrs |= {"references": "; ".join(dict.fromkeys(filter(None, cited)))} if any(cited) else {}
     attrs["history"] = "\n".join(filter(None, [before.get("history", ""), history]))
     # A renamed array shares its attributes with the one it came from, a copy does not.
-    array = array.copy(deep=False).rename(name)
-    array.attrs = attrs
+    array = array.copy(deep=False)
+    array.name, array.attrs = name, attrs
     return array
 
 

@@ -55,26 +55,30 @@ def coordinates_of(geometry, names=_GEOMETRY):
     return {name: xr.Variable(angle.dims, angle.data, cf.attributes(name)) for name, angle in angles.items()}
 
 
-def geometry_of(array):
+def geometry_of(array, names=_GEOMETRY):
     """
     Directions of sun and sensor that an array carries.
 
     Parameters
     ----------
     array : xarray.DataArray
+    names : sequence of str, optional
+        Which of them; all by default.
 
     Returns
     -------
     geometry : fifesim.base.geometry.Geometry, xarray.Dataset or None
         As `checked_geometry` gives it; None where it carries no solar zenith angle.
     """
-    if "sza" not in array.coords:
+    known = array.coords.variables
+    if "sza" not in known:
         return None
-    names = [name for name in (*_GEOMETRY, "y", "x", "spatial_ref") if name in array.coords]
-    carried = {name: array.coords[name].variable for name in names}
-    time = array.coords.get("time")
+    carried = {name: known[name] for name in (*names, "y", "x", "spatial_ref") if name in known}
+    time = known.get("time")
     if "earth_sun_distance" not in carried and time is not None and time.ndim == 0 and time.dtype.kind == "M":
         carried["earth_sun_distance"] = xr.Variable((), earth_sun_distance(time.values))
+    if "saa" in carried and not any(carried[name].ndim for name in _GEOMETRY if name in carried):
+        return Geometry(**{name: float(carried[name]) for name in _GEOMETRY if name in carried})
     return checked_geometry(xr.Dataset(carried).set_coords(["spatial_ref"] if "spatial_ref" in carried else []))
 
 

@@ -1,5 +1,7 @@
 """What a digital number of an image stands for: a count of the detector, or one of the agency's product."""
 
+from functools import partial
+
 import numpy as np
 import xarray as xr
 
@@ -116,21 +118,19 @@ def _compressed(radiance, gain, offset, compression, bits):
     return radiance_to_dn(radiance, gain, offset, bits, compression)
 
 
-def radiance_of(image, scale):
+def radiance_kernel(image):
     """
-    Radiance of digital numbers, whose values are checked where their type also holds other values.
+    Kernel of the radiance of digital numbers, which checks values if their type also holds other values.
 
     Parameters
     ----------
     image : xarray.DataArray
         Digital numbers. [1]
-    scale : sequence of xarray.DataArray
-        Gain, offset, and the compression if there is one.
 
     Returns
     -------
-    radiance : xarray.DataArray
-        [W m-2 sr-1 um-1]
+    kernel : callable
+        ``kernel(dn, gain, offset)``, or with the compression as well, gives the radiance. [W m-2 sr-1 um-1]
 
     Raises
     ------
@@ -146,11 +146,11 @@ def radiance_of(image, scale):
     # The fill value has the type in which the image was recorded.
     recorded = fill.dtype if isinstance(fill, np.generic) and fill.dtype.kind == "u" else None
     if image.dtype.kind == "u" and recorded in (None, image.dtype):
-        return chunks.pointwise(dn_to_radiance, image, *scale)
+        return dn_to_radiance
     largest = int(np.iinfo(np.uint16 if recorded is None else recorded).max)
-    return chunks.pointwise(_checked_radiance, image, *scale, largest=largest)
+    return partial(_checked_radiance, largest)
 
 
-def _checked_radiance(dn, *scale, largest):
+def _checked_radiance(largest, dn, *scale):
     check_counts(dn, largest, _CALIBRATE_FIRST)
     return dn_to_radiance(dn, *scale)
