@@ -351,6 +351,19 @@ def test_a_scenario_has_the_reflectance_of_its_canopy():
         np.testing.assert_array_equal(several["surface_reflectance"].values[:, cells], expected.values[:, cells])
 
 
+def test_the_table_of_the_howto_is_that_of_the_fields():
+    page = (ROOT / "docs/howto/canopy.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in re.findall(r"^\| `.*\|$", page, re.MULTILINE)]
+    shown = {row[0].strip("`"): row[1:] for row in rows}
+    assert list(shown) == list(PROPERTIES)
+    for name, known in PROPERTIES.items():
+        meaning, default, limits, raster = shown[name]
+        assert meaning == known.meaning
+        if name in NUMBERS:
+            found = (float(default), limits, raster == "yes")
+            assert found == (known.default, f"{known.lowest:g} to {known.highest:g}", known.by_cell)
+
+
 # A property that no model uses yet.
 ONE_MORE = """
     clumping: Annotated[float | None, Property(1.0, "clumping index", "1", 0.2, 1)] = None
