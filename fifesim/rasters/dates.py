@@ -128,7 +128,9 @@ def _check_dates(raster, time):
 def _check_no_dates(step, options):
     """Refuse dates beside a raster of one."""
     for name, other in options.items():
-        if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
+        if isinstance(other, dict | tuple | list) or is_dataclass(other):
+            _check_no_dates(step, _parts(other))
+        elif isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
             raise ValueError(
                 f"{name} has dates and the raster of {step.__name__} has none: give the raster a dimension time, or "
                 "select one date with .isel(time=0)"

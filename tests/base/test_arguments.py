@@ -12,6 +12,7 @@ import xarray as xr
 
 import fifesim
 from fifesim.accessor import PUBLIC
+from fifesim.ground.canopy.description import PROPERTIES
 from fifesim.rasters import grid as grids
 
 PACKAGE = str(Path(fifesim.__file__).parent)
@@ -61,12 +62,12 @@ def calls(tmp_path_factory):
         "arp_for_length": {"length": 3.0, "cell": 1.0},
         "Leaf": {"structure": 1.5, "chlorophyll": 30.0, "water": 0.01, "dry_matter": 0.01},
         "Background": {"fractions": {"soil_dry": 1.0}},
+        "Canopy": {name: None for name in PROPERTIES},
         "surface_reflectance": {
             "lai": lai, "instrument": "TM", "bands": ["TM3", "TM4"], "dem": None, "horizon": None, "upwelling": True,
-            "atmosphere": None, "geometry": None, "leaf_optics": None, "background": None, "leaf_angles": "spherical",
-            "hotspot": 0.0, "exact": False,
+            "atmosphere": None, "geometry": None, "canopy": None, "exact": False,
         },
-        "fpar": {"lai": lai, "geometry": None, "leaf_angles": "spherical", "fpar_inf": 0.94},
+        "fpar": {"lai": lai, "geometry": None, "canopy": None, "fpar_inf": 0.94},
         "fine_dem": {"path_or_raster": dem, "grid": grid, "fill": None, "vertical_units": None, "chunks": None},
         "source_dem": {"path_or_raster": dem, "grid": grid[4:6, 4:6], "margin": 0.0, "fill": None},
         "flint_hills": {"grid": grid, "seed": 0, "chunks": None},
@@ -177,6 +178,27 @@ def test_a_wrong_argument_is_named_in_a_line(calls, wrong, name, tmp_path, monke
     assert found == []
 
 
+@pytest.mark.parametrize("field", list(PROPERTIES))
+def test_a_wrong_field_of_a_canopy_is_named_in_a_line(calls, wrong, field):
+    given, found, refused = calls["surface_reflectance"], [], 0
+    for kind, value in wrong.items():
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                # Dead leaves, so that their optics are used.
+                dead = {} if field in ("brown", "lai") else {"brown": 0.3}
+                fifesim.surface_reflectance(**given | {"canopy": fifesim.Canopy(**dead | {field: value})})
+        except (ValueError, TypeError, FileNotFoundError) as error:
+            text, last = str(error), traceback.extract_tb(error.__traceback__)[-1].filename
+            short = len(text) <= 500 and text.count("\n") <= 2
+            also = {"leaf_optics": "leaf_optics", "brown_leaf": "leaf_optics"}.get(field, field)
+            named = names_it(text, field, kind) or names_it(text, also, kind)
+            if not (short and named and last.startswith(PACKAGE)):
+                found.append(f"{field} = {kind}: {text[:150]} ({last})")
+            refused += 1
+    assert found == [] and refused >= 5
+
+
 NOT_REAL = ["bool", "complex64", "datetime64[s]", "timedelta64[s]", "str", "object"]
 
 
@@ -199,10 +221,7 @@ def test_rasters_within_an_argument_must_hold_real_numbers(calls):
     lai, rho = given["lai"], calls["to_toa"]["reflectance"]
     mask = lai > 1
     within = {
-        "background": {"TM3": mask, "TM4": 0.2},
-        "leaf_optics": {"TM3": (mask, 0.1), "TM4": (0.4, 0.4)},
-        "brown_leaf": fifesim.Leaf(chlorophyll=mask),
-        "soil": mask,
+        "canopy": fifesim.Canopy(background={"TM3": mask, "TM4": 0.2}),
         "lai": xr.Dataset({"lai": lai, "brown": mask}),
     }
     for argument, value in within.items():
@@ -210,6 +229,10 @@ def test_rasters_within_an_argument_must_hold_real_numbers(calls):
             TypeError, match=rf"^{argument} must hold real numbers, got bool: it holds a mask, type \.ast"
         ):
             fifesim.surface_reflectance(**(given | {argument: value}))
+    fields = {"background": mask, "leaf_optics": {"TM3": (mask, 0.1), "TM4": (0.4, 0.4)}}
+    for name, value in (fields | {"brown_leaf": fifesim.Leaf(chlorophyll=mask)}).items():
+        with pytest.raises(TypeError, match=r"^canopy must hold real numbers, got bool"):
+            fifesim.surface_reflectance(**(given | {"canopy": fifesim.Canopy(**{name: value})}))
     with pytest.raises(TypeError, match=r"^setup must hold real numbers"):
         fifesim.compare(lai, ["TM"], fifesim.Setup(dem=mask))
     for wavelength in (["red", "nir"], np.array(["2001-01-01", "2001-01-02"], "datetime64[s]")):
@@ -265,7 +288,7 @@ def test_what_a_user_typed(calls):
         (lambda: fifesim.lai_scene(lai), "grid must be .*GeoBox.*type raster.odc.geobox"),
         (
             lambda: lai.fifesim.surface_reflectance(canopy=fifesim.Canopy(hotspot=lai)),
-            "hotspot must be a number, got .*one is for all cells",
+            "hotspot must be a number, got an xarray.DataArray",
         ),
         (lambda: lai.fifesim.surface_reflectance(exact="no"), "exact must be True or False, got 'no'"),
         (lambda: fifesim.to_geotiff(lai, "lai.tif", overwrite="no"), "overwrite must be True or False, got 'no'"),

@@ -60,9 +60,9 @@ def test_one_pass_makes_them_all(lai):
 
 
 def test_bands_and_options_reach_the_instruments(lai):
-    setup = fifesim.Setup(
-        interval=(20.0, 25.0), quantise=False, canopy=fifesim.Canopy(background=0.2, leaf_optics={"TM2": (0.16, 0.12), "TM5": (0.28, 0.31)} | dict.fromkeys(("OLI4", "OLI5"), (0.3, 0.3))),
-    )  # fmt: skip
+    leaf = {"TM2": (0.16, 0.12), "TM5": (0.28, 0.31)} | dict.fromkeys(("OLI4", "OLI5"), (0.3, 0.3))
+    canopy = fifesim.Canopy(background=0.2, leaf_optics=leaf)
+    setup = fifesim.Setup(interval=(20.0, 25.0), quantise=False, canopy=canopy)
     images = fifesim.compare(lai, ["TM", "OLI"], setup, bands={"TM": ["TM2", "TM5"]})
     assert images["TM"]["toa_radiance"]["band"].values.tolist() == ["TM2", "TM5"]
     for name in ("TM", "OLI"):

@@ -61,7 +61,7 @@ def test_digital_numbers_lead_back_to_their_reflectance(setup):
 
 def test_what_arrays_do_not_do_with_is_named(lai, setup):
     with pytest.raises(ValueError, match="do not do with relief, adjacency, brown: take"):
-        Kernels(replace(setup, dem=lai, adjacency=True, brown=lai))
+        Kernels(replace(setup, dem=lai, adjacency=True, canopy=fifesim.Canopy(brown=lai)))
     assert labelled_only(replace(setup, offset=(np.zeros(3), 0.0))) == ["a drifting offset"]
     angles = xr.Dataset({"sza": 30.0, "saa": 120.0})
     assert labelled_only(replace(setup, geometry=angles)) == ["angles by cell"]

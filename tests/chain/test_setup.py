@@ -61,7 +61,7 @@ def test_setup_tells_what_is_not_the_default(lai):
     assert repr(Setup()) == "Setup(instrument='TM')"
     said = repr(Setup("OLI", dem=lai, canopy=fifesim.Canopy(hotspot=0.1), onto=grids.geobox(lai), noise=("shot",)))
     assert said == (
-        "Setup(instrument='OLI', canopy=Canopy(hotspot=0.1), dem=<DataArray of y 45 x x 54>, onto=<GeoBox of y 45 x x 54>, "
-        "noise=('shot',))"
+        "Setup(instrument='OLI', canopy=Canopy(hotspot=0.1), dem=<DataArray of y 45 x x 54>, "
+        "onto=<GeoBox of y 45 x x 54>, noise=('shot',))"
     )
     assert repr(Setup(fifesim.instrument("TM"))) == "Setup(instrument='TM')"

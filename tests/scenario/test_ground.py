@@ -28,6 +28,7 @@ OWN = {
         "dissociation": 0.5,
         "crown_cover": 0.8,
         "crown_shape": 0.7,
+        "moisture": 0.2,
         "fpar_inf": 0.9,
         "background": BACKGROUND,
         "brown_leaf": {"brown": 1.0},
@@ -35,7 +36,6 @@ OWN = {
     "landscape": {
         "cover": "voronoi",
         "size": 80.0,
-        "moisture": 0.2,
         "deviations": {"soil": 0.03, "brown": 0.06, "crown_cover": 0.0},
         "arps": {"soil": 0.24},
         "coarser": 2,
@@ -71,6 +71,10 @@ def by_hand(scenario):
         covary={"soil": -0.3},
         seed=11,
     )
+
+
+def given_by(canopy):
+    return {name: getattr(canopy, name) for name in canopy.given}
 
 
 def scene_of(**sections):
@@ -164,10 +168,10 @@ def test_scene_is_lazy_in_its_chunks(scenario):
     xr.testing.assert_identical(lazy.compute(), whole)
 
 
-def test_moisture_without_deviation_is_a_number():
-    land = scene_of(landscape={"moisture": 0.3})
-    assert land["moisture"].ndim == 0 and land["moisture"] == 0.3
-    drawn = scene_of(landscape={"moisture": 0.3, "deviations": {"moisture": 0.1}})["moisture"]
+def test_moisture_without_deviation_is_a_number_of_one_stand():
+    assert list(scene_of(ground={"moisture": 0.3})) == ["lai"]
+    assert canopy_of(parse_scenario(SMALL | {"ground": {"moisture": 0.3}})).moisture == 0.3
+    drawn = scene_of(ground={"moisture": 0.3}, landscape={"deviations": {"moisture": 0.1}})["moisture"]
     assert drawn.ndim == 2 and float(drawn.mean()) == pytest.approx(0.3, abs=0.02)
 
 
@@ -175,11 +179,11 @@ def test_drawn_properties_are_about_their_means_with_the_arp_of_the_ground():
     deviations = {"soil": 0.03, "moisture": 0.1, "brown": 0.05, "crown_cover": 0.07}
     arps = {"soil": 0.24, "brown": 0.0}
     case = parse_scenario(
-        {"ground": {"arp": 0.1, "brown": 0.2, "crown_cover": 0.8}}
-        | {"landscape": {"moisture": 0.3, "deviations": deviations, "arps": arps}}
+        {"ground": {"arp": 0.1, "brown": 0.2, "crown_cover": 0.8, "soil": -0.1, "moisture": 0.3}}
+        | {"landscape": {"deviations": deviations, "arps": arps}}
     )
     assert drawn_properties(case) == {
-        "soil": fifesim.Field(sd=0.03, arp=0.24),
+        "soil": fifesim.Field(mean=-0.1, sd=0.03, arp=0.24),
         "moisture": fifesim.Field(mean=0.3, sd=0.1, arp=0.1),
         "brown": fifesim.Field(mean=0.2, sd=0.05, arp=0.0),
         "crown_cover": fifesim.Field(mean=0.8, sd=0.07, arp=0.1),
@@ -188,13 +192,11 @@ def test_drawn_properties_are_about_their_means_with_the_arp_of_the_ground():
 
 def test_what_every_class_says_and_what_is_drawn_is_not_passed(scenario):
     """It would change nothing, which `surface_reflectance` refuses."""
-    said = canopy_of(scenario)
-    assert set(said) == {
-        *("leaf_optics", "background", "brown_leaf", "hotspot", "dissociation", "crown_cover", "crown_shape")
-    }
-    assert (said["leaf_optics"], said["background"], said["brown_leaf"]) == (None, BACKGROUND, fifesim.Leaf(brown=1.0))
-    assert (said["hotspot"], said["dissociation"], said["crown_cover"], said["crown_shape"]) == (0.1, 0.5, 0.8, 0.7)
-    assert canopy_of(parse_scenario({"ground": OWN["ground"]})) == said | {"leaf_angles": "planophile", "brown": 0.2}
+    expected = {"hotspot": 0.1, "dissociation": 0.5, "crown_cover": 0.8, "crown_shape": 0.7, "moisture": 0.2}
+    expected |= {"background": BACKGROUND, "brown_leaf": fifesim.Leaf(brown=1.0)}
+    assert given_by(canopy_of(scenario)) == expected
+    alone = canopy_of(parse_scenario({"ground": OWN["ground"]}))
+    assert given_by(alone) == expected | {"leaf_angles": "planophile", "brown": 0.2, "soil": 0.0}
 
 
 @pytest.mark.parametrize("key", ["leaf", "background_spectra"])
@@ -203,8 +205,8 @@ def test_leaf_and_spectra_of_every_class_are_theirs(key):
     field = {"leaf": "leaf_optics", "background_spectra": "background"}[key]
     sections = {"ground": {key: value}, "landscape": {"cover": "voronoi"}}
     both, one = ({"a": {key: value}, "b": {key: value}}, {"a": {key: value}, "b": {}})
-    assert field not in canopy_of(parse_scenario(sections | {"classes": both}))
-    assert field in canopy_of(parse_scenario(sections | {"classes": one}))
+    assert field not in canopy_of(parse_scenario(sections | {"classes": both})).given
+    assert field in canopy_of(parse_scenario(sections | {"classes": one})).given
 
 
 @pytest.mark.parametrize(
@@ -235,7 +237,7 @@ LEVEL_LAND = [
     {"landscape": {"deviations": {"soil": 0.0, "moisture": 0.0, "brown": 0.0, "crown_cover": 0.0}}},
     {"ground": {"brown": 0.0, "dissociation": 1.0, "brown_leaf": {"brown": 1.0}}},
     {"ground": {"crown_cover": 1.0, "crown_shape": 0.3}},
-    {"landscape": {"covary": {"elevation": 0.0}, "moisture": 0.0}},
+    {"ground": {"soil": 0.0, "moisture": 0.0}, "landscape": {"covary": {"elevation": 0.0}}},
     {"landscape": {"cover": "pastures"}, "classes": {"a": {"brown": 0.0, "crown_cover": 1.0}}},
     {"landscape": {"cover": "levels", "size": 50.0}, "classes": {"a": {}, "b": {"hotspot": 0.0}}},
 ]
@@ -278,7 +280,7 @@ def test_landscape_of_soil_without_variance_is_leaf_area_alone(properties):
 
 def test_number_of_a_property_that_is_not_drawn_stays_beside_what_is():
     """A deviation of 0 says nothing: the number of [ground] is still that of its leaves."""
-    ground = {"brown": 0.15, "crown_cover": 0.8}
+    ground = {"brown": 0.15, "crown_cover": 0.8, "moisture": 0.3}
     asked = {"deviations": {"soil": 0.02, "brown": 0.0, "crown_cover": 0.0}}
     both = (
         fifesim.simulate(parse_scenario(SMALL | {"ground": ground, "landscape": land}))["image"]["dn"]
@@ -299,7 +301,7 @@ def test_number_of_a_property_that_is_not_drawn_stays_beside_what_is():
             {"ground": {"lai_file": "lai.tif"}, "landscape": {"covary": {"soil": 0.1}, "deviations": {"soil": 0.1}}},
             "a lai_file goes with the ground as it does: leave covary out",
         ),
-        ({"ground": {"method": "periodic"}, "landscape": {"moisture": 0.1}}, "is for one stand"),
+        ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"moisture": 0.1}}}, "is for one stand"),
         ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"soil": 0.1}}}, "is for one stand"),
     ],
 )

@@ -20,8 +20,9 @@ strip = fifesim.grid_at(
 case = {
     "geometry": fifesim.fife_geometry(),
     "atmosphere": fifesim.Atmosphere(),
-    "leaf_optics": fifesim.Leaf(),
-    "background": {"soil_dry": 0.475, "shade": 0.525},
+    "canopy": fifesim.Canopy(
+        leaf_optics=fifesim.Leaf(), background={"soil_dry": 0.475, "shade": 0.525}
+    ),
 }  # of the ground; the air differs below
 ground = wrap_xr(np.full((1, 71), 2.0), strip).fifesim.surface_reflectance(
     "TM", bands=BANDS, **case

@@ -17,7 +17,9 @@ grid = fifesim.grid_at(
 leaf_area = np.linspace(0, 6, 121)
 lai = wrap_xr(leaf_area[None], grid)
 sun, air = fifesim.fife_geometry(), fifesim.Atmosphere()  # the paper's case
-grass = {"leaf_optics": fifesim.Leaf(), "background": {"soil_dry": 0.475, "shade": 0.525}}
+grass = fifesim.Canopy(
+    leaf_optics=fifesim.Leaf(), background={"soil_dry": 0.475, "shade": 0.525}
+)
 
 # %%
 # Red light falls and near infrared light rises with leaf area, until more leaves change nothing. Flat (planophile)
@@ -30,8 +32,7 @@ for leaves, style in (("planophile", "--"), ("spherical", "-"), ("erectophile", 
         bands=["TM3", "TM4"],
         geometry=sun,
         atmosphere=air,
-        canopy=fifesim.Canopy(leaf_angles=leaves),
-        **grass,
+        canopy=grass.replace(leaf_angles=leaves),
     )
     for band, color in (("TM3", "#b2182b"), ("TM4", "#542788")):
         axes[0].plot(
@@ -72,8 +73,12 @@ for hotspot, style in ((0.0, "-"), (0.05, "--"), (0.2, ":")):
     for view in views:
         side = sun.saa if view <= 0 else sun.saa + 180
         geometry = fifesim.Geometry(sun.sza, sun.saa, vza=abs(view), vaa=side)
-        case = {"geometry": geometry, "atmosphere": air, "hotspot": hotspot}
-        rho = two.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **case, **grass)
+        case = {
+            "geometry": geometry,
+            "atmosphere": air,
+            "canopy": grass.replace(hotspot=hotspot),
+        }
+        rho = two.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **case)
         values.append(rho.values.ravel())
     for axis, band in zip(axes, np.transpose(values), strict=True):
         axis.plot(views, band, style, color="black", label=f"hotspot {hotspot:g}")

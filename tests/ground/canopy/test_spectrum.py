@@ -38,7 +38,7 @@ def test_leaf_spectra_are_a_file_or_a_dataset(tmp_path, lai):
     for name in ("leaf_optics", "brown_leaf"):
         made = [
             fifesim.surface_reflectance(
-                lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(brown=0.5), **{name: each}
+                lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(**{name: each}, brown=0.5)
             )
             for each in given
         ]
@@ -87,12 +87,11 @@ def test_a_spectrum_is_read_from_a_regular_file_only(tmp_path, lai, name, monkey
     }
     for path, message in wrong.items():
         with pytest.raises(ValueError, match=message):
-            fifesim.surface_reflectance(lai, "TM", **{name: path})
+            fifesim.surface_reflectance(lai, "TM", canopy=fifesim.Canopy(**{name: path}))
     if name == "background":
         with pytest.raises(ValueError, match="it is an address"):
-            fifesim.surface_reflectance(
-                lai, "TM", canopy=fifesim.Canopy(background=fifesim.Background({"http://127.0.0.1:9/x.csv": 1}))
-            )
+            mixture = fifesim.Background({"http://127.0.0.1:9/x.csv": 1})
+            fifesim.surface_reflectance(lai, "TM", canopy=fifesim.Canopy(background=mixture))
 
 
 @pytest.mark.parametrize(

@@ -40,24 +40,23 @@ def test_table_comes_back_as_it_was():
         was, now = getattr(FULL, each.name), getattr(read, each.name)
         if each.name == "lai":
             np.testing.assert_array_equal(now.ppf([0.1, 0.9]), was.ppf([0.1, 0.9]))
-        elif each.name == "leaf_angles":
-            np.testing.assert_array_equal(now, was)
-        else:
+        elif each.name != "canopy":
             assert now == was, each.name
+    assert read.canopy.given == FULL.canopy.given
+    for name in PROPERTIES:
+        was, now = getattr(FULL.canopy, name), getattr(read.canopy, name)
+        assert np.array_equal(now, was) if name == "leaf_angles" else now == was, name
 
 
 @pytest.mark.parametrize("background", [0.2, "dead_grass", {"TM3": 0.1}, Spectrum((0.4, 2.5), (0.1, 0.3))])
 def test_backgrounds_come_back(background):
-    assert (
-        read_table(table_text([CoverClass("a", canopy=Canopy(background=background))]))[0].canopy.background
-        == background
-    )
+    (read,) = read_table(table_text([CoverClass("a", canopy=Canopy(background=background))]))
+    assert read.canopy.background == background and read.canopy.given == {"background"}
 
 
 def test_leaf_optics_of_all_bands_come_back():
-    assert read_table(table_text([CoverClass("a", canopy=Canopy(leaf_optics=(0.1, [0.2, 0.3])))]))[
-        0
-    ].canopy.leaf_optics == (0.1, (0.2, 0.3))
+    (read,) = read_table(table_text([CoverClass("a", canopy=Canopy(leaf_optics=(0.1, [0.2, 0.3])))]))
+    assert read.canopy.leaf_optics == (0.1, (0.2, 0.3))
 
 
 def test_distribution_of_samples_is_left_out():
