@@ -69,7 +69,7 @@ def test_a_map_of_cover_is_a_file_and_the_names_of_patterns_are_none():
 
 def test_numbers_come_with_their_unit_and_limits_are_allowed():
     assert LandscapeKeys(size="1.2 km").size == 1200.0
-    LandscapeKeys(moisture=1, deviations=dict.fromkeys(VARYING, 1), arps={"soil": 0.2498, "brown": 0})
+    LandscapeKeys(deviations=dict.fromkeys(VARYING, 1), arps={"soil": 0.2498, "brown": 0})
     LandscapeKeys(covary={"wetness": 1, "illumination": -1}, deviations={})
     StandKeys(hotspot=1e-6, brown=1, dissociation=1, crown_cover=0, crown_shape=10, soil=-1, moisture=1)
     ClassKeys(share=1)
