@@ -34,7 +34,10 @@ def with_geometry(array, geometry, names=_GEOMETRY):
     -------
     array : xarray.DataArray or xarray.Dataset
     """
-    return array.assign_coords({} if geometry is None else coordinates_of(geometry, names))
+    if geometry is None:
+        return array
+    carried = coordinates_of(geometry, names)
+    return array.assign_coords(carried) if isinstance(array, xr.Dataset) else grids.with_coordinates(array, carried)
 
 
 def coordinates_of(geometry, names=_GEOMETRY):

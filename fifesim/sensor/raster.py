@@ -150,7 +150,8 @@ def sense(
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
     image = digital_numbers.recorded(radiance, description, bands, quantise, geometry if scaling == "product" else None)
-    image = directions.with_geometry(grids.place(image.copy(data=held(image.data)), pixels), geometry)
+    carried = {} if geometry is None else directions.coordinates_of(geometry)
+    image = grids.place(image.copy(data=held(image.data)), pixels, carried)
     return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise, scaling))
 
 

@@ -123,8 +123,8 @@ def _same(one, other):
 def _labelled(reflectance, lai, bands, geometry, angles, told, provenance):
     """Reflectance of a scene with its bands, place, directions and attributes."""
     names, wavelengths = ([getattr(band, name) for band in bands] for name in ("name", "wavelength"))
-    out = reflectance.assign_coords(cf.band_coordinates(band=names, wavelength=wavelengths))
-    out = directions.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
+    coordinates = cf.band_coordinates(band=names, wavelength=wavelengths) | directions.coordinates_of(geometry)
+    out = grids.place(reflectance, grids.geobox(lai), coordinates)
     history = f"surface_reflectance: SAIL, {angles} leaves, {told}{_directions(geometry)}"
     return cf.label(out, "surface_reflectance", source=lai, history=history, leaf_angles=angles, **provenance)
 

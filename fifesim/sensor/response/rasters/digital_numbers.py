@@ -7,6 +7,7 @@ import xarray as xr
 
 from fifesim.base.digital_numbers import check_counts
 from fifesim.rasters import cf, chunks, directions
+from fifesim.rasters import grid as grids
 from fifesim.sensor.response.calibration import dn_to_radiance, gain_offset, radiance_to_dn
 from fifesim.sensor.response.product_scaling import product_gain_offset
 
@@ -110,7 +111,7 @@ def recorded(radiance, description, bands, quantise, product_geometry=None):
         along_band |= {"gain": gain, "offset": offset}
         along_band |= {"compression": compression} if any(compression) else {}
     along_band["solar_irradiance"] = [band.solar_irradiance for band in bands]
-    return radiance.assign_coords(cf.band_coordinates(**along_band))
+    return grids.with_coordinates(radiance, cf.band_coordinates(**along_band))
 
 
 def _compressed(radiance, gain, offset, compression, bits):
