@@ -334,7 +334,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=2)
     given = parser.parse_args()
     heads = ["work: other package", "million cells", "fifesim: million cells/s", "other: million cells/s"]
-    heads += ["fifesim is faster by", "error of fifesim", "error of the other"]
+    heads += ["fifesim / other", "error of fifesim", "error of the other"]
     print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
     for name, (make, module, side) in ROWS.items():
         if find_spec(module) is None:

@@ -26,7 +26,7 @@ Measured on 2027-01-02: arm64, 4 cores, 8 GB, Python 3.12.1.
 
 ## Other packages
 
-| work: other package | million cells | fifesim: million cells/s | other: million cells/s | fifesim is faster by |
+| work: other package | million cells | fifesim: million cells/s | other: million cells/s | fifesim / other |
 |---|---|---|---|---|
 | SAIL in each cell: radiative-transfer-models | 0.98 | 0.169 | 0.178 | 0.95 |
 | SAIL interpolated in LAI: radiative-transfer-models and numpy.interp | 16 | 96.1 | 5.92 | 16.2 |
