@@ -1,22 +1,26 @@
 """
-All benchmarks by one command, each in a process of its own, and their tables on one page.
+Run all benchmarks, each in a new process, and write their tables to one page.
 
-    python benchmarks/run.py --output tables.md
+With ``--parts``, the other parts of an existing page are kept.
+
+    python benchmarks/run.py --output benchmarks/tables.md
 """
 
 import argparse
 import platform
 import subprocess
 import sys
-from contextlib import nullcontext
 from datetime import date
 from pathlib import Path
 
 import psutil
+from summary import sections
 
 PARTS = {
-    "Stages, chains and peers": "stages.py",
+    "Stages and chains": "stages.py",
+    "Other packages": "peers.py",
     "Threads": "chain.py",
+    "Small rasters": "labels.py",
     "Whole commands": "commands.py",
     "Ensembles": "ensembles.py",
     "Training sets": "dataset.py",
@@ -32,31 +36,40 @@ PARTS = {
 }
 
 
-def lines(parts):
-    """Of the page, as they are found."""
+def lines(title):
+    """Lines of a part, as they are printed."""
     cores, memory = psutil.cpu_count(), psutil.virtual_memory().total / 1e9
     machine = f"{platform.machine()}, {cores} cores, {memory:.0f} GB, Python {platform.python_version()}"
-    yield "# Tables\n"
-    yield f"Measured on {date.today()}: {machine}."
-    for title in parts:
-        yield f"\n## {title}\n"
-        command = [sys.executable, Path(__file__).with_name(PARTS[title])]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as run:
-            yield from (line.rstrip("\n") for line in run.stdout)
-        if run.returncode:
-            yield "failed"
+    yield f"Measured on {date.today()}: {machine}.\n"
+    command = [sys.executable, Path(__file__).with_name(PARTS[title])]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as run:
+        yield from (line.rstrip("\n") for line in run.stdout)
+    if run.returncode:
+        yield "failed"
+
+
+def page(found):
+    """Text of the page of some parts, in their order."""
+    return "# Tables\n\n" + "\n\n".join(f"## {title}\n\n{found[title]}" for title in PARTS if title in found) + "\n"
 
 
 def main():
-    """Print the page, and write it."""
+    """Print the parts, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART")
-    parser.add_argument("--output", type=Path, help="file for the page, beside standard output")
+    parser.add_argument("--output", type=Path, help="file for the page")
     given = parser.parse_args()
-    with given.output.open("w", encoding="utf-8") if given.output else nullcontext() as file:
-        for line in lines(given.parts):
+    known = given.output and given.output.exists()
+    found = sections(given.output.read_text(encoding="utf-8")) if known else {}
+    for title in given.parts:
+        print(f"\n## {title}\n", flush=True)
+        told = []
+        for line in lines(title):
             print(line, flush=True)
-            print(line, file=file, flush=True) if file else None
+            told.append(line)
+        found[title] = "\n".join(told)
+        if given.output:
+            given.output.write_text(page(found), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 """
-Cells a second and peak memory of each stage and chain, at several sizes, beside a floor and beside peers.
+Cells a second and peak memory of each stage and chain, at several sizes, compared with a floor.
 
     python benchmarks/stages.py --million 1 4 16 64
 
@@ -9,7 +9,6 @@ one that warms up, because other work on a machine changes the time on the clock
 
 import argparse
 import json
-import resource
 import subprocess
 import sys
 import time
@@ -17,23 +16,16 @@ import time
 import dask
 import numpy as np
 from chain import chain_on
-from peers import PEERS
-from timing import own_peak
+from timing import own_peak, processor_time
 from work import CHAINS, FLOOR, STAGES
 
-KNOWN = {**FLOOR, **STAGES, **CHAINS, **{name: peer[0] for name, peer in PEERS.items()}}
-
-
-def processor_time():
-    """Of this process and of those that it has waited for. [s]"""
-    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+KNOWN = {**FLOOR, **STAGES, **CHAINS}
 
 
 def measure(name, side, threads, repeat):
     """Print processor time, time on the clock and peak memory of a call."""
     dask.config.set(scheduler="threads", num_workers=threads)
-    if not any(name == peer for peer in PEERS):
-        KNOWN[name](min(side, 900))()
+    KNOWN[name](min(side, 900))()
     call = KNOWN[name](side)
     found = []
     for _ in range(repeat):
@@ -77,15 +69,12 @@ def exponent(rows):
     return float(np.polyfit(*np.log(np.array(known)).T, 1)[0])
 
 
-def tables(million, threads, repeat, peers, workers):
+def tables(million, threads, repeat, workers):
     sides = [round((each * 1e6) ** 0.5) for each in million]
     found = {
         name: [apart("--one", name, side, threads, repeat) for side in sides] for name in (*FLOOR, *STAGES, *CHAINS)
     }
     yield from speeds(found, million)
-    if peers:
-        yield ""
-        yield from beside_peers(found, threads)
     if workers:
         yield ""
         yield from scaling(sides[-1])
@@ -110,17 +99,6 @@ def speeds(found, million):
         yield f"| {name} | {' | '.join(rates)} | {ratio} | {grown and f'{grown:.2f}'} | {' to '.join(memory)} |"
 
 
-def beside_peers(found, threads):
-    yield "| peer | cells/s | fifesim, same stage: cells/s | fifesim is faster by |\n|---|---|---|---|"
-    for name, (_, stage, side) in PEERS.items():
-        row, own = apart("--one", name, side, threads, 1), found[stage][min(1, len(found[stage]) - 1)]
-        if row is None or own is None:
-            yield f"| {name} | not measured | | |"
-            continue
-        rate, ours = (each["cells"] / each["seconds"] for each in (row, own))
-        yield f"| {name} | {rate:,.0f} | {ours:,.0f} | {ours / rate:,.3g} |"
-
-
 def scaling(side):
     one, two = (apart("--workers-of", workers, side) for workers in (1, 2))
     if one and two:
@@ -133,7 +111,6 @@ def main():
     parser.add_argument("--million", type=float, nargs="+", default=[1, 4, 16, 64], help="sizes [million cells]")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--repeat", type=int, default=2)
-    parser.add_argument("--no-peers", action="store_true")
     parser.add_argument("--no-workers", action="store_true")
     parser.add_argument("--one", nargs=4, help=argparse.SUPPRESS)
     parser.add_argument("--workers-of", nargs=2, type=int, help=argparse.SUPPRESS)
@@ -144,9 +121,7 @@ def main():
     elif options.workers_of:
         on_workers(options.workers_of[1], options.workers_of[0])
     else:
-        for line in tables(
-            options.million, options.threads, options.repeat, not options.no_peers, not options.no_workers
-        ):
+        for line in tables(options.million, options.threads, options.repeat, not options.no_workers):
             print(line, flush=True)
 
 

@@ -1,12 +1,12 @@
 """
 Compute paper.json and write paper.md from it and paper.md.j2.
 
-Run as ``python docs/make_paper.py``; it takes a quarter of an hour of a processor. ``--text`` writes the page from the
-numbers that are there.
+Run as ``python docs/make_paper.py``; it takes a quarter of an hour of a processor. ``--only scenes`` computes one part
+and keeps the other numbers, ``--text`` computes none and writes the page.
 """
 
+import argparse
 import json
-import sys
 from pathlib import Path
 
 import jinja2
@@ -14,11 +14,13 @@ import numpy as np
 import paper_deviations
 
 from fifesim.analysis.scaling import ndvi_linearity
+from fifesim.chain.arrays import ArrayChain
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import effects, fitted, table
-from fifesim.experiments.friedl1995.case import ARPS, Case
+from fifesim.experiments.friedl1995.case import ARPS, VARIABLES, Case
+from fifesim.experiments.friedl1995.cells import cells_of
 from fifesim.experiments.friedl1995.pixels import ground_of
-from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE, READINGS
+from fifesim.experiments.friedl1995.readings import ALIGNED, CELL, NATIVE, PASSAGES, READINGS
 from fifesim.experiments.friedl1995.reproduction import SEED, reproduce_case
 from fifesim.output.pages import fixed
 
@@ -29,53 +31,98 @@ REALISATIONS = 20
 # Changes share their random numbers, and need fewer.
 FEW = 4
 
+# Noise and range are printed with so many digits, and percentages are of what is printed.
+DIGITS = 3
 
-def numbers(realisations=REALISATIONS, few=FEW):
+
+def numbers(only=None):
     """
-    All that the page states.
+    Compute the numbers of the page.
 
     Parameters
     ----------
-    realisations : int, optional
-        Of Table 2.
-    few : int, optional
-        Of what a change does.
+    only : sequence of str, optional
+        Names of `PARTS` to compute; all by default.
 
     Returns
     -------
     numbers : dict
-        Of plain numbers, text, lists and dicts.
+        Plain numbers, text, lists and dicts.
     """
-    case, seeds = Case(), range(SEED, SEED + few)
-    found = reproduce_case(case, realisations, SEED)
-    tables = {
-        reading.name: table.table2(found.sel(reading=reading.name))
-        for reading in (NATIVE, ALIGNED)
-    }
+    case, found = Case(), {}
+    for name in PARTS if only is None else only:
+        found |= PARTS[name](case)
+    return found | words(case)
+
+
+def scenes(case):
+    """Table 2, noise, range and scaling of the nine scenes."""
+    found = reproduce_case(case, REALISATIONS, SEED)
+    by_reading = {each.name: found.sel(reading=each.name) for each in (NATIVE, ALIGNED)}
+    tables = {name: table.table2(each) for name, each in by_reading.items()}
     return {
-        "run": {"realisations": realisations, "few": few, "seed": SEED, "cells": case.cells, "drift": case.drift,
+        "run": {"realisations": REALISATIONS, "few": FEW, "seed": SEED, "cells": case.cells, "drift": case.drift,
                 "interval": case.interval, "pixels": int(found["pixel_lai"][0, 0].count())},
         "table2": {name: each.to_dict("records") for name, each in tables.items()},
         "agreement": {name: table.agreement(each) for name, each in tables.items()},
         "limits": fitted.limits(*tables.values()),
-        "text": table.text_table(found.sel(reading=NATIVE.name)).to_dict("records"),
-        "readings": effects.readings(case, seeds).to_dict("records"),
-        "sizes": effects.sizes(case, seeds).to_dict("records"),
-        "sensitivity": effects.sensitivity(case, seeds).to_dict("records"),
+        "text": {name: table.text_table(each).to_dict("records") for name, each in by_reading.items()},
+        "spread": spread(case, range(SEED, SEED + REALISATIONS)),
         "growth_deviation": growth_deviation(found),
         "scaling": scaling(case, found),
-        "deviations": paper_deviations.deviations(seeds),
-        **words(case),
     }  # fmt: skip
 
 
+_SEEDS = range(SEED, SEED + FEW)
+PARTS = {
+    "scenes": scenes,
+    "readings": lambda case: {"readings": effects.readings(case, _SEEDS).to_dict("records")},
+    "sizes": lambda case: {"sizes": effects.sizes(case, _SEEDS).to_dict("records")},
+    "sensitivity": lambda case: {
+        "sensitivity": effects.sensitivity(case, _SEEDS).to_dict("records")
+    },
+    "deviations": lambda case: {"deviations": paper_deviations.deviations(_SEEDS)},
+}
+
+
 def words(case):
-    """What needs no simulation: where each number of a case comes from, how many were fitted, and what readings say."""
+    """Numbers and text that need no simulation: origins, the number of fitted inputs, readings and pixel sizes."""
     return {
         "origins": [vars(each) for each in fitted.origins(case)],
         "fitted": fitted.fitted_count(case),
         "reading_texts": {name: each.text for name, each in READINGS.items()},
+        "passages": PASSAGES,
+        "cells_per_pixel": {
+            "aligned": (case.pixel / CELL) ** 2,
+            "native": (case.interval / CELL) ** 2,
+        },
     }
+
+
+def spread(case, seeds):
+    """
+    Coefficient of variation of the block means of burned, grazed ground.
+
+    Parameters
+    ----------
+    case : fifesim.experiments.friedl1995.case.Case
+    seeds : sequence of int
+
+    Returns
+    -------
+    spread : dict of str to dict of str to float
+        By variable and arp, the mean over realisations of the standard deviation over the mean. [1]
+    """
+    chain = ArrayChain(case.setup, case.grid)
+    found = {name: {} for name in VARIABLES}
+    for arp in ARPS:
+        cells = [cells_of(case, "burned-grazed", arp, seed) for seed in seeds]
+        for name in VARIABLES:
+            blocks = [chain.means(getattr(each, name), case.pixel) for each in cells]
+            found[name][f"{arp:g}"] = np.mean(
+                [np.nanstd(each, ddof=1) / np.nanmean(each) for each in blocks]
+            )
+    return found
 
 
 def growth_deviation(found):
@@ -137,11 +184,8 @@ def text(values):
     environment.filters["fixed"] = fixed
     environment.globals |= {"between": between, "highest": highest}
     environment.globals["slope_of"] = lambda cosine: np.degrees(np.arccos(cosine))
-    ren = noise(values["text"], values["table2"]["native"])
-    return (
-        environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(**values, ren=ren)
-        + "\n"
-    )
+    template = environment.from_string(TEMPLATE.read_text(encoding="utf-8"))
+    return template.render(**values, noise=noise(values), kept=range_kept(values)) + "\n"
 
 
 def nine(reading, name):
@@ -158,33 +202,107 @@ def highest(reading):
     return {"slope": slopes.max(), "treatment": treatment, "arp": arp}
 
 
-def noise(rows, lines):
+def noise(values):
     """
-    Mean relative equivalent noise beside the paper's.
+    Mean relative equivalent noise compared with the paper's.
 
     Parameters
     ----------
-    rows, lines : list of dict
-        ``text``, and ``table2`` of one reading, from `numbers`.
+    values : dict
+        From `numbers`.
 
     Returns
     -------
-    noise : dict
-        ``largest`` relative difference; ``growth`` of LAI from least to largest arp and the ``paper_growth``; and
-        noise of LAI by arp with the slope of the line of LAI on NDVI, which makes it R2 times as large, ``by_other``.
+    rows : list of dict
+        By ``variable`` and ``arp``: the ``paper``'s; by reading, ``native`` and ``aligned``, the noise as counted in
+        increments, its ``deviation`` over realisations, its relative ``difference`` from the paper's, the
+        ``estimate`` from R2 and the spread of the variable, and the noise ``by_other`` regression line, R2 times as
+        large. [1]
     """
-    rows = [row for row in rows if row["quantity"] == "ren"]
-    lai = [row for row in rows if row["variable"] == "lai"]
+    counted = {name: _of_quantity(rows, "ren") for name, rows in values["text"].items()}
     r2 = {
-        row["arp"]: row["r2"]
-        for row in lines
-        if (row["variable"], row["distribution"]) == ("lai", "burned-grazed")
+        (name, row["variable"], row["arp"]): row["r2"]
+        for name, rows in values["table2"].items()
+        for row in rows
+        if row["distribution"] == "burned-grazed"
     }
+    found = []
+    for (variable, arp), first in counted[NATIVE.name].items():
+        row = {"variable": variable, "arp": arp, "paper": first["paper"]}
+        for name, rows in counted.items():
+            one, share = rows[variable, arp], r2[name, variable, arp]
+            row[name] = {
+                "value": one["value"],
+                "deviation": one["deviation"],
+                "difference": round(one["value"], DIGITS) / one["paper"] - 1,
+                "estimate": expected_noise(share, values["spread"][variable][f"{arp:g}"]),
+                "by_other": one["value"] * share,
+            }
+        found.append(row)
+    return found
+
+
+def expected_noise(r2, spread):
+    r"""
+    Relative equivalent noise of a normal pair at the mean of the variable.
+
+    Parameters
+    ----------
+    r2 : float
+        Of the regression of NDVI on the variable. [1]
+    spread : float
+        Standard deviation of the variable over its mean. [1]
+
+    Returns
+    -------
+    noise : float
+        [1]
+
+    Notes
+    -----
+    The deviation of NDVI about its line is :math:`s_N \sqrt{1 - R^2}` and the slope :math:`\sqrt{R^2} s_N / s_L`, so
+    that Eq. 7 gives :math:`\sqrt{(1 - R^2) / R^2}\, s_L / \bar{L}`.
+
+    Examples
+    --------
+    >>> round(expected_noise(0.5, 0.1), 12)
+    0.1
+    """
+    return np.sqrt((1 - r2) / r2) * spread
+
+
+def range_kept(values):
+    """
+    Share of the cells' range that pixels keep, compared with the paper's.
+
+    Parameters
+    ----------
+    values : dict
+        From `numbers`.
+
+    Returns
+    -------
+    rows : list of dict
+        By ``variable`` and ``arp``: the ``paper``'s, rows of the ``native`` and ``aligned`` reading, and the
+        ``difference`` and ``relative`` difference of the native reading from the paper's. [1]
+    """
+    kept = {name: _of_quantity(rows, "range_kept") for name, rows in values["text"].items()}
+    found = []
+    for (variable, arp), one in kept[NATIVE.name].items():
+        row = {"variable": variable, "arp": arp, "paper": one["paper"]}
+        row |= {name: rows[variable, arp] for name, rows in kept.items()}
+        printed = round(one["value"], DIGITS)
+        row |= {"difference": printed - one["paper"], "relative": printed / one["paper"] - 1}
+        found.append(row)
+    return found
+
+
+def _of_quantity(rows, quantity):
+    """Rows of a quantity that the paper states, by variable and arp."""
     return {
-        "largest": max(abs(row["value"] / row["paper"] - 1) for row in rows),
-        "growth": lai[-1]["value"] / lai[0]["value"],
-        "paper_growth": lai[-1]["paper"] / lai[0]["paper"],
-        "by_other": [row["value"] * r2[row["arp"]] for row in lai],
+        (row["variable"], row["arp"]): row
+        for row in rows
+        if row["quantity"] == quantity and row["paper"] is not None
     }
 
 
@@ -198,13 +316,15 @@ def between(reading, other):
 
 
 def main():
-    known = (
-        json.loads(NUMBERS.read_text(encoding="utf-8")) | words(Case())
-        if "--text" in sys.argv
-        else numbers()
-    )
-    NUMBERS.write_text(json.dumps(_plain(known), indent=1) + "\n", encoding="utf-8")
-    PAGE.write_text(text(_plain(known)), encoding="utf-8")
+    parser = argparse.ArgumentParser(description="Compute paper.json and write paper.md.")
+    parser.add_argument("--only", nargs="+", choices=PARTS, help="Compute these parts.")
+    parser.add_argument("--text", action="store_true", help="Compute none, write the page.")
+    given = parser.parse_args()
+    only = () if given.text else given.only
+    known = {} if only is None else json.loads(NUMBERS.read_text(encoding="utf-8"))
+    known = _plain(known | numbers(only=only))
+    NUMBERS.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(text(known), encoding="utf-8")
 
 
 def _plain(value):

@@ -55,7 +55,7 @@ def _main(
 @app.command()
 def simulate(
     context: typer.Context,
-    scenario: Annotated[Path | None, typer.Argument(help="TOML file; a landscape on the FIFE site by default.")] = None,
+    scenario: Annotated[Path | None, typer.Argument(help="TOML file; a synthetic landscape by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("fife"),
     overwrite: _Overwrite = False,
     resume: _Resume = False,

@@ -12,6 +12,7 @@ from fifesim.output.maps import encoded, false_colour_names, image_map, relief_m
 from fifesim.output.pairing import pairing_rows
 from fifesim.rasters import grid as grids
 from fifesim.scenario.simulation import setup_of
+from fifesim.scenario.synthetic import summary
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words, sensor_in_words
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
@@ -59,6 +60,7 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
     html = pages.html(
         _TEMPLATE,
         title=title(scenario),
+        provenance=scenario.provenance(),
         finding=finding(truth, fits, reasons),
         pairing=pairing(scenario, image, truth),
         summary=_summary(scenario, image, truth, fits, reasons)
@@ -212,7 +214,7 @@ def engine_rows(scenario):
 
 def title(scenario):
     """
-    What a run or a budget is of, in words.
+    Title of a run or a budget: ground, instrument and synthetic parts.
 
     Parameters
     ----------
@@ -226,7 +228,8 @@ def title(scenario):
     scene = Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
     if scenario.landscape.cover != "none":
         scene = f"{', '.join(scenario.class_table())} in {Path(scenario.landscape.cover).name}"
-    return f"{scene}, seen by {Path(scenario.sensor.instrument).name}"
+    seen, synthetic = f"{scene}, seen by {Path(scenario.sensor.instrument).name}", summary(scenario)
+    return f"{seen} ({synthetic})" if synthetic else seen
 
 
 def _step(rasters):

@@ -19,6 +19,7 @@ from fifesim.rasters import grid as grids
 from fifesim.rasters import whereabouts
 from fifesim.rasters.covering import covering_grid
 from fifesim.rasters.sites import on_fife_site
+from fifesim.scenario import synthetic
 from fifesim.scenario.colours import with_false_colour
 from fifesim.scenario.ground import check_leaf_area, drawn_properties
 from fifesim.scenario.ground_keys import COVARIATES
@@ -247,6 +248,10 @@ class Scenario(Keys):
         check_zenith("sza", self.sun_and_view().sza)
         if self.atmosphere.engine == "6S":
             six_s.check_installed()
+
+    def provenance(self) -> str:
+        """The synthetic parts of the landscape, the parts from files, and the overpass, in one line of text."""
+        return synthetic.statement(self)
 
     @property
     def files(self) -> dict[tuple[str, ...], str]:

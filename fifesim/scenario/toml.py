@@ -227,9 +227,10 @@ def write_scenario(scenario):
     Returns
     -------
     text : str
-        Reading it gives the same scenario.
+        Reading it gives the same scenario. The first line states the synthetic parts.
     """
-    lines = ["# Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
+    lines = [f"# {scenario.provenance()}"]
+    lines += ["# Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
     for place, section in scenario.sections().items():
         lines += ["", *_table(".".join(map(_toml_key, place)), section)]
     return "\n".join(lines) + "\n"

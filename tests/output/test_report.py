@@ -16,12 +16,12 @@ from fifesim.scenario.scenario import parse_scenario
         ({"sensor": {"instrument": "OLI", "bands": ["OLI4", "OLI5"]}}, "seen by OLI"),
     ],
 )
-def test_title_names_ground_and_instrument(values, said):
-    assert title(parse_scenario(values)).endswith(said)
+def test_title_names_ground_and_instrument_and_what_is_synthetic(values, said):
+    assert title(parse_scenario(values)).endswith(f"{said} (synthetic landscape, hypothetical overpass)")
 
 
 def test_title_has_the_names_of_files_and_not_their_folders():
-    scenario = parse_scenario({})
+    scenario = parse_scenario({"terrain": {"dem": "flat"}, "geometry": {"sza": 30.0, "saa": 120.0}})
     ground = scenario.ground.model_copy(update={"lai_file": "/somewhere/leaves.tif"})
     sensor = scenario.sensor.model_copy(update={"instrument": "/elsewhere/camera.toml"})
     scenario = scenario.model_copy(update={"ground": ground, "sensor": sensor})

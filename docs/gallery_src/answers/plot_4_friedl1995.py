@@ -4,8 +4,8 @@ Table 2 and Figures 3 to 9 of the paper
 
 ``fifesim.reproduce`` repeats the nine scenes of Friedl et al. (1995): on level ground, with pixels that drift from the
 blocks of ground that they are compared with, as Table 1 has their interval, and from leaf area, leaves and soil that
-were inferred from Table 2 itself. :doc:`/paper` says what of the agreement is found, fitted and assumed, and computes
-what is drawn here over more realisations.
+were inferred from Table 2 itself. The paper's text speaks for aligned pixels, which are shown too. :doc:`/paper` says
+what of the agreement is found, fitted and assumed, and computes what is drawn here over more realisations.
 """
 
 # sphinx_gallery_thumbnail_number = 6

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fifesim.base import datasets
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import CELLS, VARIABLES
-from fifesim.experiments.friedl1995.readings import READINGS, TABLE_1
+from fifesim.experiments.friedl1995.readings import PASSAGES, READINGS, TABLE_1
 from fifesim.ground.landscape.distribution import treatments
 
 FITTED, CHOSEN, FOUND, YOURS = "fitted to Table 2", "assumed", "in the paper", "given by you"
@@ -72,7 +72,8 @@ def origins(case):
         _size(case),
         Origin(
             "reading of Table 1", 1, FITTED if case.reading.own_interval and case.sensor == TABLE_1 else CHOSEN,
-            f"{case.reading.name}, one of {len(READINGS)}; R² of Table 2 agrees with the native one",
+            f"{case.reading.name}, one of {len(READINGS)}; R² of Table 2 agrees with the native one, "
+            f"{' and '.join(f'section {name}' for name in PASSAGES)} with the aligned one",
         ),
         Origin(
             "form of the random field", 1, FITTED_TO_TEXT,

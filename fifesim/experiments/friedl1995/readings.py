@@ -129,6 +129,12 @@ class Reading:
         )
 
 
+# The paper's text on cells and pixels, by section. It speaks for the aligned reading.
+PASSAGES = {
+    "Ground Scene Model": "9² ground cells per simulated sensor pixel",
+    "Analyses": "81 (9²) ground scene elements per 30-m TM pixel",
+}
+
 NATIVE = Reading(
     "native",
     f"pixels every {_OWN_INTERVAL}, paired by row and column with the 30 m blocks of the truth",

@@ -6,7 +6,7 @@ from fifesim.experiments.friedl1995 import fitted
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.captions import figure_captions
 from fifesim.experiments.friedl1995.case import ARPS
-from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE, READINGS, TABLE_1
+from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE, PASSAGES, READINGS, TABLE_1
 from fifesim.ground.landscape.distribution import treatments
 from fifesim.output import pages
 
@@ -72,7 +72,7 @@ def _constants(case):
     return {
         "arps": ARPS, "treatments": treatments(), "sample": friedl1995_table.SAMPLE, "fewest": _FEWEST,
         "increments": friedl1995_table.INCREMENTS, "tm": case.sensor == TABLE_1, "drift": case.drift,
-        "interval": case.interval, "pixel": case.pixel,
+        "interval": case.interval, "pixel": case.pixel, "passages": PASSAGES,
         "readings": {name: each.in_words(case.interval, case.pixel) for name, each in READINGS.items()},
     }  # fmt: skip
 

@@ -41,7 +41,8 @@ def reproduce(
     Repeat the experiment of Friedl et al. (1995): Table 2 over realisations, and what Figures 3 to 9 show.
 
     Without arguments the ground is level, pixels drift from the blocks of the truth as Table 1's interval has it, and
-    densities, optics and background are those that were inferred from the paper's own Table 2.
+    densities, optics and background are those that were inferred from the paper's own Table 2. The paper's text speaks
+    for pixels that are aligned with the blocks, the reading "aligned".
 
     Parameters
     ----------

@@ -209,7 +209,7 @@ def _check_same(unfinished, identity):
         same["inputs"] = not changed_inputs(kept["inputs"], state["inputs"])
     except (ValueError, KeyError, TypeError):
         raise NotThisRun(f"{unfinished / STATE} is not what a run writes: begin again with --overwrite") from None
-    if begun != identity[BEGUN]:
+    if _keys(begun) != _keys(identity[BEGUN]):
         raise NotThisRun(
             f"the run to resume is of another scenario, with {_other_lines(begun, identity[BEGUN])}: "
             "leave out SCENARIO to go on with that one, or begin again with --overwrite"
@@ -225,9 +225,14 @@ def _check_same(unfinished, identity):
             raise NotThisRun(f"the run to resume {said[key]}")
 
 
+def _keys(text):
+    """Lines of a text in TOML that have keys, in their order: comments are no part of a scenario."""
+    return [line.strip() for line in text.splitlines() if not line.startswith("#")]
+
+
 def _other_lines(old, new):
     """Some of the lines that only the old of two texts has, without their comments."""
-    lines = {line.strip() for line in old.splitlines()} - {line.strip() for line in new.splitlines()}
+    lines = set(_keys(old)) - set(_keys(new))
     return ", ".join((sorted(line.partition("#")[0].strip() for line in lines) or ["keys"])[:3])
 
 

@@ -12,6 +12,7 @@ from fifesim.experiments.friedl1995 import effects
 from fifesim.experiments.friedl1995 import folder as reproduction
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import case_of
+from fifesim.experiments.friedl1995.readings import PASSAGES
 from fifesim.scenario.scenario import read_scenario
 
 TABLES = {"table2.csv", "readings.csv", "sizes.csv", "sensitivity.csv"}
@@ -65,6 +66,9 @@ def test_command_writes_tables_figures_scenarios_and_page(prepared, tmp_path):
     assert "http" not in page.replace("http-equiv", "") and "nan" not in page.split("base64")[0].lower()
     # Every reading has a row of R2 and slopes, and the aligned one a column of Table 2.
     assert "Drift or blur?" in page and "slope: native</th>" in page and "aligned</th>" in page
+    # The drift is shown together with the passages of the paper that speak against it.
+    assert "The paper's text speaks for aligned pixels: " in page
+    assert all(f"“{passage}” (section {section})" in page for section, passage in PASSAGES.items())
     assert prepared("-o", "out").exit_code == 2
 
 

@@ -1,6 +1,7 @@
 """The report of a run says what its rasters say."""
 
 import html
+import json
 import re
 import shutil
 
@@ -72,6 +73,24 @@ BLUR = '<th>Blur</th><td class="number">modulation transfer at the Nyquist frequ
 def test_report_says_how_much_the_instrument_blurs(folder):
     """The paper's cosine passes 0.69 at the Nyquist frequency."""
     assert BLUR.format("0.69") in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def heading(folder):
+    """Title of a report, its tag of the browser's window, and the lines below the title."""
+    page = html.unescape((folder / "report.html").read_text(encoding="utf-8"))
+    header = page[page.index("<header>") : page.index("</header>")]
+    (title,), (tag,) = re.findall(r"<h1>(.*?)</h1>", header), re.findall(r"<title>(.*?)</title>", page)
+    return title, tag, re.findall(r"<p[^>]*>(.*?)</p>", header)
+
+
+def test_report_and_its_title_begin_with_what_is_synthetic(folder):
+    title, tag, lines = heading(folder)
+    assert title == tag == "burned-grazed, arp 0.24, seen by TM (synthetic landscape, hypothetical overpass)"
+    said = (folder / "scenario.toml").read_text(encoding="utf-8").splitlines()[0]
+    assert said.startswith("# Synthetic landscape: leaf area is synthetic; the ground is level; only")
+    assert said.endswith("Hypothetical overpass, 6 June 1987 16:35 UTC.")
+    assert lines[0] == said.removeprefix("# ")
+    assert json.loads((folder / "item.json").read_text(encoding="utf-8"))["properties"]["title"] == title
 
 
 def test_report_is_self_contained(folder):
@@ -167,6 +186,14 @@ def lai_map(path, values):
     with rasterio.open(path, "w", **profile, transform=rasterio.transform.from_origin(704970, 4334220, 30, 30)) as sink:
         sink.write(np.full((1, 20, 30), values, "float32"))
     return {"ground": {"lai_file": str(path)}}
+
+
+def test_report_of_a_map_calls_nothing_synthetic(tmp_path):
+    own = lai_map(tmp_path / "lai.tif", np.linspace(1, 3, 30)) | {"geometry": {"time": "1987-08-15T16:40Z"}}
+    simulate_to_folder(parse_scenario(own), tmp_path / "out")
+    title, tag, lines = heading(tmp_path / "out")
+    assert title == tag == "lai.tif, seen by TM"
+    assert lines[0] == "Leaf area is from a file; the ground is level. Time as given, 15 August 1987 16:40 UTC."
 
 
 def test_a_uniform_map_has_no_line_and_still_a_report(tmp_path):

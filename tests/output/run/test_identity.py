@@ -179,6 +179,27 @@ def test_another_state_is_not_gone_on_with(tmp_path, key, said):
         begin(tmp_path, other)
 
 
+def test_a_run_is_gone_on_with_whatever_the_comments_say(tmp_path):
+    """The first line of a scenario may change its words; classes in another order have other codes."""
+    classes = {name: {"share": 0.5, "distribution": name} for name in ("burned-grazed", "burned-ungrazed")}
+    values = SMALL | {"landscape": {"cover": "pastures"}, "classes": classes}
+    identity = identity_of(parse_scenario(values).complete(), False)
+    begin(tmp_path, identity)
+    heading, rest = identity[BEGUN].split("\n", 1)
+    assert heading.startswith("# Synthetic landscape: fields are synthetic; the ground is level")
+    begin(tmp_path, identity | {BEGUN: rest})
+    begin(tmp_path, identity | {BEGUN: f"# Other words.\n{rest}"})
+    turned = parse_scenario(values | {"classes": dict(reversed(classes.items()))}).complete()
+    with pytest.raises(NotThisRun, match="of another scenario"):
+        begin(tmp_path, identity_of(turned, False))
+
+
+def test_a_time_of_another_run_is_named_without_the_heading(tmp_path):
+    begin(tmp_path, identity_of(parse_scenario(SMALL | {"geometry": {"time": "1987-08-15T16:40Z"}}).complete(), False))
+    with pytest.raises(NotThisRun, match=r'of another scenario, with time = "1987-08-15T16:40Z": leave out'):
+        begin(tmp_path, identity_of(parse_scenario(SMALL).complete(), False))
+
+
 def test_another_scenario_is_not_gone_on_with(tmp_path):
     begin(tmp_path, identity_of(parse_scenario(SMALL).complete(), False))
     other = identity_of(parse_scenario(SMALL | {"ground": {"seed": 8}}).complete(), False)
