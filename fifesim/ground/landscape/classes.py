@@ -9,8 +9,8 @@ from numbers import Number
 import numpy as np
 
 from fifesim.base.annotations import Distribution, FilePath
-from fifesim.base.kinds import LEAF, described
-from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
+from fifesim.base.kinds import described
+from fifesim.ground.canopy.annotations import LEAF, BelowLeaves, LeafAngles, LeafOptics
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.prospect import Leaf
