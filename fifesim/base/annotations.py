@@ -16,10 +16,10 @@ from fifesim.base.kinds import (
     PAIR,
     PATH,
     PLAIN,
+    ROW,
     UNCHECKED,
     Kind,
     is_path,
-    is_row,
 )
 
 
@@ -76,10 +76,14 @@ Surroundings: TypeAlias = Annotated[Numbers, Kind("a reflectance, one for each b
 Pair: TypeAlias = Annotated[float | Sequence[float], PAIR]
 Interval: TypeAlias = Annotated[
     Literal["native"] | Pair,
-    Kind("'native', or metres between pixels, down and across", lambda value: isinstance(value, str) or is_row(value)),
+    Kind(
+        "'native', or metres between pixels, down and across", lambda value: isinstance(value, str) or ROW.fits(value)
+    ),
 ]
 # Of rows and of columns.
-Offset: TypeAlias = Annotated[Sequence[Numbers], Kind("two numbers, or two lists of them, such as (0.5, 0.0)", is_row)]
+Offset: TypeAlias = Annotated[
+    Sequence[Numbers], Kind("two numbers, or two lists of them, such as (0.5, 0.0)", ROW.fits)
+]
 # Cells of a chunk along each side, by dimension, "auto", or a size such as "64MB".
 Chunks: TypeAlias = Annotated[Mapping[str, int] | int | str, CHUNKS]
 # How the pixels of two rasters pair.

@@ -9,38 +9,25 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 
-from fifesim.base.kinds import (
-    FLAG,
-    FUNCTION,
-    GRID,
-    MAPPING,
-    NUMBER,
-    RASTER,
-    TEXT,
-    TWO,
-    UNCHECKED,
-    Kind,
-    described,
-    is_a,
-    is_row,
-)
+from fifesim.base import kinds
+from fifesim.base.kinds import Kind, described, is_a
 from fifesim.base.spelling import unknown_argument
 
 # Kinds of types. Classes of slow libraries are found by name; `Annotated` states any other kind.
 _KINDS = {
-    bool: FLAG,
-    int: NUMBER,
-    float: NUMBER,
-    str: TEXT,
-    tuple[float, float]: TWO,
-    Sequence: Kind("a list", lambda value: is_row(value) and np.iterable(value) and not isinstance(value, str)),
-    Mapping: MAPPING,
-    Callable: FUNCTION,
-    Any: UNCHECKED,
-    "DataArray": RASTER,
+    bool: kinds.FLAG,
+    int: kinds.NUMBER,
+    float: kinds.NUMBER,
+    str: kinds.TEXT,
+    tuple[float, float]: kinds.TWO,
+    Sequence: kinds.LISTED,
+    Mapping: kinds.MAPPING,
+    Callable: kinds.FUNCTION,
+    Any: kinds.UNCHECKED,
+    "DataArray": kinds.RASTER,
     "Dataset": Kind("an xarray.Dataset", lambda value: is_a(value, "Dataset")),
     "DataTree": Kind("an xarray.DataTree", lambda value: is_a(value, "DataTree")),
-    "GeoBox": GRID,
+    "GeoBox": kinds.GRID,
 }
 
 # What to type for values that are no real numbers, by the kind of their dtype.
@@ -95,35 +82,26 @@ def kind_of(annotation):
     return Kind(words, lambda value: isinstance(value, annotation))
 
 
-def _named(type_, kinds):
-    """The last of the kinds of a type; where it has no test, an earlier one has, or the type decides."""
-    *others, kind = kinds or [kind_of(type_)]
+def _named(type_, stated):
+    """The last of the kinds stated for a type, with the test of an earlier one or of the type where it has none."""
+    *others, kind = stated or [kind_of(type_)]
     return kind if kind.fits else kind._replace(fits=_named(type_, others).fits)
 
 
-def _either(kinds):
-    if len(kinds) == 1:
-        return kinds[0]
-    *others, last = [kind.words for kind in kinds]
-    numbers = None if any(kind.numbers is None for kind in kinds) else "".join({kind.numbers for kind in kinds})
-    return Kind(f"{', '.join(others)}, or {last}", lambda value: any(kind.fits(value) for kind in kinds), None, numbers)
+def _either(parts):
+    """The union of kinds."""
+    if len(parts) == 1:
+        return parts[0]
+    *others, last = [kind.words for kind in parts]
+    numbers = None if any(kind.numbers is None for kind in parts) else "".join(kind.numbers for kind in parts)
+    return Kind(f"{', '.join(others)}, or {last}", lambda value: any(kind.fits(value) for kind in parts), None, numbers)
 
 
 @cache
-def kinds_of(described):
-    """
-    Kinds of the annotated arguments of a function, or of the fields of a class.
-
-    Parameters
-    ----------
-    described : callable or type
-
-    Returns
-    -------
-    kinds : dict of str to Kind
-    """
-    hints = get_type_hints(described, include_extras=True)
-    names = [each.name for each in fields(described)] if is_dataclass(described) else [*hints]
+def _kinds_of(annotated):
+    """Kinds of the arguments of a function, or of the fields of a dataclass, by name."""
+    hints = get_type_hints(annotated, include_extras=True)
+    names = [each.name for each in fields(annotated)] if is_dataclass(annotated) else [*hints]
     return {name: kind_of(hints[name]) for name in names if name != "return"}
 
 
@@ -146,12 +124,18 @@ def check(name, value, kind):
 
     Examples
     --------
-    >>> check("hotspot", 0.1, NUMBER)
+    >>> check("hotspot", 0.1, kinds.NUMBER)
     """
     if not kind.fits(value):
         raise TypeError(f"{name} must be {kind.words}, got {described(value)}{_cure(value, kind)}")
-    if kind.dimensions is not None:
-        _check_cells(name, value, kind.dimensions)
+    if kind.dimensions is None or not is_a(value, "DataArray"):
+        return
+    if value.ndim < kind.dimensions:
+        dims = ", ".join(map(str, value.dims))
+        raise ValueError(f"{name} must have dimensions y and x, got ({dims}): select with .isel(x=[0]), not .isel(x=0)")
+    if not value.size:
+        sizes = ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items())
+        raise ValueError(f"{name} has no cells, its sizes are {sizes}: does the window that was cut out overlap it?")
 
 
 def checked(function):
@@ -177,12 +161,12 @@ def checked(function):
         except TypeError as error:
             wrong = unknown_argument(function.__name__, signature, options)
             raise TypeError(wrong or f"{function.__name__}: {error}") from None
-        kinds = kinds_of(function)
-        for name, kind in kinds.items():
-            if name in given and given[name] is not signature.parameters[name].default:
-                check(name, given[name], kind)
+        expected = _kinds_of(function)
         for name, value in given.items():
-            _check_numbers(name, value, kinds.get(name, UNCHECKED).numbers)
+            if value is not signature.parameters[name].default:
+                check(name, value, expected[name])
+        for name, value in given.items():
+            _check_numbers(name, value, expected[name].numbers)
         return function(*args, **options)
 
     return checking
@@ -204,23 +188,11 @@ def check_fields(description, *names):
     TypeError
         If a value is of another kind.
     """
-    kinds = kinds_of(type(description))
-    for name in names or kinds:
+    expected = _kinds_of(type(description))
+    for name in names or expected:
         value = getattr(description, name)
         if value is not type(description).__dataclass_fields__[name].default:
-            check(name, value, kinds[name])
-
-
-def _check_cells(name, raster, dimensions):
-    """Raise ValueError if a raster has no cells, or too few dimensions."""
-    if not is_a(raster, "DataArray"):
-        return
-    if raster.ndim < dimensions:
-        dims = ", ".join(map(str, raster.dims))
-        raise ValueError(f"{name} must have dimensions y and x, got ({dims}): select with .isel(x=[0]), not .isel(x=0)")
-    if not raster.size:
-        sizes = ", ".join(f"{dim}: {size}" for dim, size in raster.sizes.items())
-        raise ValueError(f"{name} has no cells, its sizes are {sizes}: does the window that was cut out overlap it?")
+            check(name, value, expected[name])
 
 
 def _check_numbers(name, value, allowed):
@@ -234,7 +206,9 @@ def _check_numbers(name, value, allowed):
 
 
 def _rasters(value):
-    """Rasters in an argument: itself, or those in a Dataset, a mapping, a pair or a dataclass."""
+    """Rasters in an argument: itself, or those in a Dataset, a mapping, a pair or a description."""
+    if value is None or isinstance(value, str | int | float):
+        return []
     if is_a(value, "DataArray"):
         return [value]
     if is_a(value, "Dataset"):
@@ -244,7 +218,9 @@ def _rasters(value):
     elif isinstance(value, list | tuple) and len(value) == 2:
         parts = value
     else:
-        parts = [getattr(value, each.name) for each in fields(value)] if is_dataclass(type(value)) else ()
+        # Classes of pydantic have checked their fields.
+        plain = is_dataclass(type(value)) and not hasattr(value, "__pydantic_validator__")
+        parts = [getattr(value, each.name) for each in fields(value)] if plain else ()
     return [raster for part in parts for raster in _rasters(part)]
 
 
@@ -261,8 +237,8 @@ def _cure(value, kind):
         return ": take one of its arrays, such as tree['10m/dn']"
     if takes_raster and isinstance(value, str):
         return ": open it with fifesim.open_image, rioxarray.open_rasterio, or onto a grid with fine_dem or open_lai"
-    if kind is NUMBER and is_a(value, "DataArray", "ndarray"):
+    if kind is kinds.NUMBER and is_a(value, "DataArray", "ndarray"):
         return ", where one is for all cells"
-    if kind is GRID and is_a(value, "DataArray"):
+    if kind is kinds.GRID and is_a(value, "DataArray"):
         return ": type raster.odc.geobox"
     return ""

@@ -9,24 +9,13 @@ import numpy as np
 
 
 class Kind(NamedTuple):
-    """
-    Set of values that an argument may have.
-
-    Parameters
-    ----------
-    words : str
-        Its name in messages.
-    fits : callable, optional
-        Function of a value: whether it belongs to the set. By default the type that is annotated decides.
-    dimensions : int, optional
-        Smallest number of dimensions of a raster, which must have cells; by default neither is checked.
-    numbers : str or None, optional
-        Kinds of numpy's dtypes that rasters in the value may have; None for any.
-    """
+    """Set of values that an argument may have, by its words in messages and a test, which the type gives by default."""
 
     words: str
     fits: Callable | None = None
+    # Smallest number of dimensions of a raster, which then must have cells.
     dimensions: int | None = None
+    # Kinds of numpy's dtypes that rasters in the value may have; None for any.
     numbers: str | None = "iuf"
 
 
@@ -110,38 +99,16 @@ def _are_two(value):
     return isinstance(value, list | tuple | np.ndarray) and getattr(value, "ndim", 1) > 0 and len(value) == 2
 
 
-def is_plain(value):
-    """
-    Whether a value is neither None nor an array or raster.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    answer : bool
-    """
+def _is_plain(value):
     return value is not None and not is_a(value, "Dataset", "DataTree", "ndarray", "DataArray", "Array")
 
 
-def is_row(value):
-    """
-    Whether a value is plain or a numpy array with one dimension.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    answer : bool
-    """
-    return is_plain(value) or (isinstance(value, np.ndarray) and value.ndim == 1)
+def _is_row(value):
+    return _is_plain(value) or (isinstance(value, np.ndarray) and value.ndim == 1)
 
 
 def _is_mapping(value):
-    return is_plain(value) and isinstance(value, Mapping)
+    return _is_plain(value) and isinstance(value, Mapping)
 
 
 def is_path(value):
@@ -168,9 +135,11 @@ NUMBERS = Kind("a number, or an array of them", _are_numbers)
 PAIR = Kind("a number, or two: down and across", _is_pair)
 LIST = Kind("a number, or a list of them", lambda value: _are_numbers(value) and np.ndim(value) < 2)
 TWO = Kind("two numbers, such as (0.5, 2.0)", _are_two)
+ROW = Kind("a name, a mapping, a description, or an array with one dimension", _is_row)
+LISTED = Kind("a list", lambda value: _is_row(value) and np.iterable(value) and not isinstance(value, str))
 FLAG = Kind("True or False", lambda value: isinstance(value, bool | np.bool_))
 TEXT = Kind("a name", lambda value: isinstance(value, str))
-NAMES = Kind("a list of names", lambda value: isinstance(value, str) or (is_plain(value) and np.iterable(value)))
+NAMES = Kind("a list of names", lambda value: isinstance(value, str) or (_is_plain(value) and np.iterable(value)))
 PATH = Kind("the path of a file", is_path)
 MAPPING = Kind("a mapping of names", _is_mapping)
 FUNCTION = Kind("a function", callable)
@@ -184,7 +153,7 @@ RASTER = Kind("an xarray.DataArray over (y, x)", lambda value: is_a(value, "Data
 GRID = Kind(
     "an odc.geo.geobox.GeoBox, such as fifesim.grid_at or raster.odc.geobox give", lambda value: is_a(value, "GeoBox")
 )
-PLAIN = Kind("a name, a mapping or a description, and no raster", is_plain)
+PLAIN = Kind("a name, a mapping or a description, and no raster", _is_plain)
 ANYTHING = Kind("a number, a mapping, a description or a raster", lambda value: True, dimensions=0)
 # The function checks the argument, and its message names the range.
 UNCHECKED = Kind("a value", lambda value: True)

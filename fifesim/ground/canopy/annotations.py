@@ -6,7 +6,7 @@ from typing import Annotated, TypeAlias
 import numpy as np
 
 from fifesim.base.annotations import Array, FilePath, NumberOrArray
-from fifesim.base.kinds import ANYTHING, MAPPING, TWO, Kind, is_a, is_path, is_row
+from fifesim.base.kinds import ANYTHING, MAPPING, ROW, TWO, Kind, is_a, is_path
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background
 
@@ -23,7 +23,7 @@ LeafAngles: TypeAlias = Annotated[
     str | Sequence[float] | np.ndarray,
     Kind(
         "a name such as 'planophile', classes such as '30: 0.5, 60: 0.5', or a list of fractions",
-        lambda value: is_row(value) and not isinstance(value, Mapping),
+        lambda value: ROW.fits(value) and not isinstance(value, Mapping),
     ),
 ]
 # A number or raster, by band or spectrum, shares of spectra, or a file or Dataset of a spectrum.
