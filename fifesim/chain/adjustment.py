@@ -19,9 +19,10 @@ from fifesim.chain.steps import to_toa
 from fifesim.ground.canopy.library import library_spectra
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions, Image, RasterOrDataset
+from fifesim.rasters.annotations import Image, RasterOrDataset
 from fifesim.rasters.combination import combined
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument

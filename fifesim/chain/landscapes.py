@@ -27,9 +27,10 @@ from fifesim.ground.landscape.rasters.cover import classes_of
 from fifesim.ground.landscape.rasters.evaluation import by_class
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import MASKS_TOO, Directions, NumberOrRaster, Raster, RasterOrDataset
+from fifesim.rasters.annotations import MASKS_TOO, NumberOrRaster, Raster, RasterOrDataset
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 
 _DEFAULTS = {"leaf_optics": None, "background": None, "leaf_angles": "spherical", "hotspot": 0.0}
 _DEFAULTS |= {"brown": 0.0, "dissociation": 0.0, "brown_leaf": None, "crown_cover": 1.0, "crown_shape": SHAPE}

@@ -13,7 +13,8 @@ from fifesim.base.foreign import in_a_line
 from fifesim.chain import steps
 from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
 from fifesim.ground.canopy.crowns import SHAPE
-from fifesim.rasters.annotations import Directions, Horizon, NumberOrRaster
+from fifesim.rasters.annotations import Horizon, NumberOrRaster
+from fifesim.rasters.directions import Directions
 from fifesim.sensor import raster as sensor
 from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.response.noise import NoiseModels

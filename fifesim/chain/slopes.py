@@ -11,8 +11,9 @@ from fifesim.chain.carried import air_bands_and_geometry, as_bands_of
 from fifesim.ground.terrain.rasters import lit_slopes
 from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.rasters import directions
-from fifesim.rasters.annotations import Directions, Horizon
+from fifesim.rasters.annotations import Horizon
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.sensor.description.annotations import InstrumentLike
 
 

@@ -18,9 +18,10 @@ from fifesim.ground.canopy.crowns import SHAPE
 from fifesim.ground.canopy.rasters import soils
 from fifesim.ground.terrain.rasters import lit_slopes
 from fifesim.rasters import directions
-from fifesim.rasters.annotations import Directions, Horizon, NumberOrRaster, RasterOrDataset
+from fifesim.rasters.annotations import Horizon, NumberOrRaster, RasterOrDataset
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.rasters.sites import is_fife
 from fifesim.rasters.sun import check_same_sun
 from fifesim.sensor.description.annotations import InstrumentLike

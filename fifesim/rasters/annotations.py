@@ -1,12 +1,10 @@
-"""Types of arguments that hold rasters, each with the kind that is checked."""
+"""Types of arguments that hold rasters, each with the kind that is checked; imports nothing slow."""
 
 from typing import Annotated, Any, TypeAlias, TypeVar
 
 import xarray as xr
-from odc.geo.crs import MaybeCRS
 
 from fifesim.base.annotations import FilePath
-from fifesim.base.geometry import Geometry
 from fifesim.base.kinds import RASTER, Kind
 
 RASTER_OR_DATASET = Kind("an xarray.DataArray or an xarray.Dataset", dimensions=2)
@@ -28,18 +26,6 @@ Horizon: TypeAlias = Annotated[
         "an xarray.DataArray over (direction, y, x), as fifesim.horizon gives it",
         lambda value: isinstance(value, xr.DataArray) and "direction" in value.dims,
     ),
-]
-# Of sun and sensor: the same everywhere, or by cell.
-Directions: TypeAlias = Annotated[
-    Geometry | xr.Dataset,
-    Kind(
-        "a fifesim.Geometry, or an xarray.Dataset of sza, saa, vza and vaa",
-        lambda value: isinstance(value, Geometry) or (isinstance(value, xr.Dataset) and "sza" in value.variables),
-    ),
-]
-CRSLike: TypeAlias = Annotated[
-    MaybeCRS,
-    Kind("a CRS, such as 'EPSG:26914'", lambda value: isinstance(value, str | int) or hasattr(value, "to_wkt")),
 ]
 # Of bands of several resolutions it is an xarray.DataTree, which a type checker does not ask after.
 Image: TypeAlias = xr.DataArray | Any

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Annotated, TypeAlias
 
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
 import rioxarray  # noqa: F401  registers .rio
 import xarray as xr
 from affine import Affine
+from odc.geo.crs import MaybeCRS
 from odc.geo.geobox import GeoBox
 
 from fifesim.base.annotations import Pair
+from fifesim.base.kinds import Kind
 from fifesim.base.lattice import whole_cells
 from fifesim.rasters import projection
-from fifesim.rasters.annotations import CRSLike
 from fifesim.rasters.axes import check_axes
 from fifesim.rasters.carried_grid import centres_of, on_lattice
 from fifesim.rasters.references import reference_of
 from fifesim.rasters.spacing import along_axis, exact_cell
 
 _LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
+
+CRSLike: TypeAlias = Annotated[
+    MaybeCRS,
+    Kind("a CRS, such as 'EPSG:26914'", lambda value: isinstance(value, str | int) or hasattr(value, "to_wkt")),
+]
 
 
 def grid_at(crs: CRSLike, west: float, north: float, width: float, height: float, cell: Pair) -> GeoBox:

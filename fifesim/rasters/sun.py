@@ -9,10 +9,11 @@ from fifesim.base import geometry
 from fifesim.base.annotations import Numbers, Times
 from fifesim.base.kinds import described
 from fifesim.rasters import cf
-from fifesim.rasters.annotations import Directions
 
 
-def sun_position(time: Times, latitude: Numbers, longitude: Numbers, altitude: Numbers = 0.0) -> Directions:
+def sun_position(
+    time: Times, latitude: Numbers, longitude: Numbers, altitude: Numbers = 0.0
+) -> geometry.Geometry | xr.Dataset:
     """
     Sun at a time and place, or at many.
 

@@ -12,8 +12,9 @@ from fifesim.base.annotations import Interval, Noise, Offset, Time, WholeNumber
 from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf, chunks, directions, swaths
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions, Image, RasterOrDataset
+from fifesim.rasters.annotations import Image, RasterOrDataset
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.rasters.own_rasters import HIGHEST, LOWEST, SAMPLED_ROWS, incoming
 from fifesim.rasters.sun import check_same_sun
 from fifesim.rasters.windows import held

@@ -29,7 +29,8 @@ from fifesim.ground.landscape.rasters.drawn import drawn_fields
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions, FileOrRaster
+from fifesim.rasters.annotations import FileOrRaster
+from fifesim.rasters.directions import Directions
 from fifesim.rasters.packed import unpacked
 from fifesim.rasters.sites import is_fife, made_on_site
 from fifesim.rasters.warp import file_onto_grid, raster_onto_grid

@@ -13,7 +13,8 @@ from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid
 from fifesim.ground.terrain.rasters.lit_slopes import on_slopes
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions, Horizon
+from fifesim.rasters.annotations import Horizon
+from fifesim.rasters.directions import Directions
 
 
 def sky_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataArray:

@@ -13,9 +13,9 @@ from fifesim.base.digital_numbers import counts
 from fifesim.base.kinds import UNCHECKED
 from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of

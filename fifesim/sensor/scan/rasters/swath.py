@@ -12,8 +12,8 @@ import xarray as xr
 from fifesim.base.annotations import Noise, Time, WholeNumber
 from fifesim.rasters import cf, chunks, directions, projection
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled
 from fifesim.sensor.response.noise import NoiseModels
