@@ -64,7 +64,7 @@ Names: TypeAlias = Annotated[str | Sequence[str], NAMES]
 Noise: TypeAlias = Annotated[
     Names, Kind("a list of kinds of noise, such as ['shot', 'thermal'], 'all', or () for none")
 ]
-# A whole number of a range that the function states in its own message.
+# The function checks the number, and its message states the range.
 WholeNumber: TypeAlias = Annotated[int, UNCHECKED]
 Metres: TypeAlias = Annotated[float, Kind("a size in metres, such as 30.0")]
 Numbers: TypeAlias = Annotated[float | Sequence[float] | Array, NUMBERS]
@@ -75,12 +75,9 @@ Surroundings: TypeAlias = Annotated[Numbers, Kind("a reflectance, one for each b
 # One number, or two: down and across.
 Pair: TypeAlias = Annotated[float | Sequence[float], PAIR]
 Interval: TypeAlias = Annotated[
-    Literal["native"] | Pair,
-    Kind(
-        "'native', or metres between pixels, down and across", lambda value: isinstance(value, str) or ROW.fits(value)
-    ),
+    Literal["native"] | Pair, Kind("'native', or metres between pixels, down and across", ROW.fits)
 ]
-# Of rows and of columns.
+# Along rows and along columns.
 Offset: TypeAlias = Annotated[
     Sequence[Numbers], Kind("two numbers, or two lists of them, such as (0.5, 0.0)", ROW.fits)
 ]

@@ -30,7 +30,7 @@ _KINDS = {
     "GeoBox": kinds.GRID,
 }
 
-# What to type for values that are no real numbers, by the kind of their dtype.
+# Remedies for values that are not real numbers, by the kind of their dtype.
 _NOT_REAL = {
     "b": "a mask, type .astype(float) if 0 and 1 are its values",
     "c": "complex numbers, type .real or abs(...)",
@@ -225,7 +225,7 @@ def _rasters(value):
 
 
 def _cure(value, kind):
-    """What to type instead, where that can be told."""
+    """Remedy for a value of another kind; empty if none is known."""
     takes_raster = "xarray.DataArray" in kind.words
     if takes_raster and is_a(value, "MaskedArray"):
         return ": xarray.DataArray(values.filled(numpy.nan), dims=('y', 'x'), coords=...) with a CRS has a place"

@@ -27,5 +27,5 @@ Horizon: TypeAlias = Annotated[
         lambda value: isinstance(value, xr.DataArray) and "direction" in value.dims,
     ),
 ]
-# Of bands of several resolutions it is an xarray.DataTree, which a type checker does not ask after.
+# An image with several resolutions is an xarray.DataTree; Any keeps type checkers from requiring a test for it.
 Image: TypeAlias = xr.DataArray | Any

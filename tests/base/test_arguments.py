@@ -403,3 +403,14 @@ def test_methods_take_the_containers_that_they_are_methods_of(lai):
         if public.methods_of:
             taken = {each for each, value in values.items() if kind_of(first[name]).fits(value)}
             assert taken == set(public.methods_of), name
+
+
+def test_a_class_names_the_function_that_gives_its_objects(lai):
+    with pytest.raises(
+        TypeError, match=r"^scenario must be a fifesim\.Scenario, as fifesim\.read_scenario gives it, got 5$"
+    ):
+        fifesim.simulate(5)
+    with pytest.raises(TypeError, match=r"^fit must be a fifesim\.Regression, as fifesim\.regress gives it, got 5$"):
+        fifesim.invert(lai, 5)
+    with pytest.raises(TypeError, match=r"^setup must be a fifesim\.Setup, got 5$"):
+        fifesim.compare(lai, ["TM"], 5)
