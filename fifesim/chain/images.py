@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import xarray as xr
 
 from fifesim.analysis.rasters import indices
+from fifesim.base.kinds import UNCHECKED
 from fifesim.rasters import cf
+from fifesim.rasters.annotations import RasterOrDataset
 from fifesim.rasters.dates import by_date
 from fifesim.rasters.own_rasters import incoming
 from fifesim.sensor import raster as sensor
@@ -15,7 +17,7 @@ from fifesim.sensor.response.rasters.matching import check_wavelengths
 
 
 @by_date
-def ndvi(image: xr.DataArray) -> xr.DataArray:
+def ndvi(image: RasterOrDataset) -> xr.DataArray:
     """
     Normalized difference vegetation index, from planetary reflectance as in the paper (Results).
 
@@ -54,7 +56,8 @@ def ndvi(image: xr.DataArray) -> xr.DataArray:
 
 @by_date
 def index(
-    image: xr.DataArray, name: Literal["NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"]
+    image: xr.DataArray,
+    name: Annotated[Literal["NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"], UNCHECKED],
 ) -> xr.DataArray:
     """
     Spectral index of an image.

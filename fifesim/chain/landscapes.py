@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters import means
-from fifesim.base.annotations import Time
-from fifesim.base.line_spread import LineSpread
+from fifesim.base.annotations import Metres, Time
+from fifesim.base.line_spread import Spread
 from fifesim.chain.stands import stands_of
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy import raster as ground
@@ -26,9 +26,10 @@ from fifesim.ground.landscape.rasters.cover import classes_of
 from fifesim.ground.landscape.rasters.evaluation import by_class
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions, Raster
+from fifesim.rasters.annotations import MASKS_TOO, Raster, RasterOrDataset
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 
 
 class Land(NamedTuple):
@@ -176,7 +177,7 @@ def _check_used(land, canopy):
 
 @by_date
 def fpar(
-    lai: xr.DataArray | xr.Dataset,
+    lai: RasterOrDataset,
     *,
     canopy: Canopy | None = None,
     geometry: Directions | None = None,
@@ -251,7 +252,9 @@ def fpar(
     return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=land.lai, history=history)
 
 
-def aggregate(array: Raster, pixel: float = 30.0, *, min_valid: float = 0.98, lsf: LineSpread | None = None) -> Raster:
+def aggregate(
+    array: Annotated[Raster, MASKS_TOO], pixel: Metres = 30.0, *, min_valid: float = 0.98, lsf: Spread | None = None
+) -> Raster:
     """
     Means over square blocks of ground: the truth that a pixel is compared with.
 

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Literal
 
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.base.annotations import FilePath, Names, Numbers, Pair
+from fifesim.base.annotations import Interval, Names, Noise, Offset, Surroundings, WholeNumber
 from fifesim.base.foreign import in_a_line
 from fifesim.chain import steps
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
-from fifesim.rasters.annotations import Directions
+from fifesim.rasters.annotations import Horizon
+from fifesim.rasters.directions import Directions
 from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.instruments import Instrument
-from fifesim.sensor.response.noise import NoiseModel
+from fifesim.sensor.description.annotations import InstrumentLike
+from fifesim.sensor.response.noise import NoiseModels
 
 # What surface_reflectance and sense take of a setup, by the same names.
 _GROUND = ("canopy", "bands", "dem", "horizon", "upwelling", "atmosphere")
@@ -60,23 +59,23 @@ class Setup:
     ['OLI']
     """
 
-    instrument: FilePath | Instrument = "TM"
+    instrument: InstrumentLike = "TM"
     bands: Names | None = None
     atmosphere: Atmosphere | None = None
     geometry: Directions | None = None
     canopy: Canopy = TALLGRASS
     dem: xr.DataArray | None = None
-    horizon: xr.DataArray | None = None
+    horizon: Horizon | None = None
     upwelling: bool = True
     adjacency: bool = False
-    surroundings: Numbers | None = None
+    surroundings: Surroundings | None = None
     onto: GeoBox | None = None
-    interval: Literal["native"] | Pair | None = None
-    offset: Sequence[Numbers] = (0.0, 0.0)
+    interval: Interval | None = None
+    offset: Offset = (0.0, 0.0)
     min_valid: float = sensor.MIN_VALID
-    noise: Names = ()
-    noise_models: NoiseModel | Mapping[str, NoiseModel] | None = None
-    seed: int = 0
+    noise: Noise = ()
+    noise_models: NoiseModels | None = None
+    seed: WholeNumber = 0
     quantise: bool = True
 
     def __repr__(self):

@@ -6,7 +6,7 @@ import xarray as xr
 
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.base.annotations import FilePath, Names, Numbers, Time
+from fifesim.base.annotations import Names, Surroundings, Time
 from fifesim.chain import landscapes
 from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
@@ -18,25 +18,26 @@ from fifesim.ground.canopy.rasters import soils
 from fifesim.ground.canopy.rasters.evaluation import Light
 from fifesim.ground.terrain.rasters import lit_slopes
 from fifesim.rasters import directions
-from fifesim.rasters.annotations import Directions
+from fifesim.rasters.annotations import Horizon, RasterOrDataset
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.rasters.sites import is_fife
 from fifesim.rasters.sun import check_same_sun
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 
 
 @by_date
 def surface_reflectance(
-    lai: xr.DataArray | xr.Dataset,
-    instrument: FilePath | Instrument | None = None,
+    lai: RasterOrDataset,
+    instrument: InstrumentLike | None = None,
     *,
     canopy: Canopy | None = None,
     bands: Names | None = None,
     dem: xr.DataArray | None = None,
-    horizon: xr.DataArray | None = None,
+    horizon: Horizon | None = None,
     upwelling: bool = True,
     atmosphere: Atmosphere | None = None,
     geometry: Directions | None = None,
@@ -137,15 +138,15 @@ def surface_reflectance(
 
 @by_date
 def to_toa(
-    reflectance: xr.DataArray | xr.Dataset,
+    reflectance: RasterOrDataset,
     atmosphere: Atmosphere | None = None,
     *,
     geometry: Directions | None = None,
     time: Time | None = None,
-    instrument: FilePath | Instrument | None = None,
+    instrument: InstrumentLike | None = None,
     elevation: xr.DataArray | None = None,
     adjacency: bool = False,
-    surroundings: Numbers | None = None,
+    surroundings: Surroundings | None = None,
 ) -> xr.DataArray:
     """
     Apparent reflectance at the top of the atmosphere.
@@ -218,16 +219,16 @@ def to_toa(
 
 @by_date
 def to_surface(
-    reflectance: xr.DataArray | xr.Dataset,
+    reflectance: RasterOrDataset,
     atmosphere: Atmosphere | None = None,
     *,
     assume: bool = False,
     geometry: Directions | None = None,
     time: Time | None = None,
-    instrument: FilePath | Instrument | None = None,
+    instrument: InstrumentLike | None = None,
     elevation: xr.DataArray | None = None,
     adjacency: bool = False,
-    surroundings: Numbers | None = None,
+    surroundings: Surroundings | None = None,
 ) -> xr.DataArray:
     """
     Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.

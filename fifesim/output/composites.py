@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 import xarray as xr
 
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest
+from fifesim.base.kinds import NAMES, Kind
 from fifesim.rasters import chunks, swaths
 from fifesim.rasters.reductions import computed
 
@@ -20,10 +21,15 @@ _DARK, _BEYOND = 0.7, 0.1
 # Pixels along a side from which the limits of a stretch are taken.
 _SAMPLE = 1000
 
+Composite: TypeAlias = Annotated[
+    Literal["false colour", "natural colour"] | tuple[str, str, str],
+    Kind("'false colour', 'natural colour', or the names of three bands", NAMES.fits),
+]
+
 
 def rgb(
     image: xr.DataArray,
-    composite: Literal["false colour", "natural colour"] | tuple[str, str, str] = "false colour",
+    composite: Composite = "false colour",
     *,
     stretch: tuple[float, float] | None = None,
 ) -> xr.DataArray:

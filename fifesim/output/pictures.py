@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
@@ -18,7 +16,7 @@ from fifesim.base.annotations import Pairing
 from fifesim.base.scan_pixels import corners
 from fifesim.chain.comparison import recorded_images, shows_ndvi
 from fifesim.chain.images import ndvi
-from fifesim.output.composites import composite_bands, rgb, thinned, valid
+from fifesim.output.composites import Composite, composite_bands, rgb, thinned, valid
 from fifesim.output.words import long_name, short_name, subject, unit
 from fifesim.rasters import grid as grids
 from fifesim.rasters import swaths
@@ -55,7 +53,7 @@ def plot(
     raster: xr.DataArray,
     *,
     band: str | None = None,
-    composite: Literal["false colour", "natural colour"] | tuple[str, str, str] = "false colour",
+    composite: Composite = "false colour",
     stretch: tuple[float, float] | None = None,
     cmap: str | Colormap | None = None,
     limits: tuple[float, float] | None = None,

@@ -1,11 +1,13 @@
 """Directions of sun and sensor on labelled rasters: numbers, or angles that differ from cell to cell."""
 
 from dataclasses import replace
+from typing import Annotated, TypeAlias
 
 import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_position, warn_of_radians
+from fifesim.base.kinds import Kind
 from fifesim.base.times import utc
 from fifesim.base.warned import warn
 from fifesim.rasters import cf, projection, whereabouts
@@ -16,6 +18,15 @@ _GEOMETRY = (*ANGLES, "earth_sun_distance")
 
 # Ignored change of convergence: 0.3 % of the illumination of slopes of 5 degrees with the sun at 65. [degree]
 _STEADY = 1.0
+
+# Angles of sun and sensor: the same everywhere, or by cell.
+Directions: TypeAlias = Annotated[
+    Geometry | xr.Dataset,
+    Kind(
+        "a fifesim.Geometry, or an xarray.Dataset of sza, saa, vza and vaa",
+        lambda value: isinstance(value, Geometry) or (isinstance(value, xr.Dataset) and "sza" in value.variables),
+    ),
+]
 
 
 def with_geometry(array, geometry, names=_GEOMETRY):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Annotated, TypeAlias
 
 import numpy as np
 import odc.geo.xr  # noqa: F401  registers .odc
@@ -13,6 +14,7 @@ from odc.geo.crs import MaybeCRS
 from odc.geo.geobox import GeoBox
 
 from fifesim.base.annotations import Pair
+from fifesim.base.kinds import Kind
 from fifesim.base.lattice import whole_cells
 from fifesim.rasters import projection
 from fifesim.rasters.axes import check_axes
@@ -22,8 +24,13 @@ from fifesim.rasters.spacing import along_axis, exact_cell
 
 _LONGEST = 2**31 - 1  # cells along a side, as whole numbers of image files count them
 
+CRSLike: TypeAlias = Annotated[
+    MaybeCRS,
+    Kind("a CRS, such as 'EPSG:26914'", lambda value: isinstance(value, str | int) or hasattr(value, "to_wkt")),
+]
 
-def grid_at(crs: MaybeCRS, west: float, north: float, width: float, height: float, cell: Pair) -> GeoBox:
+
+def grid_at(crs: CRSLike, west: float, north: float, width: float, height: float, cell: Pair) -> GeoBox:
     """
     North-up grid from its corner, size and cell.
 

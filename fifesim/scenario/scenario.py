@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from odc.geo.geobox import GeoBox
 from pydantic import Field, ValidationError, model_validator
@@ -52,6 +52,8 @@ class Scenario(Keys):
     >>> scenario.ground.arp, scenario.atmosphere.visibility
     (0.24, 45.0)
     """
+
+    _in_words: ClassVar[str] = "a fifesim.Scenario, as fifesim.read_scenario gives it"
 
     ground: Ground = Ground()
     classes: dict[str, CoverStand] = Field({})

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import FilePath, Names, Numbers, Pair, Time
+from fifesim.base.annotations import Interval, Noise, Offset, Time, WholeNumber
 from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf, chunks, directions, swaths
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions, Image
+from fifesim.rasters.annotations import Image, RasterOrDataset
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.rasters.own_rasters import HIGHEST, LOWEST, SAMPLED_ROWS, incoming
 from fifesim.rasters.sun import check_same_sun
 from fifesim.rasters.windows import held
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 from fifesim.sensor.response import calibration
-from fifesim.sensor.response.noise import NoiseModel, check_kinds
+from fifesim.sensor.response.noise import NoiseModels, check_kinds
 from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.matching import matching_bands, warn_of_others
 from fifesim.sensor.response.rasters.noise import noisy
@@ -42,15 +42,15 @@ _SCALE = ("gain", "offset", "compression")
 
 @by_date
 def sense(
-    toa: xr.DataArray,
-    instrument: FilePath | Instrument | None = None,
+    toa: RasterOrDataset,
+    instrument: InstrumentLike | None = None,
     *,
     onto: GeoBox | None = None,
-    interval: Literal["native"] | Pair | None = None,
-    offset: Sequence[Numbers] = (0.0, 0.0),
-    noise: Names = (),
-    seed: int = 0,
-    noise_models: NoiseModel | Mapping[str, NoiseModel] | None = None,
+    interval: Interval | None = None,
+    offset: Offset = (0.0, 0.0),
+    noise: Noise = (),
+    seed: WholeNumber = 0,
+    noise_models: NoiseModels | None = None,
     quantise: bool = True,
     scaling: Literal["detector", "product"] = "detector",
     min_valid: float = MIN_VALID,

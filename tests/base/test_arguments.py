@@ -1,17 +1,26 @@
 """Every public function with eight kinds of wrong argument: one line that names it, and no raw message of a library."""
 
+from __future__ import annotations
+
 import inspect
 import pickle
 import traceback
 import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, Literal, get_type_hints
 
 import numpy as np
 import pytest
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
 import fifesim
 from fifesim.accessor import PUBLIC
+from fifesim.base.annotations import FilePath, Metres, Names
+from fifesim.base.arguments import check_fields, checked, kind_of
+from fifesim.base.kinds import NUMBER, Kind
 from fifesim.ground.canopy.description import PROPERTIES
 from fifesim.rasters import grid as grids
 
@@ -301,3 +310,136 @@ def test_what_a_user_typed(calls):
         with pytest.raises((TypeError, ValueError), match=message) as caught:
             call()
         assert len(str(caught.value)) <= 500
+
+
+class Sieve:
+    """A description that no table of the package names."""
+
+
+def sieved(
+    raster: xr.DataArray,
+    mesh: float,
+    sieve: Sieve | None = None,
+    *,
+    wet: bool = False,
+    pixel: Metres = 30.0,
+    times: Annotated[int, Kind("a number of shakes")] = 1,
+    names: Names = (),
+    grid: GeoBox | None = None,
+    by: Literal["size", "mass"] = "size",
+    weights: Mapping[str, float] | None = None,
+    source: FilePath | xr.Dataset = "none",
+    sizes: Sequence[float] = (),
+    each: Callable[[float], float] | None = None,
+) -> str:
+    """A public function that no table of the package names."""
+    return "done"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"raster": 5}, "raster must be an xarray.DataArray over (y, x), got 5"),
+        ({"raster": "a.tif"}, "raster must be an xarray.DataArray over (y, x), got 'a.tif': open it with"),
+        ({"mesh": "2"}, "mesh must be a number, got '2'"),
+        ({"mesh": True}, "mesh must be a number, got True"),
+        ({"mesh": None}, "mesh must be a number, got None"),
+        ({"sieve": 3}, "sieve must be a tests.Sieve, got 3"),
+        ({"wet": 1}, "wet must be True or False, got 1"),
+        ({"pixel": "30"}, "pixel must be a size in metres, such as 30.0, got '30'"),
+        ({"times": "3"}, "times must be a number of shakes, got '3'"),
+        ({"names": 5}, "names must be a list of names, got 5"),
+        ({"grid": 5}, "grid must be an odc.geo.geobox.GeoBox, such as"),
+        ({"by": 5}, "by must be a name, got 5"),
+        ({"weights": [1.0]}, "weights must be a mapping of names, got a list of 1"),
+        ({"source": 5}, "source must be the path of a file, or an xarray.Dataset, got 5"),
+        ({"sizes": 5}, "sizes must be a list, got 5"),
+        ({"each": 5}, "each must be a function, got 5"),
+        ({"meshes": 5}, "sieved has no argument 'meshes': did you mean 'mesh'?"),
+    ],
+)
+def test_a_new_function_is_checked_by_its_annotations(lai, given, message):
+    message = message.replace("tests.Sieve", f"{__name__.partition('.')[0]}.Sieve")
+    with pytest.raises(TypeError) as caught:
+        checked(sieved)(**{"raster": lai, "mesh": 2.0, **given})
+    assert str(caught.value).startswith(message)
+
+
+def test_a_new_function_checks_the_cells_of_rasters(lai):
+    with pytest.raises(TypeError, match="raster must hold real numbers, got bool"):
+        checked(sieved)(lai > 1, 2.0)
+    with pytest.raises(ValueError, match="raster has no cells"):
+        checked(sieved)(lai[:0], 2.0)
+
+
+def test_a_new_function_takes_what_its_annotations_allow(lai):
+    every = {"wet": np.bool_(True), "pixel": 5, "times": 2, "names": ["a"], "grid": lai.odc.geobox, "by": "mass"}
+    every |= {"weights": {"a": 1.0}, "source": xr.Dataset(), "sizes": np.ones(2), "each": np.sqrt}
+    assert checked(sieved)(lai, 2, Sieve(), **every) == "done"
+    # An argument may always have its default value.
+    assert checked(sieved)(lai, np.float32(2), None, weights=None, each=None) == "done"
+
+
+def test_fields_of_a_new_description_are_checked_by_their_annotations():
+    @dataclass
+    class Mesh:
+        width: Annotated[float, NUMBER]
+        wet: bool = False
+
+        def __post_init__(self):
+            check_fields(self)
+
+    assert not Mesh(2.0).wet
+    for given, message in (({"width": "2"}, "width must be a number, got '2'"), ({"wet": 1}, "wet must be True or")):
+        with pytest.raises(TypeError, match=f"^{message}"):
+            Mesh(**{"width": 2.0, **given})
+
+
+def arguments():
+    """Public functions with their parameters and annotations."""
+    for name in PUBLIC:
+        function = inspect.unwrap(getattr(fifesim, name))
+        if inspect.isfunction(function):
+            hints = get_type_hints(function, include_extras=True)
+            for parameter in inspect.signature(function).parameters:
+                yield name, parameter, hints.get(parameter)
+
+
+def test_every_argument_of_public_functions_has_an_annotation_with_a_kind():
+    breaches = []
+    for name, parameter, annotation in arguments():
+        try:
+            assert annotation is not None, "it has no annotation"
+            assert kind_of(annotation).words and callable(kind_of(annotation).fits)
+        except (AssertionError, TypeError) as error:
+            breaches.append(f"{name}({parameter}): {error}")
+    assert breaches == []
+
+
+def test_an_annotation_without_a_kind_is_an_error():
+    for annotation in (tuple[int, int, str], Annotated[tuple[int, int, str], "metres"]):
+        with pytest.raises(TypeError, match="nothing states the kind of tuple"):
+            kind_of(annotation)
+    assert kind_of(Any).fits(None)
+
+
+def test_methods_take_the_containers_that_they_are_methods_of(lai):
+    values = {"DataArray": lai, "Dataset": lai.to_dataset(name="lai"), "DataTree": xr.DataTree()}
+    first = {}
+    for name, _, annotation in arguments():
+        first.setdefault(name, annotation)
+    for name, public in PUBLIC.items():
+        if public.methods_of:
+            taken = {each for each, value in values.items() if kind_of(first[name]).fits(value)}
+            assert taken == set(public.methods_of), name
+
+
+def test_a_class_names_the_function_that_gives_its_objects(lai):
+    with pytest.raises(
+        TypeError, match=r"^scenario must be a fifesim\.Scenario, as fifesim\.read_scenario gives it, got 5$"
+    ):
+        fifesim.simulate(5)
+    with pytest.raises(TypeError, match=r"^fit must be a fifesim\.Regression, as fifesim\.regress gives it, got 5$"):
+        fifesim.invert(lai, 5)
+    with pytest.raises(TypeError, match=r"^setup must be a fifesim\.Setup, got 5$"):
+        fifesim.compare(lai, ["TM"], 5)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 
@@ -21,9 +20,9 @@ from fifesim.atmosphere.air.profiles import (
     profile_above,
 )
 from fifesim.atmosphere.air.summary import atmosphere_in_words
-from fifesim.base.annotations import Numbers
+from fifesim.base.annotations import AerosolMixture, Numbers
 from fifesim.base.arguments import check_fields
-from fifesim.base.kinds import described
+from fifesim.base.kinds import PLAIN, described
 from fifesim.base.spelling import closest
 
 ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
@@ -91,7 +90,7 @@ class Atmosphere:
     """
 
     profile: str = "midlatitude-summer"
-    aerosol: str | Mapping[str, float] | Aerosol = "continental"
+    aerosol: Annotated[AerosolMixture | Aerosol, PLAIN] = "continental"
     visibility: float | None = None
     altitude: float = 0.4
     aot: float | None = None

@@ -1,12 +1,11 @@
 """Description of a canopy: its leaves, their arrangement, and the ground below them."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any, NamedTuple, Self, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_type_hints
 
-import numpy as np
 import xarray as xr
 
-from fifesim.base.kinds import LEAF, LEAF_ANGLES, described
+from fifesim.base.arguments import check_fields
 from fifesim.base.spelling import PARTS
 from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns
@@ -100,6 +99,8 @@ class Canopy:
     ValueError: brown must be in [0, 1], got 20: it is the share of dead leaf area, not percent
     """
 
+    _in_words: ClassVar[str] = "a fifesim.Canopy, such as fifesim.Canopy(brown=0.2)"
+
     leaf_optics: Annotated[LeafOptics | None, Property(None, "optics of green leaves")] = None
     leaf_angles: Annotated[LeafAngles | None, Property("spherical", "leaf angle distribution")] = None
     hotspot: Annotated[float | None, Property(0.0, "leaf size over canopy height", "1", 0, 10)] = None
@@ -128,10 +129,12 @@ class Canopy:
         NumberOrRaster | None,
         Property(0.0, "moisture of the soil, 0 dry to 1 saturated", "1", by_cell=True, effect="soil"),
     ] = None
-    given: frozenset[str] = field(default=frozenset(), init=False)
+    given: frozenset = field(default=frozenset(), init=False)
 
     def __post_init__(self):
         object.__setattr__(self, "given", frozenset(name for name in PROPERTIES if getattr(self, name) is not None))
+        if self.given:
+            check_fields(self, *self.given)
         for name, known in PROPERTIES.items():
             if name in self.given:
                 _check(name, getattr(self, name), known)
@@ -172,9 +175,9 @@ class Canopy:
 
 
 PROPERTIES: dict[str, Property] = {
-    name: kind.__metadata__[0]
+    name: kind.__metadata__[-1]
     for name, kind in get_type_hints(Canopy, include_extras=True).items()
-    if hasattr(kind, "__metadata__")
+    if hasattr(kind, "__metadata__") and isinstance(kind.__metadata__[-1], Property)
 }
 """Properties of the canopy by the names of the fields of `Canopy`."""
 
@@ -196,15 +199,11 @@ def is_raster(value):
 
 
 def _check(name, value, known):
-    """Raise ValueError or TypeError if a field cannot have a value."""
+    """Raise ValueError if a field cannot have a value of its kind."""
     if name == "leaf_angles":
-        if not LEAF_ANGLES.fits(value):
-            raise TypeError(f"leaf_angles must be {LEAF_ANGLES.words}, got {described(value)}")
         leaf_angle_classes(value)
-    elif name in ("leaf_optics", "brown_leaf") and not LEAF.fits(value):
-        raise TypeError(f"{name} must be {LEAF.words}, got {described(value)}")
-    elif known.unit and not (known.by_cell and is_raster(value)):
-        check_number(name, value, known)
+    elif known.unit and not is_raster(value):
+        _check_number(name, value, known)
     elif known.unit and value.dtype.kind not in "iuf":
         raise TypeError(
             f"{name} must hold real numbers, got {value.dtype}: type .astype(float) if 0 and 1 are its values"
@@ -213,11 +212,8 @@ def _check(name, value, known):
         raise ValueError(f"{name} must be a number, or a raster over (y, x), got dimensions {value.dims}")
 
 
-def check_number(name, value, known):
-    """Raise TypeError or ValueError if a value is not a number in the range of a property."""
-    if isinstance(value, bool | str) or not np.isscalar(value):
-        raster = " or a raster over (y, x)" if known.by_cell else ""
-        raise TypeError(f"{name} must be a number{raster}, got {described(value)}")
+def _check_number(name, value, known):
+    """Raise ValueError if a number is out of the range of a property."""
     if not known.lowest <= value <= known.highest:
         percent = ", not percent" if (known.lowest, known.highest) == (0, 1) else ""
         allowed = f"[{known.lowest:g}, {known.highest:g}]"
