@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from fifesim.atmosphere.air import aerosols, mixtures, molecules
+from fifesim.atmosphere.air import ENGINES, aerosols, mixtures, molecules
 from fifesim.atmosphere.air.own_aerosol import Aerosol, known_aerosol
 from fifesim.atmosphere.air.profiles import (
     BOLTZMANN,
@@ -25,8 +25,6 @@ from fifesim.base.annotations import Numbers
 from fifesim.base.arguments import check_fields
 from fifesim.base.kinds import described
 from fifesim.base.spelling import closest
-
-ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
 _NUMBER = r"([-+.\deE]+)"
 _TEXT = re.compile(
