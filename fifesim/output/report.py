@@ -12,7 +12,7 @@ from fifesim.output.composites import false_colour_names
 from fifesim.output.figures import fit_figure, histogram_figures, reflectance_change
 from fifesim.output.maps import encoded, image_map, relief_map, stretch_of, value_map
 from fifesim.output.pairing import pairing_rows
-from fifesim.output.words import capital
+from fifesim.output.words import axis_label, capital
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.scenario.simulation import setup_of
@@ -181,9 +181,9 @@ def _terrain_maps(image, terrain, level):
     dn = image["dn"].sel(y=level["y"], x=level["x"]).compute()
     change = reflectance_change(dn, level, band)
     return [
-        relief_map(terrain["dem"], "Elevation [m], lit from the north-west"),
-        value_map(terrain["slope"], "Slope [degree], mean of the cells"),
-        value_map(terrain["kt"].sel(band=band), f"Kt in {band}, mean of the cells"),
+        relief_map(terrain["dem"], f"{capital(axis_label('dem'))}, lit from the north-west"),
+        value_map(terrain["slope"], f"{capital(axis_label('slope'))}, mean of the cells"),
+        value_map(terrain["kt"].sel(band=band), f"{_label('kt')} in {band}, mean of the cells"),
         value_map(change, f"What terrain did to the reflectance in {band}", "RdBu_r", middle=0.0),
     ]
 
