@@ -5,7 +5,7 @@ from dataclasses import asdict, fields
 
 from pydantic import field_validator, model_validator
 
-from fifesim.atmosphere.air import mixtures, models
+from fifesim.atmosphere.air import ENGINES, mixtures, models
 from fifesim.atmosphere.air.raster import read_aerosol
 from fifesim.base.foreign import shown
 from fifesim.base.spelling import nearest
@@ -182,7 +182,7 @@ class Air(AirKeys):
     @field_validator("profile", "engine")
     @classmethod
     def _known_name(cls, value, info):
-        allowed = {"profile": models.PROFILES, "engine": models.ENGINES}[info.field_name]
+        allowed = {"profile": models.PROFILES, "engine": ENGINES}[info.field_name]
         if value not in allowed:
             raise ValueError(f"must be one of {', '.join(allowed)}, got {value!r}")
         return value

@@ -8,7 +8,7 @@ from typing import Annotated, Self
 
 import numpy as np
 
-from fifesim.atmosphere.air import aerosols, mixtures, molecules
+from fifesim.atmosphere.air import ENGINES, aerosols, mixtures, molecules
 from fifesim.atmosphere.air.own_aerosol import Aerosol, known_aerosol
 from fifesim.atmosphere.air.profiles import (
     BOLTZMANN,
@@ -24,8 +24,6 @@ from fifesim.base.annotations import AerosolMixture, Numbers
 from fifesim.base.arguments import check_fields
 from fifesim.base.kinds import PLAIN, described
 from fifesim.base.spelling import closest
-
-ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
 _NUMBER = r"([-+.\deE]+)"
 _TEXT = re.compile(
