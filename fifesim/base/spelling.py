@@ -83,8 +83,9 @@ def unknown_argument(name, signature, options):
     if unknown is None:
         return ""
     for argument, (description, fields) in PARTS.items():
-        if argument in known and unknown in fields:
-            return f"{name} has no argument {unknown!r}: type {argument}={description}({unknown}=...)"
+        near = unknown if unknown in fields else "" if closest(unknown, known) else closest(unknown, fields)
+        if argument in known and near:
+            return f"{name} has no argument {unknown!r}: type {argument}={description}({near}=...)"
     return f"{name} has no argument {unknown!r}: {nearest(unknown, known)}There are {', '.join(known)}"
 
 

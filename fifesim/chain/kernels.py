@@ -14,7 +14,7 @@ from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.base.geometry import Geometry
 from fifesim.chain import landscapes
 from fifesim.chain.setup import Setup
-from fifesim.ground.canopy.description import PROPERTIES
+from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.raster import fpar_kernel
 from fifesim.ground.canopy.rasters.evaluation import Light, canopy_kernel
 from fifesim.ground.terrain.lit_slopes import slope_reflectance

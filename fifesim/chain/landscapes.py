@@ -16,8 +16,9 @@ from fifesim.base.line_spread import Spread
 from fifesim.chain.stands import stands_of
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy import raster as ground
-from fifesim.ground.canopy.description import NUMBERS, PROPERTIES, TALLGRASS, Canopy, is_raster
+from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
 from fifesim.ground.canopy.optics import DEAD_LEAF
+from fifesim.ground.canopy.properties import NUMBERS, PROPERTIES
 from fifesim.ground.canopy.rasters import leaves, soils
 from fifesim.ground.canopy.rasters.evaluation import BandCanopy
 from fifesim.ground.landscape.classes import CoverClass

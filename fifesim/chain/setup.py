@@ -9,6 +9,7 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.base.annotations import Interval, Names, Noise, Offset, Surroundings, WholeNumber
+from fifesim.base.arguments import check_fields
 from fifesim.base.foreign import in_a_line
 from fifesim.chain import steps
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
@@ -63,7 +64,7 @@ class Setup:
     bands: Names | None = None
     atmosphere: Atmosphere | None = None
     geometry: Directions | None = None
-    canopy: Canopy = TALLGRASS
+    canopy: Canopy | None = TALLGRASS
     dem: xr.DataArray | None = None
     horizon: Horizon | None = None
     upwelling: bool = True
@@ -77,6 +78,11 @@ class Setup:
     noise_models: NoiseModels | None = None
     seed: WholeNumber = 0
     quantise: bool = True
+
+    def __post_init__(self):
+        check_fields(self, "canopy")
+        if self.canopy is None:
+            object.__setattr__(self, "canopy", TALLGRASS)
 
     def __repr__(self):
         others = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "instrument"}

@@ -157,7 +157,7 @@ def _at(other, number, raster):
         if isinstance(other, dict):
             return found
         if isinstance(other, tuple | list):
-            return type(other)(found.values())
+            return type(other)._make(found.values()) if hasattr(other, "_make") else type(other)(found.values())
         # A Canopy keeps which of its fields were given.
         return other.replace(**changed) if hasattr(other, "replace") else replace(other, **changed)
     if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:

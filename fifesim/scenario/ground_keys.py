@@ -6,7 +6,7 @@ from pydantic import Field, create_model, field_validator, model_validator
 
 from fifesim.base.foreign import shown
 from fifesim.base.spelling import nearest
-from fifesim.ground.canopy.description import DRAWN, PROPERTIES
+from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 from fifesim.scenario.section import Section, file, number, seed, text
 
 COVERS = ("none", "pastures", "voronoi", "levels")

@@ -321,21 +321,7 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
 
 
 def planetary(image):
-    """
-    Planetary reflectance of an image in one pass, not yet labelled.
-
-    Parameters
-    ----------
-    image : xarray.DataArray, dims (band, y, x)
-        As in `to_reflectance`.
-
-    Returns
-    -------
-    reflectance : xarray.DataArray, dims (band, y, x)
-        With the coordinates of the image but its calibration, and no attributes. [1]
-    history : str
-        The steps taken.
-    """
+    """Planetary reflectance of an image [1], with its coordinates and without attributes, and the steps taken."""
     counts = "gain" in image.coords
     if not counts:
         cf.check_quantity(image, "toa_radiance")

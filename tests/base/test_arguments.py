@@ -21,7 +21,7 @@ from fifesim.accessor import PUBLIC
 from fifesim.base.annotations import FilePath, Metres, Names
 from fifesim.base.arguments import check_fields, checked, kind_of
 from fifesim.base.kinds import NUMBER, Kind
-from fifesim.ground.canopy.description import PROPERTIES
+from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.rasters import grid as grids
 
 PACKAGE = str(Path(fifesim.__file__).parent)

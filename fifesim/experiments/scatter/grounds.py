@@ -1,6 +1,6 @@
 """The ground of a scenario with any of what varies over it at its ideal."""
 
-from fifesim.ground.canopy.description import DRAWN
+from fifesim.ground.canopy.properties import DRAWN
 from fifesim.scenario.ground import drawn_properties, ground_scene, numbers_of_stands
 
 # In this order along the axes of what `stages.pixels` gives.

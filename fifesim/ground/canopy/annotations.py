@@ -6,7 +6,7 @@ from typing import Annotated, TypeAlias
 import numpy as np
 
 from fifesim.base.annotations import Array, FilePath, NumberOrArray
-from fifesim.base.kinds import ANYTHING, MAPPING, ROW, TWO, Kind, is_a, is_path
+from fifesim.base.kinds import ANYTHING, MAPPING, NUMBER, RASTER, ROW, TWO, Kind, is_a, is_path
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background
 
@@ -28,3 +28,12 @@ LeafAngles: TypeAlias = Annotated[
 ]
 # A number or raster, by band or spectrum, shares of spectra, or a file or Dataset of a spectrum.
 BelowLeaves: TypeAlias = Annotated[float | Array | Background | Mapping | FilePath, ANYTHING]
+# A number, or a raster over (y, x).
+NumberByCell: TypeAlias = Annotated[
+    float | Array,
+    Kind(
+        f"{NUMBER.words}, or {RASTER.words}",
+        lambda value: RASTER.fits(value) or (NUMBER.fits(value) and not isinstance(value, np.complexfloating)),
+        RASTER.dimensions,
+    ),
+]

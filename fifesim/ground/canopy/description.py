@@ -1,34 +1,18 @@
 """Description of a canopy: its leaves, their arrangement, and the ground below them."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_type_hints
-
-import xarray as xr
+from typing import Any, ClassVar, Self
 
 from fifesim.base.arguments import check_fields
+from fifesim.base.kinds import described, is_a
 from fifesim.base.spelling import PARTS
-from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
-from fifesim.ground.canopy.crowns import SHAPE, check_crowns
+from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics, NumberByCell
+from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.rasters.annotations import NumberOrRaster
+from fifesim.ground.canopy.properties import PROPERTIES
 
 # Below it the hot spot is narrower than the sun. [1]
 LEAST_HOTSPOT = 1e-6
-
-
-class Property(NamedTuple):
-    """A property of the canopy."""
-
-    default: Any
-    meaning: str
-    unit: str = ""
-    """Empty for a property that is not a number."""
-    lowest: float = 0.0
-    highest: float = 1.0
-    by_cell: bool = False
-    """Whether it may be a raster over (y, x)."""
-    effect: str = ""
-    """Name of its variation in a budget; a property with an effect may be a random field."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,34 +85,17 @@ class Canopy:
 
     _in_words: ClassVar[str] = "a fifesim.Canopy, such as fifesim.Canopy(brown=0.2)"
 
-    leaf_optics: Annotated[LeafOptics | None, Property(None, "optics of green leaves")] = None
-    leaf_angles: Annotated[LeafAngles | None, Property("spherical", "leaf angle distribution")] = None
-    hotspot: Annotated[float | None, Property(0.0, "leaf size over canopy height", "1", 0, 10)] = None
-    brown: Annotated[
-        NumberOrRaster | None, Property(0.0, "share of dead leaf area", "1", by_cell=True, effect="dead leaves")
-    ] = None
-    dissociation: Annotated[
-        NumberOrRaster | None,
-        Property(0.0, "position of dead leaves: 0 among the green ones, 1 below them", "1", by_cell=True),
-    ] = None
-    brown_leaf: Annotated[LeafOptics | None, Property(None, "optics of dead leaves")] = None
-    crown_cover: Annotated[
-        NumberOrRaster | None, Property(1.0, "share of the ground below crowns", "1", by_cell=True, effect="clumping")
-    ] = None
-    crown_shape: Annotated[
-        float | None, Property(SHAPE, "crown diameter over the height of its middle", "1", 0, 10)
-    ] = None
-    background: Annotated[BelowLeaves | None, Property(None, "reflectance below the canopy")] = None
-    soil: Annotated[
-        NumberOrRaster | None,
-        Property(
-            0.0, "change of soil reflectance at 0.55 um along the soil line", "1", -1, by_cell=True, effect="soil"
-        ),
-    ] = None
-    moisture: Annotated[
-        NumberOrRaster | None,
-        Property(0.0, "moisture of the soil, 0 dry to 1 saturated", "1", by_cell=True, effect="soil"),
-    ] = None
+    leaf_optics: LeafOptics | None = None
+    leaf_angles: LeafAngles | None = None
+    hotspot: float | None = None
+    brown: NumberByCell | None = None
+    dissociation: NumberByCell | None = None
+    brown_leaf: LeafOptics | None = None
+    crown_cover: NumberByCell | None = None
+    crown_shape: float | None = None
+    background: BelowLeaves | None = None
+    soil: NumberByCell | None = None
+    moisture: NumberByCell | None = None
     given: frozenset = field(default=frozenset(), init=False)
 
     def __post_init__(self):
@@ -160,32 +127,41 @@ class Canopy:
         """
         return type(self)(**{name: getattr(self, name) for name in self.given} | changes)
 
-    def over(self, other):
-        """This canopy, with the fields that were not given taken from another one."""
+    def over(self, other: "Canopy") -> "Canopy":
+        """
+        This canopy, with the fields that were not given taken from another one.
+
+        Parameters
+        ----------
+        other : Canopy
+
+        Returns
+        -------
+        canopy : Canopy
+        """
         return other.replace(**{name: getattr(self, name) for name in self.given})
 
-    def varying(self):
-        """Names of the properties that are rasters over (y, x)."""
-        return [name for name, each in PROPERTIES.items() if each.by_cell and is_raster(getattr(self, name))]
+    def check_lai(self, largest: float) -> None:
+        """
+        Check that the crowns can hold the leaves of the ground.
 
-    def check_lai(self, largest):
-        """Raise ValueError if crowns cannot hold a leaf area index of the ground [m2 m-2]."""
-        if not is_raster(self.crown_cover):
+        Parameters
+        ----------
+        largest : float
+            Largest leaf area index of the ground. [m2 m-2]
+
+        Raises
+        ------
+        ValueError
+            If the leaf area index within the crowns would exceed the largest that SAIL is evaluated for.
+        """
+        if is_raster(self.crown_cover):
+            return
+        try:
             check_crowns(largest, self.crown_cover)
+        except ValueError as error:
+            raise ValueError(f"crown_cover = {self.crown_cover:g}: {error}") from None
 
-
-PROPERTIES: dict[str, Property] = {
-    name: kind.__metadata__[-1]
-    for name, kind in get_type_hints(Canopy, include_extras=True).items()
-    if hasattr(kind, "__metadata__") and isinstance(kind.__metadata__[-1], Property)
-}
-"""Properties of the canopy by the names of the fields of `Canopy`."""
-
-NUMBERS = {name: each for name, each in PROPERTIES.items() if each.unit}
-"""Properties that are numbers."""
-
-DRAWN = {name: each for name, each in PROPERTIES.items() if each.effect}
-"""Properties that may be random fields of a landscape."""
 
 PARTS["canopy"] = "fifesim.Canopy", tuple(PROPERTIES)
 
@@ -195,7 +171,7 @@ TALLGRASS = Canopy()
 
 def is_raster(value):
     """Whether a value of a field is a raster."""
-    return isinstance(value, xr.DataArray)
+    return is_a(value, "DataArray")
 
 
 def _check(name, value, known):
@@ -203,7 +179,12 @@ def _check(name, value, known):
     if name == "leaf_angles":
         leaf_angle_classes(value)
     elif known.unit and not is_raster(value):
-        _check_number(name, value, known)
+        if not known.lowest <= value <= known.highest:
+            percent = ", not percent" if known.meaning.startswith("share") else ""
+            allowed = f"[{known.lowest:g}, {known.highest:g}]"
+            raise ValueError(f"{name} must be in {allowed}, got {value:g}: it is the {known.meaning}{percent}")
+        if name == "hotspot" and 0 < value < LEAST_HOTSPOT:
+            raise ValueError(f"hotspot must be 0, for no hot spot, or at least {LEAST_HOTSPOT:g}, got {value:g}")
     elif known.unit and value.dtype.kind not in "iuf":
         raise TypeError(
             f"{name} must hold real numbers, got {value.dtype}: type .astype(float) if 0 and 1 are its values"
@@ -212,18 +193,6 @@ def _check(name, value, known):
         raise ValueError(f"{name} must be a number, or a raster over (y, x), got dimensions {value.dims}")
 
 
-def _check_number(name, value, known):
-    """Raise ValueError if a number is out of the range of a property."""
-    if not known.lowest <= value <= known.highest:
-        percent = ", not percent" if (known.lowest, known.highest) == (0, 1) else ""
-        allowed = f"[{known.lowest:g}, {known.highest:g}]"
-        raise ValueError(f"{name} must be in {allowed}, got {value:g}: it is the {known.meaning}{percent}")
-    if name == "hotspot" and 0 < value < LEAST_HOTSPOT:
-        raise ValueError(f"hotspot must be 0, for no hot spot, or at least {LEAST_HOTSPOT:g}, got {value:g}")
-
-
 def _brief(value):
     """A value of a field in a few words."""
-    if isinstance(value, xr.DataArray | xr.Dataset):
-        return f"<{type(value).__name__} of {' x '.join(f'{name} {size}' for name, size in value.sizes.items())}>"
-    return repr(value)
+    return f"<{described(value)}>" if is_a(value, "DataArray", "Dataset") else repr(value)

@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 from scipy import stats
 
-from fifesim.ground.canopy.description import PROPERTIES, TALLGRASS, Canopy
+from fifesim.ground.canopy.description import TALLGRASS, Canopy
+from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background
 from fifesim.ground.canopy.spectrum import Spectrum

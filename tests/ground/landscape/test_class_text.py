@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fifesim.ground.canopy.description import PROPERTIES, Canopy
+from fifesim.ground.canopy.description import Canopy
+from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background
 from fifesim.ground.canopy.spectrum import Spectrum

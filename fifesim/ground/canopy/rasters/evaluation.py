@@ -7,8 +7,9 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import Geometry, relative_azimuth
-from fifesim.ground.canopy.description import NUMBERS, Canopy, is_raster
+from fifesim.ground.canopy.description import Canopy, is_raster
 from fifesim.ground.canopy.leaf_area import check_map
+from fifesim.ground.canopy.properties import NUMBERS
 from fifesim.ground.canopy.reflectance_table import (
     Scene,
     directional_reflectance,
