@@ -86,3 +86,22 @@ def test_table_of_the_hot_spot_is_that_of_its_picture():
     for name, there in rows.items():
         (printed,) = re.findall(rf"^\| {name} \| ([\d.]+) %", page, re.MULTILINE)
         assert f"{abs(percent[there]).max():.1f}" == printed
+
+
+def test_unknown_terms_of_an_instrument_are_hatched(drawn):
+    """A number or hatching in each cell, and a total only where every term has a number."""
+    names = drawn("answers/plot_3_instruments", [0])
+    instruments, columns = names["names"], names["columns"]
+    assert [text.get_text() for text in names["figure"].legends[0].get_texts()] == [
+        "Hatched cells are unknown, not zero."
+    ]
+    for axis in names["axes"]:
+        printed = {tuple(round(at) for at in text.get_position()) for text in axis.texts}
+        hatched = {tuple(round(at + 0.5) for at in patch.get_xy()) for patch in axis.patches if patch.get_hatch()}
+        cells = {(column, row) for column in range(len(columns)) for row in range(len(instruments))}
+        assert printed | hatched == cells and not printed & hatched
+        for row, name in enumerate(instruments):
+            known = names["sizes"].set_index("instrument").loc[name, ["blur", "place", "noise"]]
+            terms = [(columns.index(stage), row) in printed for stage in ("point spread", "registration", "noise")]
+            assert terms == list(known)
+            assert ((columns.index("total"), row) in printed) == all(known)

@@ -83,9 +83,9 @@ left.legend(
 
 # %%
 # Low suns and slant views look through more air. The view zenith in the right panel has a sign; it is positive toward
-# the sun: the hot spot is at +``sza``, 45°. At negative angles the sensor looks against the light: aerosol scatters forward into the
-# view, and NDVI falls most. The closed forms of 5S keep NDVI 0.01 too high in clear air and up to 0.05 in haze against
-# the light: they miss what molecules and aerosol scatter in turn, and polarization.
+# the sun: the hot spot is at +``sza``, 45°. At negative angles the sensor looks against the light: aerosol scatters
+# forward into the view, and NDVI falls most. The closed forms of 5S keep NDVI 0.01 too high in clear air and up to 0.05
+# in haze against the light: they miss what molecules and aerosol scatter in turn, and polarization.
 #
 # What an atmosphere does, wavelength by wavelength:
 
