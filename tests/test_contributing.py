@@ -20,7 +20,7 @@ PACKAGE = "fifesim"
 # The author's own file, which the recipe of a public function cannot name.
 OWN_FILE = "fifesim/analysis/gpp.py"
 
-# Edits by recipe: a file with its text, or a file, a place in it and what takes that place. Then a check of the copy.
+# Edits by recipe: a file with its text, or a file with an old and a new passage. Then a check of the copy.
 RECIPES = {
     "leaf angle distribution": (
         [("fifesim/ground/canopy/leaf_angles.py", "_CUMULATIVE = {\n", '_CUMULATIVE = {\n    "flat": np.sin,\n')],
@@ -362,14 +362,14 @@ print(json.dumps({"package": fifesim.__file__, "failed": failed}))
 
 
 def rows():
-    """What the table says of each recipe, by its name."""
+    """Rows of the table by the name of the recipe."""
     page = (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
     table = page[page.index("| a new | goes into |") :].split("\n\n")[0]
     return dict(re.findall(r"^\| (.+?) \| (.+) \|$", table, re.MULTILINE)[1:])
 
 
 def named_files(row):
-    """Paths that a row names, from the root: those of the package are below it."""
+    """Paths that a row names, from the root of the repository."""
     roots = ("data/", "docs/", "tests/", f"{PACKAGE}/")
     names = [name for name in re.findall(r"`([^`]+)`", row) if "/" in name]
     return [name if name.startswith(roots) else f"{PACKAGE}/{name}" for name in names]
@@ -393,7 +393,7 @@ def edit(copy, path, *change):
 
 @pytest.fixture(scope="module")
 def failed(tmp_path_factory):
-    """What is wrong in a copy of the package that has all recipes, each in the files that its row names."""
+    """Errors by recipe, in a copy of the package with all recipes, each in the files that its row names."""
     copy, table = tmp_path_factory.mktemp("copy"), rows()
     for folder in (PACKAGE, "data"):
         copytree(ROOT / folder, copy / folder, ignore=ignore_patterns("make_*.py"))
@@ -424,7 +424,7 @@ def test_a_recipe_works_when_it_is_followed(failed, name):
 
 
 def test_every_recipe_that_changes_code_is_followed():
-    """Documents, tests and the STAC item have tests of their own."""
+    """Other tests cover documents, tests and the STAC item."""
     others = {"field of the STAC item", "page of the documentation", "test"}
     assert set(rows()) == set(RECIPES) | others
 
