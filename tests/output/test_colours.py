@@ -107,15 +107,13 @@ def test_land_is_the_same_in_all_pictures(lai, tmp_path):
 
 @pytest.mark.parametrize("name", ["brown", "dissociation", "crown_cover", "crown_shape", "hotspot", "soil", "moisture"])
 def test_ranges_of_canopies_are_those_of_the_verb(name, lai):
-    """A crown's shape has no largest value there."""
-    few, others = lai[:2, :2], {"brown": 0.3, "crown_cover": 0.9}
-    quantity, others = cf.QUANTITIES[name], {key: value for key, value in others.items() if key != name}
-    step = 1e-6
+    few, canopy = lai[:2, :2], fifesim.Canopy(brown=0.3, crown_cover=0.9)
+    quantity, step = cf.QUANTITIES[name], 1e-6
     for value in (quantity.lowest, quantity.highest):
-        few.fifesim.surface_reflectance("TM", bands=["TM4"], **others, **{name: float(value)})
-    for value in [quantity.lowest - step] + ([] if name == "crown_shape" else [quantity.highest + step]):
+        few.fifesim.surface_reflectance("TM", bands=["TM4"], canopy=canopy.replace(**{name: float(value)}))
+    for value in (quantity.lowest - step, quantity.highest + step):
         with pytest.raises(ValueError, match=f"{name} must be"):
-            few.fifesim.surface_reflectance("TM", bands=["TM4"], **others, **{name: value})
+            canopy.replace(**{name: value})
 
 
 @pytest.mark.parametrize("name", ["brown", "dissociation", "crown_cover", "crown_shape", "hotspot"])

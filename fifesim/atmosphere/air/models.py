@@ -120,7 +120,7 @@ class Atmosphere:
             )
         if self.engine == "6S":
             raise ValueError(
-                f"engine must be one of {', '.join(ENGINES[:3])} with an aerosol of one's own ({name}), got '6S', "
+                f"engine must be one of {', '.join(ENGINES[:-1])} with an aerosol of one's own ({name}), got '6S', "
                 "which takes no phase functions: type engine='successive-orders'"
             )
 

@@ -125,7 +125,7 @@ def test_kernel_holds_no_rasters(lai, share):
     [
         ({"soil": 5}, r"soil must be in \[-1, 1\], got 5"),
         ({"moisture": -0.2}, r"moisture must be in \[0, 1\], got -0.2"),
-        ({"soil": "bright"}, "soil must be a number or a raster over .y, x., got 'bright'"),
+        ({"soil": "bright"}, "soil must be a number, or an xarray.DataArray over .y, x., got 'bright'"),
     ],
 )
 def test_soil_that_cannot_be_is_one_line(lai, options, message):
