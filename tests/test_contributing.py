@@ -71,8 +71,7 @@ RECIPES = {
                 "\nfrom fifesim.atmosphere.schemes.bright import bright_scattering\n\n"
                 'SCATTERING = {\n    "bright": bright_scattering,\n',
             ),
-            ("fifesim/atmosphere/air/models.py", ', "6S")', ', "bright", "6S")'),
-            ("fifesim/scenario/keys.py", ', "6S")', ', "bright", "6S")'),
+            ("fifesim/atmosphere/air/__init__.py", ', "6S")', ', "bright", "6S")'),
         ],
         """
         from fifesim.atmosphere.schemes.engines import scattering
@@ -170,24 +169,21 @@ RECIPES = {
             (
                 "fifesim/rasters/cf.py",
                 "QUANTITIES = {\n",
-                'QUANTITIES = {\n    "gndvi": Quantity("1", "", "green NDVI"),\n',
+                'QUANTITIES = {\n    "gndvi": Quantity("1", "", "green NDVI", label="GNDVI", colours="YlGn"),\n',
             ),
             ("fifesim/chain/images.py", 'Literal["NDVI", ', 'Literal["GNDVI", "NDVI", '),
-            ("fifesim/output/words.py", '("ndvi", "evi",', '("gndvi", "ndvi", "evi",'),
-            ("fifesim/output/pictures.py", '"ndvi", "evi",', '"gndvi", "ndvi", "evi",'),
-            ("fifesim/output/styles.py", '"ndvi", "evi",', '"gndvi", "ndvi", "evi",'),
         ],
         """
         from typing import get_type_hints
 
-        from fifesim.output import pictures, styles, words
+        from fifesim.output import colours, words
 
         rho = reflectance(TM2=0.25, TM4=0.75)
         found = rho.fifesim.index("GNDVI")
         assert float(found[0, 0]) == 0.5 and found.attrs["long_name"] == "green NDVI"
         assert "'GNDVI'" in str(get_type_hints(fifesim.index)["name"])
         assert words.short_name(found) == "GNDVI"
-        assert "gndvi" in pictures._COLOURS and "gndvi" in styles._RAMPS
+        assert colours.colours_of("gndvi")[0].name == "YlGn"
         """,
     ),
     "key of a scenario": (
@@ -196,12 +192,6 @@ RECIPES = {
                 "fifesim/scenario/keys.py",
                 '    seed: int = seed(0, "of the noise")\n',
                 '    seed: int = seed(0, "of the noise")\n    polish: float = number(0.5, "1", "of the mirror")\n',
-            ),
-            (
-                "fifesim/scenario/ground_keys.py",
-                '    seed: int = seed(7, "of the random fields, a whole number")\n',
-                '    seed: int = seed(7, "of the random fields, a whole number")\n'
-                '    gloss: float = number(0.0, "1", "of the leaves")\n',
             ),
             (
                 "fifesim/scenario/sections.py",
@@ -219,26 +209,22 @@ RECIPES = {
                 "        seed=own.seed,\n",
                 "        seed=own.seed,\n        polish=own.polish,\n",
             ),
-            ("fifesim/scenario/ground.py", '_NUMBERS = ("leaf_angles",', '_NUMBERS = ("gloss", "leaf_angles",'),
             (
                 "fifesim/chain/setup.py",
                 "    quantise: bool = True\n",
-                "    quantise: bool = True\n    polish: float = 0.5\n    gloss: float = 0.0\n",
+                "    quantise: bool = True\n    polish: float = 0.5\n",
             ),
         ],
         """
         from fifesim.scenario.simulation import setup_of
 
-        scenario = fifesim.Scenario(sensor={"polish": 0.9}, ground={"gloss": 0.2})
-        setup = setup_of(scenario)
-        assert (setup.polish, setup.gloss) == (0.9, 0.2)
-        for section in ({"sensor": {"polish": 1.5}}, {"ground": {"gloss": "shiny"}}):
-            try:
-                fifesim.Scenario(**section)
-            except ValueError as error:
-                assert "polish" in str(error) or "gloss" in str(error)
-            else:
-                raise AssertionError(section)
+        assert setup_of(fifesim.Scenario(sensor={"polish": 0.9})).polish == 0.9
+        try:
+            fifesim.Scenario(sensor={"polish": 1.5})
+        except ValueError as error:
+            assert "polish" in str(error)
+        else:
+            raise AssertionError("polish")
         """,
     ),
     "public function": (
@@ -274,11 +260,6 @@ RECIPES = {
                 'QUANTITIES = {\n    "',
                 'QUANTITIES = {\n    "gpp": Quantity("g m-2 d-1", "", "gross primary production"),\n    "',
             ),
-            (
-                "fifesim/base/arguments.py",
-                "\nKINDS = (\n    _of(NUMBER,",
-                '\nKINDS = (\n    _of(NUMBER, "efficiency") | _of(NUMBER,',
-            ),
         ],
         """
         fpar = reflectance(TM4=0.5).squeeze("band", drop=True).drop_attrs()
@@ -292,6 +273,71 @@ RECIPES = {
                 assert "must be" in str(error), error
             else:
                 raise AssertionError(given)
+        """,
+    ),
+    "property of the canopy": (
+        [
+            (
+                "fifesim/ground/canopy/properties.py",
+                '    "background": ',
+                '    "gloss": Property(0.0, "gloss of the leaves", "1"),\n    "background": ',
+            ),
+            (
+                "fifesim/ground/canopy/description.py",
+                "    given: frozenset",
+                "    gloss: float | None = None\n    given: frozenset",
+            ),
+        ],
+        """
+        from fifesim.scenario.simulation import setup_of
+
+        scenario = fifesim.Scenario(ground={"gloss": 0.2})
+        assert setup_of(scenario).canopy.gloss == 0.2 and fifesim.Canopy().gloss == 0.0
+        """,
+    ),
+    "quantity of a raster or file": (
+        [
+            (
+                "fifesim/rasters/cf.py",
+                "QUANTITIES = {\n",
+                'QUANTITIES = {\n    "gloss_map": Quantity("1", "", "gloss", label="gloss", colours="bone"),\n',
+            ),
+        ],
+        """
+        from fifesim.output import colours
+        from fifesim.rasters import cf
+
+        found = cf.label(reflectance(TM4=0.5).isel(band=0), "gloss_map", history="made")
+        assert found.attrs["long_name"] == "gloss" and colours.colours_of("gloss_map")[0].name == "bone"
+        """,
+    ),
+    "kind of argument": (
+        [
+            (
+                "fifesim/base/annotations.py",
+                "from typing import ",
+                "from typing import Annotated as _Annotated\n"
+                "from fifesim.base.kinds import Kind as _Kind\n"
+                'Percent = _Annotated[float, _Kind("a percentage", lambda value: 0 <= value <= 100)]\n'
+                "from typing import ",
+            ),
+        ],
+        """
+        from fifesim.base.annotations import Percent
+        from fifesim.base.arguments import checked
+
+
+        def half(share: Percent):
+            return share / 2
+
+
+        assert checked(half)(50) == 25
+        try:
+            checked(half)(150)
+        except TypeError as error:
+            assert "share must be a percentage, got 150" in str(error)
+        else:
+            raise AssertionError("share")
         """,
     ),
     "check of an installation": (

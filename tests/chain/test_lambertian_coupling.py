@@ -163,9 +163,9 @@ def test_production_makes_one_reflectance_factor_of_sunlight_and_skylight():
     lai = wrap_xr(np.full((2, 2), 0.74), grid)
     geometry = fifesim.Geometry(sza=45.0, saa=180.0, vza=0.0, vaa=0.0)
     case = {"geometry": geometry, "atmosphere": air}
-    optics = {"leaf_optics": {name: each[1:3] for name, each in BANDS.items()}}
-    optics |= {"background": {name: each[3] for name, each in BANDS.items()}}
-    rho = lai.fifesim.surface_reflectance("TM", bands=list(BANDS), exact=True, **case, **optics)
+    leaves, soil = ({name: each[part] for name, each in BANDS.items()} for part in (slice(1, 3), 3))
+    grass = fifesim.Canopy(leaf_optics=leaves, background=soil)
+    rho = lai.fifesim.surface_reflectance("TM", bands=list(BANDS), canopy=grass, exact=True, **case)
     toa = rho.fifesim.to_toa(**case)
     for name, (_, *leaf) in BANDS.items():
         (band,) = fifesim.instrument("TM").select([name])
