@@ -20,9 +20,11 @@ def table(classes):
         fifesim.CoverClass(
             f"class{number}",
             lai=stats.gamma(8 + number, scale=0.15),
-            leaf={"TM3": (0.06 + 0.001 * number, 0.04), "TM4": (0.45, 0.42 - 0.002 * number)},
-            background=0.1 + 0.005 * number,
-            leaf_angles=f"campbell({50 + number})",
+            canopy=fifesim.Canopy(
+                leaf_optics={"TM3": (0.06 + 0.001 * number, 0.04), "TM4": (0.45, 0.42 - 0.002 * number)},
+                background=0.1 + 0.005 * number,
+                leaf_angles=f"campbell({50 + number})",
+            ),
         )
         for number in range(classes)
     ]

@@ -29,8 +29,9 @@ def cases(cells):
     def fields(arps, correlations=None, covariates=None):
         return lambda: fifesim.correlated_fields(grid, arps, correlations, seed=next(seeds), covariates=covariates)
 
-    def reflectance(**options):
-        return lambda: lai.fifesim.surface_reflectance("TM", bands=BANDS, **CASE, **options)
+    def reflectance(**properties):
+        canopy = fifesim.Canopy(**properties)
+        return lambda: lai.fifesim.surface_reflectance("TM", bands=BANDS, canopy=canopy, **CASE)
 
     alike = dict.fromkeys(ARPS, 0.15)
     follows = {"elevation": 0.3, "wetness": 0.5, "illumination": -0.2}

@@ -108,8 +108,8 @@ def lai_of(side):
 
 
 def ours_canopy(lai, exact):
-    optics = {"leaf_optics": LEAVES, "background": SOIL, "leaf_angles": ("verhoef", *LEAF_ANGLES)}
-    return lai.fifesim.surface_reflectance("TM", bands=BANDS, exact=exact, **optics, **CASE).values
+    canopy = fifesim.Canopy(leaf_optics=LEAVES, background=SOIL, leaf_angles=("verhoef", *LEAF_ANGLES))
+    return lai.fifesim.surface_reflectance("TM", canopy=canopy, bands=BANDS, exact=exact, **CASE).values
 
 
 def with_skylight(sun, sky):

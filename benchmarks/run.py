@@ -20,6 +20,7 @@ PARTS = {
     "Stages and chains": "stages.py",
     "Other packages": "peers.py",
     "Threads": "chain.py",
+    "Small rasters": "labels.py",
     "Whole commands": "commands.py",
     "Ensembles": "ensembles.py",
     "Training sets": "dataset.py",

@@ -20,6 +20,7 @@ from fifesim.experiments.friedl1995.table import line
 from fifesim.ground.canopy import raster as canopy
 from fifesim.ground.canopy.absorption import extinction_coefficient
 from fifesim.ground.canopy.rasters import leaves, soils
+from fifesim.ground.canopy.rasters.evaluation import BandCanopy, Light
 from fifesim.ground.landscape.autoregression import autocorrelation, correlation_length
 from fifesim.ground.landscape.raster import lai_scene
 from fifesim.sensor.description.rasters.carried import attributes_of
@@ -141,7 +142,9 @@ def blur(case, seeds):
     """The widest blur over brighter soil: slopes of LAI over the paper's, and how they grow with arp."""
     soil = {"TM3": 0.25, "TM4": 0.19}
     blurred = replace(case, reading=READINGS["blur-48.6"])
-    slope = fits(blurred, seeds, {"background": soil}).mean(axis=0)[:, 1]
+    slope = fits(
+        blurred, seeds, {"canopy": blurred.setup.canopy.replace(background=soil)}
+    ).mean(axis=0)[:, 1]
     paper = friedl1995.paper_table().query("variable == 'lai'")["slope"].to_numpy()
     by_arp = slope.reshape(3, 3)
     factor = np.exp(np.log(slope / paper).mean())
@@ -203,19 +206,14 @@ def _by_sunlight(setup, lai):
     """Reflectance of level ground by SAIL for the directions of sun and view, without skylight."""
     bands = setup.instrument.select(setup.bands)
     responses = tuple(band.response for band in bands)
-    leaf_reflectance, leaf_transmittance = leaves.leaf_optics(
-        responses, setup.leaf_optics, lai, exact=False
-    )
+    own = setup.canopy
+    leaf = leaves.leaf_optics(responses, own.leaf_optics, lai, exact=False)
+    stand = BandCanopy(own, leaf, None, soils.background(responses, own.background, lai))
     return canopy.level_reflectance(
         lai,
-        bands=[band.name for band in bands],
-        wavelengths=[band.wavelength for band in bands],
-        leaf_reflectance=leaf_reflectance,
-        leaf_transmittance=leaf_transmittance,
-        background=soils.background(responses, setup.background, lai),
-        diffuse_fraction=np.zeros(len(bands)),
-        geometry=setup.geometry or fifesim.fife_geometry(),
-        leaf_angles=setup.leaf_angles,
+        bands,
+        stand,
+        Light(setup.geometry or fifesim.fife_geometry(), np.zeros(len(bands))),
         atmosphere=(setup.atmosphere or fifesim.Atmosphere()).text,
         **attributes_of(setup.instrument),
     )

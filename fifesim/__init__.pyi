@@ -30,6 +30,7 @@ from .ground.landscape.cover import Patches as Patches
 from .ground.landscape.classes import CoverClass as CoverClass
 from .ground.landscape.classes import fife_classes as fife_classes
 from .ground.landscape.drawn import Field as Field
+from .ground.canopy.description import Canopy as Canopy
 from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
 from .chain.steps import surface_reflectance as surface_reflectance  # method, of a Dataset too

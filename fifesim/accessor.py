@@ -48,7 +48,7 @@ PUBLIC = _table()
 @cache
 def find(name):
     """
-    A public name; a function looks at its arguments first, a description at their names.
+    A public name; a function checks its arguments first, a description their names.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def find(name):
         # What pydantic makes has messages of its own.
         plain = is_dataclass(found) and not hasattr(found, "__pydantic_validator__")
         return spelled(found) if plain else found
-    function = checked(found, PUBLIC[name].methods_of)
+    function = checked(found)
     # Pickle looks a function up where it says that it lives.
     function.__module__, function.__qualname__ = "fifesim", name
     return function

@@ -1,6 +1,9 @@
-"""Slow reference for the scattering formulas: the Eddington equations integrated numerically."""
+"""Slow references for scattering: the Eddington equations integrated numerically, and ground that is not Lambertian."""
+
+from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from scipy.integrate import quad, solve_bvp
 
 # Siewert (2000), problem IIA: beta, alpha, zeta and gamma of spheres.
@@ -53,3 +56,92 @@ def eddington_flux(tau, albedo, asymmetry, mu_s):
     """Plane albedo and total transmittance of the flux. [1]"""
     field = eddington_intensities(tau, albedo, asymmetry, mu_s)
     return 4 * field(0)[1] / mu_s, np.exp(-tau / mu_s) - 4 * field(tau)[1] / mu_s
+
+
+class Ground(NamedTuple):
+    """Reflectance factors of a ground that is not Lambertian. [1]"""
+
+    directional: object  # function of sza, vza and raa [degree]
+    of_skylight: object  # function of vza: isotropic light toward the sensor
+    of_sunlight: object  # function of sza: into the hemisphere
+    of_both: float  # isotropic light into the hemisphere
+
+
+class Air(NamedTuple):
+    """An atmosphere, with sunlight and view from given zenith angles. [1]"""
+
+    path: float
+    down: float
+    up: float
+    direct_down: float
+    direct_up: float
+    albedo: float
+    sky: object  # radiance at the ground, function of sza, vza (n, 1) and raa (m,): pi L / (E0 mu_s)
+
+    def over_lambertian(self, reflectance):
+        return self.path + self.down * self.up * reflectance / (1 - self.albedo * reflectance)
+
+    @property
+    def skylight(self):
+        return 1 - self.direct_down / self.down
+
+
+def sky_directions(air, zenith, flux, *, fine):
+    """
+    Directions of skylight with the sun at a zenith angle, closer together around the sun.
+
+    Zenith angles, azimuths from the sun [degree], and weights that sum up to the flux of the skylight.
+    """
+    rings, turns, nodes = ((3, 8, 20), (3, 8, 20, 50, 110), 4) if fine else ((8,), (8, 50), 2)
+    rings = {0, 90, *(edge for step in rings for edge in (zenith - step, zenith, zenith + step) if 0 < edge < 75), 75}
+    theta, theta_weights = _panels(sorted(rings), nodes)
+    phi, phi_weights = _panels([0, *turns, 180], nodes)
+    turned = np.radians(theta)
+    weights = (np.cos(turned) * np.sin(turned) * np.radians(theta_weights))[:, None] * np.radians(phi_weights) / np.pi
+    light = air.sky(zenith, theta, phi) * weights
+    # Both sides of the plane of the sun.
+    found = np.broadcast_arrays(theta[:, None], np.concatenate([phi, -phi]), np.concatenate([light, light], axis=1))
+    theta, phi, light = (each.ravel() for each in found)
+    assert abs(light.sum() / flux - 1) < (1e-3 if fine else 0.05)
+    return theta, phi, light * flux / light.sum()
+
+
+def coupled_reflectance(air, ground, sza, vza, raa):
+    """
+    Apparent reflectance over a ground that is not Lambertian.
+
+    Sunlight and skylight are scattered by the ground from each direction into each, and go up directly or scattered by
+    the air, which by reciprocity is the skylight of a sun at the sensor. Light that the air sends back to the ground
+    counts as isotropic.
+    """
+    diffuse_up = air.up - air.direct_up
+    below, coarse = (sky_directions(air, sza, air.down - air.direct_down, fine=fine) for fine in (True, False))
+    theta, phi, upward = sky_directions(air, vza, diffuse_up, fine=True)
+    sunlit = air.direct_down * ground.directional(sza, theta, _folded(phi + raa))
+    toward_air = upward @ sunlit
+    theta, phi, upward = sky_directions(air, vza, diffuse_up, fine=False)
+    if vza == 0:  # the same from all azimuths: the azimuth of the skylight does not matter
+        zenith, place = np.unique(coarse[0], return_inverse=True)
+        coarse = zenith, np.zeros(zenith.size), np.bincount(place, coarse[2])
+    for here in np.array_split(np.arange(theta.size), 8):
+        away = _folded(coarse[1][:, None] - phi[here] - raa)
+        scattered = ground.directional(coarse[0][:, None], theta[here], away)
+        toward_air += coarse[2] @ scattered @ upward[here]
+    seen = air.direct_down * ground.directional(sza, vza, raa)
+    seen += below[2] @ ground.directional(below[0], vza, _folded(below[1] - raa))
+    leaving = air.direct_down * ground.of_sunlight(sza) + below[2] @ ground.of_sunlight(below[0])
+    back = air.albedo * leaving / (1 - air.albedo * ground.of_both)
+    again = air.direct_up * ground.of_skylight(vza) + upward @ ground.of_skylight(theta)
+    return air.path + air.direct_up * seen + toward_air + back * again
+
+
+def _panels(edges, nodes):
+    """Gauss points and weights of intervals."""
+    points, weights = leggauss(nodes)
+    edges = np.asarray(edges, float)
+    half = np.diff(edges)[:, None] / 2
+    return (edges[:-1, None] + half * (points + 1)).ravel(), (half * weights).ravel()
+
+
+def _folded(azimuth):
+    return np.abs((azimuth + 180) % 360 - 180)

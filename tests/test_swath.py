@@ -50,8 +50,10 @@ def test_reflectance_keeps_its_word(lai_with_hole, swath):
 
 def test_background_may_be_a_raster_too(lai, swath):
     litter = (lai * 0 + 0.2).drop_attrs(deep=False)
-    mapped = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, background=litter)
-    uniform = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, background=0.2)
+    mapped = lai.fifesim.surface_reflectance(
+        "TM", bands=BANDS, geometry=swath, canopy=fifesim.Canopy(background=litter)
+    )
+    uniform = lai.fifesim.surface_reflectance("TM", bands=BANDS, geometry=swath, canopy=fifesim.Canopy(background=0.2))
     np.testing.assert_allclose(mapped, uniform, rtol=1e-14)
 
 

@@ -430,9 +430,9 @@ BANDS = [
     refused("spectra that end before the band", 'own(rho.values, wavelength=("band", [0.66, 0.67])).fifesim.'
             'to_bands("TM")', "0.66 to 0.67", "TM4"),
     refused("leaf optics of one band", 'lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], '
-            'leaf_optics={"TM3": (0.1, 0.1)})', "'TM4'"),
+            'canopy=fifesim.Canopy(leaf_optics={"TM3": (0.1, 0.1)}))', "'TM4'"),
     refused("three backgrounds for two bands", 'lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], '
-            "background=[0.1, 0.2, 0.3])", "(3,) for 2 bands"),
+            "canopy=fifesim.Canopy(background=[0.1, 0.2, 0.3]))", "(3,) for 2 bands"),
 ]  # fmt: skip
 
 DIGITAL_NUMBERS = [
@@ -567,8 +567,15 @@ CANOPY = [
     refused("soil brightness in percent", "canopy(soil=30)", "[-1, 1], got 30"),
     refused("moisture in percent", "canopy(moisture=30)", "[0, 1], got 30"),
     refused("an absorbed share in percent", "lai.fifesim.fpar(fpar_inf=94)", "(0, 1], got 94"),
-    right("bare soil", "(lai * 0).fifesim.surface_reflectance('TM', bands=['TM3'], background=0.15)",
-          "np.full((1, 60, 60), 0.15)"),
+    right("bare soil", "(lai * 0).fifesim.surface_reflectance('TM', bands=['TM3'], "
+          "canopy=fifesim.Canopy(background=0.15))", "np.full((1, 60, 60), 0.15)"),
+    refused("dead leaves of no canopy", 'lai.fifesim.surface_reflectance("TM", brown=0.3)',
+            "type canopy=fifesim.Canopy(brown=...)", error=TypeError),
+    refused("dead leaves of a setup", "fifesim.Setup(brown=0.3)", "type canopy=fifesim.Canopy(brown=...)",
+            error=TypeError),
+    refused("a mapping for a canopy", 'lai.fifesim.surface_reflectance("TM", canopy={"brown": 0.3})',
+            "fifesim.Canopy(brown=0.2)", "got a dict", error=TypeError),
+    refused("a misspelt property of a canopy", "fifesim.Canopy(bron=0.3)", "'bron'", "'brown'", error=TypeError),
     warned("tallgrass elsewhere", 'own_lai().fifesim.surface_reflectance("TM", atmosphere=air, geometry=sun)', "leaf"),
     refused("NDVI as a map of LAI", "fifesim.open_lai(ndvi, grid)", "ndvi"),
     refused("FPAR as a map of LAI", "fifesim.open_lai(lai.fifesim.fpar(), grid)", "fpar"),
@@ -613,7 +620,17 @@ LANDSCAPES = [
         "lai.csv",
     ),
     refused("LAI of a class of 50", 'fifesim.CoverClass("grass", lai=50)', "class 'grass'", "50"),
-    refused("dead leaves of a class in percent", 'fifesim.CoverClass("grass", brown=3)', "[0, 1], got 3"),
+    refused(
+        "dead leaves of a class in percent",
+        'fifesim.CoverClass("grass", canopy=fifesim.Canopy(brown=3))',
+        "[0, 1], got 3",
+    ),
+    refused(
+        "dead leaves of no canopy of a class",
+        'fifesim.CoverClass("grass", brown=0.3)',
+        "type canopy=fifesim.Canopy(brown=...)",
+        error=TypeError,
+    ),
     refused("a drawn mean in percent", "fifesim.Field(mean=30, sd=1)", "mean must be in [-1, 1], got 30"),
     refused("a correlation of 5", 'fifesim.landscape(grid, dem=dem, covary={"wetness": 5}, seed=7)', "[-1, 1], got 5"),
     refused("a correlation without a DEM", 'fifesim.landscape(grid, covary={"wetness": 0.5}, seed=7)', "give dem="),
@@ -907,7 +924,8 @@ def study(draws=None, **how):
 
 def canopy(**options):
     """Red reflectance of the leaf area of the scene."""
-    return shared()["lai"].fifesim.surface_reflectance("TM", bands=["TM3"], **options)
+    own = fifesim.Canopy(**options)
+    return shared()["lai"].fifesim.surface_reflectance("TM", bands=["TM3"], canopy=own)
 
 
 def fine(arp=0.2, **options):

@@ -36,17 +36,21 @@ def ground(lai: xr.DataArray) -> xr.DataArray:
         "TM",
         bands=["TM3", "TM4"],
         dem=dem,
-        leaf_optics=fifesim.Leaf(chlorophyll=xr.where(lai > 1, 45.0, 25.0)),
-        background={"soil_dry": 0.4, "shade": 0.6},
-        soil=0.04 * fields["soil"],
-        leaf_angles="campbell(57)",
+        canopy=fifesim.Canopy(
+            leaf_optics=fifesim.Leaf(chlorophyll=xr.where(lai > 1, 45.0, 25.0)),
+            background={"soil_dry": 0.4, "shade": 0.6},
+            soil=0.04 * fields["soil"],
+            leaf_angles="campbell(57)",
+        ),
     )
 
 
 def patches(lai: xr.DataArray) -> xr.Dataset:
     classes = {
-        "wood": fifesim.CoverClass(lai=4.0, leaf=fifesim.Leaf(chlorophyll=45), background={"dead_grass": 1.0}),
-        "pond": fifesim.CoverClass(lai=0.0, background=0.03),
+        "wood": fifesim.CoverClass(
+            lai=4.0, canopy=fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=45), background={"dead_grass": 1.0})
+        ),
+        "pond": fifesim.CoverClass(lai=0.0, canopy=fifesim.Canopy(background=0.03)),
     }
     cover = fifesim.Patches("voronoi", size=150, shares={"wood": 0.7, "pond": 0.3})
     land = fifesim.landscape(lai.odc.geobox, cover=cover, classes=classes, moisture=fifesim.Field(0.25, 0.08), seed=7)
@@ -117,7 +121,7 @@ def wrong(lai: xr.DataArray, dn: xr.DataArray, fit: fifesim.Regression) -> None:
     fifesim.slope("dem.tif")  # type: ignore[arg-type]
     fifesim.surface_reflectance(lai, 5)  # type: ignore[arg-type]
     fifesim.surface_reflectance(lai, time=1987)  # type: ignore[arg-type]
-    fifesim.surface_reflectance(lai, soil=lai.values)  # type: ignore[arg-type]
+    fifesim.surface_reflectance(lai, canopy=fifesim.Canopy(soil=lai.values))  # type: ignore[arg-type]
     fifesim.to_toa(lai.values)  # type: ignore[arg-type]
     fifesim.to_toa(lai, "hazy")  # type: ignore[arg-type]
     fifesim.atmosphere.spectrum("tropical")  # type: ignore[arg-type]

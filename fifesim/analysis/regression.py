@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numba
 import numpy as np
@@ -54,6 +55,7 @@ class Regression:
     x_sum_of_squares: float
     y_name: str = ""
     x_name: str = ""
+    _in_words: ClassVar[str] = "a fifesim.Regression, as fifesim.regress gives it"
 
     plot = Method("plot_fit")
 

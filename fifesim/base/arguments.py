@@ -1,152 +1,36 @@
-"""Arguments of public functions: of the kind that their names say, or refused in a line that names them."""
+"""Checks of the arguments of public functions, derived from their annotations."""
 
 import inspect
-from collections.abc import Mapping
-from functools import wraps
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from functools import cache, wraps
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from fifesim.base.kinds import (
-    ANYTHING,
-    ATMOSPHERE,
-    CHUNKS,
-    CRS,
-    DISTRIBUTION,
-    FILE_BY_BAND,
-    FILE_OR_RASTER,
-    FILES_BY_NAME,
-    FLAG,
-    FUNCTION,
-    GEOMETRY,
-    GRID,
-    HORIZON,
-    INSTRUMENT,
-    INSTRUMENTS,
-    INTERVAL,
-    LAND,
-    LEAF,
-    LEAF_ANGLES,
-    LIST,
-    MAPPING,
-    METRES,
-    NAMES,
-    NOISE,
-    NUMBER,
-    NUMBER_OR_RASTER,
-    NUMBERS,
-    OFFSET,
-    PAIR,
-    PATH,
-    PLAIN,
-    RASTER,
-    REGRESSION,
-    REPRODUCED,
-    SCENARIO,
-    SETUP,
-    SPREAD,
-    STUDY,
-    SURROUNDINGS,
-    TABLES,
-    TEXT,
-    TRACK,
-    TWO,
-    VARIATION,
-    Kind,
-    described,
-    is_a,
-)
+from fifesim.base import kinds
+from fifesim.base.kinds import Kind, described, is_a
 from fifesim.base.spelling import unknown_argument
 
-
-def _of(kind, names):
-    return dict.fromkeys(names.split(), kind)
-
-
-KINDS = (
-    _of(NUMBER, "arp height width west north altitude hotspot fpar_inf min_valid nadir_offset heading level increment")
-    | _of(NUMBER, "bandwidth points reach extinction latitude longitude margin fill resolution directions min_count")
-    | _of(NUMBER, "cell scale_height sza saa vza vaa earth_sun_distance thermal shot detectors gain_spread slope")
-    | _of(NUMBER, "visibility aot h2o o3 residual_deviation realisations spacing offset_spread")
-    | _of(NUMBER, "uncertainty min_coverage view_tolerance")
-    | _of(NUMBER, "crown_shape")
-    | _of(NUMBER_OR_RASTER, "brown dissociation crown_cover")
-    | _of(NUMBER_OR_RASTER, "soil moisture")
-    | _of(NUMBERS, "radiance")
-    | _of(LIST, "frequency")
-    | _of(METRES, "pixel")
-    | _of(INTERVAL, "interval")
-    | _of(ANYTHING, "background")
-    | _of(SURROUNDINGS, "surroundings")
-    | _of(LEAF, "leaf_optics brown_leaf")
-    | _of(HORIZON, "horizon")
-    | _of(FLAG, "upwelling exact assume adjacency quantise allow_remote overwrite quality reflect")
-    | _of(FLAG, "resume complete")
-    | _of(TEXT, "angles scaling pair quantity method datum vertical_units engine profile along band leaves")
-    | _of(NAMES, "bands engines")
-    | _of(NOISE, "noise")
-    | _of(MAPPING, "arps correlations covariates reference tags")
-    | _of(PATH, "path folder")
-    | _of(STUDY, "study")
-    | _of(FILE_OR_RASTER, "path_or_raster")
-    | _of(RASTER, "dem elevation beside truth ndvi variable lai")
-    | _of(GRID, "grid onto")
-    | _of(INSTRUMENT, "instrument")
-    | _of(INSTRUMENTS, "instruments")
-    | _of(CHUNKS, "chunks")
-    | _of(GEOMETRY, "geometry")
-    | _of(ATMOSPHERE, "atmosphere")
-    | _of(SETUP, "setup")
-    | _of(TRACK, "track")
-    | _of(REGRESSION, "fit")
-    | _of(SCENARIO, "scenario")
-    | _of(SPREAD, "lsf")
-    | _of(FUNCTION, "algorithm")
-    | _of(PLAIN, "noise_models aerosol axes")
-    | _of(DISTRIBUTION, "distribution")
-    | _of(LEAF_ANGLES, "leaf_angles")
-    | _of(VARIATION, "cv")
-)
-"""What an argument may be, by its name, which means the same everywhere."""
-
-OF_FUNCTION = {
-    "landscape": _of(FILE_OR_RASTER, "lai") | _of(ANYTHING, "brown crown_cover soil moisture"),
-    "arp_for_length": _of(NUMBER, "length"),
-    "sense": _of(OFFSET, "offset"),
-    "read_aerosol": _of(TWO, "layer") | _of(TABLES, "source"),
-    "compare": _of(MAPPING, "bands"),
-    "lai_distribution": _of(DISTRIBUTION, "source"),
-    "grid_at": _of(PAIR, "cell") | _of(CRS, "crs"),
-    "regress": _of(RASTER, "x"),
-    "share_kept": _of(RASTER, "cells"),
-    "scale_bias": _of(RASTER, "array"),
-    "compare_engines": _of(NUMBERS, "reflectance"),
-    "instrument": _of(INSTRUMENT, "name"),
-    "sun_position": _of(NUMBERS, "latitude longitude altitude"),
-    "budget": _of(NUMBER, "cells"),
-    "reproduce": _of(NUMBER, "cells")
-    | _of(LAND, "dem")
-    | _of(FILES_BY_NAME, "densities")
-    | _of(FILE_BY_BAND, "optics background")
-    | _of(PATH, "sensor")
-    | _of(TEXT, "reading"),
-    "dataset": _of(NUMBER, "n"),
-    "chips_of": _of(NUMBER, "n") | _of(ANYTHING, "study"),
-    "plot_reproduction": _of(NUMBER, "number") | _of(REPRODUCED, "found") | _of(TEXT, "reading"),
+# Kinds of types. Classes of slow libraries are found by name; `Annotated` states any other kind.
+_KINDS = {
+    bool: kinds.FLAG,
+    int: kinds.NUMBER,
+    float: kinds.NUMBER,
+    str: kinds.TEXT,
+    tuple[float, float]: kinds.TWO,
+    Sequence: kinds.LISTED,
+    Mapping: kinds.MAPPING,
+    Callable: kinds.FUNCTION,
+    Any: kinds.UNCHECKED,
+    "DataArray": kinds.RASTER,
+    "Dataset": Kind("an xarray.Dataset", lambda value: is_a(value, "Dataset")),
+    "DataTree": Kind("an xarray.DataTree", lambda value: is_a(value, "DataTree")),
+    "GeoBox": kinds.GRID,
 }
-"""The same of single functions, where it is another."""
 
-
-# Take values along any dimensions.
-_ANY_DIMENSIONS = {"density", "share_kept", "to_bands"}
-
-# Average a mask of True and False to a share.
-_TAKE_MASKS = {"aggregate"}
-
-# Arguments that are no rasters of a quantity: dates, and results that hold masks.
-_NO_QUANTITIES = {"time", "found"}
-
-# Kinds of numpy's dtypes: integers and floating-point numbers.
-_REAL = "iuf"
+# Remedies for values that are not real numbers, by the kind of their dtype.
 _NOT_REAL = {
     "b": "a mask, type .astype(float) if 0 and 1 are its values",
     "c": "complex numbers, type .real or abs(...)",
@@ -155,9 +39,75 @@ _NOT_REAL = {
 }
 
 
+@cache
+def kind_of(annotation):
+    """
+    Kind of the values that an annotation allows, apart from None.
+
+    Parameters
+    ----------
+    annotation : type
+        The last Kind in the metadata of an ``Annotated`` is its kind.
+
+    Returns
+    -------
+    kind : Kind
+
+    Raises
+    ------
+    TypeError
+        If nothing states the kind of the annotation.
+
+    Examples
+    --------
+    >>> kind_of(float | Mapping[str, float] | None).words
+    'a number, or a mapping of names'
+    """
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _named(parts[0], [each for each in parts[1:] if isinstance(each, Kind)])
+    if isinstance(annotation, TypeVar):
+        origin, parts = Union, annotation.__constraints__
+    if origin in (Union, UnionType):
+        return _either([kind_of(each) for each in parts if each is not NoneType])
+    if origin is Literal:
+        return kind_of(type(parts[0]))
+    for key in (annotation, origin, getattr(annotation, "__name__", None)):
+        if key is not None and key in _KINDS:
+            return _KINDS[key]
+    if not isinstance(annotation, type):
+        raise TypeError(f"nothing states the kind of {annotation}: type Annotated[..., Kind(...)]")
+    library = annotation.__module__.partition(".")[0]
+    words = getattr(annotation, "_in_words", f"a {library}.{annotation.__name__}")
+    return Kind(words, lambda value: isinstance(value, annotation))
+
+
+def _named(type_, stated):
+    """The last of the kinds stated for a type, with the test of an earlier one or of the type where it has none."""
+    *others, kind = stated or [kind_of(type_)]
+    return kind if kind.fits else kind._replace(fits=_named(type_, others).fits)
+
+
+def _either(parts):
+    """The union of kinds."""
+    if len(parts) == 1:
+        return parts[0]
+    *others, last = [kind.words for kind in parts]
+    numbers = None if any(kind.numbers is None for kind in parts) else "".join(kind.numbers for kind in parts)
+    return Kind(f"{', '.join(others)}, or {last}", lambda value: any(kind.fits(value) for kind in parts), None, numbers)
+
+
+@cache
+def _kinds_of(annotated):
+    """Kinds of the arguments of a function, or of the fields of a dataclass, by name."""
+    hints = get_type_hints(annotated, include_extras=True)
+    names = [each.name for each in fields(annotated)] if is_dataclass(annotated) else [*hints]
+    return {name: kind_of(hints[name]) for name in names if name != "return"}
+
+
 def check(name, value, kind):
     """
-    Refuse what an argument cannot be.
+    Refuse a value of another kind.
 
     Parameters
     ----------
@@ -168,46 +118,41 @@ def check(name, value, kind):
     Raises
     ------
     TypeError
-        If it is of another kind.
+        If the value is of another kind.
     ValueError
         If it is a raster without cells, or without rows and columns.
 
     Examples
     --------
-    >>> check("hotspot", 0.1, NUMBER)
+    >>> check("hotspot", 0.1, kinds.NUMBER)
     """
     if not kind.fits(value):
         raise TypeError(f"{name} must be {kind.words}, got {described(value)}{_cure(value, kind)}")
-    if kind in (RASTER, FILE_OR_RASTER) or (
-        kind in (ANYTHING, SURROUNDINGS) and is_a(value, "DataArray") and value.ndim > 1
-    ):
-        _check_cells(name, value)
+    if kind.dimensions is None or not is_a(value, "DataArray"):
+        return
+    if value.ndim < kind.dimensions:
+        dims = ", ".join(map(str, value.dims))
+        raise ValueError(f"{name} must have dimensions y and x, got ({dims}): select with .isel(x=[0]), not .isel(x=0)")
+    if not value.size:
+        sizes = ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items())
+        raise ValueError(f"{name} has no cells, its sizes are {sizes}: does the window that was cut out overlap it?")
 
 
-def checked(function, methods_of=()):
+def checked(function):
     """
-    A public function that looks at its arguments first.
+    A public function that checks its arguments against its annotations.
 
     Parameters
     ----------
     function : callable
-    methods_of : sequence of str, optional
-        Classes of xarray that its first argument may be of, where it is a method of theirs.
 
     Returns
     -------
     function : callable
-        The same name, documentation and signature. What an argument is by default, it may always be. It raises
-        TypeError for an argument of another kind, or for a raster whose cells are not real numbers.
+        It has the same name, documentation and signature. An argument may always have its default value. The function
+        raises TypeError for an argument of another kind, or for a raster whose cells are not real numbers.
     """
     signature = inspect.signature(function)
-    kinds = {name: kind for name, kind in KINDS.items() if name in signature.parameters}
-    kinds |= OF_FUNCTION.get(function.__name__, {})
-    if methods_of:
-        words = " or ".join(f"an xarray.{each}" for each in methods_of)
-        words = {"an xarray.DataArray": RASTER.words}.get(words, words)
-        first = next(iter(signature.parameters))
-        kinds[first] = Kind(words, lambda value: is_a(value, *methods_of))
 
     @wraps(function)
     def checking(*args, **options):
@@ -216,15 +161,12 @@ def checked(function, methods_of=()):
         except TypeError as error:
             wrong = unknown_argument(function.__name__, signature, options)
             raise TypeError(wrong or f"{function.__name__}: {error}") from None
-        for name, kind in kinds.items():
-            if name in given and given[name] is not signature.parameters[name].default:
-                check(name, given[name], kind)
-                if methods_of and name == first:
-                    _check_cells(name, given[name], 0 if function.__name__ in _ANY_DIMENSIONS else 2)
+        expected = _kinds_of(function)
         for name, value in given.items():
-            if name in _NO_QUANTITIES:
-                continue
-            _check_numbers(name, value, _REAL + "b" if function.__name__ in _TAKE_MASKS else _REAL)
+            if value is not signature.parameters[name].default:
+                check(name, value, expected[name])
+        for name, value in given.items():
+            _check_numbers(name, value, expected[name].numbers)
         return function(*args, **options)
 
     return checking
@@ -232,41 +174,30 @@ def checked(function, methods_of=()):
 
 def check_fields(description, *names):
     """
-    Refuse what a field of a description cannot be.
+    Check fields of a description against their annotations.
 
     Parameters
     ----------
     description : object
-        Its fields are attributes.
+        An instance of a dataclass.
     *names : str
-        Fields to look at, among `KINDS`; what one is by default passes.
+        The fields to check; all by default. A field may always have its default value.
 
     Raises
     ------
     TypeError
-        If one is of another kind.
+        If a value is of another kind.
     """
-    for name in names:
+    expected = _kinds_of(type(description))
+    for name in names or expected:
         value = getattr(description, name)
         if value is not type(description).__dataclass_fields__[name].default:
-            check(name, value, KINDS[name])
-
-
-def _check_cells(name, raster, dimensions=2):
-    """Refuse a raster without cells, or without rows and columns; what else they are called is told later."""
-    if not is_a(raster, "DataArray"):
-        return
-    if raster.ndim < dimensions:
-        dims = ", ".join(map(str, raster.dims))
-        raise ValueError(f"{name} must have dimensions y and x, got ({dims}): select with .isel(x=[0]), not .isel(x=0)")
-    if not raster.size:
-        sizes = ", ".join(f"{dim}: {size}" for dim, size in raster.sizes.items())
-        raise ValueError(f"{name} has no cells, its sizes are {sizes}: does the window that was cut out overlap it?")
+            check(name, value, expected[name])
 
 
 def _check_numbers(name, value, allowed):
-    """Raise TypeError if the cells or wavelengths of the rasters in an argument are not real numbers."""
-    for raster in _rasters(value):
+    """Raise TypeError if the cells or wavelengths of the rasters in an argument have another dtype than allowed."""
+    for raster in _rasters(value) if allowed else ():
         wavelength = (raster.coords["wavelength"],) if "wavelength" in raster.coords else ()
         for what, each in ((name, raster), *((f"wavelength of {name}", each) for each in wavelength)):
             if each.dtype.kind not in allowed:
@@ -275,7 +206,9 @@ def _check_numbers(name, value, allowed):
 
 
 def _rasters(value):
-    """Rasters in an argument: itself, or those in a Dataset, a mapping, a pair, a Leaf or a Setup."""
+    """Rasters in an argument: itself, or those in a Dataset, a mapping, a pair or a description."""
+    if value is None or isinstance(value, str | int | float):
+        return []
     if is_a(value, "DataArray"):
         return [value]
     if is_a(value, "Dataset"):
@@ -285,12 +218,14 @@ def _rasters(value):
     elif isinstance(value, list | tuple) and len(value) == 2:
         parts = value
     else:
-        parts = vars(value).values() if is_a(value, "Leaf", "Setup") else ()
+        # Classes of pydantic have checked their fields.
+        plain = is_dataclass(type(value)) and not hasattr(value, "__pydantic_validator__")
+        parts = [getattr(value, each.name) for each in fields(value)] if plain else ()
     return [raster for part in parts for raster in _rasters(part)]
 
 
 def _cure(value, kind):
-    """What to type instead, where that can be told."""
+    """Remedy for a value of another kind; empty if none is known."""
     takes_raster = "xarray.DataArray" in kind.words
     if takes_raster and is_a(value, "MaskedArray"):
         return ": xarray.DataArray(values.filled(numpy.nan), dims=('y', 'x'), coords=...) with a CRS has a place"
@@ -302,8 +237,8 @@ def _cure(value, kind):
         return ": take one of its arrays, such as tree['10m/dn']"
     if takes_raster and isinstance(value, str):
         return ": open it with fifesim.open_image, rioxarray.open_rasterio, or onto a grid with fine_dem or open_lai"
-    if kind is NUMBER and is_a(value, "DataArray", "ndarray"):
+    if kind is kinds.NUMBER and is_a(value, "DataArray", "ndarray"):
         return ", where one is for all cells"
-    if kind is GRID and is_a(value, "DataArray"):
+    if kind is kinds.GRID and is_a(value, "DataArray"):
         return ": type raster.odc.geobox"
     return ""

@@ -44,6 +44,9 @@ RED = Window("red", 0.60, 0.70, 0.66)
 NEAR_INFRARED = Window("near infrared", 0.75, 1.00, 0.84)
 SHORTWAVE_INFRARED = Window("shortwave infrared", 1.53, 1.75, 1.62)
 
+COMPOSITES = {"false colour": (NEAR_INFRARED, RED, GREEN), "natural colour": (RED, GREEN, BLUE)}
+"""Windows of the bands that become red, green and blue in a colour composite."""
+
 # Common names of bands in catalogues of images, with the wavelengths between which they lie by the table of STAC's
 # extension for electro-optical data (its README, github.com/stac-extensions/eo), and where Landsat or Sentinel-2 has
 # them; rededge1 to 3, swir1 and swir2 are usual names of the same. [um]
@@ -96,6 +99,34 @@ def nearest(wavelengths, window):
     wavelengths = np.asarray(wavelengths, float)
     inside = np.flatnonzero((wavelengths >= window.low) & (wavelengths <= window.high))
     return int(inside[np.argmin(np.abs(wavelengths[inside] - window.best))]) if inside.size else None
+
+
+def composite(wavelengths, name="false colour"):
+    """
+    Bands of a colour composite.
+
+    Parameters
+    ----------
+    wavelengths : array, shape (n,)
+        Of the bands. [um]
+    name : str, optional
+        A key of `COMPOSITES`.
+
+    Returns
+    -------
+    numbers : list of (int or None), length 3
+        Of the bands that become red, green and blue; None where the window holds no band. Without a green band the
+        false-colour composite takes its red band twice.
+
+    Examples
+    --------
+    >>> composite([0.56, 0.66, 0.83]), composite([0.66, 0.83]), composite([0.66, 0.83], "natural colour")
+    ([2, 1, 0], [1, 0, 0], [0, None, None])
+    """
+    numbers = [nearest(wavelengths, window) for window in COMPOSITES[name]]
+    if name == "false colour" and numbers[2] is None:
+        numbers[2] = numbers[1]
+    return numbers
 
 
 class Quadrature(NamedTuple):

@@ -67,7 +67,7 @@ class Geometry:
                     f"{name} of a Geometry is one number, got an array: angles by cell are an xarray.Dataset with sza, "
                     "saa, vza and vaa, such as fifesim.scan_geometry(...).assign(sza=30.0, saa=120.0)"
                 )
-        check_fields(self, *ANGLES, "earth_sun_distance")
+        check_fields(self)
         for name in ("saa", "vaa"):
             if not np.isfinite(getattr(self, name)):
                 raise ValueError(f"{name} must be finite degrees, got {getattr(self, name)}")

@@ -1,25 +1,29 @@
-"""What arguments may be: numbers, names, rasters and descriptions, in words and as questions."""
+"""Kinds of arguments: numbers, names, rasters and descriptions, each with its words and its test."""
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 
 class Kind(NamedTuple):
-    """What an argument may be: in words, and a function that says whether a value is it."""
+    """Set of values that an argument may have, by its words in messages and a test, which the type gives by default."""
 
     words: str
-    fits: object
+    fits: Callable | None = None
+    # Smallest number of dimensions of a raster, which then must have cells.
+    dimensions: int | None = None
+    # Kinds of numpy's dtypes that rasters in the value may have; None for any.
+    numbers: str | None = "iuf"
 
 
 def is_a(value, *names):
     """
     Whether a value is of a class or of one derived from it, by name.
 
-    Classes of other libraries and of later folders need not be imported to be told apart.
+    Classes of other libraries need not be imported.
 
     Parameters
     ----------
@@ -91,12 +95,15 @@ def _is_pair(value):
     return _is_number(value) or (several and np.shape(value) == (2,) and _are_numbers(value))
 
 
+def _are_two(value):
+    return isinstance(value, list | tuple | np.ndarray) and getattr(value, "ndim", 1) > 0 and len(value) == 2
+
+
 def _is_plain(value):
-    """No array or raster, of which some other thing is made by mistake."""
     return value is not None and not is_a(value, "Dataset", "DataTree", "ndarray", "DataArray", "Array")
 
 
-def _is_offset(value):
+def _is_row(value):
     return _is_plain(value) or (isinstance(value, np.ndarray) and value.ndim == 1)
 
 
@@ -119,104 +126,35 @@ def is_path(value):
     return isinstance(value, str | os.PathLike)
 
 
-def _is_crs(value):
-    return isinstance(value, str | int) or hasattr(value, "to_wkt")
-
-
 def _is_size(value):
     return isinstance(value, str) and re.fullmatch(r"auto|[\d.]+ *[kMGT]?i?B", value) is not None
 
 
-def _is_raster(value):
-    return is_a(value, "DataArray")
-
-
 NUMBER = Kind("a number", _is_number)
-METRES = Kind("a size in metres, such as 30.0", _is_number)
 NUMBERS = Kind("a number, or an array of them", _are_numbers)
 PAIR = Kind("a number, or two: down and across", _is_pair)
+LIST = Kind("a number, or a list of them", lambda value: _are_numbers(value) and np.ndim(value) < 2)
+TWO = Kind("two numbers, such as (0.5, 2.0)", _are_two)
+ROW = Kind("a name, a mapping, a description, or an array with one dimension", _is_row)
+LISTED = Kind("a list", lambda value: _is_row(value) and np.iterable(value) and not isinstance(value, str))
 FLAG = Kind("True or False", lambda value: isinstance(value, bool | np.bool_))
 TEXT = Kind("a name", lambda value: isinstance(value, str))
 NAMES = Kind("a list of names", lambda value: isinstance(value, str) or (_is_plain(value) and np.iterable(value)))
-NOISE = Kind("a list of kinds of noise, such as ['shot', 'thermal'], 'all', or () for none", NAMES.fits)
-NUMBER_OR_RASTER = Kind(
-    "a number, or an xarray.DataArray over (y, x)", lambda value: _is_number(value) or _is_raster(value)
-)
 PATH = Kind("the path of a file", is_path)
-RASTER = Kind("an xarray.DataArray over (y, x)", _is_raster)
-REPRODUCED = Kind(
-    "an xarray.Dataset, as fifesim.reproduce gives it",
-    lambda value: is_a(value, "Dataset") and "paper_slope" in value.variables,
-)
-LAND = Kind("'flat', 'flint-hills' or the path of a raster file", is_path)
-FILES_BY_NAME = Kind("a folder, or a mapping by treatment", lambda value: is_path(value) or _is_mapping(value))
-FILE_BY_BAND = Kind("the path of a CSV file, or a mapping by band", lambda value: is_path(value) or _is_mapping(value))
-FILE_OR_RASTER = Kind("the path of a file, or an xarray.DataArray", lambda value: is_path(value) or _is_raster(value))
-GRID = Kind("an odc.geo.geobox.GeoBox, such as fifesim.grid_at or raster.odc.geobox give", lambda v: is_a(v, "GeoBox"))
-INSTRUMENT = Kind(
-    "the name of an instrument, such as 'TM', or a fifesim.Instrument",
-    lambda value: is_path(value) or is_a(value, "Instrument"),
-)
-INSTRUMENTS = Kind(
-    "a list of instruments, such as ['TM', 'OLI']",
-    lambda value: isinstance(value, str) or (_is_plain(value) and np.iterable(value)),
-)
+MAPPING = Kind("a mapping of names", _is_mapping)
+FUNCTION = Kind("a function", callable)
 CHUNKS = Kind(
     "a number of cells, 'auto', '64MB', None or a mapping such as {'y': 1024, 'x': 1024}",
     lambda value: (
         value is None or _is_number(value) or isinstance(value, tuple) or _is_mapping(value) or _is_size(value)
     ),
 )
-GEOMETRY = Kind(
-    "a fifesim.Geometry, or an xarray.Dataset of sza, saa, vza and vaa",
-    lambda value: is_a(value, "Geometry") or (is_a(value, "Dataset") and "sza" in value.variables),
+RASTER = Kind("an xarray.DataArray over (y, x)", lambda value: is_a(value, "DataArray"), dimensions=2)
+GRID = Kind(
+    "an odc.geo.geobox.GeoBox, such as fifesim.grid_at or raster.odc.geobox give", lambda value: is_a(value, "GeoBox")
 )
-ATMOSPHERE = Kind("a fifesim.Atmosphere", lambda value: is_a(value, "Atmosphere"))
-SETUP = Kind("a fifesim.Setup", lambda value: is_a(value, "Setup"))
-TRACK = Kind("a fifesim.Track", lambda value: is_a(value, "Track"))
-REGRESSION = Kind("a fifesim.Regression, as fifesim.regress gives it", lambda value: is_a(value, "Regression"))
-SCENARIO = Kind("a fifesim.Scenario, as fifesim.read_scenario gives it", lambda value: is_a(value, "Scenario"))
-STUDY = Kind(
-    "the path of a study, such as 'study.toml', or a fifesim.Study",
-    lambda value: is_path(value) or is_a(value, "Study"),
-)
-SPREAD = Kind(
-    "a line spread function, such as fifesim.instrument('TM').line_spread", lambda value: hasattr(value, "half_width")
-)
-FUNCTION = Kind("a function", callable)
-VARIATION = Kind(
-    "a number, or a function of the means of pixels, such as lambda mean: 0.5 / (1 + mean)",
-    lambda value: callable(value) or _is_number(value),
-)
-HORIZON = Kind(
-    "an xarray.DataArray over (direction, y, x), as fifesim.horizon gives it",
-    lambda value: _is_raster(value) and "direction" in value.dims,
-)
-LEAF = Kind(
-    "a fifesim.Leaf, the path of a CSV file or a Dataset of spectra, {band: (reflectance, transmittance)}, or a pair",
-    lambda value: is_a(value, "Leaf", "Dataset") or is_path(value) or _is_mapping(value) or TWO.fits(value),
-)
-INTERVAL = Kind(
-    "'native', or metres between pixels, down and across",
-    lambda value: isinstance(value, str) or _is_plain(value) or (isinstance(value, np.ndarray) and value.ndim == 1),
-)
-TWO = Kind(
-    "two numbers, or two lists of them, such as (0.5, 0.0)",
-    lambda value: isinstance(value, list | tuple | np.ndarray) and len(value) == 2,
-)
-DISTRIBUTION = Kind(
-    "the name of a treatment, the path of a CSV file or a frozen scipy distribution",
-    lambda value: is_path(value) or hasattr(value, "ppf"),
-)
-LEAF_ANGLES = Kind(
-    "a name such as 'planophile', classes such as '30: 0.5, 60: 0.5', or a list of fractions",
-    lambda value: not _is_mapping(value) and (_is_plain(value) or (isinstance(value, np.ndarray) and value.ndim == 1)),
-)
-OFFSET = Kind("two numbers, or two lists of them, such as (0.5, 0.0)", _is_offset)
-CRS = Kind("a CRS, such as 'EPSG:26914'", _is_crs)
-SURROUNDINGS = Kind("a reflectance, one for each band, or a raster", _are_numbers)
-LIST = Kind("a number, or a list of them", lambda value: _are_numbers(value) and np.ndim(value) < 2)
-TABLES = Kind("the path of a file, or an xarray.Dataset", lambda value: is_path(value) or is_a(value, "Dataset"))
-MAPPING = Kind("a mapping of names", _is_mapping)
-ANYTHING = Kind("a number, a mapping, a description or a raster", lambda value: True)
 PLAIN = Kind("a name, a mapping or a description, and no raster", _is_plain)
+ANYTHING = Kind("a number, a mapping, a description or a raster", lambda value: True, dimensions=0)
+# The function checks the argument, and its message names the range.
+UNCHECKED = Kind("a value", lambda value: True)
+DATES = Kind("a date and time", lambda value: True, numbers=None)

@@ -8,10 +8,12 @@ A line spread function (lsf) is any object with ``half_width`` [m], outside of w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, TypeAlias
 
 import numpy as np
 
 from fifesim.base.annotations import Numbers
+from fifesim.base.kinds import Kind
 
 
 class Transfer:
@@ -68,6 +70,16 @@ class LineSpread(Transfer):
     def _check_width(width):
         if not 0 < width < np.inf:
             raise ValueError(f"the width of a line spread function must be positive metres, got {width}")
+
+
+# Any object with the two members of a line spread function.
+Spread: TypeAlias = Annotated[
+    LineSpread,
+    Kind(
+        "a line spread function, such as fifesim.instrument('TM').line_spread",
+        lambda value: hasattr(value, "half_width"),
+    ),
+]
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,9 @@ import inspect
 from difflib import get_close_matches
 from functools import wraps
 
+PARTS = {}
+"""Names of a description and of its fields by the argument that takes it, for messages."""
+
 
 def closest(value, allowed):
     """
@@ -79,6 +82,10 @@ def unknown_argument(name, signature, options):
     unknown = next((each for each in options if each not in known), None)
     if unknown is None:
         return ""
+    for argument, (description, fields) in PARTS.items():
+        near = unknown if unknown in fields else "" if closest(unknown, known) else closest(unknown, fields)
+        if argument in known and near:
+            return f"{name} has no argument {unknown!r}: type {argument}={description}({near}=...)"
     return f"{name} has no argument {unknown!r}: {nearest(unknown, known)}There are {', '.join(known)}"
 
 

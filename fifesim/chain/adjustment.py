@@ -13,17 +13,18 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.base import datasets
-from fifesim.base.annotations import FilePath, Names, Time
+from fifesim.base.annotations import Names, Noise, Time, WholeNumber
 from fifesim.chain.carried import as_bands_of
 from fifesim.chain.steps import to_toa
 from fifesim.ground.canopy.library import library_spectra
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions, Image
+from fifesim.rasters.annotations import Image, RasterOrDataset
 from fifesim.rasters.combination import combined
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of, carried_instrument
 from fifesim.sensor.description.spectral_response import half_peak
@@ -38,11 +39,11 @@ UNCERTAINTY = 0.0005
 
 @by_date
 def adjust_bands(
-    reflectance: xr.DataArray,
-    instrument: FilePath | Instrument,
+    reflectance: RasterOrDataset,
+    instrument: InstrumentLike,
     *,
     bands: Names | None = None,
-    source: FilePath | Instrument | None = None,
+    source: InstrumentLike | None = None,
     uncertainty: float = UNCERTAINTY,
 ) -> xr.DataArray:
     """
@@ -118,17 +119,17 @@ def adjust_bands(
 
 @by_date
 def as_seen_by(
-    reflectance: xr.DataArray,
-    instrument: FilePath | Instrument,
+    reflectance: RasterOrDataset,
+    instrument: InstrumentLike,
     *,
     bands: Names | None = None,
-    source: FilePath | Instrument | None = None,
+    source: InstrumentLike | None = None,
     atmosphere: Atmosphere | None = None,
     time: Time | None = None,
     geometry: Directions | None = None,
     onto: GeoBox | None = None,
-    noise: Names = (),
-    seed: int = 0,
+    noise: Noise = (),
+    seed: WholeNumber = 0,
     uncertainty: float = UNCERTAINTY,
 ) -> Image:
     """
@@ -201,9 +202,7 @@ def _with_error(image, surface):
     return image.assign_coords(adjustment_error=error.variable)
 
 
-def spectral_adjustment(
-    source: FilePath | Instrument, target: FilePath | Instrument, *, bands: Names | None = None
-) -> xr.Dataset:
+def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands: Names | None = None) -> xr.Dataset:
     """
     Bands of one instrument as straight lines of those of another: target = slope * source + offset.
 

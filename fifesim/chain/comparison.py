@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import pandas as pd
 import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
-from fifesim.base.annotations import FilePath, Names
+from fifesim.base.annotations import Names
 from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.chain.images import ndvi
 from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import RasterOrDataset
 from fifesim.rasters.reductions import computed
 from fifesim.rasters.regularization import areas, regularized
 from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.annotations import InstrumentsLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 
 def compare(
-    lai: xr.DataArray | xr.Dataset,
-    instruments: Sequence[FilePath | Instrument],
+    lai: RasterOrDataset,
+    instruments: InstrumentsLike,
     setup: Setup | None = None,
     *,
     bands: Mapping[str, Names] | None = None,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import xarray as xr
 
 from fifesim.analysis.rasters import indices
+from fifesim.base.kinds import UNCHECKED
 from fifesim.rasters import cf
+from fifesim.rasters.annotations import RasterOrDataset
 from fifesim.rasters.dates import by_date
 from fifesim.rasters.own_rasters import incoming
 from fifesim.sensor import raster as sensor
@@ -15,7 +17,7 @@ from fifesim.sensor.response.rasters.matching import check_wavelengths
 
 
 @by_date
-def ndvi(image: xr.DataArray) -> xr.DataArray:
+def ndvi(image: RasterOrDataset) -> xr.DataArray:
     """
     Normalized difference vegetation index, from planetary reflectance as in the paper (Results).
 
@@ -49,12 +51,13 @@ def ndvi(image: xr.DataArray) -> xr.DataArray:
     >>> round(float(ndvi.mean()), 2)
     0.36
     """
-    return indices.ndvi(planetary_reflectance(image))
+    return _index(image, "NDVI")
 
 
 @by_date
 def index(
-    image: xr.DataArray, name: Literal["NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"]
+    image: xr.DataArray,
+    name: Annotated[Literal["NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"], UNCHECKED],
 ) -> xr.DataArray:
     """
     Spectral index of an image.
@@ -95,7 +98,21 @@ def index(
     >>> round(float(rho.fifesim.index("EVI").mean()), 2)
     0.27
     """
-    return indices.index(planetary_reflectance(image), name)
+    return _index(image, name)
+
+
+def _index(image, name):
+    """Spectral index of an image, without labels on the reflectance between."""
+    if not _is_recorded(image):
+        return indices.index(planetary_reflectance(image), name)
+    reflectance, history = sensor.planetary(image)
+    check_wavelengths(reflectance)
+    return indices.index(reflectance, name, source=image, history=history)
+
+
+def _is_recorded(image):
+    """Whether an image holds digital numbers or radiance."""
+    return "gain" in image.coords or image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
 
 
 def planetary_reflectance(image):
@@ -116,10 +133,6 @@ def planetary_reflectance(image):
     ValueError
         If it carries no calibration, values cannot be a reflectance, or names of bands contradict their wavelengths.
     """
-    is_radiance = image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
-    if "gain" in image.coords or is_radiance:
-        reflectance = sensor.to_reflectance(image)
-    else:
-        reflectance = incoming(image, "toa_reflectance")
+    reflectance = sensor.to_reflectance(image) if _is_recorded(image) else incoming(image, "toa_reflectance")
     check_wavelengths(reflectance)
     return reflectance

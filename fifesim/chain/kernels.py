@@ -14,16 +14,13 @@ from fifesim.base.bands import NEAR_INFRARED, RED, nearest
 from fifesim.base.geometry import Geometry
 from fifesim.chain import landscapes
 from fifesim.chain.setup import Setup
+from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.raster import fpar_kernel
-from fifesim.ground.canopy.rasters.evaluation import canopy_kernel
+from fifesim.ground.canopy.rasters.evaluation import Light, canopy_kernel
 from fifesim.ground.terrain.lit_slopes import slope_reflectance
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.rasters import digital_numbers
-
-# What `canopies_of` is told of a canopy.
-_CANOPY = ("leaf_optics", "background", "leaf_angles", "hotspot", "brown", "dissociation", "brown_leaf")
-_CANOPY += ("crown_cover", "crown_shape", "soil", "moisture")
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +138,7 @@ class Kernels:
         fifesim.chain.landscapes.fpar
         """
         own = self.setup
-        said = {name: getattr(own, name) for name in ("leaf_angles", "brown", "dissociation", "crown_cover")}
-        return fpar_kernel(None, own.geometry, fpar_inf=fpar_inf, leaves=leaves, **said)[0](lai)
+        return fpar_kernel(None, own.canopy, own.geometry, fpar_inf, leaves)[0](lai)
 
     def toa(self, reflectance):
         """
@@ -260,11 +256,10 @@ class Kernels:
 
     @cached_property
     def _canopy(self):
-        own, land = self.setup, landscapes.Land(None)
-        canopies = landscapes.canopies_of(land, self.bands, {name: getattr(own, name) for name in _CANOPY})
-        air = atmosphere_raster.diffuse_fraction(self.air, self._responses, own.geometry)
-        light = {"diffuse_fraction": air, "geometry": own.geometry}
-        kernel, rasters = canopy_kernel(None, [band.name for band in self.bands], **canopies[None], **light)
+        own = self.setup
+        stand = landscapes.canopies_of(landscapes.Land(None), self.bands, own.canopy)[None]
+        light = Light(own.geometry, atmosphere_raster.diffuse_fraction(self.air, self._responses, own.geometry))
+        kernel, rasters = canopy_kernel(None, [band.name for band in self.bands], stand, light)
         return kernel, [each.values for each in rasters]
 
     @cached_property
@@ -315,7 +310,7 @@ def labelled_only(setup):
         "angles by cell": not isinstance(setup.geometry, Geometry),
         "a drifting offset": any(np.ndim(each) for each in setup.offset),
     }
-    rasters = [name for name in _CANOPY if isinstance(getattr(setup, name), xr.DataArray | xr.Dataset)]
+    rasters = [name for name in PROPERTIES if isinstance(getattr(setup.canopy, name), xr.DataArray | xr.Dataset)]
     return [name for name, is_so in found.items() if is_so] + rasters
 
 

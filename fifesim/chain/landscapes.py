@@ -5,42 +5,32 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from fifesim.analysis.rasters import means
-from fifesim.base.annotations import Time
-from fifesim.base.line_spread import LineSpread
-from fifesim.chain.stands import of_class, stands_of
+from fifesim.base.annotations import Metres, Time
+from fifesim.base.line_spread import Spread
+from fifesim.chain.stands import stands_of
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy import raster as ground
-from fifesim.ground.canopy.annotations import LeafAngles
-from fifesim.ground.canopy.crowns import SHAPE
+from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
 from fifesim.ground.canopy.optics import DEAD_LEAF
+from fifesim.ground.canopy.properties import NUMBERS, PROPERTIES
 from fifesim.ground.canopy.rasters import leaves, soils
-from fifesim.ground.canopy.rasters.classes import reflectance_of_classes
+from fifesim.ground.canopy.rasters.evaluation import BandCanopy
 from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.compression import NO_CLASS
 from fifesim.ground.landscape.rasters.cover import classes_of
 from fifesim.ground.landscape.rasters.evaluation import by_class
 from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions, NumberOrRaster, Raster
+from fifesim.rasters.annotations import MASKS_TOO, Raster, RasterOrDataset
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
-
-_DEFAULTS = {"leaf_optics": None, "background": None, "leaf_angles": "spherical", "hotspot": 0.0}
-_DEFAULTS |= {"brown": 0.0, "dissociation": 0.0, "brown_leaf": None, "crown_cover": 1.0, "crown_shape": SHAPE}
-_DEFAULTS |= {"soil": None, "moisture": None}
-"""Of what a canopy is told, where nothing is said."""
-
-_RESOLVED = ("leaf_optics", "background", "brown_leaf", "soil", "moisture")
-"""What is resolved into numbers of each band, or what makes them."""
-
-_OF_CELLS = ("brown", "dissociation", "crown_cover", "soil", "moisture")
-"""Variables of a landscape that say what its canopy is in each cell."""
+from fifesim.rasters.directions import Directions
 
 
 class Land(NamedTuple):
@@ -77,7 +67,7 @@ def land_of(scene):
             f"a landscape has a variable lai, this Dataset has {', '.join(map(str, scene.data_vars)) or 'none'}: "
             "make it with fifesim.landscape(grid, ...), or rename one with .rename(LAI='lai')"
         )
-    cells = {name: scene[name] for name in _OF_CELLS if name in scene.data_vars}
+    cells = {name: scene[name] for name in NUMBERS if name in scene.data_vars}
     cells = {name: each if each.ndim else float(each) for name, each in cells.items()}
     if "cover" not in scene.data_vars:
         return Land(scene["lai"], cells=cells)
@@ -86,33 +76,33 @@ def land_of(scene):
 
 def canopies_of(land, bands, canopy, exact=False):
     """
-    Canopies of a scene by their numbers in each band.
+    Canopies of a scene with their optics in each band.
 
     Parameters
     ----------
     land : Land
     bands : sequence of fifesim.sensor.description.band.InstrumentBand
-    canopy : dict of str
-        What `fifesim.surface_reflectance` was told of the canopy, by the names of its arguments.
+    canopy : Canopy
+        For what neither cells nor classes have.
     exact : bool, optional
         As in `fifesim.surface_reflectance`.
 
     Returns
     -------
-    canopies : dict of int to dict
-        By codes of the classes, None where there are none: what `ground.canopy.rasters.evaluation.canopy_kernel` takes.
+    canopies : dict of int to fifesim.ground.canopy.rasters.evaluation.BandCanopy
+        By codes of the classes; None is the code without classes.
 
     Raises
     ------
     ValueError
-        As in `fifesim.surface_reflectance`; if an argument is given that all classes say themselves.
+        As in `fifesim.surface_reflectance`; if a property is given that all classes have.
     """
     optics = _Optics(tuple(band.response for band in bands), land.lai, exact)
     _check_used(land, canopy)
     return {code: optics.of(stand) for code, stand in stands_of(land.classes, canopy, land.cells).items()}
 
 
-def level_reflectance(land, bands, canopies, **scene):
+def level_reflectance(land, bands, canopies, light, **options):
     """
     Reflectance factor of the canopies of a scene, for flat ground.
 
@@ -122,8 +112,9 @@ def level_reflectance(land, bands, canopies, **scene):
     bands : sequence of fifesim.sensor.description.band.InstrumentBand
     canopies : dict
         From `canopies_of`.
-    **scene
-        What `ground.canopy.raster.level_reflectance` takes besides.
+    light : fifesim.ground.canopy.rasters.evaluation.Light
+    **options
+        ``exact`` and attributes, as in `fifesim.ground.canopy.raster.level_reflectance`.
 
     Returns
     -------
@@ -135,10 +126,9 @@ def level_reflectance(land, bands, canopies, **scene):
     ValueError
         As in `fifesim.surface_reflectance`.
     """
-    named = {"bands": [band.name for band in bands], "wavelengths": [band.wavelength for band in bands]}
     if land.cover is None:
-        return ground.level_reflectance(land.lai, **canopies[None], **named, **scene)
-    return reflectance_of_classes(land.lai, land.cover, canopies, **named, **scene)
+        return ground.level_reflectance(land.lai, bands, canopies[None], light, **options)
+    return ground.reflectance_of_classes(land.lai, land.cover, bands, canopies, light, **options)
 
 
 class _Optics:
@@ -149,25 +139,20 @@ class _Optics:
         self._known = {}
 
     def of(self, canopy):
-        """What `ground.canopy.raster.canopy_kernel` takes of a canopy."""
-        leaf = self._once("leaf_optics", leaves.leaf_optics, canopy["leaf_optics"], exact=self._exact)
-        below = self._once("background", soils.background, canopy["background"])
+        """Canopy with its optics in each band."""
+        leaf = self._once("leaf_optics", leaves.leaf_optics, canopy.leaf_optics, exact=self._exact)
+        below = self._once("background", soils.background, canopy.background)
         dead = None
-        if isinstance(canopy["brown"], xr.DataArray) or canopy["brown"] != 0:
-            given = DEAD_LEAF if canopy["brown_leaf"] is None else canopy["brown_leaf"]
+        if is_raster(canopy.brown) or canopy.brown != 0:
+            given = DEAD_LEAF if canopy.brown_leaf is None else canopy.brown_leaf
             dead = self._once("leaf_optics", leaves.leaf_optics, given, exact=self._exact)
-        others = {name: value for name, value in canopy.items() if name not in _RESOLVED}
-        by_band = {"leaf_reflectance": leaf[0], "leaf_transmittance": leaf[1], "brown_optics": dead}
-        return {**by_band, **self._below(below, canopy["soil"], canopy["moisture"]), **others}
-
-    def _below(self, dry, soil, moisture):
-        """Background, and what makes that of each cell of it."""
-        if any(isinstance(each, xr.DataArray) for each in (soil, moisture)):
-            key = "soil", id(soil), id(moisture)
-            if key not in self._known:
-                self._known[key] = soils.soil_kernel(self._responses, self._lai, soil, moisture)
-            return {"background": dry, "soil_changes": self._known[key]}
-        return {"background": soils.as_it_lies(self._responses, dry, self._lai, soil, moisture)}
+        soil, moisture = soils.changes_of(canopy)
+        if not any(map(is_raster, (soil, moisture))):
+            return BandCanopy(canopy, leaf, dead, soils.as_it_lies(self._responses, below, self._lai, soil, moisture))
+        key = "soil", id(soil), id(moisture)
+        if key not in self._known:
+            self._known[key] = soils.soil_kernel(self._responses, self._lai, soil, moisture)
+        return BandCanopy(canopy, leaf, dead, below, self._known[key])
 
     def _once(self, name, function, given, **options):
         # What is given is kept beside, so that its identity stays its own.
@@ -178,31 +163,28 @@ class _Optics:
 
 
 def _check_used(land, canopy):
-    """Refuse an argument that would change nothing."""
-    for name, value in canopy.items():
-        default = _DEFAULTS[name]
-        if value is default or (isinstance(value, str | int | float) and value == default):
+    """Raise ValueError if a property is given that would change nothing."""
+    for name in canopy.given:
+        value, default = getattr(canopy, name), PROPERTIES[name].default
+        if isinstance(value, str | int | float) and value == default:
             continue
         if name in land.cells:
             raise ValueError(f"{name} is given, and the landscape has a variable {name}: leave out one of the two")
-        if land.classes and all(of_class(each, name) is not None for each in land.classes):
+        if land.classes and all(name in each.canopy.given for each in land.classes):
             raise ValueError(
-                f"{name} is given, and all classes of the landscape say theirs: leave it out, or out of the classes"
+                f"{name} is given, and all classes of the landscape have their own: leave it out, or out of the classes"
             )
 
 
 @by_date
 def fpar(
-    lai: xr.DataArray | xr.Dataset,
+    lai: RasterOrDataset,
     *,
+    canopy: Canopy | None = None,
     geometry: Directions | None = None,
     time: Time | None = None,
-    leaf_angles: LeafAngles = "spherical",
     fpar_inf: float = absorption.FPAR_INF,
     leaves: Literal["all", "green"] = "all",
-    brown: NumberOrRaster = 0.0,
-    dissociation: NumberOrRaster = 0.0,
-    crown_cover: NumberOrRaster = 1.0,
 ) -> xr.DataArray:
     """
     Fraction of photosynthetically active radiation that a canopy absorbs, or its green leaves.
@@ -211,18 +193,16 @@ def fpar(
     ----------
     lai : xarray.DataArray, dims (y, x), or xarray.Dataset
         Leaf area index, or a landscape that has it as ``lai``. [m2 m-2]
+    canopy : Canopy, optional
+        Its leaf angles, crown cover, and dead leaves; properties that the landscape has are not given here.
     geometry : fifesim.base.geometry.Geometry, optional
         The sun's; by default that which the array carries, else at its time and place.
     time : str or datetime, optional
         In the place of ``geometry``.
-    leaf_angles : optional
-        As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
     fpar_inf : float, optional
         Of an infinitely thick canopy. [1]
     leaves : {"all", "green"}, optional
         Which leaves absorb it: all of them, dead ones too, or those alone that can use it.
-    brown, dissociation, crown_cover : float or xarray.DataArray, dims (y, x), optional
-        As in `surface_reflectance`. [1]
 
     Returns
     -------
@@ -255,23 +235,27 @@ def fpar(
     >>> round(float(lai.fifesim.fpar().mean()), 2)
     0.3
     """
-    land = land_of(lai)
-    said = {"geometry": geometry, "time": time, "fpar_inf": fpar_inf, "leaves": leaves}
-    canopy = {"leaf_angles": leaf_angles, "brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
+    land, canopy = land_of(lai), canopy or TALLGRASS
+    light = {"geometry": geometry, "time": time, "fpar_inf": fpar_inf, "leaves": leaves}
     _check_used(land, canopy)
+    stands = stands_of(land.classes, canopy, land.cells)
     if land.cover is None:
-        return ground.fpar(land.lai, **said, **stands_of((), canopy, land.cells)[None])
-    told = stands_of(land.classes, canopy, land.cells)
-    # Of classes with the same canopy once.
-    made = {repr(each): ground.fpar(land.lai, **said, **each) for each in {repr(v): v for v in told.values()}.values()}
-    taken = {text: (np.positive, [each]) for text, each in made.items()}
-    kernels = {code: taken[repr(each)] for code, each in told.items()}
+        return ground.fpar(land.lai, stands[None], **light)
+    # Classes whose canopies absorb alike are computed once.
+    kernels, known = {}, []
+    for code, stand in stands.items():
+        alike = [kernel for other, kernel in known if ground.same_properties(stand, other, ground.ABSORBING)]
+        kernels[code] = alike[0] if alike else (np.positive, [ground.fpar(land.lai, stand, **light)])
+        known.append((stand, kernels[code]))
+    distinct = list({id(kernel): kernel for kernel in kernels.values()}.values())
     out = grids.place(by_class(kernels, land.cover), grids.geobox(land.lai))
-    history = next(iter(made.values())).attrs["history"].splitlines()[-1] if len(made) == 1 else "fpar: by class"
+    history = distinct[0][1][0].attrs["history"].splitlines()[-1] if len(distinct) == 1 else "fpar: by class"
     return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=land.lai, history=history)
 
 
-def aggregate(array: Raster, pixel: float = 30.0, *, min_valid: float = 0.98, lsf: LineSpread | None = None) -> Raster:
+def aggregate(
+    array: Annotated[Raster, MASKS_TOO], pixel: Metres = 30.0, *, min_valid: float = 0.98, lsf: Spread | None = None
+) -> Raster:
     """
     Means over square blocks of ground: the truth that a pixel is compared with.
 

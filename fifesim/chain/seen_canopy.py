@@ -9,7 +9,7 @@ from fifesim.atmosphere.schemes.coupling import apparent_reflectance, apparent_r
 from fifesim.ground.canopy.lai_table import RUN, places_of, value_at
 from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS, check_map
 from fifesim.ground.canopy.rasters.evaluation import EvenCanopy
-from fifesim.ground.canopy.reflectance_table import canopy_reflectance, even_table
+from fifesim.ground.canopy.reflectance_table import scene_reflectance, surface_table
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters.origins import origin_of
 
@@ -35,13 +35,13 @@ def seen_through_air(reflectance):
 
     def made(terms):
         by_band = {name: tuple(map(float, values)) for name, values in terms.uniform.items()}
-        kernel = partial(seen_reflectance, canopy=canopy.parameters, terms=by_band)
+        kernel = partial(seen_reflectance, background=canopy.background, scene=canopy.scene, terms=by_band)
         return chunking.pointwise(kernel, canopy.lai, bands=reflectance.sizes["band"])
 
     return made
 
 
-def seen_reflectance(lai, *, canopy, terms):
+def seen_reflectance(lai, *, background, scene, terms):
     """
     Apparent reflectance of a canopy at the top of the atmosphere, by a table of its reflectance.
 
@@ -49,8 +49,10 @@ def seen_reflectance(lai, *, canopy, terms):
     ----------
     lai : array, shape (y, x)
         NaN gives NaN. [m2 m-2]
-    canopy : dict
-        What `fifesim.ground.canopy.reflectance_table.even_table` takes.
+    background : tuple of float, shape (band,)
+        [1]
+    scene : fifesim.ground.canopy.reflectance_table.Scene
+        Of numbers.
     terms : dict
         What `fifesim.atmosphere.schemes.coupling.apparent_reflectance` takes, each a value for each band. [1]
 
@@ -64,11 +66,11 @@ def seen_reflectance(lai, *, canopy, terms):
     ValueError
         As they do.
     """
-    cells, table = np.ascontiguousarray(lai, float), even_table(**canopy)
+    cells, table = np.ascontiguousarray(lai, float), surface_table(background, scene)
     out = np.empty((table.coefficients.shape[1], cells.size))
     if _seen(cells.reshape(-1), table, np.array(list(terms.values())), out):
         # The functions themselves say what is wrong.
-        ground = canopy_reflectance(check_map(lai), **canopy)
+        ground = scene_reflectance(check_map(lai), np.array(background), scene)
         return apparent_reflectance(ground, **{name: np.array(each)[:, None, None] for name, each in terms.items()})
     return out.reshape(-1, *cells.shape)
 

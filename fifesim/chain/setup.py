@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Literal
 
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.base.annotations import FilePath, Names, Numbers, Pair
+from fifesim.base.annotations import Interval, Names, Noise, Offset, Surroundings, WholeNumber
+from fifesim.base.arguments import check_fields
 from fifesim.base.foreign import in_a_line
 from fifesim.chain import steps
-from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
-from fifesim.ground.canopy.crowns import SHAPE
-from fifesim.rasters.annotations import Directions, NumberOrRaster
+from fifesim.ground.canopy.description import TALLGRASS, Canopy
+from fifesim.rasters.annotations import Horizon
+from fifesim.rasters.directions import Directions
 from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.instruments import Instrument
-from fifesim.sensor.response.noise import NoiseModel
+from fifesim.sensor.description.annotations import InstrumentLike
+from fifesim.sensor.response.noise import NoiseModels
 
 # What surface_reflectance and sense take of a setup, by the same names.
-_GROUND = ("bands", "dem", "horizon", "upwelling", "atmosphere", "leaf_optics", "background", "leaf_angles", "hotspot")
-_GROUND += ("brown", "dissociation", "brown_leaf", "crown_cover", "crown_shape")
-_GROUND += ("soil", "moisture")
+_GROUND = ("canopy", "bands", "dem", "horizon", "upwelling", "atmosphere")
 _SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
 
 
@@ -41,9 +38,7 @@ class Setup:
         By default midlatitude summer, continental aerosol, 45 km visibility.
     geometry : Geometry or xarray.Dataset, optional
         Of sun and sensor; by default that of the leaf area, else the paper's.
-    leaf_optics, background, soil, moisture, leaf_angles, hotspot : optional
-        As in `fifesim.surface_reflectance`.
-    brown, dissociation, brown_leaf, crown_cover, crown_shape : optional
+    canopy : Canopy, optional
         As in `fifesim.surface_reflectance`.
     dem, horizon, upwelling : optional
         As in `fifesim.surface_reflectance`; without a dem the ground is level.
@@ -65,34 +60,29 @@ class Setup:
     ['OLI']
     """
 
-    instrument: FilePath | Instrument = "TM"
+    instrument: InstrumentLike = "TM"
     bands: Names | None = None
     atmosphere: Atmosphere | None = None
     geometry: Directions | None = None
-    leaf_optics: LeafOptics | None = None
-    background: BelowLeaves | None = None
-    soil: NumberOrRaster | None = None
-    moisture: NumberOrRaster | None = None
-    leaf_angles: LeafAngles = "spherical"
-    hotspot: float = 0.0
-    brown: NumberOrRaster = 0.0
-    dissociation: NumberOrRaster = 0.0
-    brown_leaf: LeafOptics | None = None
-    crown_cover: NumberOrRaster = 1.0
-    crown_shape: float = SHAPE
+    canopy: Canopy | None = TALLGRASS
     dem: xr.DataArray | None = None
-    horizon: xr.DataArray | None = None
+    horizon: Horizon | None = None
     upwelling: bool = True
     adjacency: bool = False
-    surroundings: Numbers | None = None
+    surroundings: Surroundings | None = None
     onto: GeoBox | None = None
-    interval: Literal["native"] | Pair | None = None
-    offset: Sequence[Numbers] = (0.0, 0.0)
+    interval: Interval | None = None
+    offset: Offset = (0.0, 0.0)
     min_valid: float = sensor.MIN_VALID
-    noise: Names = ()
-    noise_models: NoiseModel | Mapping[str, NoiseModel] | None = None
-    seed: int = 0
+    noise: Noise = ()
+    noise_models: NoiseModels | None = None
+    seed: WholeNumber = 0
     quantise: bool = True
+
+    def __post_init__(self):
+        check_fields(self, "canopy")
+        if self.canopy is None:
+            object.__setattr__(self, "canopy", TALLGRASS)
 
     def __repr__(self):
         others = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "instrument"}

@@ -6,14 +6,15 @@ import xarray as xr
 
 from fifesim.atmosphere.air.models import Atmosphere
 from fifesim.atmosphere.schemes import engines
-from fifesim.base.annotations import FilePath, Time
+from fifesim.base.annotations import Time
 from fifesim.chain.carried import air_bands_and_geometry, as_bands_of
 from fifesim.ground.terrain.rasters import lit_slopes
 from fifesim.ground.terrain.rasters.dem import beside_altitude
 from fifesim.rasters import directions
-from fifesim.rasters.annotations import Directions
+from fifesim.rasters.annotations import Horizon
 from fifesim.rasters.dates import by_date
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.rasters.directions import Directions
+from fifesim.sensor.description.annotations import InstrumentLike
 
 
 @by_date
@@ -21,11 +22,11 @@ def kt(
     reflectance: xr.DataArray,
     dem: xr.DataArray,
     *,
-    horizon: xr.DataArray | None = None,
+    horizon: Horizon | None = None,
     atmosphere: Atmosphere | None = None,
     geometry: Directions | None = None,
     time: Time | None = None,
-    instrument: FilePath | Instrument | None = None,
+    instrument: InstrumentLike | None = None,
 ) -> xr.DataArray:
     """
     Topographic correction factor Kt: what terrain does to the irradiance in each band.

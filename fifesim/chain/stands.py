@@ -4,6 +4,7 @@ from numbers import Number
 from types import MappingProxyType
 
 from fifesim.base.warned import warn
+from fifesim.ground.canopy.description import is_raster
 
 _TALLGRASS = {"background": "soil and litter", "brown_leaf": "dead leaves", "leaf_optics": "green leaves"}
 """Optics that are those of FIFE's tallgrass by default."""
@@ -17,44 +18,23 @@ _CURES = {
 
 def stands_of(classes, canopy, cells=MappingProxyType({})):
     """
-    Canopies of a scene as they are given, by codes of the classes; None is the code without classes.
+    Canopies of a scene by codes of its classes; None is the code without classes.
 
     Parameters
     ----------
     classes : sequence of CoverClass
-    canopy : dict of str
-        Canopy arguments of `fifesim.surface_reflectance`.
-    cells : mapping of str, optional
-        Variables of the landscape, which win.
+        Fields that their canopies leave open are those of `canopy`.
+    canopy : Canopy
+    cells : mapping of str to xarray.DataArray or float, optional
+        Properties of the canopy by cell, which have precedence.
 
     Returns
     -------
-    stands : dict of int to dict
+    stands : dict of int to Canopy
     """
-    of_cells = {name: each for name, each in cells.items() if name in canopy}
     if not classes:
-        return {None: canopy | of_cells}
-    own = {kind.code: {name: of_class(kind, name) for name in canopy} for kind in classes}
-    given = {code: {name: each for name, each in stand.items() if each is not None} for code, stand in own.items()}
-    return {code: canopy | stand | of_cells for code, stand in given.items()}
-
-
-def of_class(kind, name):
-    """
-    Value of a canopy argument in a class of cover.
-
-    Parameters
-    ----------
-    kind : CoverClass
-    name : str
-        Argument of `fifesim.surface_reflectance`.
-
-    Returns
-    -------
-    value : object
-        None if the class does not have one.
-    """
-    return getattr(kind, "leaf" if name == "leaf_optics" else name)
+        return {None: canopy.replace(**cells)}
+    return {kind.code: kind.canopy.over(canopy).replace(**cells) for kind in classes}
 
 
 def warn_of_tallgrass(scene, classes, canopy, cells=MappingProxyType({})):
@@ -86,6 +66,6 @@ def warn_of_tallgrass(scene, classes, canopy, cells=MappingProxyType({})):
 
 def _defaults(stand, has_leaves):
     """Names of the optics that a stand leaves to the defaults."""
-    dead = not isinstance(stand["brown"], Number) or stand["brown"] != 0
+    dead = is_raster(stand.brown) or stand.brown != 0
     needed = {"background": True, "leaf_optics": has_leaves, "brown_leaf": has_leaves and dead}
-    return [name for name, need in needed.items() if need and stand[name] is None]
+    return [name for name, need in needed.items() if need and getattr(stand, name) is None]

@@ -6,51 +6,42 @@ import xarray as xr
 
 from fifesim.atmosphere import raster as atmosphere_raster
 from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.base.annotations import FilePath, Names, Numbers, Time
+from fifesim.base.annotations import Names, Surroundings, Time
 from fifesim.chain import landscapes
 from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
 from fifesim.chain.images import planetary_reflectance
 from fifesim.chain.seen_canopy import seen_through_air
 from fifesim.chain.slopes import sunlight
 from fifesim.chain.stands import warn_of_tallgrass
-from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
-from fifesim.ground.canopy.crowns import SHAPE
+from fifesim.ground.canopy.description import TALLGRASS, Canopy
 from fifesim.ground.canopy.rasters import soils
+from fifesim.ground.canopy.rasters.evaluation import Light
 from fifesim.ground.terrain.rasters import lit_slopes
 from fifesim.rasters import directions
-from fifesim.rasters.annotations import Directions, NumberOrRaster
+from fifesim.rasters.annotations import Horizon, RasterOrDataset
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.rasters.sites import is_fife
 from fifesim.rasters.sun import check_same_sun
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 
 
 @by_date
 def surface_reflectance(
-    lai: xr.DataArray | xr.Dataset,
-    instrument: FilePath | Instrument | None = None,
+    lai: RasterOrDataset,
+    instrument: InstrumentLike | None = None,
     *,
+    canopy: Canopy | None = None,
     bands: Names | None = None,
     dem: xr.DataArray | None = None,
-    horizon: xr.DataArray | None = None,
+    horizon: Horizon | None = None,
     upwelling: bool = True,
     atmosphere: Atmosphere | None = None,
     geometry: Directions | None = None,
     time: Time | None = None,
-    leaf_optics: LeafOptics | None = None,
-    background: BelowLeaves | None = None,
-    soil: NumberOrRaster | None = None,
-    moisture: NumberOrRaster | None = None,
-    leaf_angles: LeafAngles = "spherical",
-    hotspot: float = 0.0,
-    brown: NumberOrRaster = 0.0,
-    dissociation: NumberOrRaster = 0.0,
-    brown_leaf: LeafOptics | None = None,
-    crown_cover: NumberOrRaster = 1.0,
-    crown_shape: float = SHAPE,
     exact: bool = False,
 ) -> xr.DataArray:
     """
@@ -59,10 +50,12 @@ def surface_reflectance(
     Parameters
     ----------
     lai : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area index, or a landscape that has it as ``lai``, from `landscape`: its variables are those of its cells,
-        what classes say stands, and arguments below are of what neither says. [m2 m-2]
+        Leaf area index, or a landscape with a variable ``lai``, from `landscape`. Its other variables have precedence
+        over the canopies of its classes, and these over ``canopy``. [m2 m-2]
     instrument : str or Instrument, optional
         Whose bands are simulated; by default TM for a scene on the FIFE site.
+    canopy : Canopy, optional
+        Leaves, their arrangement, and the ground below them; by default green tallgrass of the FIFE site.
     bands : sequence of str, optional
         Names of its bands; all by default.
     dem : xarray.DataArray, dims (y, x), optional
@@ -80,36 +73,6 @@ def surface_reflectance(
         the FIFE site has the paper's sun.
     time : str or datetime, optional
         In the place of ``geometry``: when the sun stood over the middle of the grid, below a nadir view.
-    leaf_optics : Leaf, str, path, xarray.Dataset, or mapping of str to (float, float), optional
-        A leaf by its contents; the path of a CSV file, or a Dataset, with its spectra ``wavelength`` [um],
-        ``reflectance`` and ``transmittance``; or both by band name. By default green tallgrass.
-        Each number may be a raster over (y, x): SAIL is evaluated at every cell then. Where one content of the `Leaf`
-        alone is a raster, its optics are from a table within 1e-8; of more, each kind of leaf is computed once. [1]
-    background : optional
-        Reflectance below the canopy: a number, by band name, or a raster over ([band], y, x); a `Background` or
-        ``{spectrum: fraction}`` that mixes spectra; the path of a CSV file, or a Dataset, with ``wavelength`` [um] and
-        ``reflectance``. Each number by band or spectrum may be a raster over (y, x). By default soil and litter of
-        tallgrass. [1]
-    soil : float or xarray.DataArray, dims (y, x), optional
-        How much brighter the background is along the soil line: the change of its reflectance at 0.55 um, by which all
-        bands change; below 0 it is darker. No reflectance leaves 0 to 1. [1]
-    moisture : float or xarray.DataArray, dims (y, x), optional
-        Of the background, 0 dry and 1 saturated (5 and 55 percent of the volume): films of water darken it, most of all
-        in the shortwave infrared. [1]
-    leaf_angles : optional
-        A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions.
-    hotspot : float, optional
-        Leaf size over canopy height; 0 is none, as in the paper's SAIL. [1]
-    brown : float or xarray.DataArray, dims (y, x), optional
-        Dead share of the leaf area, 0 to 1. [1]
-    dissociation : float or xarray.DataArray, dims (y, x), optional
-        Where dead leaves are: 0 among the green ones, 1 below them. Of a raster, SAIL is evaluated at every cell. [1]
-    brown_leaf : optional
-        Optics of dead leaves, as ``leaf_optics`` takes them; by default dead tallgrass.
-    crown_cover : float or xarray.DataArray, dims (y, x), optional
-        Share of the ground below crowns, which hold all leaves; 0 is bare ground. [1]
-    crown_shape : float, optional
-        Crown diameter over height. [1]
     exact : bool, optional
         Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it, and all leaves.
 
@@ -127,7 +90,8 @@ def surface_reflectance(
     Warns
     -----
     UserWarning
-        If atmosphere, leaf_optics or background are not given for a scene that was not made on the FIFE site.
+        If the atmosphere, or leaves or background of the canopy, are not given for a scene from elsewhere than the FIFE
+        site.
 
     References
     ----------
@@ -158,24 +122,14 @@ def surface_reflectance(
     atmosphere, lai = air_of(atmosphere, lai), directions.dated(lai, time)
     selected = description.select(bands)
     responses = tuple(band.response for band in selected)
-    canopy = {"leaf_optics": leaf_optics, "background": background, "leaf_angles": leaf_angles, "hotspot": hotspot}
-    canopy |= {"brown": brown, "dissociation": dissociation, "brown_leaf": brown_leaf}
-    canopy |= {"crown_cover": crown_cover, "crown_shape": crown_shape, "soil": soil, "moisture": moisture}
-    land = land._replace(lai=lai)
+    land, canopy = land._replace(lai=lai), canopy or TALLGRASS
     if not is_fife(lai):
         warn_of_tallgrass(lai.name or "the raster", land.classes, canopy, land.cells)
     canopies = landscapes.canopies_of(land, selected, canopy, exact)
-    level = landscapes.level_reflectance(
-        land,
-        selected,
-        canopies,
-        diffuse_fraction=atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry),
-        geometry=geometry,
-        exact=exact,
-        atmosphere=atmosphere.text,
-        **soils.in_words(*({**canopy, **land.cells}[name] for name in ("soil", "moisture"))),
-        **attributes_of(description),
-    )
+    light = Light(geometry, atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry))
+    soil = soils.in_words(canopy.replace(**land.cells))
+    provenance = {"atmosphere": atmosphere.text, **soil, **attributes_of(description)}
+    level = landscapes.level_reflectance(land, selected, canopies, light, exact=exact, **provenance)
     if dem is None:
         return level
     light = sunlight(dem, atmosphere, responses, geometry, "surface_reflectance on slopes")
@@ -184,15 +138,15 @@ def surface_reflectance(
 
 @by_date
 def to_toa(
-    reflectance: xr.DataArray | xr.Dataset,
+    reflectance: RasterOrDataset,
     atmosphere: Atmosphere | None = None,
     *,
     geometry: Directions | None = None,
     time: Time | None = None,
-    instrument: FilePath | Instrument | None = None,
+    instrument: InstrumentLike | None = None,
     elevation: xr.DataArray | None = None,
     adjacency: bool = False,
-    surroundings: Numbers | None = None,
+    surroundings: Surroundings | None = None,
 ) -> xr.DataArray:
     """
     Apparent reflectance at the top of the atmosphere.
@@ -265,16 +219,16 @@ def to_toa(
 
 @by_date
 def to_surface(
-    reflectance: xr.DataArray | xr.Dataset,
+    reflectance: RasterOrDataset,
     atmosphere: Atmosphere | None = None,
     *,
     assume: bool = False,
     geometry: Directions | None = None,
     time: Time | None = None,
-    instrument: FilePath | Instrument | None = None,
+    instrument: InstrumentLike | None = None,
     elevation: xr.DataArray | None = None,
     adjacency: bool = False,
-    surroundings: Numbers | None = None,
+    surroundings: Surroundings | None = None,
 ) -> xr.DataArray:
     """
     Surface reflectance from that at the top of the atmosphere; the inverse of `to_toa`.

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from functools import partial
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 import xarray as xr
 
-from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest
+from fifesim.base.bands import COMPOSITES
+from fifesim.base.bands import composite as composite_numbers
+from fifesim.base.kinds import NAMES, Kind
+from fifesim.output.colours import dark_and_bright, percentile_limits
 from fifesim.rasters import chunks, swaths
 from fifesim.rasters.reductions import computed
-
-COMPOSITES = {"false colour": (NEAR_INFRARED, RED, GREEN), "natural colour": (RED, GREEN, BLUE)}
-
-# The dark end of a colour picture is this share of what its darkest percent has, and the bright end lies this much
-# beyond the brightest: bands that vary against each other, as red and near infrared do, would else leave pure colours.
-_DARK, _BEYOND = 0.7, 0.1
 
 # Pixels along a side from which the limits of a stretch are taken.
 _SAMPLE = 1000
 
+Composite: TypeAlias = Annotated[
+    Literal["false colour", "natural colour"] | tuple[str, str, str],
+    Kind("'false colour', 'natural colour', or the names of three bands", NAMES.fits),
+]
+
 
 def rgb(
     image: xr.DataArray,
-    composite: Literal["false colour", "natural colour"] | tuple[str, str, str] = "false colour",
+    composite: Composite = "false colour",
     *,
     stretch: tuple[float, float] | None = None,
 ) -> xr.DataArray:
@@ -61,15 +64,12 @@ def rgb(
     (90, 90, 3)
     """
     names = composite_bands(image, composite)
-    percentiles = None if stretch is None else _percentiles(stretch)
+    limits_of = dark_and_bright if stretch is None else partial(percentile_limits, percentiles=_percentiles(stretch))
     have = [str(name) for name in image["band"].values]
     layers = [valid(image.isel(band=have.index(name))) for name in names]
-    values = [
-        np.asarray(each, float)[np.isfinite(each)] for each in computed(*(thinned(each, _SAMPLE) for each in layers))
-    ]
-    limits = [dark_and_bright(each, percentiles) for each in values]
+    limits = map(limits_of, computed(*(thinned(each, _SAMPLE) for each in layers)))
     stretched = [
-        chunks.pointwise(_stretched, layer, dtype=np.float32, low=float(start), high=float(stop))
+        chunks.pointwise(_stretched, layer, dtype=np.float32, low=start, high=stop)
         for layer, (start, stop) in zip(layers, limits, strict=True)
     ]
     # A scalar such as the distance of the sun would be the title that xarray gives a picture.
@@ -82,35 +82,6 @@ def rgb(
     out.attrs = {"long_name": f"{', '.join(names)} as red, green, blue", "units": "1"} | kept
     out.encoding = {"grid_mapping": "spatial_ref"}
     return out.rename("colours")
-
-
-def dark_and_bright(values, percentiles=None):
-    """
-    Values of a band that become dark and bright.
-
-    Parameters
-    ----------
-    values : array
-        Without NaN; there may be none.
-    percentiles : (float, float), optional
-        Of the values; by default from below the first to beyond the last. [%]
-
-    Returns
-    -------
-    dark, bright : float
-
-    Examples
-    --------
-    >>> dark_and_bright(np.linspace(0.1, 0.2, 101), (0, 100))
-    (0.1, 0.2)
-    """
-    if not values.size:
-        return 0.0, 1.0
-    low, high = (float(each) for each in np.percentile(values, percentiles or (1, 99)))
-    if percentiles is not None or low == high:
-        return low, high
-    dark = min(_DARK * low, low)
-    return dark, high + _BEYOND * (high - dark)
 
 
 def composite_bands(image, composite="false colour"):
@@ -146,13 +117,28 @@ def composite_bands(image, composite="false colour"):
     if "wavelength" not in image.coords:
         three = tuple(have[-1:-4:-1]) if len(have) > 2 else ("B5", "B4", "B3")
         raise ValueError(f"the image has no wavelength [um] along band: name three bands, composite={three}")
-    numbers = [nearest(image["wavelength"].values, window) for window in COMPOSITES[composite]]
-    if composite == "false colour" and numbers[2] is None:
-        numbers[2] = numbers[1]
+    numbers = composite_numbers(image["wavelength"].values, composite)
     if None in numbers:
         lacks = [window.name for window, number in zip(COMPOSITES[composite], numbers, strict=True) if number is None]
         raise ValueError(f"{composite} needs a {' and a '.join(lacks)} band, the image has {', '.join(have)}")
     return [have[number] for number in numbers]
+
+
+def false_colour_names(image):
+    """
+    Names of the bands of a picture in false colours.
+
+    Parameters
+    ----------
+    image : xarray.DataArray with a ``wavelength`` along band
+
+    Returns
+    -------
+    names : list of str
+        Near infrared, red and green; none where one is missing.
+    """
+    numbers = composite_numbers(image["wavelength"].values)
+    return [str(image["band"].values[number]) for number in numbers] if len({*numbers} - {None}) == 3 else []
 
 
 def valid(layer):

@@ -4,26 +4,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fifesim.analysis.rasters.pairs import matched
+from fifesim.output.colours import BAND, LINE, finite
+from fifesim.output.words import axis_label, capital
+from fifesim.rasters import cf
 from fifesim.sensor.raster import to_reflectance
 
-_LINE, _BAND = "#b2182b", "#f4a582"
 _COLORS = ("#2166ac", "#b2182b", "#1a9850", "#762a83", "#e08214", "#35978f")
 
 # Places of axes and colour bar: laying a figure out by its words takes longer than drawing it. [1]
 _PANEL, _BESIDE = (0.15, 0.17, 0.82, 0.72), (0.88, 0.14, 0.025, 0.66)
 _PLOT = (0.125, 0.14, 0.73, 0.77)
-
-NAMES = {
-    "lai": "leaf area index",
-    "fpar": "FPAR",
-    "green_fpar": "FPAR of green leaves",
-    "brown": "dead share of the leaf area",
-    "crown_cover": "crown cover",
-    "soil": "brightness of the soil",
-    "moisture": "moisture of the soil",
-    "ndvi": "NDVI",
-}
-"""Quantities in words."""
 
 
 def fit_figure(image, truth, name, fit):
@@ -49,15 +39,18 @@ def fit_figure(image, truth, name, fit):
     _density(axis, figure.add_axes(_BESIDE), x[both], y[both])
     line = np.linspace(x[both].min(), x[both].max(), 50)
     interval = fit.prediction_interval(line)
-    axis.fill_between(line, *interval, color=_BAND, alpha=0.35, linewidth=0, label="95 % prediction interval")
-    axis.plot(line, fit.predict(line), color=_LINE, linewidth=2, label="least-squares line")
+    axis.fill_between(line, *interval, color=BAND, alpha=0.35, linewidth=0, label="95 % prediction interval")
+    axis.plot(line, fit.predict(line), color=LINE, linewidth=2, label="least-squares line")
     sign = "+" if fit.slope >= 0 else "−"
-    title = f"{fit.intercept:.3f} {sign} {abs(fit.slope):.3f} NDVI,  R² = {fit.r2:.3f},  n = {fit.n}"
-    axis.set(xlabel="NDVI at the top of the atmosphere", ylabel=f"True {NAMES[name]}")
+    index = cf.QUANTITIES["ndvi"].label
+    title = f"{fit.intercept:.3f} {sign} {abs(fit.slope):.3f} {index},  R² = {fit.r2:.3f},  n = {fit.n}"
+    axis.set(xlabel=f"{index} at the top of the atmosphere", ylabel=f"True {axis_label(name)}")
     axis.set_title(title.replace("-", "−"), fontsize=10)
-    # Above all that is drawn, whichever way the line goes; not below the least that leaf area can be.
+    # Above all that is drawn, whichever way the line goes; not below the least that the quantity can be.
     low, high = axis.get_ylim()
-    axis.set_ylim(max(low, 0), high + 0.16 * (high - max(low, 0)))
+    lowest = cf.QUANTITIES[name].lowest
+    low = low if lowest is None else max(low, lowest)
+    axis.set_ylim(low, high + 0.16 * (high - low))
     axis.legend(frameon=False, loc="upper left", fontsize=8.5, ncols=2, columnspacing=1.2)
     return figure
 
@@ -104,20 +97,18 @@ def histogram_figures(image, truth, detail):
         (detail, "cells in the middle", "#a6d96a"),
         (truth["lai"], "means over all pixels", "#1a9850"),
     ):
-        leaves.hist(
-            _finite(values), bins=bins, density=True, alpha=0.7, label=label, color=color, histtype="stepfilled"
-        )
-    leaves.set(xlabel="LAI [m² m⁻²]", ylabel="density", title="Leaf area index")
+        leaves.hist(finite(values), bins=bins, density=True, alpha=0.7, label=label, color=color, histtype="stepfilled")
+    leaves.set(xlabel=axis_label("lai"), ylabel="density", title=capital(cf.QUANTITIES["lai"].long_name))
     leaves.set_ylim(top=1.22 * leaves.get_ylim()[1])
     leaves.legend(frameon=False, fontsize=7.5, ncols=2, loc="upper center", columnspacing=1.0)
-    fpar.hist(_finite(truth["fpar"]), bins=60, density=True, histtype="stepfilled", color="#1a9850")
-    fpar.set(xlabel="FPAR", ylabel="density", title="True FPAR of the pixels")
+    fpar.hist(finite(truth["fpar"]), bins=60, density=True, histtype="stepfilled", color="#1a9850")
+    fpar.set(xlabel=axis_label("fpar"), ylabel="density", title=f"True {cf.QUANTITIES['fpar'].label} of the pixels")
     for number, band in enumerate(image["dn"]["band"].values):
         values = image["dn"].sel(band=band).values
         dn, times = np.unique(values[values > 0], return_counts=True)
         color = _COLORS[number % len(_COLORS)]
         counts.step(dn, times / max(times.sum(), 1), where="mid", label=str(band), color=color, linewidth=1)
-    counts.set(xlabel="digital number", ylabel="share of pixels", title="Image")
+    counts.set(xlabel=axis_label("dn"), ylabel="share of pixels", title="Image")
     counts.legend(frameon=False, fontsize=8)
     for axis in (leaves, fpar, counts):
         axis.title.set_size(10)
@@ -142,8 +133,3 @@ def reflectance_change(dn, level, band):
     """
     one = [band]
     return (to_reflectance(dn.sel(band=one)) - to_reflectance(level.sel(band=one))).isel(band=0)
-
-
-def _finite(array):
-    values = np.asarray(array.values, float).ravel()
-    return values[np.isfinite(values)]

@@ -5,19 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import LightSource, ListedColormap, Normalize, to_hex
+from matplotlib.colors import LightSource, Normalize, to_rgb
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
-from fifesim.base.bands import GREEN, NEAR_INFRARED, RED, nearest
-from fifesim.output.composites import dark_and_bright
+from fifesim.output.colours import LAND, NO_DATA, colours_of, dark_and_bright, percentile_limits, stops_of
+from fifesim.output.composites import false_colour_names
 from fifesim.rasters import grid as grids
 from fifesim.sensor.raster import to_reflectance
-
-# Without the blue of the map's seas.
-LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)))
-
-_NO_DATA = np.array([217, 217, 217], np.uint8)
 
 # Pictures with fewer pixels along the longer side keep their values and their edges. [pixel]
 _FEW = 200
@@ -27,10 +22,6 @@ _QUALITY = 78
 
 # Of lossless ones: from 4 up zlib takes longer, and noise of pixels takes more bytes.
 _LEVEL = 2
-
-# Percentiles between which colours run, and stops of a colour bar.
-_MOST = 0.5, 99.5
-_STOPS = 9
 
 # Decimals of a number beside a colour bar are fewer.
 _MOST_DIGITS = 12
@@ -80,7 +71,7 @@ class Map(NamedTuple):
         return max(self.size) < _FEW
 
 
-def value_map(array, title, cmap="YlGn", *, limits=None, middle=None, frame=None):
+def value_map(array, title, cmap=None, *, limits=None, middle=None, frame=None):
     """
     A quantity by a colour map.
 
@@ -89,11 +80,12 @@ def value_map(array, title, cmap="YlGn", *, limits=None, middle=None, frame=None
     array : xarray.DataArray, dims (y, x)
         In memory; NaN is no data.
     title : str
-    cmap : str or matplotlib.colors.Colormap, optional
+    cmap : str, optional
+        Name of a colour map; by default the colours of the quantity, with the value from which they diverge.
     limits : (float, float), optional
-        Of the colours; by default the 0.5th and 99.5th percentile.
+        Values of the first and the last colour; by default percentiles.
     middle : float, optional
-        Value from which colours diverge to both sides.
+        Value from which the colours of ``cmap`` diverge to both sides.
     frame : odc.geo.geom.BoundingBox, optional
         A part to mark.
 
@@ -101,10 +93,8 @@ def value_map(array, title, cmap="YlGn", *, limits=None, middle=None, frame=None
     -------
     found : Map
     """
-    colours, (low, high) = colormaps[cmap] if isinstance(cmap, str) else cmap, limits or _limits(array)
-    if middle is not None:
-        half = max(abs(low - middle), abs(high - middle), 1e-6)
-        low, high = middle - half, middle + half
+    colours, middle = colours_of(array.name) if cmap is None else (colormaps[cmap], middle)
+    low, high = limits or percentile_limits(array, middle=middle)
     known = np.isfinite(array.values)
     # As matplotlib does, in a quarter of the time.
     shares = (np.where(known, array.values, low) - low) / max(high - low, 1e-9)
@@ -127,7 +117,7 @@ def relief_map(dem, title):
     -------
     found : Map
     """
-    low, high = _limits(dem)
+    low, high = percentile_limits(dem)
     down, across = grids.cell_size(grids.geobox(dem))
     filled = np.nan_to_num(dem.values, nan=float(dem.mean()) if dem.notnull().any() else 0.0)
     tint = LAND(Normalize(low, max(high, low + 1e-9))(filled))[..., :3]
@@ -177,26 +167,9 @@ def stretch_of(dn):
     names = false_colour_names(dn) or [str(dn["band"].values[-1])] * 3
     reflectance, spans = to_reflectance(dn.sel(band=list(dict.fromkeys(names)))), []
     for name in names:
-        dark, bright = dark_and_bright(_finite(reflectance.sel(band=name)))
+        dark, bright = dark_and_bright(reflectance.sel(band=name))
         spans.append((name, dark, max(bright, dark + 1e-6)))
     return spans
-
-
-def false_colour_names(image):
-    """
-    Names of the bands of a false-colour picture.
-
-    Parameters
-    ----------
-    image : xarray.DataArray with a ``wavelength`` along band
-
-    Returns
-    -------
-    names : list of str
-        Of near infrared, red and green; none where one is missing.
-    """
-    numbers = [nearest(image["wavelength"].values, window) for window in (NEAR_INFRARED, RED, GREEN)]
-    return [] if None in numbers else [str(image["band"].values[number]) for number in numbers]
 
 
 def encoded(pixels, lossless=False):
@@ -225,7 +198,7 @@ def encoded(pixels, lossless=False):
 
 def _map(array, pixels, valid, title, bar, frame=None):
     if not valid.all():
-        pixels = np.where(valid[..., None], pixels, _NO_DATA)
+        pixels = np.where(valid[..., None], pixels, _bytes(to_rgb(NO_DATA)))
     box = grids.geobox(array).boundingbox
     marked = frame and (
         100 * (frame.left - box.left) / box.span_x,
@@ -244,25 +217,14 @@ def _scale(width):
 
 
 def _bar(colours, low, high):
-    stops = [to_hex(colours(share)) for share in np.linspace(0, 1, _STOPS)]
     ticks = [each for each in MaxNLocator(4).tick_values(low, high) if low <= each <= high and high > low]
     # As few as the steps need: that from .25 to .5 has two.
     step = min(np.diff(ticks), default=1.0) * 10.0 ** np.arange(_MOST_DIGITS)
     digits = int(np.argmax(np.abs(step - step.round()) < 1e-6 * step))
     texts = (f"{each:.{digits}f}".replace("-", "−") for each in ticks)
-    return Bar(stops, [(100 * (each - low) / (high - low), text) for each, text in zip(ticks, texts, strict=True)])
-
-
-def _limits(array):
-    values = _finite(array)
-    low, high = np.percentile(values, _MOST) if values.size else (0.0, 1.0)
-    return float(low), float(high)
-
-
-def _finite(array):
-    values = np.asarray(array.values).ravel()
-    return values[np.isfinite(values)]
+    places = [(100 * (each - low) / (high - low), text) for each, text in zip(ticks, texts, strict=True)]
+    return Bar(stops_of(colours), places)
 
 
 def _bytes(shares):
-    return np.round(255 * shares).astype(np.uint8)
+    return np.round(255 * np.asarray(shares)).astype(np.uint8)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
-from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
 from fifesim.analysis.rasters.pairs import matched
@@ -18,31 +15,12 @@ from fifesim.base.annotations import Pairing
 from fifesim.base.scan_pixels import corners
 from fifesim.chain.comparison import recorded_images, shows_ndvi
 from fifesim.chain.images import ndvi
-from fifesim.output.composites import composite_bands, rgb, thinned, valid
-from fifesim.output.words import long_name, short_name, subject, unit
+from fifesim.output.colours import BAND, LINE, NO_DATA, PERCENTILES, colours_of, percentile_limits
+from fifesim.output.composites import Composite, composite_bands, rgb, thinned, valid
+from fifesim.output.words import axis_label, capital, long_name, short_name, subject, unit
 from fifesim.rasters import grid as grids
 from fifesim.rasters import swaths
 from fifesim.rasters.reductions import computed
-
-_NO_DATA = (0.85, 0.85, 0.85)
-_LINE, _BAND = "#b2182b", "#f4a582"
-
-# Without the blue of the map's seas.
-_LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)), name="land")
-
-# Colours by the name of a quantity, and the value about which they diverge.
-_COLOURS = {
-    **dict.fromkeys(("lai", "fpar", "ndvi", "evi", "evi2", "savi", "msavi", "nirv"), ("YlGn", None)),
-    **dict.fromkeys(("ndwi", "ndmi"), ("YlGnBu", None)),
-    **dict.fromkeys(("dn", "toa_radiance", "toa_reflectance", "surface_reflectance"), ("gray", None)),
-    **dict.fromkeys(("illumination", "sky_view"), ("gray", None)),
-    **dict.fromkeys(("ndvi_bias", "fpar_bias"), ("RdBu_r", 0.0)),
-    "dem": (_LAND, None),
-    "slope": ("YlOrBr", None),
-    "aspect": ("twilight", None),
-    "shadow": ("gray_r", None),
-    "kt": ("RdBu_r", 1.0),
-}
 
 # Pixels that are drawn along the longer side at most.
 _SIZE = 1500
@@ -55,7 +33,7 @@ def plot(
     raster: xr.DataArray,
     *,
     band: str | None = None,
-    composite: Literal["false colour", "natural colour"] | tuple[str, str, str] = "false colour",
+    composite: Composite = "false colour",
     stretch: tuple[float, float] | None = None,
     cmap: str | Colormap | None = None,
     limits: tuple[float, float] | None = None,
@@ -72,7 +50,7 @@ def plot(
     band : str, optional
         The band to draw; by default three of them as colours, or the only one.
     composite, stretch : optional
-        As in `fifesim.output.composites.rgb`; of one band or quantity the percentiles are 2 and 98 by default.
+        As in `fifesim.output.composites.rgb`; of one band or quantity the percentiles are 1 and 99 by default.
     cmap : str or matplotlib.colors.Colormap, optional
         By default that of the quantity.
     limits : (float, float), optional
@@ -106,17 +84,17 @@ def plot(
     shown = computed(thinned(few, size))[0]
     if axes is None:
         _, axes = plt.subplots(figsize=_figure_size(shown), layout="constrained")
-    axes.set_facecolor(_NO_DATA)
+    axes.set_facecolor(NO_DATA)
     if names:
         picture = rgb(shown, names, stretch=stretch)
         _draw(axes, picture, colours=np.dstack([np.nan_to_num(picture.values), picture.notnull().all("rgb").values]))
         what = picture.attrs["long_name"]
     else:
-        style = _style(shown, stretch or (2, 98), cmap, limits)
+        style = _style(shown, stretch or PERCENTILES, cmap, limits)
         drawn = _draw(axes, shown, **style)
         extend = _extend(shown, style["vmin"], style["vmax"])
-        label = " ".join(filter(None, [short_name(shown), unit(shown)]))
-        axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label=label, extend=extend)
+        words = " ".join(filter(None, [short_name(shown), unit(shown)]))
+        axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label=words, extend=extend)
         what = long_name(shown)
     where = subject(raster)
     axes.set_title(what + (f"\n{where}" if where else ""), fontsize="medium")
@@ -176,7 +154,7 @@ def plot_fit(
     spread = 2.5 * np.sqrt(fit.x_sum_of_squares / fit.n)
     span = fit.x_mean - spread, fit.x_mean + spread
     if y is not None:
-        labels = tuple(" ".join(filter(None, [_first_capital(long_name(each)), unit(each)])) for each in (y, x))
+        labels = tuple(" ".join(filter(None, [capital(long_name(each)), unit(each)])) for each in (y, x))
         pairs = computed(*(thinned(each, _SIZE) for each in matched(y, x, pair)))
         ordinate, abscissa = (np.asarray(each, float).ravel() for each in pairs)
         both = np.isfinite(ordinate) & np.isfinite(abscissa)
@@ -187,8 +165,8 @@ def plot_fit(
         axes.figure.colorbar(density, ax=axes, shrink=0.8, label="pixels")
     line = np.linspace(*span, 50)
     interval = f"{100 * level:g} % prediction interval"
-    axes.fill_between(line, *fit.prediction_interval(line, level), color=_BAND, alpha=0.3, linewidth=0, label=interval)
-    axes.plot(line, fit.predict(line), color=_LINE, linewidth=2, label="least-squares line")
+    axes.fill_between(line, *fit.prediction_interval(line, level), color=BAND, alpha=0.3, linewidth=0, label=interval)
+    axes.plot(line, fit.predict(line), color=LINE, linewidth=2, label="least-squares line")
     sign = "+" if fit.slope >= 0 else "−"
     title = f"y = {fit.intercept:.4g} {sign} {abs(fit.slope):.4g} x,  R² = {fit.r2:.3f},  n = {fit.n}"
     title = title.replace("-", "−")
@@ -244,8 +222,8 @@ def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None =
     found = {name: ndvi(thinned(image, 800)) for name, image in recorded.items()}
     maps = dict(zip(found, computed(*found.values()), strict=True))
     if limits is None:
-        values = np.concatenate([each.values[np.isfinite(each.values)] for each in maps.values()])
-        limits = np.percentile(values, (1, 99)) if values.size else (0.0, 1.0)
+        values = np.concatenate([each.values.ravel() for each in maps.values()])
+        limits = percentile_limits(values)
     columns = min(len(maps), 4)
     rows = -(-len(maps) // columns)
     width = 3.0 * columns + 0.8
@@ -254,19 +232,15 @@ def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None =
     for axes in panels.ravel()[len(maps) :]:
         axes.set_axis_off()
     for axes, (name, array) in zip(panels.ravel(), maps.items(), strict=False):
-        axes.set_facecolor(_NO_DATA)
-        drawn = _draw(axes, array, cmap="YlGn", vmin=limits[0], vmax=limits[1])
+        axes.set_facecolor(NO_DATA)
+        drawn = _draw(axes, array, cmap=colours_of("ndvi")[0], vmin=limits[0], vmax=limits[1])
         pixel = grids.cell_size(grids.geobox(recorded[name]))[0]
         mean, deviation = float(array.mean()), float(array.std())
         axes.set_title(f"{name}, {pixel:g} m\nmean {mean:.3f}, sd {deviation:.3f}", fontsize="medium")
     for axes in panels[:, 1:].ravel():
         axes.set_ylabel("")
-    figure.colorbar(drawn, ax=panels, shrink=0.8, label="NDVI", extend="both")
+    figure.colorbar(drawn, ax=panels, shrink=0.8, label=axis_label("ndvi"), extend="both")
     return figure
-
-
-def _first_capital(text):
-    return text[:1].upper() + text[1:]
 
 
 def _checked(raster, band):
@@ -331,13 +305,9 @@ def _figure_size(array):
 
 
 def _style(array, stretch, cmap, limits):
-    own, middle = _COLOURS.get(array.name, ("viridis", None))
-    finite = array.values[np.isfinite(array.values)]
+    own, middle = colours_of(array.name)
     if limits is None:
-        limits = np.percentile(finite, stretch) if finite.size else (0.0, 1.0)
-        if cmap is None and middle is not None:
-            half = max(*np.abs(np.subtract(limits, middle)), 1e-6)
-            limits = middle - half, middle + half
+        limits = percentile_limits(array, stretch, middle if cmap is None else None)
     return {"cmap": own if cmap is None else cmap, "vmin": float(limits[0]), "vmax": float(limits[1])}
 
 

@@ -7,9 +7,13 @@ import numpy as np
 from fifesim.analysis.rasters.pairs import matched
 from fifesim.chain.engines import TYPICAL_LAI, engine_error
 from fifesim.output import pages
-from fifesim.output.figures import NAMES, fit_figure, histogram_figures, reflectance_change
-from fifesim.output.maps import encoded, false_colour_names, image_map, relief_map, stretch_of, value_map
+from fifesim.output.colours import percentile_limits
+from fifesim.output.composites import false_colour_names
+from fifesim.output.figures import fit_figure, histogram_figures, reflectance_change
+from fifesim.output.maps import encoded, image_map, relief_map, stretch_of, value_map
 from fifesim.output.pairing import pairing_rows
+from fifesim.output.words import axis_label, capital
+from fifesim.rasters import cf
 from fifesim.rasters import grid as grids
 from fifesim.scenario.simulation import setup_of
 from fifesim.scenario.synthetic import summary
@@ -72,7 +76,7 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
         terrain=[] if terrain is None else _terrain_maps(image, terrain, level),
         band=str(image["dn"]["band"].values[-1]),
         histograms=[pages.png(figure, _DPI) for figure in histogram_figures(shown, means, detail)],
-        fits=[(NAMES[name], fit, figures[name]) for name, fit in fits.items()],
+        fits=[(_label(name), fit, figures[name]) for name, fit in fits.items()],
         parameters=_parameters(scenario),
         history=image["dn"].attrs.get("history", "").splitlines(),
     )
@@ -97,12 +101,12 @@ def finding(truth, fits, reasons):
     if not fits:
         why = "; ".join(dict.fromkeys(reasons.values()))
         return f"No line was fitted: {why}" if why else "The bands make no NDVI, so that no line was fitted."
-    shares = [f"{100 * fit.r2:.1f} % of the variance of true {NAMES[name]}" for name, fit in fits.items()]
+    shares = [f"{100 * fit.r2:.1f} % of the variance of true {_label(name)}" for name, fit in fits.items()]
     text = f"A straight line on the NDVI of this image explains {' and '.join(shares)}."
     name, fit = next(iter(fits.items()))
     mean = float(truth[name].mean())
     share = f", {100 * fit.residual_deviation / mean:.0f} % of the mean" if mean > 0 else ""
-    return f"{text} What it misses of {NAMES[name]} has a standard deviation of {fit.residual_deviation:.3f}{share}."
+    return f"{text} What it misses of {_label(name)} has a standard deviation of {fit.residual_deviation:.3f}{share}."
 
 
 def pairing(scenario, image, truth):
@@ -139,14 +143,14 @@ def _seen(shown, part, detail):
     """The whole image; the cells in its middle, and the pixels over them."""
     box = grids.geobox(detail).boundingbox
     cell, pixel = (grids.cell_size(grids.geobox(each))[1] for each in (detail, part["dn"]))
-    high = max(float(detail.quantile(0.995)) if detail.notnull().any() else 1.0, 1e-6)
-    cells = value_map(detail, f"Leaf area index in cells of {cell:.2f} m", limits=(0.0, high))
+    high = max(percentile_limits(detail)[1], 1e-6)
+    cells = value_map(detail, f"{_label('lai')} in cells of {cell:.2f} m", limits=(0.0, high))
     titles = "The image", f"The same ground in pixels of {pixel:g} m"
     names = false_colour_names(shown["dn"])
     if not names and "ndvi" in shown:
-        limits = tuple(np.nanpercentile(shown["ndvi"], (0.5, 99.5))) if shown["ndvi"].notnull().any() else (0.0, 1.0)
+        limits = percentile_limits(shown["ndvi"])
         whole, pixels = (
-            value_map(each["ndvi"], f"{said}: NDVI", limits=limits, frame=frame)
+            value_map(each["ndvi"], f"{said}: {_label('ndvi')}", limits=limits, frame=frame)
             for each, said, frame in zip((shown, part), titles, (box, None), strict=True)
         )
         return whole, cells, pixels
@@ -161,15 +165,15 @@ def _seen(shown, part, detail):
 
 def _maps(shown, means, fits):
     """True leaf area index, NDVI, and what a line on it makes of the ground."""
-    maps = [value_map(means["lai"], "True leaf area index")]
+    maps = [value_map(means["lai"], f"True {_label('lai')}")]
     if "ndvi" not in shown:
-        return [*maps, value_map(means["fpar"], "True FPAR")]
-    maps.append(value_map(shown["ndvi"], "NDVI of the image"))
+        return [*maps, value_map(means["fpar"], f"True {_label('fpar')}")]
+    maps.append(value_map(shown["ndvi"], f"{_label('ndvi')} of the image"))
     if "lai" in fits:
         values, ndvi = matched(means["lai"], shown["ndvi"], "index")
         error = means["lai"].isel(y=slice(values.sizes["y"]), x=slice(values.sizes["x"]))
         error = error.copy(data=fits["lai"].predict(ndvi.values) - values.values)
-        maps.append(value_map(error, "Leaf area index by the line, less the true one", "RdBu", middle=0.0))
+        maps.append(value_map(error, f"{_label('lai')} by the line, less the true one", "RdBu", middle=0.0))
     return maps
 
 
@@ -179,9 +183,9 @@ def _terrain_maps(image, terrain, level):
     dn = image["dn"].sel(y=level["y"], x=level["x"]).compute()
     change = reflectance_change(dn, level, band)
     return [
-        relief_map(terrain["dem"], "Elevation [m], lit from the north-west"),
-        value_map(terrain["slope"], "Slope [degree], mean of the cells", "YlOrBr"),
-        value_map(terrain["kt"].sel(band=band), f"Kt in {band}, mean of the cells", "RdBu_r", middle=1.0),
+        relief_map(terrain["dem"], f"{capital(axis_label('dem'))}, lit from the north-west"),
+        value_map(terrain["slope"], f"{capital(axis_label('slope'))}, mean of the cells"),
+        value_map(terrain["kt"].sel(band=band), f"{_label('kt')} in {band}, mean of the cells"),
         value_map(change, f"What terrain did to the reflectance in {band}", "RdBu_r", middle=0.0),
     ]
 
@@ -232,6 +236,10 @@ def title(scenario):
     return f"{seen} ({synthetic})" if synthetic else seen
 
 
+def _label(name):
+    return cf.QUANTITIES[name].label
+
+
 def _step(rasters):
     return -(-max(rasters.sizes[axis] for axis in ("y", "x")) // _MOST)
 
@@ -256,11 +264,11 @@ def _summary(scenario, image, truth, fits, reasons):
         ("Sun", f"zenith {float(pixels['sza']):.1f} degrees, azimuth {float(pixels['saa']):.1f} degrees from north"),
     ]
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
-        label = f"{NAMES[name][0].upper()}{NAMES[name][1:]} of the pixels"
+        label = f"{capital(_label(name))} of the pixels"
         mean, deviation = (pages.fixed(float(each), 3) for each in (values.mean(), values.std()))
         rows.append((label, f"mean {mean}, standard deviation {deviation}"))
     found = {name: f"{fit.r2:.3f}" for name, fit in fits.items()} | {name: f"none, {reasons[name]}" for name in reasons}
-    return rows + [(f"R² of {NAMES[name]} on NDVI", text) for name, text in found.items()]
+    return rows + [(f"R² of {_label(name)} on NDVI", text) for name, text in found.items()]
 
 
 def _ground(terrain):

@@ -7,32 +7,17 @@ from typing import NamedTuple
 
 import jinja2
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import ListedColormap, to_hex
 
 from fifesim.base.annotations import FilePath
-from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest
+from fifesim.base.bands import COMPOSITES, composite
 from fifesim.base.foreign import in_a_line
+from fifesim.output.colours import colours_of, dark_and_bright, finite, percentile_limits, stops_of
+from fifesim.rasters import cf
 from fifesim.rasters.opening import ErrorsOfGdal, raster_file
 
 _TEMPLATE = Path(__file__).with_name("style.qml.j2")
 
-_GREEN = colormaps["YlGn"]
-# Without the blue of the map's seas.
-_LAND = ListedColormap(colormaps["gist_earth"](np.linspace(0.3, 0.95, 256)))
-
-# Colours of a quantity, and the values of the first and of the last where they are the same for all files.
-_RAMPS = {
-    "lai": (_GREEN, 0.0, None),
-    **dict.fromkeys(("fpar", "green_fpar", "ndvi", "evi", "evi2", "savi", "msavi", "nirv"), (_GREEN, 0.0, 1.0)),
-    **dict.fromkeys(("ndwi", "ndmi"), (colormaps["YlGnBu"], None, None)),
-    "dem": (_LAND, None, None),
-    "slope": (colormaps["YlOrBr"], 0.0, None),
-}
-_COLOURS = 9
-
-# Percentiles of a band that become dark and bright, from so many pixels along a side at most. [%], [pixel]
-_STRETCH = (2, 98)
+# Values are stretched by so many pixels along a side at most. [pixel]
 _SAMPLE = 1000
 
 
@@ -70,8 +55,9 @@ def write_style(path: FilePath, *, overwrite: bool = False) -> Path:
     Notes
     -----
     Near infrared, red and green become red, green and blue, red twice where there is no green; else red, green and
-    blue. A first band that is called ``lai``, ``ndvi``, ``dem`` or the like gets a ramp, and any other is grey. Bands
-    are stretched between their percentiles 2 and 98, in the unit that scale and offset lead to, as QGIS counts.
+    blue, stretched as in `fifesim.rgb`. A first band that is named after a quantity with a colour map, such as ``lai``,
+    ``ndvi`` or ``dem``, gets a ramp, and any other is grey. Both run from the first to the 99th percentile, in the unit
+    that scale and offset lead to, as QGIS counts; LAI, FPAR, slope and most vegetation indices begin at 0.
 
     Examples
     --------
@@ -86,10 +72,8 @@ def write_style(path: FilePath, *, overwrite: bool = False) -> Path:
         raise FileExistsError(f"there is a style {in_a_line(style, 150)}: type overwrite=True to replace it")
     with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
         name = source.descriptions[0]
-        colours, low, high = _RAMPS.get(name, (None, None, None))
-        numbers = [1] if colours else _composite(source)
-        bands = [_stretched(source, number, low, high) for number in numbers]
-    ramp = _ramp(colours, bands[0]) if colours else []
+        is_coloured = name in cf.QUANTITIES and cf.QUANTITIES[name].colours != "gray"
+        bands, ramp = _ramp(source, name) if is_coloured else (_shown_bands(source), [])
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
@@ -104,26 +88,40 @@ def _composite(source):
     if not all(said):
         return [1]
     wavelengths = [float(each) for each in said]
-    blue, green, red, near = (nearest(wavelengths, window) for window in (BLUE, GREEN, RED, NEAR_INFRARED))
-    false_colour = (near, red, red if green is None else green)
-    for numbers in (false_colour, (red, green, blue)):
+    for name in COMPOSITES:
+        numbers = composite(wavelengths, name)
         if None not in numbers:
             return [number + 1 for number in numbers]
     return [1]
 
 
-def _stretched(source, number, low, high):
-    """A band between its percentiles, or between what is given."""
+def _values(source, number):
+    """Some values of a band, in the unit that scale and offset lead to."""
     step = max(1, -(-max(source.shape) // _SAMPLE))
     shape = tuple(-(-size // step) for size in source.shape)
     counts = source.read(number, out_shape=shape, masked=True).compressed()
-    values = counts[np.isfinite(counts)] * source.scales[number - 1] + source.offsets[number - 1]
-    found = np.percentile(values, _STRETCH) if values.size else (0.0, 1.0)
-    low, high = (float(f"{own if given is None else given:.6g}") for own, given in zip(found, (low, high), strict=True))
-    # A band of one value still needs two.
+    return finite(counts) * source.scales[number - 1] + source.offsets[number - 1]
+
+
+def _shown(number, limits):
+    """A band between its limits; a band of one value still needs two."""
+    low, high = (float(f"{each:.6g}") for each in limits)
     return _Shown(number, low, high if high > low else low + 1.0)
 
 
-def _ramp(colours, band):
-    places = np.linspace(0, 1, _COLOURS)
-    return [(f"{band.low + at * (band.high - band.low):.6g}", to_hex(colours(at))) for at in places]
+def _shown_bands(source):
+    """Bands of a picture in colours, else the first band in grey."""
+    numbers = _composite(source)
+    limits_of = dark_and_bright if len(numbers) == 3 else percentile_limits
+    return [_shown(number, limits_of(_values(source, number))) for number in numbers]
+
+
+def _ramp(source, name):
+    """The first band, and the values and colours of its quantity."""
+    colours, middle = colours_of(name)
+    found = percentile_limits(_values(source, 1), middle=middle)
+    ends = cf.QUANTITIES[name].ends
+    band = _shown(1, [own if given is None else given for own, given in zip(found, ends, strict=True)])
+    stops = stops_of(colours)
+    values = np.linspace(band.low, band.high, len(stops))
+    return [band], [(f"{value:.6g}", stop) for value, stop in zip(values, stops, strict=True)]

@@ -5,23 +5,9 @@ import re
 import numpy as np
 import pandas as pd
 
+from fifesim.rasters import cf, projection
 from fifesim.rasters import grid as grids
-from fifesim.rasters import projection
 from fifesim.sensor.description.instruments import instrument, instrument_names
-
-_SHORT = {
-    "lai": "LAI",
-    "fpar": "FPAR",
-    "dem": "elevation",
-    "dn": "digital number",
-    "kt": "Kt",
-    "toa_radiance": "radiance",
-    "toa_reflectance": "reflectance",
-    "surface_reflectance": "reflectance",
-    "ren": "REN",
-    **{name: name.upper() for name in ("ndvi", "evi", "evi2", "savi", "msavi", "ndwi", "ndmi")},
-    "nirv": "NIRv",
-}
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -38,7 +24,31 @@ def short_name(array):
     -------
     name : str
     """
-    return _SHORT.get(array.name, str(array.name or array.attrs.get("long_name", "")).replace("_", " "))
+    if array.name in cf.QUANTITIES:
+        return cf.QUANTITIES[array.name].label
+    return str(array.name or array.attrs.get("long_name", "")).replace("_", " ")
+
+
+def axis_label(name):
+    """
+    A quantity with its unit, as an axis names it.
+
+    Parameters
+    ----------
+    name : str
+        A key of `fifesim.rasters.cf.QUANTITIES`.
+
+    Returns
+    -------
+    text : str
+
+    Examples
+    --------
+    >>> axis_label("lai"), axis_label("fpar")
+    ('LAI [m² m⁻²]', 'FPAR')
+    """
+    quantity = cf.QUANTITIES[name]
+    return " ".join(filter(None, [quantity.label, _printed(quantity.shown_units or quantity.units)]))
 
 
 def long_name(array):
@@ -55,10 +65,21 @@ def long_name(array):
     """
     name = str(array.attrs.get("long_name") or short_name(array) or "values")
     band = array.coords.get("band")
-    return f"{band.item()}: {name}" if band is not None and band.ndim == 0 else _capital(name)
+    return f"{band.item()}: {name}" if band is not None and band.ndim == 0 else capital(name)
 
 
-def _capital(text):
+def capital(text):
+    """
+    A text with its first letter as a capital.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    text : str
+    """
     return text[:1].upper() + text[1:]
 
 
@@ -81,12 +102,16 @@ def unit(array):
     >>> unit(xr.DataArray(0, attrs={"units": "W m-2 sr-1 um-1"}))
     '[W m⁻² sr⁻¹ µm⁻¹]'
     """
-    text = str(array.attrs.get("units", ""))
-    if array.name == "lai":
-        text = "m2 m-2"
-    if text in ("", "1"):
+    units = str(array.attrs.get("units", ""))
+    known = cf.QUANTITIES.get(array.name)
+    return _printed((known and known.shown_units) or units)
+
+
+def _printed(units):
+    """Units in brackets with raised exponents, empty for 1."""
+    if units in ("", "1"):
         return ""
-    text = re.sub(r"\bum\b", "µm", text.replace("um-", "µm-"))
+    text = re.sub(r"\bum\b", "µm", units.replace("um-", "µm-"))
     raised = re.sub(r"(?<=[A-Za-zµ])-?\d+", lambda found: found[0].translate(_RAISED), text)
     return f"[{raised}]"
 

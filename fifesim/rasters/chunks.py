@@ -54,9 +54,33 @@ def pointwise(kernel, *arrays, bands=None, dtype=float, **parameters):
         lazy = any(isinstance(each, da.Array) for each in data)
         return _blockwise(call, data, along_band, bands, dtype) if lazy else call(*data)
 
-    out = xr.apply_ufunc(by_blocks, *arrays, join="exact", dask="allowed", keep_attrs=True, **core)
+    # Variables have no coordinates to align, which takes longer than the kernel on small rasters.
+    variables = [array.variable for array in arrays]
+    out = xr.apply_ufunc(by_blocks, *variables, dask="allowed", keep_attrs=True, **core)
     dims = [name for name in ("band", "y", "x") if name in out.dims]
-    return out.transpose(*dims, ...)
+    return xr.DataArray(out.transpose(*dims, ...), coords=_shared_coordinates(arrays, out.dims), name=_name(arrays))
+
+
+def _name(arrays):
+    """Name that all named arrays share, else None."""
+    names = {array.name for array in arrays}
+    return names.pop() if len(names) == 1 else None
+
+
+def _shared_coordinates(arrays, dims):
+    """Coordinates of aligned arrays along some dimensions; those that differ are left out."""
+    variables, indexes, differing = {}, {}, set()
+    for array in arrays:
+        for name, variable in array.coords.variables.items():
+            if not set(variable.dims) <= set(dims):
+                continue
+            if name not in variables:
+                variables[name] = variable
+            elif name not in dims and not (variables[name] is variable or variables[name].equals(variable)):
+                differing.add(name)
+        indexes |= {name: each for name, each in array.xindexes.items() if name not in indexes and name in variables}
+    known = {name: variable for name, variable in variables.items() if name not in differing}
+    return xr.Coordinates(known, indexes=indexes)
 
 
 def _blockwise(call, data, along_band, bands, dtype):
@@ -331,20 +355,32 @@ def aligned(arrays):
     ValueError
         If they do not share their cells, or a scalar coordinate such as sza differs.
     """
+    rasters = [array for array in arrays if _is_raster(array)]
+    if len(rasters) < 2:
+        return list(arrays)
+    if grids.on_same_coordinates(rasters):
+        for one, other in combinations(rasters, 2):
+            _check_scalars(one, other)
+        return list(arrays)
     arrays = _with_crs(arrays)
     rasters = [array for array in arrays if _is_raster(array)]
-    # One raster lies on its own cells, whatever they are.
-    placed = [(array, grids.geobox(array)) for array in rasters] if rasters[1:] else []
+    placed = [(array, grids.geobox(array)) for array in rasters]
     for (one, own), (other, others) in combinations(placed, 2):
         if not grids.same_grid(own, others):
             raise ValueError(
                 f"{one.name!r} and {other.name!r} lie on different grids, {grids.in_words(own)} and "
                 f"{grids.in_words(others)}: bring one onto the other's first"
             )
-        for name in set(one.coords) & set(other.coords) - {"spatial_ref"}:
-            a, b = one.coords[name], other.coords[name]
-            if a.ndim == 0 and a.dtype.kind in "fiu" and not np.array_equal(a, b, equal_nan=True):
-                raise ValueError(f"{name} is {float(a):g} in {one.name!r} and {float(b):g} in {other.name!r}")
+        _check_scalars(one, other)
     # xarray aligns to the bit, and coordinates from elsewhere differ by rounding.
-    place = {axis: rasters[0].coords[axis].variable for axis in ("y", "x")} if rasters[1:] else {}
+    place = {axis: rasters[0].coords[axis].variable for axis in ("y", "x")}
     return [array.assign_coords(place) if any(array is each for each in rasters[1:]) else array for array in arrays]
+
+
+def _check_scalars(one, other):
+    """Raise ValueError if a scalar coordinate such as sza differs."""
+    known, others = one.coords.variables, other.coords.variables
+    for name in set(known) & set(others) - {"spatial_ref"}:
+        a, b = known[name], others[name]
+        if a is not b and a.ndim == 0 and a.dtype.kind in "fiu" and not np.array_equal(a, b, equal_nan=True):
+            raise ValueError(f"{name} is {float(a):g} in {one.name!r} and {float(b):g} in {other.name!r}")

@@ -128,23 +128,38 @@ def _check_dates(raster, time):
 def _check_no_dates(step, options):
     """Refuse dates beside a raster of one."""
     for name, other in options.items():
-        if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
+        if isinstance(other, dict | tuple | list) or is_dataclass(other):
+            _check_no_dates(step, _parts(other))
+        elif isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
             raise ValueError(
                 f"{name} has dates and the raster of {step.__name__} has none: give the raster a dimension time, or "
                 "select one date with .isel(time=0)"
             )
 
 
+def _parts(other):
+    """Parts of a mapping, a sequence or a description by name, a dict."""
+    if isinstance(other, dict):
+        return other
+    if isinstance(other, tuple | list):
+        return dict(enumerate(other))
+    return {field.name: getattr(other, field.name) for field in fields(other) if field.init}
+
+
 def _at(other, number, raster):
     """That date of something which has the dimension too, or holds what has."""
-    if isinstance(other, dict | tuple | list):
-        parts = other.items() if isinstance(other, dict) else enumerate(other)
-        found = {name: _at(each, number, raster) for name, each in parts}
-        return found if isinstance(other, dict) else type(other)(found.values())
-    if is_dataclass(other):
-        own = {field.name: getattr(other, field.name) for field in fields(other) if field.init}
-        dated = {name: each for name, each in own.items() if isinstance(each, xr.DataArray) and "time" in each.dims}
-        return replace(other, **{name: _at(each, number, raster) for name, each in dated.items()}) if dated else other
+    if isinstance(other, dict | tuple | list) or is_dataclass(other):
+        parts = _parts(other)
+        found = {name: _at(each, number, raster) for name, each in parts.items()}
+        changed = {name: each for name, each in found.items() if each is not parts[name]}
+        if not changed:
+            return other
+        if isinstance(other, dict):
+            return found
+        if isinstance(other, tuple | list):
+            return type(other)._make(found.values()) if hasattr(other, "_make") else type(other)(found.values())
+        # A Canopy keeps which of its fields were given.
+        return other.replace(**changed) if hasattr(other, "replace") else replace(other, **changed)
     if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
         if not np.array_equal(other["time"].values, raster["time"].values):
             raise ValueError(f"the times of {getattr(other, 'name', None) or 'a Dataset'} are not those of the raster")

@@ -1,11 +1,13 @@
 """Directions of sun and sensor on labelled rasters: numbers, or angles that differ from cell to cell."""
 
 from dataclasses import replace
+from typing import Annotated, TypeAlias
 
 import numpy as np
 import xarray as xr
 
 from fifesim.base.geometry import ANGLES, Geometry, earth_sun_distance, fife_geometry, sun_position, warn_of_radians
+from fifesim.base.kinds import Kind
 from fifesim.base.times import utc
 from fifesim.base.warned import warn
 from fifesim.rasters import cf, projection, whereabouts
@@ -16,6 +18,15 @@ _GEOMETRY = (*ANGLES, "earth_sun_distance")
 
 # Ignored change of convergence: 0.3 % of the illumination of slopes of 5 degrees with the sun at 65. [degree]
 _STEADY = 1.0
+
+# Angles of sun and sensor: the same everywhere, or by cell.
+Directions: TypeAlias = Annotated[
+    Geometry | xr.Dataset,
+    Kind(
+        "a fifesim.Geometry, or an xarray.Dataset of sza, saa, vza and vaa",
+        lambda value: isinstance(value, Geometry) or (isinstance(value, xr.Dataset) and "sza" in value.variables),
+    ),
+]
 
 
 def with_geometry(array, geometry, names=_GEOMETRY):
@@ -34,7 +45,10 @@ def with_geometry(array, geometry, names=_GEOMETRY):
     -------
     array : xarray.DataArray or xarray.Dataset
     """
-    return array.assign_coords({} if geometry is None else coordinates_of(geometry, names))
+    if geometry is None:
+        return array
+    carried = coordinates_of(geometry, names)
+    return array.assign_coords(carried) if isinstance(array, xr.Dataset) else grids.with_coordinates(array, carried)
 
 
 def coordinates_of(geometry, names=_GEOMETRY):
@@ -55,26 +69,30 @@ def coordinates_of(geometry, names=_GEOMETRY):
     return {name: xr.Variable(angle.dims, angle.data, cf.attributes(name)) for name, angle in angles.items()}
 
 
-def geometry_of(array):
+def geometry_of(array, names=_GEOMETRY):
     """
     Directions of sun and sensor that an array carries.
 
     Parameters
     ----------
     array : xarray.DataArray
+    names : sequence of str, optional
+        Which of them; all by default.
 
     Returns
     -------
     geometry : fifesim.base.geometry.Geometry, xarray.Dataset or None
         As `checked_geometry` gives it; None where it carries no solar zenith angle.
     """
-    if "sza" not in array.coords:
+    known = array.coords.variables
+    if "sza" not in known:
         return None
-    names = [name for name in (*_GEOMETRY, "y", "x", "spatial_ref") if name in array.coords]
-    carried = {name: array.coords[name].variable for name in names}
-    time = array.coords.get("time")
+    carried = {name: known[name] for name in (*names, "y", "x", "spatial_ref") if name in known}
+    time = known.get("time")
     if "earth_sun_distance" not in carried and time is not None and time.ndim == 0 and time.dtype.kind == "M":
         carried["earth_sun_distance"] = xr.Variable((), earth_sun_distance(time.values))
+    if "saa" in carried and not any(carried[name].ndim for name in _GEOMETRY if name in carried):
+        return Geometry(**{name: float(carried[name]) for name in _GEOMETRY if name in carried})
     return checked_geometry(xr.Dataset(carried).set_coords(["spatial_ref"] if "spatial_ref" in carried else []))
 
 

@@ -26,6 +26,7 @@ from fifesim.base.foreign import in_a_line
 from fifesim.base.geometry import ANGLES
 from fifesim.base.warned import warn
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import RasterOrDataset
 from fifesim.rasters.clients import found_client
 from fifesim.rasters.fingerprint import fingerprint_of
 from fifesim.rasters.gdal_bands import gdal_description, physical
@@ -51,7 +52,7 @@ _COG |= {"copy_src_mdd": "yes"}
 
 
 def to_geotiff(
-    raster: xr.DataArray | xr.Dataset, path: FilePath, *, overwrite: bool = False, tags: Mapping[str, str] | None = None
+    raster: RasterOrDataset, path: FilePath, *, overwrite: bool = False, tags: Mapping[str, str] | None = None
 ) -> Path:
     """
     Write a raster as a cloud-optimised GeoTIFF.

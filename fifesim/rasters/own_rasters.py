@@ -8,6 +8,7 @@ import xarray as xr
 from fifesim.base.bands import LONGEST
 from fifesim.base.warned import warn
 from fifesim.rasters import cf, chunks
+from fifesim.rasters import grid as grids
 from fifesim.rasters.axes import check_axes, is_scan, north_up
 from fifesim.rasters.origins import origin_of
 from fifesim.rasters.packed import STORAGE, has_no_data, scale_and_offset, unpacked
@@ -83,7 +84,8 @@ def in_micrometres(array):
     if "wavelength" not in array.coords:
         return array
     given = array.coords["wavelength"]
-    return array.assign_coords(wavelength=(given.dims, micrometres(given), cf.attributes("wavelength")))
+    found = xr.Variable(given.dims, micrometres(given), cf.attributes("wavelength"))
+    return grids.with_coordinates(array, {"wavelength": found})
 
 
 def micrometres(wavelength):

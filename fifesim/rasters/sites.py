@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
 from fifesim.base import fife
-from fifesim.base.kinds import described
+from fifesim.base.kinds import UNCHECKED, described
 from fifesim.rasters import grid as grids
 from fifesim.rasters import proj_objects, whereabouts
 
 _NAME = "FIFE"
 _FAR = 1.0  # from the site a scene is another place [degree]
 
+# First and last-plus-one row, and column.
+Window: TypeAlias = Annotated[tuple[tuple[int, int], tuple[int, int]], UNCHECKED]
+
 
 def fife_site(
     cell: float,
-    window: tuple[tuple[int, int], tuple[int, int]] | None = None,
+    window: Window | None = None,
     datum: Literal["NAD83", "NAD27"] = "NAD83",
 ) -> GeoBox:
     """

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import xarray as xr
 
 from fifesim.base import geometry
-from fifesim.base.annotations import Array, Numbers, Time
+from fifesim.base.annotations import Numbers, Times
 from fifesim.base.kinds import described
 from fifesim.rasters import cf
-from fifesim.rasters.annotations import Directions
 
 
 def sun_position(
-    time: Time | Sequence[Time] | Array, latitude: Numbers, longitude: Numbers, altitude: Numbers = 0.0
-) -> Directions:
+    time: Times, latitude: Numbers, longitude: Numbers, altitude: Numbers = 0.0
+) -> geometry.Geometry | xr.Dataset:
     """
     Sun at a time and place, or at many.
 

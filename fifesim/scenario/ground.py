@@ -6,7 +6,6 @@ import xarray as xr
 
 from fifesim.chain.landscapes import fpar
 from fifesim.chain.stands import warn_of_tallgrass
-from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.landscape.classes import CoverClass, class_table
 from fifesim.ground.landscape.cover import PATTERNS, Patches
 from fifesim.ground.landscape.distribution import lai_distribution
@@ -16,10 +15,6 @@ from fifesim.ground.landscape.rasters.scenes import landscape
 from fifesim.rasters.sites import on_fife_site
 from fifesim.scenario.ground_keys import COVARIATES
 from fifesim.scenario.land import cut
-
-# What `Setup` has of a stand by the same names, and what a class of cover calls otherwise.
-_NUMBERS = ("leaf_angles", "hotspot", "brown", "dissociation", "crown_cover", "crown_shape")
-_OF_A_CLASS = {"leaf_optics": "leaf"}
 
 
 def ground_scene(scenario, grid, chunks=None, dem=None):
@@ -54,8 +49,6 @@ def ground_scene(scenario, grid, chunks=None, dem=None):
 def _landscape(scenario, grid, chunks, dem):
     land, own = scenario.ground, scenario.landscape
     properties = drawn_properties(scenario)
-    if own.moisture and "moisture" not in properties:
-        properties["moisture"] = own.moisture
     if own.cover == "none":
         cover, classes = None, CoverClass("ground", lai=land.distribution)
     else:
@@ -95,9 +88,10 @@ def warn_of_canopy(scenario):
     """
     own = scenario.ground.lai_file
     if own or not on_fife_site(scenario.geobox()):
-        canopy = {"leaf_optics": None, "background": None, "brown_leaf": None, "brown": 0.0} | canopy_of(scenario)
-        classes = class_table(_classes(scenario)) if _classes(scenario) else ()
-        warn_of_tallgrass(Path(own).name if own else "the scene", classes, canopy, drawn_properties(scenario))
+        name, classes = Path(own).name if own else "the scene", _classes(scenario)
+        # A mean stands for what is drawn.
+        cells = {name: each.mean for name, each in drawn_properties(scenario).items()}
+        warn_of_tallgrass(name, class_table(classes) if classes else (), canopy_of(scenario), cells)
 
 
 def drawn_properties(scenario):
@@ -113,17 +107,16 @@ def drawn_properties(scenario):
     properties : dict of str to fifesim.ground.landscape.drawn.Field
     """
     land, own = scenario.ground, scenario.landscape
-    means = {"soil": 0.0, "moisture": own.moisture, "brown": land.brown, "crown_cover": land.crown_cover}
     return {
-        name: Field(mean=means[name], sd=deviation, arp=own.arps.get(name, land.arp), coarser=own.coarser)
+        name: Field(mean=getattr(land, name), sd=deviation, arp=own.arps.get(name, land.arp), coarser=own.coarser)
         for name, deviation in own.deviations.items()
         if deviation
     }
 
 
-def check_crown_cover(scenario):
+def check_leaf_area(scenario):
     """
-    Check that the crowns of each stand can hold the largest leaf area index of its distribution.
+    Check that the canopy of each stand can hold the largest leaf area index of its distribution.
 
     Parameters
     ----------
@@ -133,27 +126,22 @@ def check_crown_cover(scenario):
     ------
     ValueError
         If the leaf area index within the crowns could exceed the largest that SAIL is evaluated for. The check is left
-        to the run where leaf area or crown cover varies in a map or field.
+        to the run where leaf area or a property varies in a map or field.
     """
-    land = scenario.ground
-    if land.lai_file or "crown_cover" in drawn_properties(scenario):
+    land, classes = scenario.ground, _classes(scenario)
+    if land.lai_file or drawn_properties(scenario).keys() & {"crown_cover"}:
         return
-    stands = [("ground", land.distribution, land.crown_cover)]
-    if scenario.landscape.cover != "none":
-        stands = [
-            (f"classes.{name}", each.lai, land.crown_cover if each.crown_cover is None else each.crown_cover)
-            for name, each in scenario.class_table().items()
-        ]
-    for place, distribution, cover in stands:
+    stands = [(f"classes.{each.name}", each.lai, each.canopy.over(land.canopy())) for each in classes]
+    for place, distribution, canopy in stands or [("ground", land.distribution, land.canopy())]:
         try:
-            check_crowns(lai_distribution(distribution).support()[1], cover)
+            canopy.check_lai(lai_distribution(distribution).support()[1])
         except ValueError as error:
-            raise ValueError(f"{place}.crown_cover = {cover:g}: {error}") from None
+            raise ValueError(f"{place}.{error}") from None
 
 
 def canopy_of(scenario):
     """
-    What the keys of [ground] say of the canopy.
+    Canopy of the keys of [ground], without what is drawn, and without what every class has itself.
 
     Parameters
     ----------
@@ -161,15 +149,11 @@ def canopy_of(scenario):
 
     Returns
     -------
-    canopy : dict
-        Fields of a `Setup`, without what is drawn, and without what every class says itself.
+    canopy : fifesim.ground.canopy.description.Canopy
     """
-    land = scenario.ground
-    said = {"leaf_optics": land.leaf_optics(), "background": land.below_canopy(), "brown_leaf": land.dead_leaf()}
-    said |= {name: getattr(land, name) for name in _NUMBERS}
-    left_out = {name for name in said if _all_say(scenario, _OF_A_CLASS.get(name, name))}
-    left_out |= set(drawn_properties(scenario))
-    return {name: value for name, value in said.items() if name not in left_out}
+    found = scenario.ground.canopy()
+    left_out = {name for name in found.given if _all_have(scenario, name)} | set(drawn_properties(scenario))
+    return found.replace(**dict.fromkeys(left_out))
 
 
 def truth_of(scenario, setup, land):
@@ -225,37 +209,24 @@ def absorbed_light(scenario, setup, land, leaves="all"):
     fpar : xarray.DataArray, dims (y, x)
         [1]
     """
-    told = {name: getattr(setup, name) for name in ("geometry", "leaf_angles", "brown", "dissociation", "crown_cover")}
-    return fpar(land, leaves=leaves, fpar_inf=scenario.ground.fpar_inf, **told)
+    fpar_inf = scenario.ground.fpar_inf
+    return fpar(land, canopy=setup.canopy, geometry=setup.geometry, leaves=leaves, fpar_inf=fpar_inf)
 
 
 def _has_dead_leaves(scenario):
-    return any(said_by_stands(scenario, "brown")) or "brown" in drawn_properties(scenario)
+    return any(numbers_of_stands(scenario, "brown")) or "brown" in drawn_properties(scenario)
 
 
-def said_by_stands(scenario, name):
-    """
-    Numbers of a property that hold somewhere on the ground of a scenario, where it is not drawn.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    name : str
-        Of the property, such as ``"crown_cover"``.
-
-    Returns
-    -------
-    numbers : list of float
-    """
-    own = [getattr(each, name) for each in _classes(scenario)]
-    ground = [] if _all_say(scenario, name) else [getattr(scenario.ground, name)]
-    return [*ground, *(number for number in own if number is not None)]
+def numbers_of_stands(scenario, name):
+    """Values of a property in the stands of a scenario, where it is not drawn, a list of float."""
+    ground = [] if _all_have(scenario, name) else [getattr(scenario.ground, name)]
+    return [*ground, *(getattr(each.canopy, name) for each in _classes(scenario) if name in each.canopy.given)]
 
 
-def _all_say(scenario, name):
+def _all_have(scenario, name):
     """Whether every class of cover has a value of its own."""
     classes = _classes(scenario)
-    return bool(classes) and all(getattr(each, name) is not None for each in classes)
+    return bool(classes) and all(name in each.canopy.given for each in classes)
 
 
 def _classes(scenario):

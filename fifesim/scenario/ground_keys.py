@@ -2,34 +2,45 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, create_model, field_validator, model_validator
 
 from fifesim.base.foreign import shown
 from fifesim.base.spelling import nearest
+from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 from fifesim.scenario.section import Section, file, number, seed, text
 
 COVERS = ("none", "pastures", "voronoi", "levels")
-VARYING = ("soil", "moisture", "brown", "crown_cover")
+VARYING = tuple(DRAWN)
+KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None}
+"""Properties of the canopy that are one key of a scenario."""
 COVARIATES = ("elevation", "wetness", "illumination")
 
 # By the name of a band, a spectrum or a part of a leaf.
 ByName = dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False)]]
 LONGEST_NAME = 60
 _LEAF = "structure [1], chlorophyll, carotenoids, anthocyanins [ug cm-2], brown [1], water [cm], dry_matter [g cm-2]"
-_LEAST_HOTSPOT = 1e-6  # below it the hot spot is narrower than the sun
 
 
-class StandKeys(Section):
-    """Leaf area, leaves and what lies below them, of a stand of plants."""
+class _LeafArea(Section):
+    """Leaf area of a stand of plants."""
 
     distribution: str = file("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples", suffix=".csv")
     arp: float = number(0.15, "1", "autoregressive parameter; larger is smoother", ge=0, lt=0.25)
-    leaf_angles: str = text("spherical", "leaf angle distribution")
-    hotspot: float = number(0.0, "1", "leaf size over canopy height", ge=0, le=10)
-    brown: float = number(0.0, "1", "share of dead leaf area", ge=0, le=1)
-    dissociation: float = number(0.0, "1", "0: dead leaves are mixed with green ones; 1: lie below", ge=0, le=1)
-    crown_cover: float = number(1.0, "1", "share of the ground below crowns", ge=0, le=1)
-    crown_shape: float = number(1.0, "1", "diameter of a crown over the height of its middle", ge=0, le=10)
+
+
+def _key(known):
+    """Type and field of a key that is a property of the canopy."""
+    if not known.unit:
+        return str, text(known.default, known.meaning)
+    return float, number(known.default, known.unit, known.meaning, ge=known.lowest, le=known.highest)
+
+
+_Structure = create_model("_Structure", __base__=_LeafArea, **{name: _key(known) for name, known in KEYS.items()})
+
+
+class StandKeys(_Structure):
+    """Leaf area, leaves and what lies below them, of a stand of plants."""
+
     leaf_reflectance: ByName = text({}, "by band [1]; all bands or none")
     leaf_transmittance: ByName = text({}, "by band [1]; all bands or none")
     background: ByName = text({}, "reflectance below the canopy by band [1]; all bands or none")
@@ -38,13 +49,6 @@ class StandKeys(Section):
     background_spectra: ByName = text(
         {}, "instead of background by band: shares of soil_dry, soil_wet, dead_grass, golden_grass, shade"
     )
-
-    @field_validator("hotspot")
-    @classmethod
-    def _wide_enough(cls, value):
-        if 0 < value < _LEAST_HOTSPOT:
-            raise ValueError(f"must be 0, for no hot spot, or at least {_LEAST_HOTSPOT:g}")
-        return value
 
     @field_validator("leaf_reflectance", "leaf_transmittance", "background", "leaf", "brown_leaf", "background_spectra")
     @classmethod
@@ -93,7 +97,6 @@ class LandscapeKeys(Section):
         suffix="*",
     )
     size: float = number(1200.0, "m", "of a pasture or patch that is drawn, along an edge or across", gt=0)
-    moisture: float = number(0.0, "1", "of the soil, 0 dry to 1 saturated", ge=0, le=1)
     deviations: ByName = text(
         {}, f"standard deviations [1] of what varies in fields that are drawn: {', '.join(VARYING)}"
     )
@@ -110,9 +113,7 @@ class LandscapeKeys(Section):
 
     def is_one(self):
         """Whether one stand is everywhere, and nothing but its leaf area varies."""
-        return (
-            self.cover == "none" and not self.moisture and not any((*self.deviations.values(), *self.covary.values()))
-        )
+        return self.cover == "none" and not any((*self.deviations.values(), *self.covary.values()))
 
     @field_validator("cover")
     @classmethod

@@ -6,6 +6,7 @@ from typing import get_args
 
 from pydantic import Field, field_validator, model_validator
 
+from fifesim.atmosphere.air import ENGINES
 from fifesim.base import fife
 from fifesim.base.foreign import shown
 from fifesim.base.spelling import nearest
@@ -16,7 +17,6 @@ from fifesim.scenario.section import Section, file, number, seed, text
 LAND_FORMS = ("flint-hills", "flat")
 INTERVALS = ("product", "native")
 EXTENT = ("west", "north", "width", "height")
-ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
 
 class GridKeys(Section):

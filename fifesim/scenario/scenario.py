@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from odc.geo.geobox import GeoBox
 from pydantic import Field, ValidationError, model_validator
@@ -21,7 +21,7 @@ from fifesim.rasters.covering import covering_grid
 from fifesim.rasters.sites import on_fife_site
 from fifesim.scenario import synthetic
 from fifesim.scenario.colours import with_false_colour
-from fifesim.scenario.ground import check_crown_cover, drawn_properties
+from fifesim.scenario.ground import check_leaf_area, drawn_properties
 from fifesim.scenario.ground_keys import COVARIATES
 from fifesim.scenario.keys import EXTENT, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
@@ -52,6 +52,8 @@ class Scenario(Keys):
     >>> scenario.ground.arp, scenario.atmosphere.visibility
     (0.24, 45.0)
     """
+
+    _in_words: ClassVar[str] = "a fifesim.Scenario, as fifesim.read_scenario gives it"
 
     ground: Ground = Ground()
     classes: dict[str, CoverStand] = Field({})
@@ -183,7 +185,7 @@ class Scenario(Keys):
         self._check_image(box)
         self._check_air()
         self._check_fields()
-        check_crown_cover(self)
+        check_leaf_area(self)
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
         own_time = self.geometry.model_copy(update={"time": self._time()})

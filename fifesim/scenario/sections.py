@@ -5,26 +5,24 @@ from dataclasses import asdict, fields
 
 from pydantic import field_validator, model_validator
 
-from fifesim.atmosphere.air import mixtures, models
+from fifesim.atmosphere.air import ENGINES, mixtures, models
 from fifesim.atmosphere.air.raster import read_aerosol
 from fifesim.base.foreign import shown
 from fifesim.base.spelling import nearest
 from fifesim.ground.canopy import optics
-from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.ground.canopy.description import Canopy
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background, spectrum_names
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
 from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.distribution import lai_distribution
 from fifesim.ground.terrain.units import metres_per_unit
-from fifesim.scenario.ground_keys import ClassKeys, GroundKeys, StandKeys
+from fifesim.scenario.ground_keys import KEYS, ClassKeys, GroundKeys, StandKeys
 from fifesim.scenario.keys import AirKeys, SensorKeys, TerrainKeys
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.noise import NoiseModel, check_kinds
 from fifesim.sensor.response.rasters.noise import noise_models
 
-# Keys of a stand that a class of cover has by the same names.
-_OF_A_CLASS = ("arp", "leaf_angles", "hotspot", "brown", "dissociation", "crown_cover", "crown_shape")
 _BY_BAND = ("leaf_reflectance", "leaf_transmittance")
 
 
@@ -38,10 +36,10 @@ class Stand(StandKeys):
             lai_distribution(value)
         return value
 
-    @field_validator("leaf_angles")
+    @field_validator(*KEYS)
     @classmethod
-    def _known_leaf_angles(cls, value):
-        leaf_angle_classes(value)
+    def _possible_canopy(cls, value, info):
+        Canopy(**{info.field_name: value})
         return value
 
     @field_validator("leaf", "brown_leaf")
@@ -86,9 +84,14 @@ class Stand(StandKeys):
         """Background by band or as a mixture of spectra, a dict or `Background`; None for the default."""
         return Background(self.background_spectra) if self.background_spectra else self.background or None
 
-    def dead_leaf(self):
-        """What dead leaves are made of, a `Leaf`; None for the default."""
-        return Leaf(**self.brown_leaf) if self.brown_leaf else None
+    def canopy(self, keys=KEYS):
+        """Canopy of these keys, a `Canopy`; optics are given where the table has them."""
+        return Canopy(
+            leaf_optics=self.leaf_optics(),
+            brown_leaf=Leaf(**self.brown_leaf) if self.brown_leaf else None,
+            background=self.below_canopy(),
+            **{key: getattr(self, key) for key in keys},
+        )
 
 
 class Ground(Stand, GroundKeys):
@@ -152,10 +155,10 @@ class CoverStand(Stand, ClassKeys):
         -------
         cover_class : fifesim.ground.landscape.classes.CoverClass
         """
-        optics = {"leaf": self.leaf_optics(), "brown_leaf": self.dead_leaf(), "background": self.below_canopy()}
-        numbers = {key: getattr(self, key) for key in _OF_A_CLASS if key in self.model_fields_set}
-        lai = (self if "distribution" in self.model_fields_set else ground).distribution
-        return CoverClass(name, lai=lai, code=self.code, **optics, **numbers)
+        given = self.model_fields_set
+        lai = (self if "distribution" in given else ground).distribution
+        canopy = self.canopy([key for key in KEYS if key in given])
+        return CoverClass(name, lai=lai, arp=self.arp if "arp" in given else None, canopy=canopy, code=self.code)
 
 
 def _by_band(names, values):
@@ -179,7 +182,7 @@ class Air(AirKeys):
     @field_validator("profile", "engine")
     @classmethod
     def _known_name(cls, value, info):
-        allowed = {"profile": models.PROFILES, "engine": models.ENGINES}[info.field_name]
+        allowed = {"profile": models.PROFILES, "engine": ENGINES}[info.field_name]
         if value not in allowed:
             raise ValueError(f"must be one of {', '.join(allowed)}, got {value!r}")
         return value

@@ -114,7 +114,7 @@ def setup_of(scenario):
         bands=tuple(own.bands),
         atmosphere=scenario.model_atmosphere(),
         geometry=scenario.sun_and_view(),
-        **canopy_of(scenario),
+        canopy=canopy_of(scenario),
         upwelling=scenario.terrain.upwelling,
         adjacency=scenario.atmosphere.adjacency,
         onto=grids.aligned(scenario.geobox(), own.size) if aligned else None,

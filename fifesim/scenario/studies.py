@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from fifesim.base.annotations import FilePath
 from fifesim.base.foreign import shown
+from fifesim.base.kinds import Kind
 from fifesim.base.seeds import check_seed
 from fifesim.base.spelling import nearest
 from fifesim.scenario.distributions import distribution_of
@@ -144,6 +145,11 @@ class Study:
         for path, value in drawn.items():
             put(values, path, value)
         return parse_scenario(values)
+
+
+StudyLike: TypeAlias = Annotated[
+    FilePath | Study, Kind("the path of a study, such as 'study.toml', or a fifesim.Study")
+]
 
 
 def read_study(path: FilePath) -> Study:

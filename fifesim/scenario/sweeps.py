@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import product
-from typing import Any
+from typing import Annotated, Any
 
 import dask
 import dask.array as da
@@ -14,7 +14,7 @@ import xarray as xr
 
 from fifesim.analysis.rasters.regression import regress
 from fifesim.base.annotations import Array, Pairing
-from fifesim.base.kinds import described
+from fifesim.base.kinds import PLAIN, described
 from fifesim.scenario.ensemble import realise
 from fifesim.scenario.named_keys import changed, find_key, in_text
 from fifesim.scenario.scenario import Scenario
@@ -27,7 +27,7 @@ VARIABLES = ("lai", "fpar")
 
 def sweep(
     scenario: Scenario,
-    axes: Mapping[str, Sequence[Any] | Array],
+    axes: Annotated[Mapping[str, Sequence[Any] | Array], PLAIN],
     measures: Mapping[str, Callable[[xr.DataTree], float]] | None = None,
     *,
     pair: Pairing = "coordinates",

@@ -4,11 +4,10 @@ from fifesim.base import fife
 from fifesim.base.times import utc
 from fifesim.ground.landscape.distribution import treatments
 from fifesim.rasters.sites import on_fife_site
-from fifesim.scenario.ground_keys import VARYING
 from fifesim.scenario.keys import EXTENT
 
 _PATTERNS = {"pastures": "fields", "voronoi": "patches", "levels": "patches"}
-_VARYING = dict(zip(VARYING, ("soil brightness", "soil moisture", "dead leaves", "crown cover"), strict=True))
+_VARYING = {"soil": "soil brightness", "moisture": "soil moisture", "brown": "dead leaves"}
 _PLURALS = {*_PATTERNS.values(), "dead leaves", "hills"}
 _COUNTS = {1: "grass type", 2: "two grass types", 3: "three grass types"}
 
@@ -79,7 +78,9 @@ def _parts(scenario):
     else:
         synthetic += [] if ground.lai_file else ["leaf area"]
         given += [] if cover == "none" else ["land cover"]
-        synthetic += [_VARYING[name] for name, value in scenario.landscape.deviations.items() if value]
+        synthetic += [
+            _VARYING.get(name, name.replace("_", " ")) for name, value in scenario.landscape.deviations.items() if value
+        ]
     if dem == "flint-hills":
         synthetic.append("hills")
     elif dem != "flat":

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import FilePath, Names, Numbers, Pair, Time
+from fifesim.base.annotations import Interval, Noise, Offset, Time, WholeNumber
 from fifesim.base.geometry import ANGLES
 from fifesim.rasters import cf, chunks, directions, swaths
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions, Image
+from fifesim.rasters.annotations import Image, RasterOrDataset
 from fifesim.rasters.dates import by_date
+from fifesim.rasters.directions import Directions
 from fifesim.rasters.own_rasters import HIGHEST, LOWEST, SAMPLED_ROWS, incoming
 from fifesim.rasters.sun import check_same_sun
 from fifesim.rasters.windows import held
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
 from fifesim.sensor.response import calibration
-from fifesim.sensor.response.noise import NoiseModel, check_kinds
+from fifesim.sensor.response.noise import NoiseModels, check_kinds
 from fifesim.sensor.response.rasters import digital_numbers
 from fifesim.sensor.response.rasters.matching import matching_bands, warn_of_others
 from fifesim.sensor.response.rasters.noise import noisy
@@ -36,18 +36,21 @@ from fifesim.sensor.response.rasters.pixels import (
 # scene of whole 30 m pixels by 0.16 m.
 MIN_VALID = 0.98
 
+# Coordinates that turn digital numbers into radiance.
+_SCALE = ("gain", "offset", "compression")
+
 
 @by_date
 def sense(
-    toa: xr.DataArray,
-    instrument: FilePath | Instrument | None = None,
+    toa: RasterOrDataset,
+    instrument: InstrumentLike | None = None,
     *,
     onto: GeoBox | None = None,
-    interval: Literal["native"] | Pair | None = None,
-    offset: Sequence[Numbers] = (0.0, 0.0),
-    noise: Names = (),
-    seed: int = 0,
-    noise_models: NoiseModel | Mapping[str, NoiseModel] | None = None,
+    interval: Interval | None = None,
+    offset: Offset = (0.0, 0.0),
+    noise: Noise = (),
+    seed: WholeNumber = 0,
+    noise_models: NoiseModels | None = None,
     quantise: bool = True,
     scaling: Literal["detector", "product"] = "detector",
     min_valid: float = MIN_VALID,
@@ -147,7 +150,8 @@ def sense(
     first = grids.lattice_position(pixels)
     radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, first, noise_models)
     image = digital_numbers.recorded(radiance, description, bands, quantise, geometry if scaling == "product" else None)
-    image = directions.with_geometry(grids.place(image.copy(data=held(image.data)), pixels), geometry)
+    carried = {} if geometry is None else directions.coordinates_of(geometry)
+    image = grids.place(image.copy(data=held(image.data)), pixels, carried)
     return labelled(image, toa, description, _history(description, interval, offset, noise, seed, quantise, scaling))
 
 
@@ -261,15 +265,20 @@ def to_radiance(image: xr.DataArray) -> xr.DataArray:
     >>> image.fifesim.to_radiance().mean(["y", "x"]).round().values
     array([41., 58.])
     """
+    scale = _scale_of(image)
+    out = chunks.pointwise(digital_numbers.radiance_kernel(image), image, *scale)
+    out = swaths.placed_as(out.drop_vars(_SCALE, errors="ignore"), image)
+    return cf.label(out, "toa_radiance", source=image, history="to_radiance")
+
+
+def _scale_of(image):
+    """Gain, offset, and the compression if there is one, of an image of digital numbers."""
     missing = {"gain", "offset"} - set(image.coords)
     if missing:
         raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
     if not np.all(image["gain"].values > 0):
         raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.atleast_1d(image['gain'].values)}")
-    names = [name for name in ("gain", "offset", "compression") if name in image.coords]
-    out = digital_numbers.radiance_of(image, [_along_band(image, name) for name in names])
-    out = swaths.placed_as(out.drop_vars(names), image)
-    return cf.label(out, "toa_radiance", source=image, history="to_radiance")
+    return [_along_band(image, name) for name in _SCALE if name in image.coords]
 
 
 @by_date
@@ -307,15 +316,32 @@ def to_reflectance(image: xr.DataArray) -> xr.DataArray:
     >>> image.fifesim.to_reflectance().mean(["y", "x"]).round(2).values
     array([0.1 , 0.21])
     """
-    radiance = to_radiance(image) if "gain" in image.coords else image
-    cf.check_quantity(radiance, "toa_radiance")
-    # The sun alone counts, and a scan's view is an array.
-    geometry = directions.geometry_of(image.drop_vars(["vza", "vaa"], errors="ignore"))
+    out, history = planetary(image)
+    return cf.label(swaths.placed_as(out, image), "toa_reflectance", source=image, history=history)
+
+
+def planetary(image):
+    """Planetary reflectance of an image [1], with its coordinates and without attributes, and the steps taken."""
+    counts = "gain" in image.coords
+    if not counts:
+        cf.check_quantity(image, "toa_radiance")
+    scale, radiance = (_scale_of(image), digital_numbers.radiance_kernel(image)) if counts else ([], None)
+    # Only the sun counts, and the view of a scan is an array.
+    geometry = directions.geometry_of(image, ("sza", "saa", "earth_sun_distance"))
     if geometry is None or "solar_irradiance" not in image.coords:
         raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
-    out = _by_sun(_plausible_reflectance, radiance, _along_band(image, "solar_irradiance"), geometry)
-    out = swaths.placed_as(out, image)
-    return cf.label(out, "toa_reflectance", source=radiance, history="to_reflectance")
+    below = _along_band(image, "solar_irradiance"), directions.mu_s(geometry)
+    distance = float(geometry.earth_sun_distance)
+    out = chunks.pointwise(_reflectance_of, image, *below, *scale, radiance=radiance, earth_sun_distance=distance)
+    out.attrs = {}
+    history = "to_radiance\nto_reflectance" if counts else "to_reflectance"
+    return out.drop_vars(_SCALE, errors="ignore"), history
+
+
+def _reflectance_of(values, solar_irradiance, mu_s, *scale, radiance, earth_sun_distance):
+    """Reflectance of digital numbers, by the kernel of their radiance, or of radiance."""
+    light = values if radiance is None else radiance(values, *scale)
+    return _plausible_reflectance(light, solar_irradiance, mu_s, earth_sun_distance)
 
 
 def _plausible_reflectance(radiance, solar_irradiance, mu_s, earth_sun_distance):

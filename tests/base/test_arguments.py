@@ -1,17 +1,27 @@
 """Every public function with eight kinds of wrong argument: one line that names it, and no raw message of a library."""
 
+from __future__ import annotations
+
 import inspect
 import pickle
 import traceback
 import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, Literal, get_type_hints
 
 import numpy as np
 import pytest
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
 import fifesim
 from fifesim.accessor import PUBLIC
+from fifesim.base.annotations import FilePath, Metres, Names
+from fifesim.base.arguments import check_fields, checked, kind_of
+from fifesim.base.kinds import NUMBER, Kind
+from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.rasters import grid as grids
 
 PACKAGE = str(Path(fifesim.__file__).parent)
@@ -61,12 +71,12 @@ def calls(tmp_path_factory):
         "arp_for_length": {"length": 3.0, "cell": 1.0},
         "Leaf": {"structure": 1.5, "chlorophyll": 30.0, "water": 0.01, "dry_matter": 0.01},
         "Background": {"fractions": {"soil_dry": 1.0}},
+        "Canopy": {name: None for name in PROPERTIES},
         "surface_reflectance": {
             "lai": lai, "instrument": "TM", "bands": ["TM3", "TM4"], "dem": None, "horizon": None, "upwelling": True,
-            "atmosphere": None, "geometry": None, "leaf_optics": None, "background": None, "leaf_angles": "spherical",
-            "hotspot": 0.0, "exact": False,
+            "atmosphere": None, "geometry": None, "canopy": None, "exact": False,
         },
-        "fpar": {"lai": lai, "geometry": None, "leaf_angles": "spherical", "fpar_inf": 0.94},
+        "fpar": {"lai": lai, "geometry": None, "canopy": None, "fpar_inf": 0.94},
         "fine_dem": {"path_or_raster": dem, "grid": grid, "fill": None, "vertical_units": None, "chunks": None},
         "source_dem": {"path_or_raster": dem, "grid": grid[4:6, 4:6], "margin": 0.0, "fill": None},
         "flint_hills": {"grid": grid, "seed": 0, "chunks": None},
@@ -177,6 +187,27 @@ def test_a_wrong_argument_is_named_in_a_line(calls, wrong, name, tmp_path, monke
     assert found == []
 
 
+@pytest.mark.parametrize("field", list(PROPERTIES))
+def test_a_wrong_field_of_a_canopy_is_named_in_a_line(calls, wrong, field):
+    given, found, refused = calls["surface_reflectance"], [], 0
+    for kind, value in wrong.items():
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                # Dead leaves, so that their optics are used.
+                dead = {} if field in ("brown", "lai") else {"brown": 0.3}
+                fifesim.surface_reflectance(**given | {"canopy": fifesim.Canopy(**dead | {field: value})})
+        except (ValueError, TypeError, FileNotFoundError) as error:
+            text, last = str(error), traceback.extract_tb(error.__traceback__)[-1].filename
+            short = len(text) <= 500 and text.count("\n") <= 2
+            also = {"leaf_optics": "leaf_optics", "brown_leaf": "leaf_optics"}.get(field, field)
+            named = names_it(text, field, kind) or names_it(text, also, kind)
+            if not (short and named and last.startswith(PACKAGE)):
+                found.append(f"{field} = {kind}: {text[:150]} ({last})")
+            refused += 1
+    assert found == [] and refused >= 5
+
+
 NOT_REAL = ["bool", "complex64", "datetime64[s]", "timedelta64[s]", "str", "object"]
 
 
@@ -199,10 +230,7 @@ def test_rasters_within_an_argument_must_hold_real_numbers(calls):
     lai, rho = given["lai"], calls["to_toa"]["reflectance"]
     mask = lai > 1
     within = {
-        "background": {"TM3": mask, "TM4": 0.2},
-        "leaf_optics": {"TM3": (mask, 0.1), "TM4": (0.4, 0.4)},
-        "brown_leaf": fifesim.Leaf(chlorophyll=mask),
-        "soil": mask,
+        "canopy": fifesim.Canopy(background={"TM3": mask, "TM4": 0.2}),
         "lai": xr.Dataset({"lai": lai, "brown": mask}),
     }
     for argument, value in within.items():
@@ -210,6 +238,10 @@ def test_rasters_within_an_argument_must_hold_real_numbers(calls):
             TypeError, match=rf"^{argument} must hold real numbers, got bool: it holds a mask, type \.ast"
         ):
             fifesim.surface_reflectance(**(given | {argument: value}))
+    fields = {"background": mask, "leaf_optics": {"TM3": (mask, 0.1), "TM4": (0.4, 0.4)}}
+    for name, value in (fields | {"brown_leaf": fifesim.Leaf(chlorophyll=mask)}).items():
+        with pytest.raises(TypeError, match=r"^canopy must hold real numbers, got bool"):
+            fifesim.surface_reflectance(**(given | {"canopy": fifesim.Canopy(**{name: value})}))
     with pytest.raises(TypeError, match=r"^setup must hold real numbers"):
         fifesim.compare(lai, ["TM"], fifesim.Setup(dem=mask))
     for wavelength in (["red", "nir"], np.array(["2001-01-01", "2001-01-02"], "datetime64[s]")):
@@ -254,13 +286,19 @@ def test_what_a_user_typed(calls):
         (lambda: lai.fifesim.aggregate("30"), "pixel must be a size in metres, such as 30.0, got '30'"),
         (lambda: lai[:0].fifesim.fpar(), "lai has no cells, its sizes are y: 0, x: 12"),
         (lambda: rho.fifesim.to_toa(surroundings="lake", adjacency=True), "surroundings must be a reflectance.*'lake'"),
-        (lambda: lai.fifesim.fpar(leaf_angles={30: 0.5, 60: 0.5}), "leaf_angles must be a name .*got a dict of 2"),
+        (
+            lambda: lai.fifesim.fpar(canopy=fifesim.Canopy(leaf_angles={30: 0.5, 60: 0.5})),
+            "leaf_angles must be a name .*got a dict of 2",
+        ),
         (lambda: rho.fifesim.sense("TM", noise=True), r"noise must .*such as \['shot', 'thermal'\].*got True"),
         (lambda: fifesim.psf("TM", ["TM3"]), "band must be a name, got a list of 1"),
         (lambda: fifesim.regress(np.ones(3), lai), "y must be an xarray.DataArray over"),
         (lambda: lai.fifesim.regress(np.ones(3)), "x must be an xarray.DataArray over"),
         (lambda: fifesim.lai_scene(lai), "grid must be .*GeoBox.*type raster.odc.geobox"),
-        (lambda: lai.fifesim.surface_reflectance(hotspot=lai), "hotspot must be a number, got .*one is for all cells"),
+        (
+            lambda: lai.fifesim.surface_reflectance(canopy=fifesim.Canopy(hotspot=lai)),
+            "hotspot must be a number, got an xarray.DataArray",
+        ),
         (lambda: lai.fifesim.surface_reflectance(exact="no"), "exact must be True or False, got 'no'"),
         (lambda: fifesim.to_geotiff(lai, "lai.tif", overwrite="no"), "overwrite must be True or False, got 'no'"),
         (lambda: fifesim.open_landsat("x_MTL.txt", quality="yes"), "quality must be True or False, got 'yes'"),
@@ -272,3 +310,136 @@ def test_what_a_user_typed(calls):
         with pytest.raises((TypeError, ValueError), match=message) as caught:
             call()
         assert len(str(caught.value)) <= 500
+
+
+class Sieve:
+    """A description that no table of the package names."""
+
+
+def sieved(
+    raster: xr.DataArray,
+    mesh: float,
+    sieve: Sieve | None = None,
+    *,
+    wet: bool = False,
+    pixel: Metres = 30.0,
+    times: Annotated[int, Kind("a number of shakes")] = 1,
+    names: Names = (),
+    grid: GeoBox | None = None,
+    by: Literal["size", "mass"] = "size",
+    weights: Mapping[str, float] | None = None,
+    source: FilePath | xr.Dataset = "none",
+    sizes: Sequence[float] = (),
+    each: Callable[[float], float] | None = None,
+) -> str:
+    """A public function that no table of the package names."""
+    return "done"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"raster": 5}, "raster must be an xarray.DataArray over (y, x), got 5"),
+        ({"raster": "a.tif"}, "raster must be an xarray.DataArray over (y, x), got 'a.tif': open it with"),
+        ({"mesh": "2"}, "mesh must be a number, got '2'"),
+        ({"mesh": True}, "mesh must be a number, got True"),
+        ({"mesh": None}, "mesh must be a number, got None"),
+        ({"sieve": 3}, "sieve must be a tests.Sieve, got 3"),
+        ({"wet": 1}, "wet must be True or False, got 1"),
+        ({"pixel": "30"}, "pixel must be a size in metres, such as 30.0, got '30'"),
+        ({"times": "3"}, "times must be a number of shakes, got '3'"),
+        ({"names": 5}, "names must be a list of names, got 5"),
+        ({"grid": 5}, "grid must be an odc.geo.geobox.GeoBox, such as"),
+        ({"by": 5}, "by must be a name, got 5"),
+        ({"weights": [1.0]}, "weights must be a mapping of names, got a list of 1"),
+        ({"source": 5}, "source must be the path of a file, or an xarray.Dataset, got 5"),
+        ({"sizes": 5}, "sizes must be a list, got 5"),
+        ({"each": 5}, "each must be a function, got 5"),
+        ({"meshes": 5}, "sieved has no argument 'meshes': did you mean 'mesh'?"),
+    ],
+)
+def test_a_new_function_is_checked_by_its_annotations(lai, given, message):
+    message = message.replace("tests.Sieve", f"{__name__.partition('.')[0]}.Sieve")
+    with pytest.raises(TypeError) as caught:
+        checked(sieved)(**{"raster": lai, "mesh": 2.0, **given})
+    assert str(caught.value).startswith(message)
+
+
+def test_a_new_function_checks_the_cells_of_rasters(lai):
+    with pytest.raises(TypeError, match="raster must hold real numbers, got bool"):
+        checked(sieved)(lai > 1, 2.0)
+    with pytest.raises(ValueError, match="raster has no cells"):
+        checked(sieved)(lai[:0], 2.0)
+
+
+def test_a_new_function_takes_what_its_annotations_allow(lai):
+    every = {"wet": np.bool_(True), "pixel": 5, "times": 2, "names": ["a"], "grid": lai.odc.geobox, "by": "mass"}
+    every |= {"weights": {"a": 1.0}, "source": xr.Dataset(), "sizes": np.ones(2), "each": np.sqrt}
+    assert checked(sieved)(lai, 2, Sieve(), **every) == "done"
+    # An argument may always have its default value.
+    assert checked(sieved)(lai, np.float32(2), None, weights=None, each=None) == "done"
+
+
+def test_fields_of_a_new_description_are_checked_by_their_annotations():
+    @dataclass
+    class Mesh:
+        width: Annotated[float, NUMBER]
+        wet: bool = False
+
+        def __post_init__(self):
+            check_fields(self)
+
+    assert not Mesh(2.0).wet
+    for given, message in (({"width": "2"}, "width must be a number, got '2'"), ({"wet": 1}, "wet must be True or")):
+        with pytest.raises(TypeError, match=f"^{message}"):
+            Mesh(**{"width": 2.0, **given})
+
+
+def arguments():
+    """Public functions with their parameters and annotations."""
+    for name in PUBLIC:
+        function = inspect.unwrap(getattr(fifesim, name))
+        if inspect.isfunction(function):
+            hints = get_type_hints(function, include_extras=True)
+            for parameter in inspect.signature(function).parameters:
+                yield name, parameter, hints.get(parameter)
+
+
+def test_every_argument_of_public_functions_has_an_annotation_with_a_kind():
+    breaches = []
+    for name, parameter, annotation in arguments():
+        try:
+            assert annotation is not None, "it has no annotation"
+            assert kind_of(annotation).words and callable(kind_of(annotation).fits)
+        except (AssertionError, TypeError) as error:
+            breaches.append(f"{name}({parameter}): {error}")
+    assert breaches == []
+
+
+def test_an_annotation_without_a_kind_is_an_error():
+    for annotation in (tuple[int, int, str], Annotated[tuple[int, int, str], "metres"]):
+        with pytest.raises(TypeError, match="nothing states the kind of tuple"):
+            kind_of(annotation)
+    assert kind_of(Any).fits(None)
+
+
+def test_methods_take_the_containers_that_they_are_methods_of(lai):
+    values = {"DataArray": lai, "Dataset": lai.to_dataset(name="lai"), "DataTree": xr.DataTree()}
+    first = {}
+    for name, _, annotation in arguments():
+        first.setdefault(name, annotation)
+    for name, public in PUBLIC.items():
+        if public.methods_of:
+            taken = {each for each, value in values.items() if kind_of(first[name]).fits(value)}
+            assert taken == set(public.methods_of), name
+
+
+def test_a_class_names_the_function_that_gives_its_objects(lai):
+    with pytest.raises(
+        TypeError, match=r"^scenario must be a fifesim\.Scenario, as fifesim\.read_scenario gives it, got 5$"
+    ):
+        fifesim.simulate(5)
+    with pytest.raises(TypeError, match=r"^fit must be a fifesim\.Regression, as fifesim\.regress gives it, got 5$"):
+        fifesim.invert(lai, 5)
+    with pytest.raises(TypeError, match=r"^setup must be a fifesim\.Setup, got 5$"):
+        fifesim.compare(lai, ["TM"], 5)

@@ -6,6 +6,9 @@ import xarray as xr
 
 import fifesim
 from fifesim.base import kinds
+from fifesim.base.arguments import kind_of
+from fifesim.ground.canopy.annotations import LEAF
+from fifesim.sensor.description.annotations import InstrumentLike
 
 
 @pytest.mark.parametrize(
@@ -16,8 +19,8 @@ from fifesim.base import kinds
         (kinds.PAIR, [30, (30, 15)], [(1, 2, 3), "30", np.ones((2, 2)), ("a", "b")]),
         (kinds.FLAG, [True, np.bool_(False)], [1, 0, None, "no"]),
         (kinds.CHUNKS, [256, "auto", "64MB", {"y": 2}, (2, 2), None], ["many", xr.Dataset(), np.ones(2)]),
-        (kinds.LEAF, [fifesim.Leaf(), {"TM3": (0.1, 0.1)}, (0.1, 0.1)], [0.1, (0.1,), 5]),
-        (kinds.INSTRUMENT, ["TM", fifesim.instrument("TM")], [None, ["TM"], 5]),
+        (LEAF, [fifesim.Leaf(), {"TM3": (0.1, 0.1)}, (0.1, 0.1)], [0.1, (0.1,), 5]),
+        (kind_of(InstrumentLike), ["TM", fifesim.instrument("TM")], [None, ["TM"], 5]),
     ],
 )
 def test_kinds_know_their_own(kind, fits, others):

@@ -40,7 +40,13 @@ def test_what_a_user_misspells(lai):
         (lambda: fifesim.sens, AttributeError, "no attribute 'sens': did you mean 'sense'"),
         (lambda: lai.fifesim.sens, AttributeError, "no method 'sens' of an xarray.DataArray: did you mean 'sense'"),
         (lambda: lai.fifesim.fife_site, AttributeError, "fife_site is no method of a raster.* fifesim.fife_site is"),
-        (lambda: lai.fifesim.fpar(leaf_angels="spherical"), TypeError, "fpar has no .* did you mean 'leaf_angles'"),
+        (lambda: lai.fifesim.fpar(canpoy=fifesim.Canopy()), TypeError, "fpar has no .* did you mean 'canopy'"),
+        (lambda: fifesim.Canopy(leaf_angels="spherical"), TypeError, "Canopy has no .* did you mean 'leaf_angles'"),
+        (
+            lambda: lai.fifesim.fpar(leaf_angles="spherical"),
+            TypeError,
+            r"type canopy=fifesim.Canopy\(leaf_angles=...\)",
+        ),
         (lambda: fifesim.Atmosphere(visibilty=23), TypeError, "Atmosphere has no .* did you mean 'visibility'"),
     ]
     for call, kind, said in typed:

@@ -14,22 +14,22 @@ NEAREST = {"TM1": "MSI2", "TM2": "MSI3", "TM3": "MSI4", "TM4": "MSI8", "TM5": "M
 
 # Leaves and ground that are none of the library's.
 LAND = {
-    "green": {
-        "leaf_optics": fifesim.Leaf(1.4, 42, 9, 0, 0.1, 0.009, 0.006),
-        "background": fifesim.Background({"soil_wet": 0.6, "golden_grass": 0.4}),
-        "leaf_angles": "campbell(63)",
-        "hotspot": 0.1,
-    },
-    "dry": {
-        "leaf_optics": fifesim.Leaf(2.1, 18, 6, 1.0, 0.6, 0.006, 0.012),
-        "background": fifesim.Background({"soil_dry": 0.3, "dead_grass": 0.5, "shade": 0.2}),
-        "leaf_angles": "uniform",
-    },
-    "crop": {
-        "leaf_optics": fifesim.Leaf(1.6, 60, 12, 0, 0.0, 0.02, 0.004),
-        "background": fifesim.Background({"soil_dry": 1.0}),
-        "leaf_angles": "planophile",
-    },
+    "green": fifesim.Canopy(
+        leaf_optics=fifesim.Leaf(1.4, 42, 9, 0, 0.1, 0.009, 0.006),
+        background=fifesim.Background({"soil_wet": 0.6, "golden_grass": 0.4}),
+        leaf_angles="campbell(63)",
+        hotspot=0.1,
+    ),
+    "dry": fifesim.Canopy(
+        leaf_optics=fifesim.Leaf(2.1, 18, 6, 1.0, 0.6, 0.006, 0.012),
+        background=fifesim.Background({"soil_dry": 0.3, "dead_grass": 0.5, "shade": 0.2}),
+        leaf_angles="uniform",
+    ),
+    "crop": fifesim.Canopy(
+        leaf_optics=fifesim.Leaf(1.6, 60, 12, 0, 0.0, 0.02, 0.004),
+        background=fifesim.Background({"soil_dry": 1.0}),
+        leaf_angles="planophile",
+    ),
 }
 
 
@@ -50,7 +50,7 @@ def lai():
 
 @pytest.fixture(scope="module")
 def msi(lai):
-    return lai.fifesim.surface_reflectance("MSI", **LAND["green"])
+    return lai.fifesim.surface_reflectance("MSI", canopy=LAND["green"])
 
 
 def test_bands_of_the_tm_are_found_from_those_of_the_msi(lai):
@@ -62,7 +62,7 @@ def test_bands_of_the_tm_are_found_from_those_of_the_msi(lai):
     """
     errors, differences = [], []
     for land in LAND.values():
-        source, truth = (lai.fifesim.surface_reflectance(name, **land) for name in ("MSI", "TM"))
+        source, truth = (lai.fifesim.surface_reflectance(name, canopy=land) for name in ("MSI", "TM"))
         found = source.fifesim.adjust_bands("TM")
         errors.append(bands(found) - bands(truth))
         differences.append(bands(source.sel(band=list(NEAREST.values()))) - bands(truth))
@@ -147,7 +147,7 @@ def test_what_is_not_known_is_refused(msi, change, options, said):
 
 def test_another_instrument_sees_the_scene(lai):
     """The image from MSI bands is that from the ground itself, within two digital numbers."""
-    scenes = {name: lai.fifesim.surface_reflectance(name, **LAND["green"]) for name in ("MSI", "TM")}
+    scenes = {name: lai.fifesim.surface_reflectance(name, canopy=LAND["green"]) for name in ("MSI", "TM")}
     seen = scenes["MSI"].fifesim.as_seen_by("TM", noise=(), seed=1)
     truth = scenes["TM"].fifesim.to_toa().fifesim.sense("TM")
     assert seen.dtype == np.uint8 and seen.attrs["instrument"] == "TM"

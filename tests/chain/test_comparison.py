@@ -60,10 +60,9 @@ def test_one_pass_makes_them_all(lai):
 
 
 def test_bands_and_options_reach_the_instruments(lai):
-    setup = fifesim.Setup(
-        interval=(20.0, 25.0), quantise=False, background=0.2,
-        leaf_optics={"TM2": (0.16, 0.12), "TM5": (0.28, 0.31)} | dict.fromkeys(("OLI4", "OLI5"), (0.3, 0.3)),
-    )  # fmt: skip
+    leaf = {"TM2": (0.16, 0.12), "TM5": (0.28, 0.31)} | dict.fromkeys(("OLI4", "OLI5"), (0.3, 0.3))
+    canopy = fifesim.Canopy(background=0.2, leaf_optics=leaf)
+    setup = fifesim.Setup(interval=(20.0, 25.0), quantise=False, canopy=canopy)
     images = fifesim.compare(lai, ["TM", "OLI"], setup, bands={"TM": ["TM2", "TM5"]})
     assert images["TM"]["toa_radiance"]["band"].values.tolist() == ["TM2", "TM5"]
     for name in ("TM", "OLI"):
@@ -88,8 +87,12 @@ def test_one_leaf_and_one_soil_are_seen_by_all(lai):
     """A leaf without red absorption on grey ground has no vegetation signal, in whichever bands."""
     white = fifesim.Leaf(structure=2.0, chlorophyll=0, carotenoids=0, water=0, dry_matter=0)
     clear = fifesim.Atmosphere(aerosol="none")
-    images = fifesim.compare(lai, NAMES, fifesim.Setup(leaf_optics=white, background=0.3, atmosphere=clear))
-    green = fifesim.compare(lai, NAMES, fifesim.Setup(leaf_optics=fifesim.Leaf(), background={"soil_wet": 1.0}))
+    images = fifesim.compare(
+        lai, NAMES, fifesim.Setup(canopy=fifesim.Canopy(leaf_optics=white, background=0.3), atmosphere=clear)
+    )
+    green = fifesim.compare(
+        lai, NAMES, fifesim.Setup(canopy=fifesim.Canopy(leaf_optics=fifesim.Leaf(), background={"soil_wet": 1.0}))
+    )
     for name in NAMES:
         assert (
             float(fifesim.ndvi(images[name]["dn"]).mean()) < 0.1 < 0.4 < float(fifesim.ndvi(green[name]["dn"]).mean())

@@ -23,7 +23,9 @@ def lai():
 @pytest.fixture(scope="module")
 def setup():
     geometry = fifesim.Geometry(35.0, 120.0, 20.0, 80.0, earth_sun_distance=1.01)
-    return fifesim.Setup("TM", bands=("TM4", "TM3"), geometry=geometry, brown=0.1, atmosphere=fifesim.Atmosphere())
+    return fifesim.Setup(
+        "TM", bands=("TM4", "TM3"), geometry=geometry, canopy=fifesim.Canopy(brown=0.1), atmosphere=fifesim.Atmosphere()
+    )
 
 
 def test_kernels_are_the_labelled_steps_to_the_bit(lai, setup):
@@ -34,7 +36,7 @@ def test_kernels_are_the_labelled_steps_to_the_bit(lai, setup):
     np.testing.assert_array_equal(kernels.toa(level), toa)
     np.testing.assert_array_equal(kernels.ndvi(kernels.toa(level)), fifesim.ndvi(toa))
     for leaves in ("all", "green"):
-        expected = fifesim.fpar(lai, geometry=setup.geometry, brown=0.1, leaves=leaves)
+        expected = fifesim.fpar(lai, geometry=setup.geometry, canopy=fifesim.Canopy(brown=0.1), leaves=leaves)
         np.testing.assert_array_equal(kernels.fpar(lai.values, 0.94, leaves), expected)
 
 
@@ -59,7 +61,7 @@ def test_digital_numbers_lead_back_to_their_reflectance(setup):
 
 def test_what_arrays_do_not_do_with_is_named(lai, setup):
     with pytest.raises(ValueError, match="do not do with relief, adjacency, brown: take"):
-        Kernels(replace(setup, dem=lai, adjacency=True, brown=lai))
+        Kernels(replace(setup, dem=lai, adjacency=True, canopy=fifesim.Canopy(brown=lai)))
     assert labelled_only(replace(setup, offset=(np.zeros(3), 0.0))) == ["a drifting offset"]
     angles = xr.Dataset({"sza": 30.0, "saa": 120.0})
     assert labelled_only(replace(setup, geometry=angles)) == ["angles by cell"]

@@ -12,11 +12,14 @@ from fifesim.atmosphere.schemes import engines
 from fifesim.rasters import grid as grids
 
 TM34 = ["TM3", "TM4"]
-GRASS = {"lai": "burned-grazed", "leaf_angles": "erectophile", "background": {"dead_grass": 1.0}, "hotspot": 0.1}
-WOOD = {"lai": "unburned-ungrazed", "leaf": fifesim.Leaf(chlorophyll=50), "background": {"TM3": 0.05, "TM4": 0.1}}
-BARE = {"lai": 0.0, "background": 0.2}
-CLASSES = {"grass": fifesim.CoverClass(**GRASS), "wood": fifesim.CoverClass(**WOOD), "bare": fifesim.CoverClass(**BARE)}
-CANOPY = {"leaf": "leaf_optics"}
+GRASS = fifesim.Canopy(leaf_angles="erectophile", background={"dead_grass": 1.0}, hotspot=0.1)
+WOOD = fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=50), background={"TM3": 0.05, "TM4": 0.1})
+BARE = fifesim.Canopy(background=0.2)
+CLASSES = {
+    "grass": fifesim.CoverClass(lai="burned-grazed", canopy=GRASS),
+    "wood": fifesim.CoverClass(lai="unburned-ungrazed", canopy=WOOD),
+    "bare": fifesim.CoverClass(lai=0.0, canopy=BARE),
+}
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +33,8 @@ def rho(land):
 
 
 def test_each_class_has_the_bits_of_a_scene_of_it_alone(land, rho):
-    for code, said in enumerate((GRASS, WOOD, BARE), 1):
-        canopy = {CANOPY.get(name, name): value for name, value in said.items() if name != "lai"}
-        alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, **canopy)
+    for code, canopy in enumerate((GRASS, WOOD, BARE), 1):
+        alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy)
         of_class = (land.cover == code).values
         assert 400 < of_class.sum() < 1600
         np.testing.assert_array_equal(rho.values[:, of_class], alone.values[:, of_class])
@@ -57,8 +59,10 @@ def test_reflectance_of_a_landscape_goes_on_as_of_a_lone_leaf_area(land, rho):
 
 
 def test_landscape_without_cover_is_one_class(land):
-    alone = land[["lai"]].fifesim.surface_reflectance("TM", bands=TM34, hotspot=0.1)
-    xr.testing.assert_identical(alone, land.lai.fifesim.surface_reflectance("TM", bands=TM34, hotspot=0.1))
+    alone = land[["lai"]].fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(hotspot=0.1))
+    xr.testing.assert_identical(
+        alone, land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(hotspot=0.1))
+    )
 
 
 def test_arguments_are_those_of_classes_that_leave_them_open(land, rho, lai):
@@ -66,16 +70,16 @@ def test_arguments_are_those_of_classes_that_leave_them_open(land, rho, lai):
     open_one = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed")}
     scene = fifesim.landscape(grids.geobox(land.lai), cover=fifesim.Patches("voronoi", 30), classes=open_one, seed=7)
     litter = (0.1 + lai / 20).rename("litter").drop_attrs(deep=False)
-    made = scene.fifesim.surface_reflectance("TM", bands=TM34, background=litter)
-    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, background=litter)
+    made = scene.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=litter))
+    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=litter))
     grass = (land.cover == 1).values
     np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
     np.testing.assert_array_equal(made.values[:, ~grass], rho.values[:, ~grass])
 
 
 def test_argument_that_would_change_nothing_is_refused(land):
-    with pytest.raises(ValueError, match="background is given, and all classes of the landscape say theirs"):
-        land.fifesim.surface_reflectance("TM", background=0.1)
+    with pytest.raises(ValueError, match="background is given, and all classes of the landscape have their own"):
+        land.fifesim.surface_reflectance("TM", canopy=fifesim.Canopy(background=0.1))
 
 
 def test_view_and_leaves_that_vary_are_taken_by_class(land):
@@ -83,8 +87,7 @@ def test_view_and_leaves_that_vary_are_taken_by_class(land):
     sza = (xr.zeros_like(land.lai) + 30 + 0.01 * np.arange(land.sizes["x"])).rename("sza").drop_attrs(deep=False)
     sun = xr.Dataset({"sza": sza, "saa": 120.0, "vza": 10.0, "vaa": 90.0, "earth_sun_distance": 1.0})
     made = land.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun)
-    canopy = {CANOPY.get(name, name): value for name, value in WOOD.items() if name != "lai"}
-    alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun, **canopy)
+    alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, geometry=sun, canopy=WOOD)
     wood = (land.cover == 2).values
     np.testing.assert_array_equal(made.values[:, wood], alone.values[:, wood])
 
@@ -134,8 +137,10 @@ def two_uniform_classes():
     grid = fifesim.fife_site(30 / 9, window=((0, 9), (0, 90)))
     codes = np.where(np.arange(9)[:, None] < np.repeat(np.arange(10), 9), 1, 2)
     table = {
-        "canopy": fifesim.CoverClass(lai=DENSE, leaf=LEAF, background=DARK, leaf_angles="45: 1"),
-        "soil": fifesim.CoverClass(lai=0, leaf=LEAF, background=SOIL),
+        "canopy": fifesim.CoverClass(
+            lai=DENSE, canopy=fifesim.Canopy(leaf_optics=LEAF, background=DARK, leaf_angles="45: 1")
+        ),
+        "soil": fifesim.CoverClass(lai=0, canopy=fifesim.Canopy(leaf_optics=LEAF, background=SOIL)),
     }
     return fifesim.landscape(grid, cover=labelled(grid, codes).drop_attrs(deep=False), classes=table)
 
@@ -201,47 +206,48 @@ def test_codes_are_counted_not_averaged(land):
 def test_light_absorbed_goes_by_the_leaf_angles_of_a_class(land):
     fpar = land.fifesim.fpar()
     for code, angles in ((1, "erectophile"), (2, "spherical"), (3, "spherical")):
-        alone = land.lai.fifesim.fpar(leaf_angles=angles)
+        alone = land.lai.fifesim.fpar(canopy=fifesim.Canopy(leaf_angles=angles))
         np.testing.assert_array_equal(fpar.values[land.cover == code], alone.values[land.cover == code])
-    planophile = land.fifesim.fpar(leaf_angles="planophile")
+    planophile = land.fifesim.fpar(canopy=fifesim.Canopy(leaf_angles="planophile"))
     grass = (land.cover == 1).values
     assert (planophile.values[grass] == fpar.values[grass]).all() and (planophile != fpar).any()
     assert fpar.name == "fpar"
     xr.testing.assert_identical(land[["lai"]].fifesim.fpar(), land.lai.fifesim.fpar())
 
 
-DEAD = {"brown": 0.4, "dissociation": 0.5, "crown_cover": 0.7, "crown_shape": 0.5}
+DEAD = fifesim.Canopy(brown=0.4, dissociation=0.5, crown_cover=0.7, crown_shape=0.5)
 
 
 def test_dead_leaves_and_crowns_are_those_of_a_class(site, land):
     """What a class says of them has the bits of a scene of it alone, and other classes go on without."""
-    dead = fifesim.CoverClass(lai="burned-grazed", brown_leaf={"TM3": (0.3, 0.1), "TM4": (0.4, 0.3)}, **DEAD)
-    table = CLASSES | {"grass": dead}
+    canopy = DEAD.replace(brown_leaf={"TM3": (0.3, 0.1), "TM4": (0.4, 0.3)})
+    table = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed", canopy=canopy)}
     scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7)
     made = scene.fifesim.surface_reflectance("TM", bands=TM34)
-    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, brown_leaf=dead.brown_leaf, **DEAD)
+    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy)
     grass = (land.cover == 1).values
     np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
     others = land.fifesim.surface_reflectance("TM", bands=TM34)
     np.testing.assert_array_equal(made.values[:, ~grass], others.values[:, ~grass])
     green = scene.fifesim.fpar(leaves="green")
-    shares = {name: DEAD[name] for name in ("brown", "dissociation", "crown_cover")}
-    expected = scene.lai.fifesim.fpar(leaves="green", **shares)
+    expected = scene.lai.fifesim.fpar(leaves="green", canopy=DEAD)
     np.testing.assert_array_equal(green.values[grass], expected.values[grass])
 
 
 def test_variables_of_a_landscape_win_over_its_classes(site, land):
     brown = (land.lai / 5).drop_attrs(deep=False).rename("brown")
-    table = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed", brown=0.9)}
+    table = CLASSES | {"grass": fifesim.CoverClass(lai="burned-grazed", canopy=fifesim.Canopy(brown=0.9))}
     scene = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=table, seed=7, brown=brown)
     made = scene.fifesim.surface_reflectance("TM", bands=TM34)
-    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, brown=scene.brown)
+    alone = scene.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(brown=scene.brown))
     grass = (land.cover == 1).values
     np.testing.assert_array_equal(made.values[:, grass], alone.values[:, grass])
     with pytest.raises(ValueError, match="brown is given, and the landscape has a variable brown"):
-        scene.fifesim.surface_reflectance("TM", bands=TM34, brown=0.1)
+        scene.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(brown=0.1))
     number = fifesim.landscape(site, lai=land.lai, brown=0.3).fifesim.surface_reflectance("TM", bands=TM34)
-    xr.testing.assert_equal(number, land.lai.fifesim.surface_reflectance("TM", bands=TM34, brown=0.3))
+    xr.testing.assert_equal(
+        number, land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(brown=0.3))
+    )
 
 
 @pytest.mark.slow

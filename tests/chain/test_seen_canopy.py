@@ -19,8 +19,8 @@ def scene(chunks=None):
     return lai.copy(data=xr.where(lai.data < 1.9, lai.data, np.nan) if chunks is None else lai.data)
 
 
-def chains(lai, **canopy):
-    reflectance = lai.fifesim.surface_reflectance("TM", bands=BANDS, **canopy)
+def chains(lai, exact=False, **canopy):
+    reflectance = lai.fifesim.surface_reflectance("TM", bands=BANDS, canopy=fifesim.Canopy(**canopy), exact=exact)
     return reflectance, reflectance.fifesim.to_toa()
 
 
@@ -50,13 +50,13 @@ def test_changed_values_are_not_made_again():
 
 def test_missing_cells_are_missing():
     lai = np.array([[0.0, np.nan, 2.5]])
-    canopy = origin_of(chains(scene({"y": 90, "x": 40}))[0]).parameters
+    canopy = origin_of(chains(scene({"y": 90, "x": 40}))[0])
     names = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo", "gas_transmittance")
     clear = dict(zip(names, np.repeat([[0.0], [1.0], [1.0], [0.0], [1.0]], 3, axis=1), strict=True))
-    found = seen_reflectance(lai, canopy=canopy, terms=clear)
+    found = seen_reflectance(lai, background=canopy.background, scene=canopy.scene, terms=clear)
     assert np.isnan(found[:, 0, 1]).all()
     # Through no air, bare ground is seen as it is.
-    np.testing.assert_allclose(found[:, 0, 0], canopy["background"], rtol=1e-9)
+    np.testing.assert_allclose(found[:, 0, 0], canopy.background, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("lai", "message"), [(-1.0, "negative"), (35.0, "at most 20")])

@@ -14,17 +14,7 @@ GROUND = {
     "bands": ("TM3", "TM4"),
     "atmosphere": fifesim.Atmosphere(visibility=23),
     "geometry": fifesim.Geometry(40.0, 100.0, 5.0, 10.0),
-    "leaf_optics": {"TM3": (0.1, 0.08), "TM4": (0.5, 0.4)},
-    "background": {"TM3": 0.1, "TM4": 0.2},
-    "soil": 0.03,
-    "moisture": 0.4,
-    "leaf_angles": "planophile",
-    "hotspot": 0.2,
-    "brown": 0.3,
-    "dissociation": 0.6,
-    "brown_leaf": {"TM3": (0.3, 0.1), "TM4": (0.4, 0.3)},
-    "crown_cover": 0.8,
-    "crown_shape": 0.5,
+    "canopy": fifesim.Canopy(hotspot=0.2, brown=0.3, soil=0.03),
     "upwelling": False,
 }
 SENSOR = {
@@ -69,9 +59,9 @@ def test_setup_is_frozen():
 
 def test_setup_tells_what_is_not_the_default(lai):
     assert repr(Setup()) == "Setup(instrument='TM')"
-    said = repr(Setup("OLI", dem=lai, hotspot=0.1, onto=grids.geobox(lai), noise=("shot",)))
+    said = repr(Setup("OLI", dem=lai, canopy=fifesim.Canopy(hotspot=0.1), onto=grids.geobox(lai), noise=("shot",)))
     assert said == (
-        "Setup(instrument='OLI', hotspot=0.1, dem=<DataArray of y 45 x x 54>, onto=<GeoBox of y 45 x x 54>, "
-        "noise=('shot',))"
+        "Setup(instrument='OLI', canopy=Canopy(hotspot=0.1), dem=<DataArray of y 45 x x 54>, "
+        "onto=<GeoBox of y 45 x x 54>, noise=('shot',))"
     )
     assert repr(Setup(fifesim.instrument("TM"))) == "Setup(instrument='TM')"

@@ -5,7 +5,7 @@ import warnings
 import pytest
 
 import fifesim
-from fifesim.chain.stands import of_class, stands_of
+from fifesim.chain.stands import stands_of
 
 GRID = fifesim.fife_site(30, window=((0, 12), (0, 12)))
 ELSEWHERE = fifesim.grid_at("EPSG:32633", 390000, 5820000, 360, 360, 30)
@@ -30,8 +30,8 @@ def own_map(grid=GRID):
 def test_tallgrass_on_a_map_of_ones_own_is_a_warning(given, message):
     lai = own_map()
     for function in (
-        lambda: lai.fifesim.surface_reflectance("TM", **KNOWN, **given),
-        lambda: fifesim.compare(lai, ["TM"], fifesim.Setup(**KNOWN, **given)),
+        lambda: lai.fifesim.surface_reflectance("TM", **KNOWN, canopy=fifesim.Canopy(**given)),
+        lambda: fifesim.compare(lai, ["TM"], fifesim.Setup(**KNOWN, canopy=fifesim.Canopy(**given))),
     ):
         with pytest.warns(UserWarning, match=message) as said:
             function()
@@ -41,17 +41,18 @@ def test_tallgrass_on_a_map_of_ones_own_is_a_warning(given, message):
 
 def test_a_canopy_that_is_given_is_no_warning():
     with warnings.catch_warnings(action="error", category=UserWarning):
-        own_map().fifesim.surface_reflectance("TM", **KNOWN, **GREEN, **BARE)
-        dead = {"brown": 0.2, "brown_leaf": fifesim.Leaf(chlorophyll=0, brown=1)}
-        own_map().fifesim.surface_reflectance("TM", **KNOWN, **GREEN, **BARE, **dead)
+        canopy = fifesim.Canopy(**GREEN, **BARE)
+        own_map().fifesim.surface_reflectance("TM", **KNOWN, canopy=canopy)
+        dead = canopy.replace(brown=0.2, brown_leaf=fifesim.Leaf(chlorophyll=0, brown=1))
+        own_map().fifesim.surface_reflectance("TM", **KNOWN, canopy=dead)
         fifesim.lai_scene(GRID, seed=7).fifesim.surface_reflectance("TM")
         fifesim.landscape(GRID, seed=7).fifesim.surface_reflectance("TM")
 
 
 def test_classes_with_leaves_need_optics():
     """Water needs no leaves, and the call stands in for what a class does not have."""
-    water = fifesim.CoverClass(lai=0, background=0.03)
-    forest = fifesim.CoverClass(lai=4.0, leaf=fifesim.Leaf(chlorophyll=50))
+    water = fifesim.CoverClass(lai=0, canopy=fifesim.Canopy(background=0.03))
+    forest = fifesim.CoverClass(lai=4.0, canopy=fifesim.Canopy(leaf_optics=fifesim.Leaf(chlorophyll=50)))
     patches = fifesim.Patches("voronoi", 100)
     land = fifesim.landscape(ELSEWHERE, cover=patches, classes={"water": water, "forest": forest}, seed=7)
     with pytest.warns(
@@ -59,13 +60,14 @@ def test_classes_with_leaves_need_optics():
     ):
         land.fifesim.surface_reflectance("TM", **KNOWN)
     with warnings.catch_warnings(action="error", category=UserWarning):
-        land.fifesim.surface_reflectance("TM", **KNOWN, background=0.1)
+        land.fifesim.surface_reflectance("TM", **KNOWN, canopy=fifesim.Canopy(background=0.1))
 
 
 def test_cells_win_over_classes_and_classes_over_the_call():
-    kind = fifesim.CoverClass("grass", lai=1.0, hotspot=0.1, brown=0.3, code=4)
-    canopy = {"leaf_optics": None, "hotspot": 0.0, "brown": 0.0, "crown_cover": 0.9}
-    assert stands_of((), canopy, {"brown": 0.5, "soil": 0.1}) == {None: canopy | {"brown": 0.5}}
-    found = {"leaf_optics": None, "hotspot": 0.1, "brown": 0.5, "crown_cover": 0.9}
-    assert stands_of((kind,), canopy, {"brown": 0.5}) == {4: found}
-    assert of_class(kind, "leaf_optics") is kind.leaf and of_class(kind, "brown") == 0.3
+    kind = fifesim.CoverClass("grass", lai=1.0, canopy=fifesim.Canopy(hotspot=0.1, brown=0.3), code=4)
+    canopy = fifesim.Canopy(brown=0.1, crown_cover=0.9)
+    alone = stands_of((), canopy, {"brown": 0.5})[None]
+    assert (alone.brown, alone.crown_cover, alone.given) == (0.5, 0.9, {"brown", "crown_cover"})
+    found = stands_of((kind,), canopy, {"brown": 0.5})[4]
+    assert (found.hotspot, found.brown, found.crown_cover, found.leaf_optics) == (0.1, 0.5, 0.9, None)
+    assert stands_of((kind,), canopy)[4].brown == 0.3

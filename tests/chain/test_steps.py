@@ -10,6 +10,7 @@ from fifesim.atmosphere.schemes import engines
 from fifesim.base.geometry import Geometry
 from fifesim.chain import landscapes
 from fifesim.ground.canopy import optics
+from fifesim.ground.canopy.rasters.evaluation import BandCanopy, Light
 from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 from fifesim.sensor.description.instruments import instrument
@@ -74,12 +75,8 @@ def test_skylight_of_the_atmosphere_reaches_the_ground(lai):
     bands = instrument("TM").select(TM34)
     sun = fifesim.fife_geometry()
     terms = engines.band_terms(haze, tuple(band.response for band in bands), sun.sza, sun.vza, sun.raa)
-    reflectance, transmittance = optics.leaf_optics(TM34)
-    expected = landscapes.ground.level_reflectance(
-        lai, bands=TM34, wavelengths=[band.wavelength for band in bands], leaf_reflectance=reflectance,
-        leaf_transmittance=transmittance, background=optics.background(TM34), diffuse_fraction=terms.diffuse_fraction,
-        geometry=sun,
-    )  # fmt: skip
+    stand = BandCanopy(fifesim.Canopy(), optics.leaf_optics(TM34), None, optics.background(TM34))
+    expected = landscapes.ground.level_reflectance(lai, bands, stand, Light(sun, terms.diffuse_fraction))
     np.testing.assert_array_equal(rho, expected)
     assert not np.array_equal(rho, lai.fifesim.surface_reflectance("TM", bands=TM34))
     assert rho.fifesim.to_toa().attrs["atmosphere"] == haze.text
@@ -95,27 +92,33 @@ def test_bare_ground_is_the_background(lai):
 
 def test_background_is_a_number_a_mapping_or_a_raster(lai):
     number, mapping = (
-        lai.fifesim.surface_reflectance("TM", bands=TM34, background=value) for value in (0.2, {"TM3": 0.2, "TM4": 0.2})
+        lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=value))
+        for value in (0.2, {"TM3": 0.2, "TM4": 0.2})
     )
     raster = xr.full_like(lai, 0.2)
     np.testing.assert_array_equal(number, mapping)
-    from_raster = lai.fifesim.surface_reflectance("TM", bands=TM34, background=raster)
+    from_raster = lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=raster))
     np.testing.assert_allclose(from_raster, number, rtol=0, atol=1e-6)
-    exact = [lai.fifesim.surface_reflectance("TM", bands=TM34, background=value, exact=True) for value in (0.2, raster)]
+    exact = [
+        lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=value), exact=True)
+        for value in (0.2, raster)
+    ]
     np.testing.assert_allclose(exact[0], exact[1], rtol=1e-12)
 
 
 def test_raster_of_background_stays_lazy(lai):
     soil = in_chunks(xr.full_like(lai, 0.2).expand_dims(band=TM34), {"band": 1, "y": 20})
     with no_compute():
-        rho = in_chunks(lai, ODD_CHUNKS).fifesim.surface_reflectance("TM", bands=TM34, background=soil)
+        rho = in_chunks(lai, ODD_CHUNKS).fifesim.surface_reflectance(
+            "TM", bands=TM34, canopy=fifesim.Canopy(background=soil)
+        )
     np.testing.assert_allclose(
-        rho, lai.fifesim.surface_reflectance("TM", bands=TM34, background=0.2), rtol=0, atol=1e-6
+        rho, lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=fifesim.Canopy(background=0.2)), rtol=0, atol=1e-6
     )
 
 
 def test_tabulated_reflectance_is_within_a_millionth_of_the_exact_one(lai):
-    options = {"bands": TM34, "hotspot": 0.1, "leaf_angles": "planophile"}
+    options = {"bands": TM34, "canopy": fifesim.Canopy(hotspot=0.1, leaf_angles="planophile")}
     fast, exact = (lai.fifesim.surface_reflectance("TM", **options, exact=each) for each in (False, True))
     np.testing.assert_allclose(fast, exact, rtol=0, atol=1e-6)
 
@@ -150,15 +153,25 @@ def test_hole_in_the_ground_is_no_data_in_the_image(lai):
         ),
         ({"instrument": "TN"}, "TM"),
         ({"bands": ["TM33"]}, "TM3"),
+    ],
+)
+def test_impossible_ground_is_refused(lai, options, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.surface_reflectance(lai, **({"bands": TM34} | options))
+
+
+@pytest.mark.parametrize(
+    "field, message",
+    [
         ({"leaf_optics": {"TM3": (0.8, 0.3), "TM4": (0.5, 0.4)}}, "TM3|sum|1"),
         ({"background": -0.1}, "background|0"),
         ({"leaf_angles": "sphere"}, "spherical"),
         ({"hotspot": -1}, "hotspot"),
     ],
 )
-def test_impossible_ground_is_refused(lai, options, message):
+def test_impossible_canopy_is_refused(lai, field, message):
     with pytest.raises(ValueError, match=message):
-        fifesim.surface_reflectance(lai, **({"bands": TM34} | options))
+        fifesim.surface_reflectance(lai, bands=TM34, canopy=fifesim.Canopy(**field))
 
 
 def test_low_sun_is_refused_by_the_atmosphere(lai):

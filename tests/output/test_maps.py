@@ -8,7 +8,8 @@ from matplotlib import colormaps
 from PIL import Image
 
 import fifesim
-from fifesim.output.maps import encoded, false_colour_names, image_map, relief_map, stretch_of, value_map
+from fifesim.output.composites import false_colour_names
+from fifesim.output.maps import encoded, image_map, relief_map, stretch_of, value_map
 
 
 @pytest.fixture(scope="module")

@@ -71,7 +71,7 @@ def test_finding_is_that_of_the_line(run):
     _, image, truth = run
     fit = regress(truth["lai"], image["ndvi"], pair="index")
     text = finding(truth, {"lai": fit}, {})
-    assert f"explains {100 * fit.r2:.1f} % of the variance of true leaf area index." in text
+    assert f"explains {100 * fit.r2:.1f} % of the variance of true LAI." in text
     share = fit.residual_deviation / float(truth["lai"].mean())
     assert f"{fit.residual_deviation:.3f}, {100 * share:.0f} % of the mean" in text
 

@@ -38,7 +38,7 @@ def test_other_cells_stay_without(lai, change):
     }[change]
     assert with_crs_of(other, lai) is other
     with pytest.raises(ValueError, match=r"no CRS.*xr\.where drops it"):
-        lai.fifesim.surface_reflectance(bands=TM34, background=other * 0.01)
+        lai.fifesim.surface_reflectance(bands=TM34, canopy=fifesim.Canopy(background=other * 0.01))
 
 
 def test_every_combination_of_rasters_takes_one(lai):
@@ -48,7 +48,7 @@ def test_every_combination_of_rasters_takes_one(lai):
 
     def steps(of):
         sza = of(30 + lai.drop_attrs(deep=False))
-        yield lai.fifesim.surface_reflectance(bands=TM34, background=of(soil))
+        yield lai.fifesim.surface_reflectance(bands=TM34, canopy=fifesim.Canopy(background=of(soil)))
         yield lai.fifesim.surface_reflectance(bands=TM34, dem=of(dem.drop_attrs(deep=False)))
         yield lai.fifesim.surface_reflectance(bands=TM34, geometry=xr.Dataset({"sza": sza, "saa": 100.0}))
         yield rho.fifesim.kt(of(dem.drop_attrs(deep=False)))
@@ -66,6 +66,8 @@ def test_every_combination_of_rasters_takes_one(lai):
 def test_stays_lazy(lai):
     soil = in_chunks(lost(lai * 0.01), ODD_CHUNKS)
     with no_compute():
-        found = in_chunks(lai, ODD_CHUNKS).fifesim.surface_reflectance(bands=TM34, background=soil)
-    whole = lai.fifesim.surface_reflectance(bands=TM34, background=lai * 0.01)
+        found = in_chunks(lai, ODD_CHUNKS).fifesim.surface_reflectance(
+            bands=TM34, canopy=fifesim.Canopy(background=soil)
+        )
+    whole = lai.fifesim.surface_reflectance(bands=TM34, canopy=fifesim.Canopy(background=lai * 0.01))
     xr.testing.assert_equal(found.compute(), whole)

@@ -71,11 +71,11 @@ def test_a_stack_stays_lazy(season):
 
 def test_other_rasters_of_the_same_dates_go_along(season):
     background = xr.zeros_like(season) + xr.DataArray([0.1, 0.2, 0.3], dims="time")
-    rho = season.fifesim.surface_reflectance("TM", bands=["TM3"], background=background)
-    alone = season[2].fifesim.surface_reflectance("TM", bands=["TM3"], background=background[2])
+    rho = season.fifesim.surface_reflectance("TM", bands=["TM3"], canopy=fifesim.Canopy(background=background))
+    alone = season[2].fifesim.surface_reflectance("TM", bands=["TM3"], canopy=fifesim.Canopy(background=background[2]))
     np.testing.assert_array_equal(rho[2], alone)
     with pytest.raises(ValueError, match=r"the times of .* are not those of the raster"):
-        season.fifesim.surface_reflectance("TM", background=background[:2])
+        season.fifesim.surface_reflectance("TM", canopy=fifesim.Canopy(background=background[:2]))
 
 
 def test_epochs_are_seconds():
@@ -95,11 +95,12 @@ def test_dates_may_lie_within_what_is_given(season):
     season = season[:, :9, :9]
     background = xr.zeros_like(season) + xr.DataArray([0.1, 0.2, 0.3], dims="time")
     leaf = fifesim.Leaf(chlorophyll=background.drop_attrs(deep=False) * 200)
-    given = {"background": {"TM3": background}, "bands": ["TM3"], "leaf_optics": leaf}
-    rho = season.fifesim.surface_reflectance("TM", **given)
+    canopy = fifesim.Canopy(background={"TM3": background}, leaf_optics=leaf)
+    rho = season.fifesim.surface_reflectance("TM", bands=["TM3"], canopy=canopy)
     leaf = fifesim.Leaf(chlorophyll=leaf.chlorophyll[1])
-    given |= {"background": {"TM3": background[1]}, "leaf_optics": leaf}
-    np.testing.assert_array_equal(rho[1], season[1].fifesim.surface_reflectance("TM", **given))
+    canopy = fifesim.Canopy(background={"TM3": background[1]}, leaf_optics=leaf)
+    expected = season[1].fifesim.surface_reflectance("TM", bands=["TM3"], canopy=canopy)
+    np.testing.assert_array_equal(rho[1], expected)
 
 
 def test_dates_that_do_not_fit_are_told(season):
@@ -110,4 +111,4 @@ def test_dates_that_do_not_fit_are_told(season):
     with pytest.raises(ValueError, match="dem has dates and the raster of kt has none"):
         fifesim.kt(season[0].fifesim.surface_reflectance("TM"), season * 0)
     with pytest.raises(ValueError, match="background has dates and the raster of surface_reflectance has none"):
-        season[0].fifesim.surface_reflectance("TM", background=season / 30)
+        season[0].fifesim.surface_reflectance("TM", canopy=fifesim.Canopy(background=season / 30))

@@ -28,6 +28,7 @@ OWN = {
         "dissociation": 0.5,
         "crown_cover": 0.8,
         "crown_shape": 0.7,
+        "moisture": 0.2,
         "fpar_inf": 0.9,
         "background": BACKGROUND,
         "brown_leaf": {"brown": 1.0},
@@ -35,7 +36,6 @@ OWN = {
     "landscape": {
         "cover": "voronoi",
         "size": 80.0,
-        "moisture": 0.2,
         "deviations": {"soil": 0.03, "brown": 0.06, "crown_cover": 0.0},
         "arps": {"soil": 0.24},
         "coarser": 2,
@@ -60,16 +60,21 @@ def by_hand(scenario):
         scenario.geobox(),
         cover=fifesim.Patches("voronoi", 80, {"grass": 0.7, "wood": 0.3}),
         classes={
-            "grass": fifesim.CoverClass(lai="burned-ungrazed", hotspot=0.2, arp=0.2, leaf_angles="spherical"),
-            "wood": fifesim.CoverClass(lai="unburned-ungrazed", leaf_angles="erectophile"),
+            "grass": fifesim.CoverClass(
+                lai="burned-ungrazed", canopy=fifesim.Canopy(hotspot=0.2, leaf_angles="spherical"), arp=0.2
+            ),
+            "wood": fifesim.CoverClass(lai="unburned-ungrazed", canopy=fifesim.Canopy(leaf_angles="erectophile")),
         },
         arp=0.1,
-        moisture=0.2,
         brown=fifesim.Field(mean=0.2, sd=0.06, arp=0.1, coarser=2),
         soil=fifesim.Field(sd=0.03, arp=0.24, coarser=2),
         covary={"soil": -0.3},
         seed=11,
     )
+
+
+def given_by(canopy):
+    return {name: getattr(canopy, name) for name in canopy.given}
 
 
 def scene_of(**sections):
@@ -79,7 +84,7 @@ def scene_of(**sections):
 
 def test_landscape_of_a_scenario_is_that_written_out(scenario, by_hand):
     land = ground_scene(scenario, scenario.geobox())
-    assert set(land) == {"lai", "cover", "brown", "soil", "moisture"}
+    assert set(land) == {"lai", "cover", "brown", "soil"}
     for name in land:
         xr.testing.assert_identical(land[name].drop_attrs(), by_hand[name].drop_attrs())
         assert land[name].attrs["history"] == by_hand[name].attrs["history"]
@@ -87,20 +92,20 @@ def test_landscape_of_a_scenario_is_that_written_out(scenario, by_hand):
 
 def test_light_and_truth_of_a_scenario_are_those_written_out(scenario, by_hand):
     bands, sun = ["TM3", "TM4"], scenario.sun_and_view()
-    canopy = {"hotspot": 0.1, "dissociation": 0.5, "crown_cover": 0.8, "crown_shape": 0.7}
-    optics = {"background": BACKGROUND, "brown_leaf": fifesim.Leaf(brown=1.0)}
-    rho = fifesim.surface_reflectance(by_hand, bands=bands, geometry=sun, **canopy, **optics)
+    shares = fifesim.Canopy(dissociation=0.5, crown_cover=0.8)
+    canopy = shares.replace(hotspot=0.1, crown_shape=0.7, moisture=0.2, background=BACKGROUND)
+    canopy = canopy.replace(brown_leaf=fifesim.Leaf(brown=1.0))
+    rho = fifesim.surface_reflectance(by_hand, bands=bands, geometry=sun, canopy=canopy)
     with no_compute():
         tree = fifesim.simulate(scenario)
     np.testing.assert_array_equal(tree["scene"]["surface_reflectance"], rho)
     onto = grids.aligned(scenario.geobox(), 30.0)
     image = fifesim.sense(fifesim.to_toa(rho), onto=onto)
     np.testing.assert_array_equal(tree["image"]["dn"], image)
-    shares = {"dissociation": 0.5, "crown_cover": 0.8}
     truth = {
         "lai": by_hand["lai"],
-        "fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, **shares),
-        "green_fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, leaves="green", **shares),
+        "fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, canopy=shares),
+        "green_fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, leaves="green", canopy=shares),
         "soil": by_hand["soil"],
     }
     assert set(tree["truth"].data_vars) == {*truth, "brown"}
@@ -163,10 +168,10 @@ def test_scene_is_lazy_in_its_chunks(scenario):
     xr.testing.assert_identical(lazy.compute(), whole)
 
 
-def test_moisture_without_deviation_is_a_number():
-    land = scene_of(landscape={"moisture": 0.3})
-    assert land["moisture"].ndim == 0 and land["moisture"] == 0.3
-    drawn = scene_of(landscape={"moisture": 0.3, "deviations": {"moisture": 0.1}})["moisture"]
+def test_moisture_without_deviation_is_a_number_of_one_stand():
+    assert list(scene_of(ground={"moisture": 0.3})) == ["lai"]
+    assert canopy_of(parse_scenario(SMALL | {"ground": {"moisture": 0.3}})).moisture == 0.3
+    drawn = scene_of(ground={"moisture": 0.3}, landscape={"deviations": {"moisture": 0.1}})["moisture"]
     assert drawn.ndim == 2 and float(drawn.mean()) == pytest.approx(0.3, abs=0.02)
 
 
@@ -174,11 +179,11 @@ def test_drawn_properties_are_about_their_means_with_the_arp_of_the_ground():
     deviations = {"soil": 0.03, "moisture": 0.1, "brown": 0.05, "crown_cover": 0.07}
     arps = {"soil": 0.24, "brown": 0.0}
     case = parse_scenario(
-        {"ground": {"arp": 0.1, "brown": 0.2, "crown_cover": 0.8}}
-        | {"landscape": {"moisture": 0.3, "deviations": deviations, "arps": arps}}
+        {"ground": {"arp": 0.1, "brown": 0.2, "crown_cover": 0.8, "soil": -0.1, "moisture": 0.3}}
+        | {"landscape": {"deviations": deviations, "arps": arps}}
     )
     assert drawn_properties(case) == {
-        "soil": fifesim.Field(sd=0.03, arp=0.24),
+        "soil": fifesim.Field(mean=-0.1, sd=0.03, arp=0.24),
         "moisture": fifesim.Field(mean=0.3, sd=0.1, arp=0.1),
         "brown": fifesim.Field(mean=0.2, sd=0.05, arp=0.0),
         "crown_cover": fifesim.Field(mean=0.8, sd=0.07, arp=0.1),
@@ -187,13 +192,11 @@ def test_drawn_properties_are_about_their_means_with_the_arp_of_the_ground():
 
 def test_what_every_class_says_and_what_is_drawn_is_not_passed(scenario):
     """It would change nothing, which `surface_reflectance` refuses."""
-    said = canopy_of(scenario)
-    assert set(said) == {
-        *("leaf_optics", "background", "brown_leaf", "hotspot", "dissociation", "crown_cover", "crown_shape")
-    }
-    assert (said["leaf_optics"], said["background"], said["brown_leaf"]) == (None, BACKGROUND, fifesim.Leaf(brown=1.0))
-    assert (said["hotspot"], said["dissociation"], said["crown_cover"], said["crown_shape"]) == (0.1, 0.5, 0.8, 0.7)
-    assert canopy_of(parse_scenario({"ground": OWN["ground"]})) == said | {"leaf_angles": "planophile", "brown": 0.2}
+    expected = {"hotspot": 0.1, "dissociation": 0.5, "crown_cover": 0.8, "crown_shape": 0.7, "moisture": 0.2}
+    expected |= {"background": BACKGROUND, "brown_leaf": fifesim.Leaf(brown=1.0)}
+    assert given_by(canopy_of(scenario)) == expected
+    alone = canopy_of(parse_scenario({"ground": OWN["ground"]}))
+    assert given_by(alone) == expected | {"leaf_angles": "planophile", "brown": 0.2, "soil": 0.0}
 
 
 @pytest.mark.parametrize("key", ["leaf", "background_spectra"])
@@ -202,8 +205,8 @@ def test_leaf_and_spectra_of_every_class_are_theirs(key):
     field = {"leaf": "leaf_optics", "background_spectra": "background"}[key]
     sections = {"ground": {key: value}, "landscape": {"cover": "voronoi"}}
     both, one = ({"a": {key: value}, "b": {key: value}}, {"a": {key: value}, "b": {}})
-    assert field not in canopy_of(parse_scenario(sections | {"classes": both}))
-    assert field in canopy_of(parse_scenario(sections | {"classes": one}))
+    assert field not in canopy_of(parse_scenario(sections | {"classes": both})).given
+    assert field in canopy_of(parse_scenario(sections | {"classes": one})).given
 
 
 @pytest.mark.parametrize(
@@ -234,7 +237,7 @@ LEVEL_LAND = [
     {"landscape": {"deviations": {"soil": 0.0, "moisture": 0.0, "brown": 0.0, "crown_cover": 0.0}}},
     {"ground": {"brown": 0.0, "dissociation": 1.0, "brown_leaf": {"brown": 1.0}}},
     {"ground": {"crown_cover": 1.0, "crown_shape": 0.3}},
-    {"landscape": {"covary": {"elevation": 0.0}, "moisture": 0.0}},
+    {"ground": {"soil": 0.0, "moisture": 0.0}, "landscape": {"covary": {"elevation": 0.0}}},
     {"landscape": {"cover": "pastures"}, "classes": {"a": {"brown": 0.0, "crown_cover": 1.0}}},
     {"landscape": {"cover": "levels", "size": 50.0}, "classes": {"a": {}, "b": {"hotspot": 0.0}}},
 ]
@@ -269,13 +272,15 @@ def test_landscape_of_soil_without_variance_is_leaf_area_alone(properties):
     given = {name: each for name, each in properties.items() if name != "dissociation"}
     land = fifesim.landscape(case.geobox(), lai=lai, **given)
     options = {"bands": ["TM3", "TM4"], "geometry": case.sun_and_view(), "exact": True}
-    found = fifesim.surface_reflectance(land, dissociation=properties.get("dissociation", 0.0), **options)
+    found = fifesim.surface_reflectance(
+        land, canopy=fifesim.Canopy(dissociation=properties.get("dissociation", 0.0)), **options
+    )
     np.testing.assert_array_equal(found, fifesim.surface_reflectance(lai, **options))
 
 
 def test_number_of_a_property_that_is_not_drawn_stays_beside_what_is():
     """A deviation of 0 says nothing: the number of [ground] is still that of its leaves."""
-    ground = {"brown": 0.15, "crown_cover": 0.8}
+    ground = {"brown": 0.15, "crown_cover": 0.8, "moisture": 0.3}
     asked = {"deviations": {"soil": 0.02, "brown": 0.0, "crown_cover": 0.0}}
     both = (
         fifesim.simulate(parse_scenario(SMALL | {"ground": ground, "landscape": land}))["image"]["dn"]
@@ -296,7 +301,7 @@ def test_number_of_a_property_that_is_not_drawn_stays_beside_what_is():
             {"ground": {"lai_file": "lai.tif"}, "landscape": {"covary": {"soil": 0.1}, "deviations": {"soil": 0.1}}},
             "a lai_file goes with the ground as it does: leave covary out",
         ),
-        ({"ground": {"method": "periodic"}, "landscape": {"moisture": 0.1}}, "is for one stand"),
+        ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"moisture": 0.1}}}, "is for one stand"),
         ({"ground": {"method": "periodic"}, "landscape": {"deviations": {"soil": 0.1}}}, "is for one stand"),
     ],
 )

@@ -14,7 +14,6 @@ from fifesim.scenario.section import Section
     [
         {},
         {"cover": "none", "size": 50.0},
-        {"moisture": 0.0},
         {"deviations": {"soil": 0.0, "brown": 0}},
         {"deviations": {"soil": 0.0}, "arps": {"soil": 0.24}},
         {"deviations": {"soil": 0.0}, "covary": {"elevation": 0.0, "soil": 0}},
@@ -30,7 +29,6 @@ def test_one_stand_is_where_nothing_varies_but_leaf_area(values):
     [
         {"cover": "pastures"},
         {"cover": "cover.tif"},
-        {"moisture": 1e-6},
         {"deviations": {"soil": 0.02}},
         {"deviations": {"soil": 0.0, "brown": 0.1}},
         {"covary": {"elevation": -0.3}},
@@ -71,9 +69,9 @@ def test_a_map_of_cover_is_a_file_and_the_names_of_patterns_are_none():
 
 def test_numbers_come_with_their_unit_and_limits_are_allowed():
     assert LandscapeKeys(size="1.2 km").size == 1200.0
-    LandscapeKeys(moisture=1, deviations=dict.fromkeys(VARYING, 1), arps={"soil": 0.2498, "brown": 0})
+    LandscapeKeys(deviations=dict.fromkeys(VARYING, 1), arps={"soil": 0.2498, "brown": 0})
     LandscapeKeys(covary={"wetness": 1, "illumination": -1}, deviations={})
-    StandKeys(hotspot=1e-6, brown=1, dissociation=1, crown_cover=0, crown_shape=10)
+    StandKeys(hotspot=1e-6, brown=1, dissociation=1, crown_cover=0, crown_shape=10, soil=-1, moisture=1)
     ClassKeys(share=1)
 
 
@@ -88,8 +86,12 @@ def test_numbers_come_with_their_unit_and_limits_are_allowed():
         (LandscapeKeys, {"cover": ""}, "allowed are none"),
         (LandscapeKeys, {"size": 0.0}, "greater than 0"),
         (LandscapeKeys, {"size": "1 degree"}, "size is in m"),
-        (LandscapeKeys, {"moisture": 1.1}, "less than or equal to 1"),
-        (LandscapeKeys, {"deviations": {"elevation": 0.1}}, "unknown name 'elevation': .*allowed are soil, moisture"),
+        (LandscapeKeys, {"moisture": 0.1}, "moisture\n +Extra inputs are not permitted"),
+        (
+            LandscapeKeys,
+            {"deviations": {"elevation": 0.1}},
+            "unknown name 'elevation': .*allowed are brown, crown_cover, soil, moisture",
+        ),
         (LandscapeKeys, {"deviations": {"soil": 1.1}}, r"soil = 1.1: must be in \[0, 1\]"),
         (LandscapeKeys, {"deviations": {"soil": "much"}}, "valid number"),
         (LandscapeKeys, {"deviations": {"soil": float("nan")}}, "finite"),
@@ -109,7 +111,8 @@ def test_numbers_come_with_their_unit_and_limits_are_allowed():
         (LandscapeKeys, {"covary": {"wettness": 0.1}}, "did you mean 'wetness'"),
         (LandscapeKeys, {"covary": {"wetness": -1.1}}, r"wetness = -1.1: must be in \[-1, 1\]"),
         (LandscapeKeys, {"colour": "green"}, "colour"),
-        (StandKeys, {"hotspot": 9e-7}, "must be 0, for no hot spot, or at least 1e-06"),
+        (StandKeys, {"moisture": 1.1}, "less than or equal to 1"),
+        (StandKeys, {"soil": -1.1}, "greater than or equal to -1"),
         (StandKeys, {"crown_cover": 1.01}, "less than or equal to 1"),
         (StandKeys, {"brown": -0.01}, "greater than or equal to 0"),
         (StandKeys, {"leaf": {"water": 0.01}, "leaf_reflectance": {"TM3": 0.1}}, "leaf and leaf_reflectance are both"),
@@ -132,4 +135,4 @@ def test_what_is_not_allowed_is_named(section, values, said):
 def test_sections_are_frozen():
     assert all(issubclass(each, Section) for each in (GroundKeys, ClassKeys, LandscapeKeys))
     with pytest.raises(ValidationError, match="frozen"):
-        LandscapeKeys().moisture = 0.5
+        LandscapeKeys().size = 0.5

@@ -355,8 +355,8 @@ def test_a_class_without_leaf_area_has_that_of_the_ground():
         classes={"grass": {}, "own": {"distribution": "burned-grazed", "brown": 0.3}},
     )
     grass, own = (stand.cover_class(name, scenario.ground) for name, stand in scenario.classes.items())
-    assert (grass.lai, grass.arp, grass.brown) == ("unburned-ungrazed", None, None)
-    assert (own.lai, own.brown) == ("burned-grazed", 0.3)
+    assert (grass.lai, grass.arp, grass.canopy.given) == ("unburned-ungrazed", None, frozenset())
+    assert (own.lai, own.canopy.brown, own.canopy.given) == ("burned-grazed", 0.3, {"brown"})
 
 
 @pytest.mark.parametrize(

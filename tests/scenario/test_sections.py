@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.scenario.sections import Air, Ground, Sensor, Terrain
+from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.sensor.description.instruments import instrument
 
 
@@ -39,6 +39,9 @@ def test_size_of_a_pixel_is_the_products_unless_given():
     [
         (Ground, {"arp": 0.2499}, "at most 0.2498 when streaming"),
         (Ground, {"distribution": "burnt"}, "unknown LAI distribution"),
+        (Ground, {"hotspot": 5e-324}, "hotspot must be 0, for no hot spot, or at least 1e-06, got 4.94066e-324"),
+        (CoverStand, {"hotspot": 9e-7}, "hotspot must be 0, for no hot spot, or at least 1e-06, got 9e-07"),
+        (CoverStand, {"leaf_angles": "spheric"}, "did you mean 'spherical'"),
         (Terrain, {"dem": "a.tif", "vertical_units": "furlong"}, "vertical units must be one of"),
         (Air, {"engine": "7S"}, "must be one of 5S"),
         (Sensor, {"noise": ["shot"]}, "no noise for TM3"),

@@ -218,8 +218,9 @@ def test_leaf_and_spectra_of_a_scenario_reach_the_canopy():
         "OLI",
         bands=["OLI4", "OLI5"],
         geometry=scenario.sun_and_view(),
-        leaf_optics=fifesim.Leaf(chlorophyll=55.0),
-        background={"soil_wet": 0.5, "golden_grass": 0.5},
+        canopy=fifesim.Canopy(
+            leaf_optics=fifesim.Leaf(chlorophyll=55.0), background={"soil_wet": 0.5, "golden_grass": 0.5}
+        ),
     )
     np.testing.assert_array_equal(tree["image"]["dn"], fifesim.to_toa(rho).fifesim.sense("OLI"))
 
@@ -256,13 +257,10 @@ def test_every_key_of_a_scenario_reaches_its_stage():
         bands=bands,
         atmosphere=fifesim.Atmosphere(visibility=23, altitude=1.0),
         geometry=sun,
-        leaf_optics=leaf,
-        background=back,
-        leaf_angles="planophile",
-        hotspot=0.2,
+        canopy=fifesim.Canopy(leaf_optics=leaf, background=back, leaf_angles="planophile", hotspot=0.2),
     )
     image = fifesim.sense(fifesim.to_toa(rho), onto=grids.aligned(grid, 50.0), min_valid=1.0)
-    fpar = fifesim.fpar(lai, geometry=sun, leaf_angles="planophile", fpar_inf=0.9)
+    fpar = fifesim.fpar(lai, geometry=sun, canopy=fifesim.Canopy(leaf_angles="planophile"), fpar_inf=0.9)
     np.testing.assert_array_equal(tree["image"]["dn"], image)
     np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))
     np.testing.assert_array_equal(tree["truth"]["fpar"], fifesim.aggregate(fpar, 50.0, min_valid=1.0))

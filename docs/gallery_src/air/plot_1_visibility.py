@@ -17,7 +17,9 @@ grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=30, heigh
 wavelength = np.linspace(0.4025, 2.4975, 839)
 cell = wrap_xr(np.ones((1, 1)), grid)
 sun = fifesim.fife_geometry()  # of the paper's day
-grass = {"leaf_optics": fifesim.Leaf(), "background": {"soil_dry": 0.475, "shade": 0.525}}
+grass = fifesim.Canopy(
+    leaf_optics=fifesim.Leaf(), background={"soil_dry": 0.475, "shade": 0.525}
+)
 spectrum = cell * xr.DataArray(
     np.ones(839), dims="band", coords={"wavelength": ("band", wavelength)}
 )
@@ -57,10 +59,10 @@ ndvi = []
 for visibility in visibilities:
     air = fifesim.Atmosphere(visibility=visibility)
     rho = lai.fifesim.surface_reflectance(
-        "TM", bands=["TM3", "TM4"], geometry=sun, atmosphere=air, **grass
+        "TM", bands=["TM3", "TM4"], geometry=sun, atmosphere=air, canopy=grass
     )
     ndvi.append(rho.fifesim.to_toa().fifesim.ndvi().values[0])
-clear = {"geometry": sun, "atmosphere": fifesim.Atmosphere(), **grass}
+clear = {"geometry": sun, "atmosphere": fifesim.Atmosphere(), "canopy": grass}
 below = (
     lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **clear)
     .fifesim.ndvi()

@@ -20,8 +20,9 @@ strip = fifesim.grid_at(
 case = {
     "geometry": fifesim.fife_geometry(),
     "atmosphere": fifesim.Atmosphere(),
-    "leaf_optics": fifesim.Leaf(),
-    "background": {"soil_dry": 0.475, "shade": 0.525},
+    "canopy": fifesim.Canopy(
+        leaf_optics=fifesim.Leaf(), background={"soil_dry": 0.475, "shade": 0.525}
+    ),
 }  # of the ground; the air differs below
 ground = wrap_xr(np.full((1, 71), 2.0), strip).fifesim.surface_reflectance(
     "TM", bands=BANDS, **case
@@ -73,7 +74,7 @@ left.set(
     ylabel="NDVI at the top of the atmosphere, LAI 2",
     ylim=(0, 0.85),
 )
-right.set(xlabel="view zenith angle [°], sun at 45°; left of 0 against the light")
+right.set(xlabel="view zenith angle [°], positive toward the sun; sun at 45°")
 left.legend(
     frameon=False,
     title="visibility; lines 5S, dots successive orders",
@@ -82,8 +83,9 @@ left.legend(
 )
 
 # %%
-# Low suns and slant views look through more air. Against the light (left of 0 in the right panel) aerosol scatters
-# forward into the view, and NDVI falls most. The closed forms of 5S keep NDVI .01 too high in clear air and up to .05
+# Low suns and slant views look through more air. The view zenith in the right panel has a sign; it is positive toward
+# the sun: the hot spot is at +``sza``, 45°. At negative angles the sensor looks against the light: aerosol scatters
+# forward into the view, and NDVI falls most. The closed forms of 5S keep NDVI 0.01 too high in clear air and up to 0.05
 # in haze against the light: they miss what molecules and aerosol scatter in turn, and polarization.
 #
 # What an atmosphere does, wavelength by wavelength:

@@ -2,15 +2,16 @@
 What each instrument loses
 ==========================
 
-The same ground, burned and grazed prairie on level land, through every instrument: how much of the variance of leaf
-area a line on NDVI leaves unexplained, and which stage takes it. Cells are 3.33 m; truth is the mean over a pixel. Each
-instrument has the blur, the noise and the error of its product's place that a source states. **Where nobody states one
-(named below the instrument), its image is better than it.** Means over 20 realisations, whiskers are standard errors;
-``python docs/make_instruments.py`` computes the table, and ``fifesim budget --sensor MSI`` one of its rows.
+The same ground, burned and grazed prairie on level land, through every instrument: which share of the variance of leaf
+area a line on NDVI leaves unexplained, by stage. Cells are 3.33 m; truth is the mean over a pixel. An instrument has
+the point spread function, the noise and the geolocation error that a source states. **Hatched cells are unknown, not
+zero.** An instrument with an unknown term has no total, and its other shares are computed without that term. Shares are
+means over 20 realisations; ``python docs/make_instruments.py`` computes the table, and ``fifesim budget --sensor MSI``
+one of its rows.
 
-Two things are to be kept in mind. This ground is one homogeneous grass: nothing in it is larger than some ten metres,
-so that coarse pixels hold hardly any variance to explain, and what counts and air add weighs more in them. And a
-product's place counts against the truth of the same pixel: a map of another instrument has an error of its own.
+The ground is one homogeneous grass: nothing in it is larger than some ten metres. Coarse pixels therefore hold little
+variance to explain, and quantisation and atmosphere weigh more in them. The geolocation error of a product counts
+against the truth of the same pixel.
 """
 
 from pathlib import Path
@@ -18,6 +19,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.patches import Patch, Rectangle
 
 table = pd.read_csv(
     next(
@@ -27,96 +29,73 @@ table = pd.read_csv(
     )
 )
 table = table[table["variable"] == "lai"]
+sizes = table.sort_values("pixel", kind="stable").drop_duplicates("instrument")
+names, arps = list(sizes["instrument"]), sorted(table["arp"].unique())
+shares = table.pivot(index=["arp", "instrument"], columns="stage", values="share")
+# Curvature of the relation, within and between pixels: no property of an instrument.
+shares["relation"] = shares[["non-linearity", "NDVI scaling", "curvature"]].sum(axis=1)
+columns = (
+    "point spread",
+    "registration",
+    "noise",
+    "quantisation",
+    "atmosphere",
+    "relation",
+    "total",
+)
 
-STAGES = {
-    "point spread": "#0072B2",
-    "registration": "#E69F00",
-    "noise": "#CC79A7",
-    "quantisation": "#999999",
-    "atmosphere": "#56B4E9",
-}
-
-names = list(dict.fromkeys(table.sort_values("pixel", kind="stable")["instrument"]))
-arps = sorted(table["arp"].unique())
 figure, axes = plt.subplots(
-    1, 3, figsize=(9.5, 0.42 * len(names) + 1.6), sharey=True, layout="constrained"
+    1, 3, figsize=(11, 0.3 * len(names) + 2), sharey=True, layout="constrained"
 )
 for axis, arp in zip(axes, arps, strict=True):
-    of_ground = table[table["arp"] == arp].set_index(["instrument", "stage"])
-    left = np.zeros(len(names))
-    for stage, color in STAGES.items():
-        rows = [of_ground.loc[(name, stage)] for name in names]
-        share = np.array([max(row["share"], 0.0) for row in rows])
-        axis.barh(names, share, left=left, color=color, height=0.72, label=stage)
-        left += share
-    totals = [of_ground.loc[(name, "total")] for name in names]
-    rest = np.array([row["share"] for row in totals]) - left
-    axis.barh(
-        names,
-        np.maximum(rest, 0),
-        left=left,
-        color="#dddddd",
-        height=0.72,
-        label="the relation itself",
-    )
-    error = [row["share_error"] for row in totals]
-    axis.errorbar(
-        [row["share"] for row in totals],
-        names,
-        xerr=error,
-        fmt="none",
-        ecolor="#222222",
-        elinewidth=1,
-    )
-    axis.set(title=f"arp {arp:g}", xlim=(0, 1.05), xticks=[0, 0.5, 1])
-    axis.spines[["top", "right"]].set_visible(False)
-axes[0].set_ylim(len(names) - 0.4, -0.6)
-known = table.drop_duplicates("instrument").set_index("instrument")
-labels = []
-for name in names:
-    unknown = [what for what in ("blur", "noise", "place") if not known.loc[name, what]]
-    labels.append(
-        f"{name}, {known.loc[name, 'pixel']:g} m"
-        + (f"\n(no {', '.join(unknown)})" if unknown else "")
-    )
-axes[0].set_yticks(range(len(names)), labels, fontsize=8)
-axes[1].set_xlabel("share of the variance of leaf area left")
+    cells = shares.loc[arp].loc[names, list(columns)].to_numpy()
+    axis.imshow(np.ma.masked_invalid(cells), cmap="Blues", vmin=0, vmax=1, aspect="auto")
+    for (row, column), share in np.ndenumerate(cells):
+        if np.isnan(share):
+            corner = (column - 0.5, row - 0.5)
+            axis.add_patch(
+                Rectangle(corner, 1, 1, fill=False, hatch="////", edgecolor="0.6", linewidth=0)
+            )
+        else:
+            color = "white" if share > 0.55 else "black"
+            text = f"{share:.2f}".replace("-0.00", "0.00")
+            axis.text(column, row, text, ha="center", va="center", fontsize=7, color=color)
+    axis.axvline(len(columns) - 1.5, color="black", linewidth=1)
+    axis.set_xticks(range(len(columns)), columns, rotation=45, ha="right", fontsize=8)
+    axis.set(title=f"arp {arp:g}")
+axes[0].set_yticks(
+    range(len(names)),
+    [f"{name}, {pixel:g} m" for name, pixel in zip(names, sizes["pixel"], strict=True)],
+    fontsize=8,
+)
+figure.suptitle("Share of the variance of leaf area that a line on NDVI leaves unexplained")
 figure.legend(
-    *axes[0].get_legend_handles_labels(),
+    handles=[Patch(facecolor="white", edgecolor="0.6", hatch="////")],
+    labels=["Hatched cells are unknown, not zero."],
     loc="outside lower center",
-    ncols=6,
     frameon=False,
-    fontsize=9,
 )
 
 # %%
-# The same as numbers: R² of leaf area on NDVI.
+# R² of leaf area on NDVI, for the instruments whose terms are all known:
 
-totals = table[table["stage"] == "total"]
-r2 = 1 - totals.pivot(index="instrument", columns="arp", values="share").loc[names]
-error = totals.pivot(index="instrument", columns="arp", values="share_error").loc[names]
+totals = table[table["stage"] == "total"].dropna(subset="share")
+r2 = 1 - totals.pivot(index="instrument", columns="arp", values="share")
+error = totals.pivot(index="instrument", columns="arp", values="share_error")
 text = r2.map("{:.2f}".format) + " ± " + error.map("{:.3f}".format)
-print(text.to_string())
+print(text.loc[[name for name in names if name in text.index]].to_string())
 
 # %%
-# What the table says; the shares below are of those instruments whose error is stated. **Place first**: where the
-# agency states the error of its product's place, that error alone takes most of what is lost, because the ground varies
-# within some ten metres and truth is read where the map says. **Then blur**, wherever it is known; an instrument
-# without a known blur looks flawless beside one whose blur was measured. **Noise and counts** matter where a pixel
-# holds little variance: six bits, ten bits over a kilometre, the finest bands of MODIS. **Air that is the same
-# everywhere** takes next to nothing from R²: it turns the line, which is another error.
+# Smallest and largest share of each term among the instruments where it is known. **Registration** takes most wherever
+# the agency states the geolocation error of its product: the ground varies within some ten metres, and truth is read
+# where the map says. **Noise and quantisation** matter where a pixel holds little variance: six bits, ten bits over a
+# kilometre, the finest bands of MODIS. A **uniform atmosphere** takes little from R²: it changes the slope and the
+# intercept of the line.
 
-shares = table.pivot(index=["arp", "instrument"], columns="stage", values="share")
-known["all"] = True
-for stage, quantity in (
-    ("registration", "place"),
-    ("point spread", "blur"),
-    ("noise", "noise"),
-    ("atmosphere", "all"),
-):
+for stage in columns[:5]:
     print(stage)
     for arp in arps:
-        found = shares.loc[arp, stage][known[quantity]]
+        found = shares.loc[arp, stage].dropna()
         least, most = found.idxmin(), found.idxmax()
         print(f"    arp {arp:.2f}: {found[least]:.2f} ({least}) to {found[most]:.2f} ({most})")
 plt.show()

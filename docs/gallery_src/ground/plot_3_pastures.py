@@ -75,13 +75,18 @@ figure.colorbar(shown, ax=axes, shrink=0.8, pad=0.02, label="leaf area index [mÂ
 
 table = {
     "wood": fifesim.CoverClass(
-        lai=stats.gamma(60, scale=0.07), arp=0.2, background={"dead_grass": 0.5, "shade": 0.5}
+        lai=stats.gamma(60, scale=0.07),
+        arp=0.2,
+        canopy=fifesim.Canopy(background={"dead_grass": 0.5, "shade": 0.5}),
     ),
     "meadow": fifesim.CoverClass(lai="burned-ungrazed", arp=0.2),
     "field": fifesim.CoverClass(
-        lai=stats.gamma(6, scale=0.08), background={"soil_dry": 0.7, "shade": 0.3}
+        lai=stats.gamma(6, scale=0.08),
+        canopy=fifesim.Canopy(background={"soil_dry": 0.7, "shade": 0.3}),
     ),
-    "pond": fifesim.CoverClass(lai=0.0, background={"OLI2": 0.05, "OLI3": 0.045, "OLI4": 0.03}),
+    "pond": fifesim.CoverClass(
+        lai=0.0, canopy=fifesim.Canopy(background={"OLI2": 0.05, "OLI3": 0.045, "OLI4": 0.03})
+    ),
 }
 shares = {"wood": 0.3, "meadow": 0.4, "field": 0.25, "pond": 0.05}
 small = fifesim.fife_site(cell=10, window=((0, 400), (0, 400)))

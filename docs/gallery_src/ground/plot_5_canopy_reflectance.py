@@ -7,6 +7,7 @@ SAIL for one row of cells whose leaf area index grows from 0 to 6.
 
 import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
 from odc.geo.xr import wrap_xr
 
 import fifesim
@@ -17,7 +18,9 @@ grid = fifesim.grid_at(
 leaf_area = np.linspace(0, 6, 121)
 lai = wrap_xr(leaf_area[None], grid)
 sun, air = fifesim.fife_geometry(), fifesim.Atmosphere()  # the paper's case
-grass = {"leaf_optics": fifesim.Leaf(), "background": {"soil_dry": 0.475, "shade": 0.525}}
+grass = fifesim.Canopy(
+    leaf_optics=fifesim.Leaf(), background={"soil_dry": 0.475, "shade": 0.525}
+)
 
 # %%
 # Red light falls and near infrared light rises with leaf area, until more leaves change nothing. Flat (planophile)
@@ -30,8 +33,7 @@ for leaves, style in (("planophile", "--"), ("spherical", "-"), ("erectophile", 
         bands=["TM3", "TM4"],
         geometry=sun,
         atmosphere=air,
-        leaf_angles=leaves,
-        **grass,
+        canopy=grass.replace(leaf_angles=leaves),
     )
     for band, color in (("TM3", "#b2182b"), ("TM4", "#542788")):
         axes[0].plot(
@@ -61,26 +63,28 @@ for axis in axes:
     )
 
 # %%
-# Across the principal plane, toward the sun (left) and away from it. The paper's SAIL has no hot spot (section Surface
-# Reflectance); ``hotspot``, leaf size over canopy height, gives it one.
+# The same leaves seen across the principal plane. The view zenith has a sign here; it is positive toward the sun: the
+# hot spot is at +``sza``. The paper's SAIL has no hot spot (section Surface Reflectance); ``hotspot``, leaf size over
+# canopy height, gives it one. Angles may be rasters, so one row of cells holds all views.
 
-views = np.union1d(np.arange(-70, 71), -sun.sza)
-two = lai.isel(x=[40])  # LAI 2
+views = np.union1d(np.arange(-70, 71), sun.sza)
+strip = fifesim.grid_at(
+    "EPSG:26914", west=705000, north=4334000, width=views.size * 10, height=10, cell=10
+)
+two = wrap_xr(np.full((1, views.size), 2.0), strip)  # LAI 2
+side = np.where(views >= 0, sun.saa, sun.saa + 180)  # azimuth toward the sensor
+angles = {"vza": wrap_xr(abs(views)[None], strip), "vaa": wrap_xr(side[None], strip)}
+geometry = xr.Dataset({"sza": sun.sza, "saa": sun.saa, **angles})
 figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
 for hotspot, style in ((0.0, "-"), (0.05, "--"), (0.2, ":")):
-    values = []
-    for view in views:
-        side = sun.saa if view <= 0 else sun.saa + 180
-        geometry = fifesim.Geometry(sun.sza, sun.saa, vza=abs(view), vaa=side)
-        case = {"geometry": geometry, "atmosphere": air, "hotspot": hotspot}
-        rho = two.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **case, **grass)
-        values.append(rho.values.ravel())
-    for axis, band in zip(axes, np.transpose(values), strict=True):
+    case = {"geometry": geometry, "atmosphere": air, "canopy": grass.replace(hotspot=hotspot)}
+    rho = two.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], **case)
+    for axis, band in zip(axes, rho.values[:, 0], strict=True):
         axis.plot(views, band, style, color="black", label=f"hotspot {hotspot:g}")
 for axis, band in zip(axes, ("TM3, red, LAI 2", "TM4, near infrared, LAI 2"), strict=True):
-    axis.axvline(-sun.sza, color="#e08214", linewidth=1, label="the sun")
+    axis.axvline(sun.sza, color="#e08214", linewidth=1, label="the sun")
     axis.set(
-        xlabel="view zenith [degree], negative toward the sun",
+        xlabel="view zenith [degree], positive toward the sun",
         ylabel="reflectance factor",
         title=band,
     )

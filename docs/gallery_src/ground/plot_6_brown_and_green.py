@@ -19,10 +19,12 @@ lai = wrap_xr(np.full((1, 101), 2.0), grid)
 case = {
     "geometry": fifesim.fife_geometry(),
     "atmosphere": fifesim.Atmosphere(),
-    "leaf_optics": fifesim.Leaf(),
-    "background": {"soil_dry": 0.475, "shade": 0.525},
-    "brown_leaf": fifesim.Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001),
-}  # the paper's case, and dead tallgrass
+}  # the paper's case
+grass = fifesim.Canopy(
+    leaf_optics=fifesim.Leaf(),
+    background={"soil_dry": 0.475, "shade": 0.525},
+    brown_leaf=fifesim.Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001),
+)  # green and dead tallgrass
 bands = ["TM3", "TM4"]
 
 # %%
@@ -32,8 +34,8 @@ bands = ["TM3", "TM4"]
 places = {0.0: ("-", "mixed"), 0.5: ("--", "half below"), 1.0: (":", "below the green")}
 figure, axes = plt.subplots(1, 3, figsize=(13, 4.2), layout="constrained")
 for dissociation, (style, where) in places.items():
-    dead = {"brown": share, "dissociation": dissociation}
-    rho = lai.fifesim.surface_reflectance("TM", bands=bands, **dead, **case)
+    dying = grass.replace(brown=share, dissociation=dissociation)
+    rho = lai.fifesim.surface_reflectance("TM", bands=bands, canopy=dying, **case)
     for band, color in zip(bands, ("#b2182b", "#542788"), strict=True):
         axes[0].plot(
             share.squeeze(),
@@ -49,7 +51,7 @@ for dissociation, (style, where) in places.items():
         color="#1b7837",
         label=f"NDVI, {where}",
     )
-    green = lai.fifesim.fpar(leaves="green", geometry=case["geometry"], **dead)
+    green = lai.fifesim.fpar(canopy=dying, leaves="green", geometry=case["geometry"])
     axes[2].plot(
         share.squeeze(), green.squeeze(), style, color="#8c510a", label=f"green leaves, {where}"
     )
@@ -73,7 +75,7 @@ figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
 cover = share.where(share >= 0.1)
 for leaf_area, style in ((1.0, ":"), (2.0, "--"), (4.0, "-")):
     rho = (lai / 2 * leaf_area).fifesim.surface_reflectance(
-        "TM", bands=bands, crown_cover=cover, **case
+        "TM", bands=bands, canopy=grass.replace(crown_cover=cover), **case
     )
     for band, color in zip(bands, ("#b2182b", "#542788"), strict=True):
         axes[0].plot(

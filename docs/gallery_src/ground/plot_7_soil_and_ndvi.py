@@ -27,15 +27,15 @@ lai = xr.zeros_like(lai) + xr.DataArray(
 across = xr.zeros_like(lai) + xr.DataArray(np.linspace(0, 1, 41), dims="x", coords={"x": lai.x})
 case = {"bands": bands, "geometry": fifesim.fife_geometry(), "atmosphere": fifesim.Atmosphere()}
 changes = {
-    "Brightness −0.1 to 0.15": {"soil": 0.25 * across - 0.1},
-    "Moisture 0 to 1, of a brighter soil": {"soil": 0.15, "moisture": across},
+    "Brightness −0.1 to 0.15": fifesim.Canopy(soil=0.25 * across - 0.1),
+    "Moisture 0 to 1, of a brighter soil": fifesim.Canopy(soil=0.15, moisture=across),
 }
 
 figure, axes = plt.subplots(
     1, 2, figsize=(11, 4.6), layout="constrained", sharex=True, sharey=True
 )
-for axis, (title, soil) in zip(axes, changes.items(), strict=True):
-    rho = fifesim.surface_reflectance(lai, "TM", **case, **soil)
+for axis, (title, canopy) in zip(axes, changes.items(), strict=True):
+    rho = fifesim.surface_reflectance(lai, "TM", canopy=canopy, **case)
     for ndvi in (0.2, 0.4, 0.6, 0.8):
         slope = (1 + ndvi) / (1 - ndvi)
         axis.plot([0, 0.5], [0, 0.5 * slope], color="0.8", linewidth=0.8, zorder=0)
@@ -63,7 +63,7 @@ truth = lai.fifesim.aggregate(30)
 def ndvi_over(deviation):
     soil = deviation * score if deviation else None
     return (
-        lai.fifesim.surface_reflectance("TM", bands=bands, soil=soil)
+        lai.fifesim.surface_reflectance("TM", bands=bands, canopy=fifesim.Canopy(soil=soil))
         .fifesim.to_toa()
         .fifesim.sense("TM")
         .fifesim.ndvi()

@@ -13,14 +13,14 @@ import fifesim
 
 site = fifesim.fife_site(10 / 3, window=((0, 540), (0, 540)))
 lai = 1.5 * fifesim.lai_scene(site, "burned-ungrazed", arp=0.24, seed=7)
-ground = {
-    "leaf_optics": fifesim.Leaf(
+grass = fifesim.Canopy(
+    leaf_optics=fifesim.Leaf(
         structure=1.4, chlorophyll=42, brown=0.1, water=0.009, dry_matter=0.006
     ),
-    "background": fifesim.Background({"soil_wet": 0.6, "golden_grass": 0.4}),
-    "leaf_angles": "campbell(63)",
-}
-fine = {name: lai.fifesim.surface_reflectance(name, **ground) for name in ("MSI", "TM")}
+    background=fifesim.Background({"soil_wet": 0.6, "golden_grass": 0.4}),
+    leaf_angles="campbell(63)",
+)
+fine = {name: lai.fifesim.surface_reflectance(name, canopy=grass) for name in ("MSI", "TM")}
 
 # %%
 # Sentinel-2 sees means over 10 m: let them be its surface reflectance, as a processor would give it.

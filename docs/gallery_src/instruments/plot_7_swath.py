@@ -19,8 +19,9 @@ rho = lai.fifesim.surface_reflectance(
     "AVHRR",
     geometry=view,
     atmosphere=fifesim.Atmosphere(visibility=30),
-    leaf_optics=fifesim.Leaf(),
-    background={"soil_dry": 0.475, "shade": 0.525},
+    canopy=fifesim.Canopy(
+        leaf_optics=fifesim.Leaf(), background={"soil_dry": 0.475, "shade": 0.525}
+    ),
 )
 image = rho.fifesim.to_toa().fifesim.sense_swath("AVHRR", **away)
 ndvi = image.fifesim.ndvi()

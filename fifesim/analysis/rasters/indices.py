@@ -19,7 +19,7 @@ INDICES = {
 }
 
 
-def index(reflectance, name):
+def index(reflectance, name, source=None, history=""):
     """
     Spectral index of a reflectance.
 
@@ -30,6 +30,10 @@ def index(reflectance, name):
         (0.60-0.70 um), near infrared (0.75-1.00 um) and shortwave infrared (1.53-1.75 um).
     name : str
         A key of `INDICES`.
+    source : xarray.DataArray, optional
+        Raster whose history and provenance the index carries on; by default the reflectance.
+    history : str, optional
+        Steps from that raster to the reflectance.
 
     Returns
     -------
@@ -51,7 +55,8 @@ def index(reflectance, name):
     name = known[name.lower()]
     kernel, windows = INDICES[name]
     out = swaths.placed_as(chunks.pointwise(kernel, *_bands(reflectance, windows, name)), reflectance)
-    return cf.label(out, name.lower(), source=reflectance, history=name.lower())
+    steps = "\n".join(filter(None, [history, name.lower()]))
+    return cf.label(out, name.lower(), source=reflectance if source is None else source, history=steps)
 
 
 def ndvi(reflectance):

@@ -13,6 +13,7 @@ from fifesim.analysis.rasters.pairs import check_same_quantity, matched
 from fifesim.analysis.regression import Regression, totals
 from fifesim.base.annotations import Pairing
 from fifesim.rasters import cf, chunks, swaths
+from fifesim.rasters.annotations import RasterOrDataset
 from fifesim.rasters.reductions import sums_by_row
 
 _LIMITS = ("low", "high")
@@ -102,9 +103,7 @@ def invert(
     return xr.Dataset(found | {"flag": flag})
 
 
-def inversion_error(
-    estimate: xr.Dataset | xr.DataArray, truth: xr.DataArray, *, pair: Pairing = "coordinates"
-) -> xr.Dataset:
+def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pairing = "coordinates") -> xr.Dataset:
     """
     Error of an estimated map against the truth; computes.
 

@@ -10,7 +10,8 @@ import xarray as xr
 from fifesim.analysis import variogram as kernels
 from fifesim.analysis.rasters.means import aggregate
 from fifesim.analysis.rasters.pairs import origins, sound_cells
-from fifesim.base.line_spread import Boxcar, LineSpread
+from fifesim.base.annotations import Metres
+from fifesim.base.line_spread import Boxcar, Spread
 from fifesim.rasters import grid as grids
 from fifesim.rasters.reductions import extremes, sums_by_block
 from fifesim.rasters.regularization import operators
@@ -134,7 +135,7 @@ def variogram(array: xr.DataArray, reach: float) -> xr.Dataset:
     return out
 
 
-def regularized_variance(array: xr.DataArray, pixel: float = 30.0, lsf: LineSpread | None = None) -> xr.Dataset:
+def regularized_variance(array: xr.DataArray, pixel: Metres = 30.0, lsf: Spread | None = None) -> xr.Dataset:
     """
     Variance of pixels, predicted from that of cells and their variogram, beside the simulated; computes.
 

@@ -15,8 +15,10 @@ from fifesim.analysis.rasters.indices import red_and_nir
 from fifesim.analysis.rasters.means import aggregate
 from fifesim.analysis.rasters.pairs import check_same_quantity, sound_cells
 from fifesim.analysis.rasters.regression import regress
+from fifesim.base.annotations import Metres
 from fifesim.rasters import cf, chunks
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import AnyDimensions
 from fifesim.rasters.reductions import extremes, sums_by_block
 
 # Bins of the histogram that stands for the values of a raster: 1/2000 of their range is far less than a bandwidth.
@@ -30,7 +32,7 @@ _BLOCK = 1024
 
 
 def scale_bias(
-    algorithm: Callable[[xr.DataArray], xr.DataArray], array: xr.DataArray, pixel: float = 30.0
+    algorithm: Callable[[xr.DataArray], xr.DataArray], array: xr.DataArray, pixel: Metres = 30.0
 ) -> xr.Dataset:
     """
     Mean over pixels of an algorithm, less the algorithm of the mean.
@@ -74,7 +76,7 @@ def scale_bias(
     return out
 
 
-def ndvi_bias(reflectance: xr.DataArray, pixel: float = 30.0) -> xr.DataArray:
+def ndvi_bias(reflectance: xr.DataArray, pixel: Metres = 30.0) -> xr.DataArray:
     """
     Mean NDVI less NDVI of the mean reflectance, predicted from variances and covariance within the pixels.
 
@@ -122,7 +124,7 @@ def ndvi_bias(reflectance: xr.DataArray, pixel: float = 30.0) -> xr.DataArray:
     return cf.label(out, "ndvi_bias", source=reflectance, history=f"ndvi_bias: second order, {pixel:g} m")
 
 
-def fpar_bias(lai: xr.DataArray, extinction: float, fpar_inf: float = 0.94, pixel: float = 30.0) -> xr.DataArray:
+def fpar_bias(lai: xr.DataArray, extinction: float, fpar_inf: float = 0.94, pixel: Metres = 30.0) -> xr.DataArray:
     """
     Mean FPAR less FPAR of the mean LAI, predicted from the variance of LAI within the pixels.
 
@@ -210,7 +212,7 @@ def ndvi_linearity(reflectance: xr.DataArray) -> float:
     return math.copysign(math.sqrt(fit.r2), fit.slope)
 
 
-def share_kept(pixels: xr.DataArray, cells: xr.DataArray) -> xr.Dataset:
+def share_kept(pixels: AnyDimensions, cells: xr.DataArray) -> xr.Dataset:
     """
     Share of the range and of the variance of cells that pixels keep.
 
@@ -259,7 +261,7 @@ def share_kept(pixels: xr.DataArray, cells: xr.DataArray) -> xr.Dataset:
 
 
 def density(
-    array: xr.DataArray, points: int = 256, bandwidth: float | None = None, *, reflect: bool | None = None
+    array: AnyDimensions, points: int = 256, bandwidth: float | None = None, *, reflect: bool | None = None
 ) -> xr.DataArray:
     """
     Gaussian kernel density of the values of a raster; computes.

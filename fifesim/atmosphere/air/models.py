@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 
-from fifesim.atmosphere.air import aerosols, mixtures, molecules
+from fifesim.atmosphere.air import ENGINES, aerosols, mixtures, molecules
 from fifesim.atmosphere.air.own_aerosol import Aerosol, known_aerosol
 from fifesim.atmosphere.air.profiles import (
     BOLTZMANN,
@@ -21,12 +20,10 @@ from fifesim.atmosphere.air.profiles import (
     profile_above,
 )
 from fifesim.atmosphere.air.summary import atmosphere_in_words
-from fifesim.base.annotations import Numbers
+from fifesim.base.annotations import AerosolMixture, Numbers
 from fifesim.base.arguments import check_fields
-from fifesim.base.kinds import described
+from fifesim.base.kinds import PLAIN, described
 from fifesim.base.spelling import closest
-
-ENGINES = ("5S", "successive-orders", "successive-orders-scalar", "6S")
 
 _NUMBER = r"([-+.\deE]+)"
 _TEXT = re.compile(
@@ -91,7 +88,7 @@ class Atmosphere:
     """
 
     profile: str = "midlatitude-summer"
-    aerosol: str | Mapping[str, float] | Aerosol = "continental"
+    aerosol: Annotated[AerosolMixture | Aerosol, PLAIN] = "continental"
     visibility: float | None = None
     altitude: float = 0.4
     aot: float | None = None
@@ -123,7 +120,7 @@ class Atmosphere:
             )
         if self.engine == "6S":
             raise ValueError(
-                f"engine must be one of {', '.join(ENGINES[:3])} with an aerosol of one's own ({name}), got '6S', "
+                f"engine must be one of {', '.join(ENGINES[:-1])} with an aerosol of one's own ({name}), got '6S', "
                 "which takes no phase functions: type engine='successive-orders'"
             )
 

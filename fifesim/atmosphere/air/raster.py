@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ import xarray as xr
 
 from fifesim.atmosphere.air import aerosols, components
 from fifesim.atmosphere.air.own_aerosol import Aerosol, phase_of_moments
-from fifesim.base.annotations import FilePath
+from fifesim.base.annotations import AerosolMixture, FilePath
 from fifesim.base.foreign import read_csv
 
 # What may stand in the place of each name: Eradiate's, libRadtran's and AERONET's.
@@ -109,7 +108,7 @@ def read_aerosol(
     )
 
 
-def aerosol_tables(aerosol: str | Mapping[str, float]) -> xr.Dataset:
+def aerosol_tables(aerosol: AerosolMixture) -> xr.Dataset:
     """
     Tables of an aerosol of the package, in the form that `read_aerosol` takes.
 

@@ -11,7 +11,7 @@ from fifesim.atmosphere.schemes import engines
 from fifesim.atmosphere.schemes.terms import on_wavelengths, spectral_nodes
 from fifesim.base.geometry import fife_geometry
 from fifesim.rasters import cf, directions
-from fifesim.rasters.annotations import Directions
+from fifesim.rasters.directions import Directions
 
 _LONG_NAMES = {
     "path_reflectance": "reflectance of molecules and aerosol over a black ground, without gases",

@@ -1,9 +1,8 @@
 // The page itself: sliders in, pictures and numbers out.
 
 const $ = (id) => document.getElementById(id);
-const NAMES = { lai: "LAI", fpar: "FPAR" };
-const UNITS = { lai: "LAI [m² m⁻²]", fpar: "FPAR" };
-const VIEWS = { ndvi: "NDVI", red: "red reflectance", nir: "near-infrared reflectance" };
+const LABELS = Object.fromEntries(Object.entries(data.layers).map(([key, { label }]) => [key, label]));
+const COLOURS = Object.fromEntries(Object.entries(data.layers).map(([key, { stops }]) => [key, ramp(stops)]));
 // Where bars begin, and the shares that they may end at.
 const ZERO = 12;
 const SCALES = [0.05, 0.1, 0.25, 0.5, 1];
@@ -23,22 +22,21 @@ function main(arrays) {
     const extent = [(shown.columns * size) / columns, (shown.rows * size) / rows];
     const k = markedPixel();
     const [row, column] = [Math.floor(k / shown.columns), k % shown.columns];
-    const scene = drawField($("scene"), { values: sceneOf(arrays, state), rows, columns }, data.ranges.scene, "green", aspect);
+    const scene = drawField($("scene"), { values: sceneOf(arrays, state), rows, columns }, data.ranges.scene, COLOURS.lai, aspect);
     const step = (scene.width * size) / columns;
     const [south, east] = data.offsets[state.registration];
     outline(scene.pen, column * step, row * step, step, step, false);
     if (south || east) outline(scene.pen, (column + east) * step, (row + south) * step, step, step, true);
     const field = { values: shown[state.view], rows: shown.rows, columns: shown.columns };
-    const colours = state.view === "ndvi" ? "green" : "grey";
-    const image = drawField($("image"), field, data.ranges[state.view], colours, aspect, extent);
+    const image = drawField($("image"), field, data.ranges[state.view], COLOURS[state.view], aspect, extent);
     outline(image.pen, column * step, row * step, step, step, false);
     drawScatter($("scatter"), {
       x: shown.ndvi, y: shown.truth, marked: k, line: lineOf(arrays, state),
       first: isStart() ? null : lineOf(arrays, { ...START, variable: state.variable }),
-      ranges: [data.ranges.ndvi, data.ranges[variable]], names: ["NDVI of the pixel", `true ${UNITS[variable]} of the pixel`],
+      ranges: [data.axes.ndvi, data.axes[variable]], names: [`${LABELS.ndvi} of the pixel`, `true ${data.layers[variable].axis} of the pixel`],
     });
     $("reading").textContent = `Pixel in row ${row + 1}, column ${column + 1}: NDVI ${fixed(shown.ndvi[k], 3)}, `
-      + `true ${NAMES[variable]} ${fixed(shown.truth[k], 2)}`;
+      + `true ${LABELS[variable]} ${fixed(shown.truth[k], 2)}`;
   }
 
   const isStart = () => KEYS.every((key) => state[key] === START[key]);
@@ -67,14 +65,14 @@ function main(arrays) {
     $("then").textContent = isStart() ? "" : `at the start ${fixed(start.r2, 3)}`;
     $("headline").replaceChildren(...headline(line, shares, variable));
     $("scene-about").textContent = data.sliders[0].texts[state.arp];
-    $("image-about").textContent = `${camera.name}, pixels of ${camera.pixel} m, ${camera.bits} bits; ${VIEWS[state.view]}`;
-    $("scatter-about").textContent = `true ${NAMES[variable]} against NDVI, ${fixed(line.n, 0)} pixels`;
+    $("image-about").textContent = `${camera.name}, pixels of ${camera.pixel} m, ${camera.bits} bits; ${LABELS[state.view]}`;
+    $("scatter-about").textContent = `true ${LABELS[variable]} against NDVI, ${fixed(line.n, 0)} pixels`;
     $("explained").style.width = `${100 * Math.max(line.r2, 0)}%`;
     $("explained-said").textContent = `the line explains ${fixed(100 * line.r2, 1)} %`;
     $("left-said").textContent = `scatter ${fixed(100 * (1 - line.r2), 1)} %`;
     bars(shares);
-    legend("scene", data.ranges.scene, "green", "LAI");
-    legend("image", data.ranges[state.view], state.view === "ndvi" ? "green" : "grey", VIEWS[state.view]);
+    legend("scene", data.ranges.scene, data.layers.lai);
+    legend("image", data.ranges[state.view], data.layers[state.view]);
     $("image").setAttribute("aria-label", `The image of ${camera.name}: ${shown.rows} by ${shown.columns} pixels. Arrow keys mark another pixel.`);
     $("scatter").setAttribute("aria-label", `${$("scatter-about").textContent}. R squared ${fixed(line.r2, 3)}, slope ${fixed(line.slope, 3)}.`);
     $("toml").textContent = tomlOf(state);
@@ -89,10 +87,10 @@ function main(arrays) {
   function headline(line, shares, variable) {
     const bold = (text) => Object.assign(document.createElement("b"), { textContent: text });
     if (!Number.isFinite(line.slope)) {
-      return ["Every pixel has the ", bold("same NDVI"), `: the counts are too coarse for what varies here, and it tells nothing of ${NAMES[variable]}.`];
+      return ["Every pixel has the ", bold("same NDVI"), `: the counts are too coarse for what varies here, and it tells nothing of ${LABELS[variable]}.`];
     }
     const largest = shares.indexOf(Math.max(...shares));
-    return ["A line on NDVI tells ", bold(`${fixed(100 * line.r2, 0)} %`), ` of how ${NAMES[variable]} varies from pixel to pixel. The largest part of the rest is `,
+    return ["A line on NDVI tells ", bold(`${fixed(100 * line.r2, 0)} %`), ` of how ${LABELS[variable]} varies from pixel to pixel. The largest part of the rest is `,
       bold(data.stages[largest].name), `, ${fixed(100 * shares[largest], 1)} %.`];
   }
 
@@ -110,13 +108,11 @@ function main(arrays) {
     });
   }
 
-  function legend(name, [low, high], colours, text) {
-    const [first, middle, last] = [0, 127, 255].map((level) => `rgb(${COLOURS[colours][level].map(Math.round)})`);
-    const stops = colours === "green" ? RAMPS.green : [first, middle, last];
+  function legend(name, [low, high], { stops, label }) {
     $(`${name}-bar`).style.background = `linear-gradient(90deg, ${stops.join(", ")})`;
     $(`${name}-low`).textContent = fixed(low, 2);
     $(`${name}-high`).textContent = fixed(high, 2);
-    $(`${name}-of`).textContent = text;
+    $(`${name}-of`).textContent = label;
   }
 
   // What the last move changed, and what it did not.
@@ -124,7 +120,7 @@ function main(arrays) {
     const changed = (...keys) => keys.some((key) => past.state[key] !== state[key]);
     const slider = data.sliders.find(({ key }) => past.state[key] !== state[key]);
     const named = (at) => (slider ? slider.marks[at[slider.key]]
-      : changed("variable") ? NAMES[data.variables[at.variable]] : VIEWS[at.view]);
+      : changed("variable") ? LABELS[data.variables[at.variable]] : LABELS[at.view]);
     const title = slider ? slider.name : changed("variable") ? "Compared with" : "Image in";
     const variable = data.variables[state.variable];
     const other = Array.from(shown.counts).filter((count, k) => count !== past.shown.counts[k]).length;
@@ -136,7 +132,7 @@ function main(arrays) {
     chip("truth", truth ? "the same" : changed("instrument") ? "of other pixels" : "others", truth);
     chip("image", image, image === "the same");
     chip("line", line.r2 === past.line.r2 ? "the same" : `R² ${fixed(past.line.r2, 3)} → ${fixed(line.r2, 3)}`, line.r2 === past.line.r2);
-    $("truth-name").textContent = `True ${NAMES[variable]}`;
+    $("truth-name").textContent = `True ${LABELS[variable]}`;
     $("moved-what").textContent = `${title}: ${named(past.state)} → ${named(state)}`;
   }
 
@@ -217,7 +213,7 @@ function settingInAddress() {
     const slider = data.sliders.find((each) => each.key === key);
     const count = slider ? slider.texts.length : key === "variable" ? data.variables.length : 0;
     if (/^\d+$/.test(text) && Number(text) < count) found[key] = Number(text);
-    if (key === "view" && text in VIEWS) found.view = text;
+    if (key === "view" && data.views.includes(text)) found.view = text;
   }
   return found;
 }

@@ -1,10 +1,5 @@
 // Pictures on canvases: fields in colours, and points about a line.
 
-const RAMPS = {
-  // From bare ground to dense green.
-  green: ["#f4ecd8", "#dfdcae", "#b4c987", "#7fb06d", "#4b9160", "#236f55", "#0d4a45"],
-  grey: ["#14181a", "#f7f5ef"],
-};
 const LIGHT = { ink: "#22302a", faint: "#66736c", rule: "#dfe2da", point: "#2f6f4f", line: "#b4531f", mark: "#12211a", halo: "#ffffff" };
 const DARK = { ink: "#e3e9e4", faint: "#8a978f", rule: "#2e3833", point: "#8fcfa5", line: "#f0a067", mark: "#ffffff", halo: "#101512" };
 
@@ -12,15 +7,15 @@ let printing = false;
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 const inks = () => (dark.matches && !printing ? DARK : LIGHT);
 
-function ramp(name) {
-  const stops = RAMPS[name].map((hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16)));
+// Colours of 256 levels between stops.
+function ramp(hexes) {
+  const stops = hexes.map((hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16)));
   return Array.from({ length: 256 }, (_, k) => {
     const place = (k / 255) * (stops.length - 1);
     const low = Math.min(Math.floor(place), stops.length - 2);
     return stops[low].map((value, c) => value + (place - low) * (stops[low + 1][c] - value));
   });
 }
-const COLOURS = { green: ramp("green"), grey: ramp("grey") };
 
 // A canvas as sharp as the screen, and its size on the page; its height there follows from its proportions.
 function fitted(canvas, aspect) {
@@ -35,9 +30,8 @@ function fitted(canvas, aspect) {
 }
 
 // A field in colours over the whole canvas; `extent` is what of the ground it covers, in shares of the scene.
-function drawField(canvas, field, [low, high], name, aspect, extent = [1, 1]) {
+function drawField(canvas, field, [low, high], colours, aspect, extent = [1, 1]) {
   const { pen, width, height } = fitted(canvas, aspect);
-  const colours = COLOURS[name];
   const small = new OffscreenCanvas(field.columns, field.rows);
   const picture = new ImageData(field.columns, field.rows);
   field.values.forEach((value, k) => {

@@ -8,17 +8,16 @@ from markupsafe import Markup
 from fifesim.experiments.explorer.outcomes import NUMBERS
 from fifesim.experiments.explorer.packing import packed, stepped
 from fifesim.experiments.explorer.words import STAGES as MEANINGS
-from fifesim.experiments.explorer.words import slider_words
+from fifesim.experiments.explorer.words import VIEWS, layer_words, slider_words
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES
 from fifesim.output import pages
+from fifesim.output.colours import percentile_limits
 from fifesim.output.report import title
 from fifesim.rasters import grid as grids
 
 _TEMPLATE = Path(__file__).with_name("explore.html.j2")
 _SCRIPTS = ("explore_data.js", "explore_drawing.js", "explore.js")
-# Colours end at these shares of the values, so that a single cell does not pale all others. [%]
-_ENDS = 0.5, 99.5
 # So many pixels of each image say where colours end.
 _SAMPLE = 50
 
@@ -86,13 +85,15 @@ def page_data(sweep, outcomes):
         "steps": steps,
         "sliders": slider_words(sweep),
         "variables": list(VARIABLES),
+        "views": list(VIEWS),
+        "layers": layer_words(VARIABLES),
         "numbers": list(NUMBERS),
         "stages": [{"name": name, "meaning": MEANINGS[name]} for name in names],
         "instruments": [_instrument(sweep, k, camera) for k, camera in enumerate(outcomes.cameras)],
         "offsets": [list(offset) for offset in sweep.offsets],
         "szas": list(sweep.szas),
         "scene": {"rows": box.shape.y, "columns": box.shape.x, "cell": grids.cell_size(box)[0]},
-        "ranges": _ranges(sweep, outcomes),
+        **_ranges(sweep, outcomes),
         "keys": _keys(sweep),
     }
     return text, data
@@ -138,7 +139,7 @@ def _instrument(sweep, number, camera):
 
 
 def _ranges(sweep, outcomes):
-    """Ends of colours and axes, the same for all settings: what is drawn can be compared."""
+    """Ends of colours and of axes, the same for all settings: what is drawn can be compared."""
     ndvi, bands = [], []
     mu_s = np.cos(np.radians(sweep.szas))[None, None, :, None, None, None]
     for image, camera in zip(outcomes.images, outcomes.cameras, strict=True):
@@ -151,7 +152,10 @@ def _ranges(sweep, outcomes):
     truths = [np.concatenate([truth[:, :, k].ravel() for truth in outcomes.truths]) for k in (0, 1)]
     found = {"scene": outcomes.scenes, "ndvi": np.concatenate(ndvi), "red": red, "nir": nir}
     found |= dict(zip(VARIABLES, truths, strict=True))
-    return {name: [float(end) for end in np.nanpercentile(values, _ENDS)] for name, values in found.items()}
+    return {
+        "ranges": {name: percentile_limits(values) for name, values in found.items()},
+        "axes": {name: percentile_limits(found[name], (0, 100)) for name in ("ndvi", *VARIABLES)},
+    }
 
 
 def _keys(sweep):

@@ -1,10 +1,13 @@
-"""What a page calls its sliders, stages and instruments."""
+"""What a page calls its sliders, stages, instruments and layers."""
 
 import math
 
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.ground.landscape.autoregression import correlation_length
+from fifesim.output.colours import colours_of, stops_of
 from fifesim.output.pages import fixed
+from fifesim.output.words import axis_label
+from fifesim.rasters import cf
 from fifesim.sensor.description.instruments import instrument
 
 # Beside the name of a stage: what it does.
@@ -24,6 +27,33 @@ STAGES = {
     "clumping": "leaves stand in crowns, with gaps between",
     "covariance": "leaf area goes with the lie of the land and with the soil",
 }
+
+# What an image is shown in: a quantity, and one of its bands.
+VIEWS = {"ndvi": ("ndvi", ""), "red": ("toa_reflectance", "red"), "nir": ("toa_reflectance", "near infrared")}
+
+
+def layer_words(variables):
+    """
+    What the truths and views of a page are called, and their colours.
+
+    Parameters
+    ----------
+    variables : iterable of str
+        Names of the truths, keys of `fifesim.rasters.cf.QUANTITIES`.
+
+    Returns
+    -------
+    layers : dict of dict
+        By truth and by key of `VIEWS`: ``name`` to choose it by, ``label``, ``axis`` with the unit, and ``stops`` of
+        its colours.
+    """
+    layers = {name: (name, "") for name in variables} | VIEWS
+    return {key: _layer(quantity, band) for key, (quantity, band) in layers.items()}
+
+
+def _layer(quantity, band):
+    label, axis = (f"{band} {text}".strip() for text in (cf.QUANTITIES[quantity].label, axis_label(quantity)))
+    return {"name": band or label, "label": label, "axis": axis, "stops": stops_of(colours_of(quantity)[0])}
 
 
 def slider_words(sweep):

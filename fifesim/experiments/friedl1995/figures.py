@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Annotated, TypeAlias
+
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fifesim.analysis import density, regression, scaling
+from fifesim.base.kinds import Kind
 from fifesim.experiments.friedl1995 import table as friedl1995_table
 from fifesim.experiments.friedl1995.case import VARIABLES
 
@@ -20,6 +23,15 @@ _DOT = {"s": 9, "linewidths": 0, "alpha": 0.75}
 _LABELS = {"lai": "LAI [m² m⁻²]", "fpar": "FPAR", "ndvi": "NDVI"}
 _FIGURE_WIDTH = 7.2
 
+Reproduced: TypeAlias = Annotated[
+    xr.Dataset,
+    Kind(
+        "an xarray.Dataset, as fifesim.reproduce gives it",
+        lambda value: isinstance(value, xr.Dataset) and "paper_slope" in value.variables,
+        numbers=None,
+    ),
+]
+
 NUMBERS = range(3, 10)
 """Of the figures that are drawn."""
 
@@ -27,7 +39,7 @@ BY_READING = (5, 6, 7, 9)
 """Of those that differ with the reading of Table 1."""
 
 
-def plot_reproduction(number: int, found: xr.Dataset, *, reading: str | None = None) -> Figure:
+def plot_reproduction(number: int, found: Reproduced, *, reading: str | None = None) -> Figure:
     """
     A figure of Friedl et al. (1995), drawn from a repetition of the experiment.
 

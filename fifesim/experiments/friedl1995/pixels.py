@@ -54,7 +54,7 @@ def ground_of(case, treatment, arp, seed, land=(None, None)):
     keys, (dem, horizon) = case.common.ground, land
     setup = replace(case.setup, dem=dem, horizon=horizon)
     lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method=keys.method)
-    fpar = canopy.fpar(lai, geometry=setup.geometry, leaf_angles=keys.leaf_angles, fpar_inf=keys.fpar_inf)
+    fpar = canopy.fpar(lai, setup.canopy, geometry=setup.geometry, fpar_inf=keys.fpar_inf)
     reflectance = reflectance_of(setup, lai).compute()
     return Ground(setup, lai, fpar, reflectance, chain.to_toa(reflectance, instrument=setup.instrument))
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import Distribution, FilePath
+from fifesim.base.annotations import Distribution, FilePath, WholeNumber
+from fifesim.base.kinds import Kind
 from fifesim.base.seeds import check_seed
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import shown
@@ -19,6 +20,12 @@ from fifesim.experiments.friedl1995.table import COEFFICIENTS, realise
 from fifesim.ground.landscape.distribution import treatments
 from fifesim.output.progress import steps
 
+FILE_BY_BAND = Kind("the path of a CSV file, or a mapping by band")
+Land: TypeAlias = Annotated[FilePath, Kind("'flat', 'flint-hills' or the path of a raster file")]
+Densities: TypeAlias = Annotated[
+    FilePath | Mapping[str, FilePath | Distribution], Kind("a folder, or a mapping by treatment")
+]
+
 SEED = 1995
 REALISATIONS = 20
 
@@ -26,14 +33,14 @@ REALISATIONS = 20
 def reproduce(
     *,
     reading: Literal["native", "aligned", "narrow", "offset", "blur-40.8", "blur-48.6"] = "native",
-    dem: FilePath = "flat",
-    densities: FilePath | Mapping[str, FilePath | Distribution] | None = None,
-    optics: FilePath | Mapping[str, tuple[float, float]] | None = None,
-    background: FilePath | Mapping[str, float] | None = None,
+    dem: Land = "flat",
+    densities: Densities | None = None,
+    optics: Annotated[FilePath | Mapping[str, tuple[float, float]], FILE_BY_BAND] | None = None,
+    background: Annotated[FilePath | Mapping[str, float], FILE_BY_BAND] | None = None,
     sensor: FilePath = TABLE_1,
     realisations: int = REALISATIONS,
     cells: int | None = None,
-    seed: int = SEED,
+    seed: WholeNumber = SEED,
     west: float | None = None,
     north: float | None = None,
 ) -> xr.Dataset:

@@ -1,7 +1,7 @@
 """The ground of a scenario with any of what varies over it at its ideal."""
 
-from fifesim.ground.landscape.classes import OPTICS
-from fifesim.scenario.ground import drawn_properties, ground_scene, said_by_stands
+from fifesim.ground.canopy.properties import DRAWN
+from fifesim.scenario.ground import drawn_properties, ground_scene, numbers_of_stands
 
 # In this order along the axes of what `stages.pixels` gives.
 PROPERTIES = {
@@ -27,19 +27,19 @@ def varying(scenario):
         In the order of `PROPERTIES`.
     """
     own, classes = scenario.landscape, scenario.class_table() if scenario.landscape.cover != "none" else {}
-    drawn = drawn_properties(scenario)
-    found = {
-        "soil": bool({"soil", "moisture"} & set(drawn)),
-        "dead leaves": "brown" in drawn,
-        "cover": len(classes) > 1 and any(_has_optics(each) for each in classes.values()),
-        "clumping": "crown_cover" in drawn or min(said_by_stands(scenario, "crown_cover")) < 1,
-        "covariance": any(own.covary.values()),
-    }
-    return tuple(name for name in PROPERTIES if found[name])
+    found = {DRAWN[name].effect for name in drawn_properties(scenario)}
+    if len(classes) > 1 and any(each.canopy.given for each in classes.values()):
+        found.add("cover")
+    if any(set(numbers_of_stands(scenario, name)) != {known.default} for name, known in _of("clumping").items()):
+        found.add("clumping")
+    if any(own.covary.values()):
+        found.add("covariance")
+    return tuple(name for name in PROPERTIES if name in found)
 
 
-def _has_optics(kind):
-    return any(getattr(kind, name) is not None for name in OPTICS)
+def _of(effect):
+    """Properties of the canopy whose variation is an effect."""
+    return {name: known for name, known in DRAWN.items() if known.effect == effect}
 
 
 def ground_with(scenario, grid, at_work, dem=None):
@@ -65,13 +65,12 @@ def ground_with(scenario, grid, at_work, dem=None):
     if "covariance" not in at_work:
         ideal["covary"] = {}
     land = ground_scene(scenario.model_copy(update={"landscape": own.model_copy(update=ideal)}), grid, dem=dem)
-    if "soil" not in at_work:
-        land = land.drop_vars("soil", errors="ignore")
-        land = land.assign(moisture=own.moisture) if "moisture" in land else land
-    if "dead leaves" not in at_work and "brown" in land:
-        land = land.assign(brown=scenario.ground.brown)
-    if "clumping" not in at_work and "clumping" in varying(scenario):
-        land = land.assign(crown_cover=1.0)
+    for name, known in DRAWN.items():
+        # Without clumping there are no gaps between crowns; what else is not at work has its mean.
+        if known.effect == "clumping" and known.effect in varying(scenario) and known.effect not in at_work:
+            land = land.assign({name: known.default})
+        elif known.effect not in at_work and name in land:
+            land = land.assign({name: getattr(scenario.ground, name)})
     if "cover" not in at_work and "cover" in land:
         first = land["cover"].attrs["flag_values"][0]
         land["cover"] = land["cover"].where(land["cover"] < 0, first).astype(land["cover"].dtype)

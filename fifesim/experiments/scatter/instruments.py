@@ -4,13 +4,16 @@ import math
 
 import pandas as pd
 
-from fifesim.experiments.scatter.shares import budget, table
+from fifesim.experiments.scatter.shares import TOTAL, VARIATION, budget, table
 from fifesim.scenario.scenario import Scenario
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.responses import knows_blur
 
 _PIXELS = 12  # along a window of a coarse instrument, at least
 _CELLS = 333  # along a window of any
+
+# Column of the table that states whether the instrument's file has what a stage needs.
+KNOWN = {"point spread": "blur", "registration": "place", "noise": "noise"}
 
 
 def instrument_scenario(name, *, arp=0.15):
@@ -77,7 +80,8 @@ def compare_instruments(names, *, arps=(0.05, 0.15, 0.24), realisations=20, each
     -------
     table : pandas.DataFrame
         Rows of `fifesim.experiments.scatter.shares.table`, with ``instrument``, ``arp``, the ``pixel`` [m], and whether
-        the file knows the instrument's ``blur``, ``noise`` and ``place``.
+        the file has the instrument's ``blur``, ``noise`` and ``place``. A stage whose property is unknown is NaN, and
+        so are the total and the sub-pixel variation of its instrument. [1]
 
     Raises
     ------
@@ -94,5 +98,14 @@ def compare_instruments(names, *, arps=(0.05, 0.15, 0.24), realisations=20, each
             "noise": bool(scenario.sensor.noise),
             "place": description.geolocation is not None,
         }
+        rows = _without_unknown(rows, known)
         found.append(rows.assign(instrument=description.name, arp=arp, pixel=pixel, **known))
     return pd.concat(found, ignore_index=True)
+
+
+def _without_unknown(rows, known):
+    """Rows of a budget, NaN where a stage's property is unknown or a row counts all stages."""
+    unknown = [stage for stage, name in KNOWN.items() if not known[name]]
+    hidden = rows["stage"].isin([*unknown, TOTAL, VARIATION] if unknown else [])
+    numbers = rows.columns.difference(["stage", "variable"])
+    return rows.assign(**rows[numbers].mask(hidden))

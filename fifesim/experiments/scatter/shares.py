@@ -12,6 +12,7 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.analysis.attribution import by_itself, shapley, taken_away
+from fifesim.base.annotations import WholeNumber
 from fifesim.base.seeds import check_seed
 from fifesim.base.warned import warn
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
@@ -37,7 +38,7 @@ def budget(
     *,
     realisations: int = 20,
     cells: int = 333,
-    seed: int | None = None,
+    seed: WholeNumber | None = None,
     each: Callable[[Sequence[Any]], Iterable[Any]] | None = None,
 ) -> xr.Dataset:
     r"""

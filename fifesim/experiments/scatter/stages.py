@@ -1,6 +1,6 @@
 """Images of a scene with any of its stages at their ideal."""
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 
@@ -267,9 +267,9 @@ def _truth(scene, ground, curve):
 
 
 def _setup_over(scene, ground):
-    """The setup without what the cells say themselves."""
-    said = {each.name: each.default for each in fields(Setup) if each.name in ground.land}
-    return replace(scene.setup, **said)
+    """The setup without the properties of the canopy that its cells have."""
+    given = scene.setup.canopy.given & set(ground.land.data_vars)
+    return replace(scene.setup, canopy=scene.setup.canopy.replace(**dict.fromkeys(given)))
 
 
 def _cells(scene, ground, at_work):

@@ -7,7 +7,7 @@ import numpy as np
 from fifesim.base import datasets
 from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.ground.canopy.background import with_background
-from fifesim.ground.canopy.crowns import clumped, crown_shares, crown_terms, crowns_over_background
+from fifesim.ground.canopy.crowns import SHAPE, clumped, crown_shares, crown_terms, crowns_over_background
 from fifesim.ground.canopy.layers import two_layers
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.light_sharing import light_budget
@@ -19,6 +19,12 @@ _deviation = partial(Deviation, "canopy")
 _GREEN, _DEAD = ([0.07, 0.45], [0.04, 0.42]), ([0.28, 0.42], [0.12, 0.3])
 _LAI = np.array([0, 0.01, 0.5, 2, 8, 20])[:, None]
 _BROWN = np.linspace(0, 1, 5)
+# Scenes of RAMI-3: leaf area index [m2 m-2], crown cover seen from above, leaf reflectance and transmittance, and
+# background [1]. Leaves of HET04 are the mean of its spheres and cylinders, by leaf area.
+CROWNS = {
+    "HET01": (2.356, 0.4712, 0.4957, 0.4409, 0.159),
+    "HET04": (1.4999, 0.2989, 0.4688, 0.3518, 0.15),
+}
 _VIEW = {"sza": 35.0, "vza": 20.0, "raa": 30.0, "hotspot": 0.1}
 
 
@@ -95,15 +101,60 @@ def _crowns():
     yield _deviation("crowns over ground, in both ways of writing it", worst, 1e-12, "1", "clumped SAIL")
 
 
-def _spheres():
-    """Two numbers stand for where fifteen spheres are: what is left is the model's own."""
-    table = datasets.table("verification/spheres_of_leaves.csv")
+def known_crowns(scene):
+    """
+    Reflectance of a scene whose crowns are known leaf by leaf.
+
+    Parameters
+    ----------
+    scene : {"HET01", "HET04"}
+        Of RAMI-3: spheres, by Eradiate, or spheres and cylinders, by the Monte Carlo of ``make_crown_scenes.py``.
+
+    Returns
+    -------
+    table : DataFrame
+        Columns vza, raa [degree] and brf [1].
+    """
+    if scene == "HET01":
+        return datasets.table("verification/spheres_of_leaves.csv")
+    return datasets.table("verification/crown_scenes.csv").query("scene == @scene")
+
+
+def crown_errors(scene, crown_cover=None):
+    """
+    Error of crowns by SAIL in a scene whose crowns are known leaf by leaf.
+
+    Parameters
+    ----------
+    scene : {"HET01", "HET04"}
+        As in `known_crowns`.
+    crown_cover : float, optional
+        By default the cover of the scene as seen from above; 1 is a canopy without gaps. [1]
+
+    Returns
+    -------
+    vza : array, shape (views,)
+        View zenith, positive toward the sun. [degree]
+    error : array, shape (views,)
+        Of the bidirectional reflectance factor. [%]
+    """
+    lai, seen, *leaf, background = CROWNS[scene]
+    cover = seen if crown_cover is None else crown_cover
+    table = known_crowns(scene)
     angles = 20.0, table["vza"].to_numpy(), table["raa"].to_numpy()
-    given = dict(zip(("sza", "vza", "raa"), angles, strict=True))
-    # Discs of .2 m in crowns of 20 m.
-    crowns = sail(2.356 / 0.4712, 0.4957, 0.4409, hotspot=0.01, **given)
-    found = with_background(clumped(crowns, crown_shares(0.4712, 1.0, *angles)), 0.159).rso
-    yield _deviation("spheres full of leaves", largest(100 * (found / table["brf"] - 1), 0), 14.0, "%", "RAMI-3 HET01")
+    # Discs of 0.2 m in crowns of 20 m; of 0.1 m in crowns of 8 to 12 m.
+    canopy = sail(lai / cover, *leaf, hotspot=0.01, **dict(zip(("sza", "vza", "raa"), angles, strict=True)))
+    found = with_background(clumped(canopy, crown_shares(cover, SHAPE, *angles)), background).rso
+    return np.where(angles[2] == 0, 1, -1) * angles[1], 100 * (found / table["brf"].to_numpy() - 1)
 
 
-CHECKS = (_other_layers, _limits, _energy, _tables, _crowns, _spheres)
+def _known_crowns():
+    """Cover and shape stand for the places of all crowns: the bounds state the error of this model."""
+    for scene, what, bound, source in (
+        ("HET01", "spheres full of leaves", 14.0, "Eradiate, RAMI-3 HET01"),
+        ("HET04", "spheres and cylinders full of leaves", 26.0, "Monte Carlo, RAMI-3 HET04"),
+    ):
+        yield _deviation(what, largest(crown_errors(scene)[1], 0), bound, "%", source)
+
+
+CHECKS = (_other_layers, _limits, _energy, _tables, _crowns, _known_crowns)

@@ -3,42 +3,25 @@
 from functools import partial
 
 import numpy as np
-import xarray as xr
 
 from fifesim.ground.canopy import absorption
 from fifesim.ground.canopy.crowns import SHAPE, check_crowns, crown_shares, lai_in_crowns
+from fifesim.ground.canopy.description import Canopy, is_raster
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.leaf_area import check_map, warn_of_large
-from fifesim.ground.canopy.rasters import canopy_shares
-from fifesim.ground.canopy.rasters.evaluation import canopy_kernel, even_canopy
+from fifesim.ground.canopy.rasters.evaluation import SHARES, canopy_kernel, even_canopy, in_words, shares_of
+from fifesim.ground.landscape.rasters.evaluation import by_class
 from fifesim.rasters import cf, directions
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
 from fifesim.rasters.origins import made_of
 from fifesim.rasters.packed import unpacked
 
+ABSORBING = ("leaf_angles", *SHARES)
+"""Properties of the canopy that the light absorbed by its leaves depends on."""
 
-def level_reflectance(
-    lai,
-    *,
-    bands,
-    wavelengths,
-    leaf_reflectance,
-    leaf_transmittance,
-    background,
-    diffuse_fraction,
-    geometry,
-    leaf_angles="spherical",
-    hotspot=0.0,
-    brown=0.0,
-    dissociation=0.0,
-    brown_optics=None,
-    crown_cover=1.0,
-    crown_shape=SHAPE,
-    soil_changes=None,
-    exact=False,
-    **provenance,
-):
+
+def level_reflectance(lai, bands, stand, light, *, exact=False, **provenance):
     """
     Reflectance factor of a canopy over its background, for flat ground.
 
@@ -46,31 +29,12 @@ def level_reflectance(
     ----------
     lai : xarray.DataArray, dims (y, x)
         [m2 m-2]
-    bands : sequence of str, shape (band,)
-        Names.
-    wavelengths : sequence of float, shape (band,)
-        [um]
-    leaf_reflectance, leaf_transmittance : sequence of float, shape (band,), or xarray.DataArray, dims (band, y, x)
-        Where they are rasters, SAIL is evaluated at every cell. [1]
-    background : sequence of float, shape (band,), or xarray.DataArray, dims ([band], y, x)
-        Reflectance below the canopy. [1]
-    diffuse_fraction : sequence of float, shape (band,), or xarray.DataArray, dims (band, y, x)
-        Share of skylight in the irradiance. [1]
-    geometry : fifesim.base.geometry.Geometry or xarray.Dataset
-        Carried on as coordinates. Where an angle is a raster, SAIL is evaluated at every cell.
-    leaf_angles : optional
-        As `ground.canopy.leaf_angles.leaf_angle_classes` takes them.
-    hotspot : float, optional
-        Leaf size over canopy height; 0 is none. [1]
-    brown, dissociation, crown_cover : float or xarray.DataArray, dims (y, x), optional
-        Dead share of the leaf area, how far it lies below the rest, and the share of the ground below crowns. Where the
-        dissociation is a raster, SAIL is evaluated at every cell. [1]
-    brown_optics : (reflectance, transmittance), optional
-        Of dead leaves, each as those of the leaves are given; where some are dead they are needed. [1]
-    crown_shape : float, optional
-        Crown diameter over height. [1]
-    soil_changes : (callable, sequence of xarray.DataArray), optional
-        What makes the background of each cell of a dry one, from `ground.canopy.rasters.soils.soil_kernel`.
+    bands : sequence of fifesim.sensor.description.band.InstrumentBand
+        With a name and a wavelength [um].
+    stand : fifesim.ground.canopy.rasters.evaluation.BandCanopy
+        SAIL is evaluated at every cell where its leaf optics or dissociation are rasters.
+    light : fifesim.ground.canopy.rasters.evaluation.Light
+        Carried on as coordinates. SAIL is evaluated at every cell where an angle is a raster.
     exact : bool, optional
         Evaluate SAIL at every cell instead of interpolating a table that is within 1e-6 of it.
     **provenance : str or number
@@ -84,7 +48,7 @@ def level_reflectance(
     Raises
     ------
     ValueError
-        If the optics, the hotspot or a share are not possible, or LAI is negative.
+        If the optics or a share are not possible, or LAI is negative.
 
     See Also
     --------
@@ -92,57 +56,80 @@ def level_reflectance(
     fifesim.ground.canopy.crowns.clumped
     """
     lai = checked_scene(lai)
-    optics = {"leaf_reflectance": leaf_reflectance, "leaf_transmittance": leaf_transmittance, "background": background}
-    shares = {"brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
-    how = {"leaf_angles": leaf_angles, "hotspot": hotspot, "brown_optics": brown_optics, "crown_shape": crown_shape}
-    how["soil_changes"] = soil_changes
-    light = {"diffuse_fraction": diffuse_fraction, "geometry": geometry, "exact": exact}
-    kernel, rasters = canopy_kernel(lai, bands, **optics, **shares, **how, **light)
-    varies = directions.varying(geometry)
+    kernel, rasters = canopy_kernel(lai, [band.name for band in bands], stand, light, exact)
+    varies = directions.varying(light.geometry)
     out = chunking.pointwise(kernel, lai.drop_vars(varies, errors="ignore"), *rasters, bands=len(bands))
-    described = "raster" if isinstance(background, xr.DataArray) else ",".join(f"{value:g}" for value in background)
-    said = {"leaf_angles": str(leaf_angle_classes(leaf_angles)), "background": described}
-    out = labelled(out, lai, bands, wavelengths, geometry, told=canopy_shares.in_words(shares), **said, **provenance)
-    return made_of(out, even_canopy(lai, **optics, **shares, **how, **light))
+    below = "raster" if is_raster(stand.background) else ",".join(f"{value:g}" for value in stand.background)
+    provenance = {"background": below} | provenance
+    told, angles = in_words(stand.canopy), str(leaf_angle_classes(stand.canopy.leaf_angles))
+    out = _labelled(out, lai, bands, light.geometry, angles, told, provenance)
+    return made_of(out, even_canopy(lai, stand, light, exact))
 
 
-def labelled(reflectance, lai, bands, wavelengths, geometry, *, leaf_angles, told="", **provenance):
+def reflectance_of_classes(lai, cover, bands, stands, light, *, exact=False, **provenance):
     """
-    Reflectance of a scene with its bands, place, directions and attributes.
+    Reflectance factor of canopies of several classes over their backgrounds, for flat ground.
 
     Parameters
     ----------
-    reflectance : xarray.DataArray, dims (band, y, x)
     lai : xarray.DataArray, dims (y, x)
-    bands, wavelengths, geometry
+        [m2 m-2]
+    cover : xarray.DataArray, dims (y, x)
+        Codes; -1 and NaN give NaN.
+    stands : dict of int to fifesim.ground.canopy.rasters.evaluation.BandCanopy
+        By code.
+    bands, light, exact, **provenance
         As in `level_reflectance`.
-    leaf_angles, told : str
-        Leaf angles, and what else there is to tell, for a line of the history.
-    **provenance : str or number
-        Further attributes.
 
     Returns
     -------
     reflectance : xarray.DataArray, dims (band, y, x)
+        The same bits as of each class alone. [1]
+
+    Raises
+    ------
+    ValueError
+        As in `level_reflectance`; when computed, if a cell has another code.
     """
-    out = reflectance.assign_coords(cf.band_coordinates(band=bands, wavelength=wavelengths))
-    out = directions.with_geometry(grids.place(out, grids.geobox(lai)), geometry)
-    said = f"surface_reflectance: SAIL, {leaf_angles} leaves, {told}{_directions(geometry)}"
-    return cf.label(out, "surface_reflectance", source=lai, history=said, leaf_angles=leaf_angles, **provenance)
+    lai = checked_scene(lai)
+    kernels, distinct = {}, []
+    for code, stand in stands.items():
+        alike = [kernel for other, kernel in distinct if _same(stand, other)]
+        kernels[code] = alike[0] if alike else canopy_kernel(lai, [band.name for band in bands], stand, light, exact)
+        distinct.append((stand, kernels[code]))
+    out = by_class(kernels, cover, lai, bands=len(bands))
+    angles = dict.fromkeys(str(leaf_angle_classes(each.canopy.leaf_angles)) for each in stands.values())
+    return _labelled(out, lai, bands, light.geometry, " and ".join(angles), "", {"background": "by class"} | provenance)
 
 
-def fpar(
-    lai,
-    *,
-    geometry=None,
-    time=None,
-    leaf_angles="spherical",
-    fpar_inf=absorption.FPAR_INF,
-    leaves="all",
-    brown=0.0,
-    dissociation=0.0,
-    crown_cover=1.0,
-):
+def same_properties(one, other, names):
+    """Whether some properties of two canopies are known to be the same."""
+    return all(_same(getattr(one, name), getattr(other, name)) for name in names)
+
+
+def _same(one, other):
+    """Whether two values are known to be the same; of rasters, those that are one object."""
+    if one is other:
+        return True
+    if isinstance(one, Canopy) and isinstance(other, Canopy):
+        return same_properties(one, other, ("hotspot", "crown_shape", *ABSORBING))
+    if isinstance(one, tuple | list):
+        return isinstance(other, tuple | list) and len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, np.ndarray):
+        return isinstance(other, np.ndarray) and np.array_equal(one, other)
+    return isinstance(one, str | float | int) and isinstance(other, str | float | int) and one == other
+
+
+def _labelled(reflectance, lai, bands, geometry, angles, told, provenance):
+    """Reflectance of a scene with its bands, place, directions and attributes."""
+    names, wavelengths = ([getattr(band, name) for band in bands] for name in ("name", "wavelength"))
+    coordinates = cf.band_coordinates(band=names, wavelength=wavelengths) | directions.coordinates_of(geometry)
+    out = grids.place(reflectance, grids.geobox(lai), coordinates)
+    history = f"surface_reflectance: SAIL, {angles} leaves, {told}{_directions(geometry)}"
+    return cf.label(out, "surface_reflectance", source=lai, history=history, leaf_angles=angles, **provenance)
+
+
+def fpar(lai, canopy, *, geometry=None, time=None, fpar_inf=absorption.FPAR_INF, leaves="all"):
     """
     Fraction of photosynthetically active radiation that a canopy absorbs, or its green leaves.
 
@@ -150,7 +137,8 @@ def fpar(
     ----------
     lai : xarray.DataArray, dims (y, x)
         [m2 m-2]
-    geometry, time, leaf_angles, fpar_inf, leaves, brown, dissociation, crown_cover : optional
+    canopy : Canopy
+    geometry, time, fpar_inf, leaves : optional
         As in `fifesim.fpar`.
 
     Returns
@@ -175,38 +163,28 @@ def fpar(
     if "sza" in directions.varying(geometry):
         directions.uniform_geometry(geometry, "fpar")
     lai = checked_scene(lai)
-    said = {"leaf_angles": leaf_angles, "fpar_inf": fpar_inf, "leaves": leaves}
-    shares = {"brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
-    kernel, rasters, shares = fpar_kernel(lai, geometry, **said, **shares)
+    kernel, rasters = fpar_kernel(lai, canopy, geometry, fpar_inf, leaves)
     out = chunking.pointwise(kernel, lai, *rasters)
     out = grids.place(out, grids.geobox(lai))
     of = "" if leaves == "all" else "green leaves, "
-    extinction = absorption.extinction_coefficient(float(geometry.sza), leaf_angles)
-    said = f"fpar: Beer's law, {of}{canopy_shares.in_words(shares)}K {float(extinction):.4f}, limit {fpar_inf:g}"
-    return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=lai, history=said)
+    extinction = absorption.extinction_coefficient(float(geometry.sza), canopy.leaf_angles)
+    told = in_words(canopy, _absorbing(leaves))
+    history = f"fpar: Beer's law, {of}{told}K {float(extinction):.4f}, limit {fpar_inf:g}"
+    return cf.label(out, "green_fpar" if leaves == "green" else "fpar", source=lai, history=history)
 
 
-def fpar_kernel(
-    lai,
-    geometry,
-    *,
-    leaf_angles="spherical",
-    fpar_inf=absorption.FPAR_INF,
-    leaves="all",
-    brown=0.0,
-    dissociation=0.0,
-    crown_cover=1.0,
-):
+def fpar_kernel(lai, canopy, geometry, fpar_inf=absorption.FPAR_INF, leaves="all"):
     """
     Kernel of the light that a canopy absorbs, and the rasters that it takes.
 
     Parameters
     ----------
     lai : xarray.DataArray, dims (y, x), or None
-        Whose CRS the rasters have where they lost theirs.
+        Its CRS is that of rasters that lost theirs.
+    canopy : Canopy
     geometry : fifesim.base.geometry.Geometry or xarray.Dataset
         Of one sun.
-    leaf_angles, fpar_inf, leaves, brown, dissociation, crown_cover : optional
+    fpar_inf, leaves : optional
         As in `fpar`.
 
     Returns
@@ -214,8 +192,6 @@ def fpar_kernel(
     kernel : callable
         ``kernel(lai, *blocks)`` gives the fraction from leaf area, and blocks of the rasters. [1]
     rasters : list of xarray.DataArray
-    shares : dict of str to float or xarray.DataArray
-        Those that it uses.
 
     Raises
     ------
@@ -226,15 +202,27 @@ def fpar_kernel(
         raise ValueError(f"fpar_inf must be in (0, 1], got {fpar_inf:g}: it is a fraction, 0.94 in the paper")
     if leaves not in ("all", "green"):
         raise ValueError(f"leaves must be 'all' or 'green', got {leaves!r}: which of them absorb the light")
-    shares = {"crown_cover": canopy_shares.share("crown_cover", crown_cover, lai)}
-    if leaves == "green":
-        shares |= {"brown": canopy_shares.share("brown", brown, lai)}
-        shares |= {"dissociation": canopy_shares.share("dissociation", dissociation, lai)}
     sza = float(geometry.sza)
-    extinction = float(absorption.extinction_coefficient(sza, leaf_angles))
-    light = {"extinction": extinction, "fpar_inf": fpar_inf, "sza": sza}
-    kernel, rasters = canopy_shares.with_shares(partial(_fpar, **light), shares)
-    return kernel, rasters, shares
+    extinction = float(absorption.extinction_coefficient(sza, canopy.leaf_angles))
+    varying, numbers = shares_of(canopy, _absorbing(leaves), lai)
+    return partial(_fpar, extinction, fpar_inf, sza, tuple(varying), numbers), list(varying.values())
+
+
+def _absorbing(leaves):
+    """Properties that the light absorbed by all or by green leaves depends on."""
+    return SHARES if leaves == "green" else ("crown_cover",)
+
+
+def _fpar(extinction, fpar_inf, sza, varying, numbers, lai, *blocks):
+    shares = numbers | dict(zip(varying, blocks, strict=True))
+    lai, cover = check_map(lai), shares.pop("crown_cover")
+    light = {"extinction": extinction, "fpar_inf": fpar_inf}
+    absorbed = partial(absorption.green_fpar, **light, **shares) if shares else partial(absorption.fpar, **light)
+    if not isinstance(cover, np.ndarray) and cover == 1:
+        return absorbed(lai)
+    check_crowns(lai, cover)
+    lit = crown_shares(cover, SHAPE, sza, 0.0, 0.0).sun
+    return lit * absorbed(lai_in_crowns(lai, cover))
 
 
 def checked_scene(lai):
@@ -285,12 +273,3 @@ def _directions(geometry):
         f"{name} varying" if name in directions.varying(geometry) else f"{name} {getattr(geometry, name):.2f}"
         for name in ("sza", "vza")
     )
-
-
-def _fpar(lai, *, extinction, fpar_inf, sza, crown_cover, **kinds):
-    lai, light = check_map(lai), {"extinction": extinction, "fpar_inf": fpar_inf}
-    if not isinstance(crown_cover, np.ndarray) and crown_cover == 1:
-        return absorption.green_fpar(lai, **light, **kinds) if kinds else absorption.fpar(lai, **light)
-    check_crowns(lai, crown_cover)
-    inside, lit = lai_in_crowns(lai, crown_cover), crown_shares(crown_cover, SHAPE, sza, 0.0, 0.0).sun
-    return lit * (absorption.green_fpar(inside, **light, **kinds) if kinds else absorption.fpar(inside, **light))

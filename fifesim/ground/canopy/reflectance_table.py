@@ -1,17 +1,35 @@
-"""Canopy reflectance of many cells: SAIL once per scene, then a table over leaf area index."""
+"""Reflectance of a canopy in many cells: by the models themselves, or interpolated in tables of what cells share."""
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from fifesim.ground.canopy.background import over_background, reflectance_factor
-from fifesim.ground.canopy.cell_reflectance import varied_reflectance
-from fifesim.ground.canopy.crowns import SHAPE
+from fifesim.ground.canopy.absorption import extinction_coefficient
+from fifesim.ground.canopy.background import over_background, reflectance_factor, with_background
+from fifesim.ground.canopy.crowns import (
+    SHAPE,
+    check_crowns,
+    clumped,
+    crown_shares,
+    crown_terms,
+    crowns_over_background,
+    lai_in_crowns,
+)
+from fifesim.ground.canopy.foliage_interpolation import interpolate_crowned, interpolate_foliage
+from fifesim.ground.canopy.foliage_table import crown_table, tabulate_foliage
 from fifesim.ground.canopy.lai_table import interpolate, interpolate_over, tabulate
-from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.ground.canopy.layers import two_layers
+from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
+from fifesim.ground.canopy.leaf_area import check_lai
 from fifesim.ground.canopy.optics import check_background, check_leaf_optics
 from fifesim.ground.canopy.ranges import check_share
-from fifesim.ground.canopy.scene import Scene, canopy_of, cell_by_cell, check_cells, decay, reflectance_of, sky_of
+from fifesim.ground.canopy.sail_model import sail
+
+_BLOCK = 2**15  # cells evaluated at a time, to bound memory
+
+# Background reflectances for which a table of terms is tested.
+_GROUNDS = (0.0, 0.5, 1.0)
 
 
 def canopy_reflectance(
@@ -93,64 +111,60 @@ def canopy_reflectance(
     0.15
     """
     lai, background = np.asarray(lai, float), np.asarray(background, float)
-    bands = np.broadcast_shapes((1,), *(np.shape(v) for v in (leaf_reflectance, leaf_transmittance, diffuse_fraction)))
+    leaf = leaf_reflectance, leaf_transmittance
+    dead = brown_reflectance, brown_transmittance
+    dead = None if any(each is None for each in dead) else dead
+    bands = np.broadcast_shapes(*map(np.shape, (*leaf, diffuse_fraction)), background.shape[: background.ndim < 2])
+    scene = uniform_scene(leaf, diffuse_fraction, (sza, vza, raa), leaf_angles, hotspot, dead, crown_shape, bands)
+    scene = with_shares(scene, lai.shape, brown, dissociation, crown_cover)
+    return scene_reflectance(lai, background, scene, exact)
+
+
+def scene_reflectance(lai, background, scene, exact=False):
+    """Reflectance of cells, shape (band,) + lai.shape, from leaf area of any shape, a background and a Scene."""
+    bands, cells = len(scene.leaf_reflectance), lai.shape
     uniform = background.ndim < 2
-    if uniform:
-        bands = np.broadcast_shapes(bands, background.shape)
-    leaves = map(_numbers, (leaf_reflectance, leaf_transmittance, diffuse_fraction))
-    dead = tuple(map(_numbers, (brown_reflectance, brown_transmittance)))
-    scene = _even(*leaves, bands, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
-    scene = scene._replace(**_kinds(lai, brown, dissociation, dead, bands), **_crowns(lai, crown_cover, crown_shape))
     if not (exact or scene.varies()):
         check_cells(lai, background, scene)
         if uniform:
-            return interpolate(_surface_table(_per_band(background, bands), scene), lai)
+            return interpolate(_surface_table(_per_band(background, (bands,)), scene), lai)
         return interpolate_over(_layer_table(scene), lai, background)
-    if uniform:
-        ground = np.broadcast_to(background, bands)[:, None]
-    else:
-        ground = np.broadcast_to(background, bands + lai.shape).reshape(*bands, -1)
-    kernel = _exact_reflectance if exact else varied_reflectance
-    return kernel(lai.reshape(-1), ground, scene).reshape(bands + lai.shape)
+    ground = np.broadcast_to(background, (bands,) if uniform else (bands, *cells)).reshape(bands, -1)
+    if exact:
+        check_cells(lai.reshape(-1), ground, scene)
+    kernel = cell_by_cell if exact else varied_reflectance
+    return kernel(lai.reshape(-1), ground, scene).reshape(bands, *cells)
 
 
-def even_table(
-    leaf_reflectance,
-    leaf_transmittance,
-    background,
-    *,
-    sza,
-    vza,
-    raa,
-    leaf_angles,
-    hotspot,
-    diffuse_fraction,
-):
-    """
-    Table by which `canopy_reflectance` interpolates where cells differ in their green leaf area alone.
+def uniform_scene(leaf, sky, directions, leaf_angles, hotspot, dead=None, crown_shape=SHAPE, bands=(1,)):
+    """Scene without gaps or dead leaves, whose optics (reflectance, transmittance) are the same in all cells."""
+    if not 0 <= crown_shape < np.inf:
+        raise ValueError(f"crown_shape must be at least 0, got {crown_shape:g}: it is crown diameter over height")
+    for optics in (leaf, dead or leaf):
+        check_leaf_optics(*optics)
+    bands = np.broadcast_shapes(bands, (1,), *map(np.shape, (*leaf, sky)))
+    of_leaves = [_per_band(each, bands) for each in (*leaf, sky)]
+    of_dead = [None, None] if dead is None else [_per_band(each, bands) for each in dead]
+    angles = map(float, directions)
+    scene = Scene(*of_leaves, *angles, leaf_angle_classes(leaf_angles), float(hotspot), *of_dead)
+    return scene._replace(crown_shape=float(crown_shape))
 
-    Parameters
-    ----------
-    leaf_reflectance, leaf_transmittance, background, diffuse_fraction : array, shape (band,)
-        [1]
-    sza, vza, raa, leaf_angles, hotspot
-        As in `canopy_reflectance`.
 
-    Returns
-    -------
-    table : fifesim.ground.canopy.lai_table.LaiTable
-        A column for each band.
+def with_shares(scene, cells, brown=0.0, dissociation=0.0, crown_cover=1.0):
+    """Scene with dead leaves and crowns: numbers, or arrays that broadcast to the shape of the cells."""
+    if not np.ndim(brown) and brown == 0:
+        brown, dissociation = 0.0, 0.0
+    elif scene.brown_reflectance is None:
+        raise ValueError("brown leaves need optics of their own: give brown_reflectance and brown_transmittance")
+    check_share("dissociation", dissociation)
+    shares = (_of_cells(each, cells) for each in (brown, dissociation, crown_cover))
+    return scene._replace(**dict(zip(("brown", "dissociation", "crown_cover"), shares, strict=True)))
 
-    Raises
-    ------
-    ValueError
-        As in `canopy_reflectance`.
-    """
+
+def surface_table(background, scene):
+    """Table of the reflectance of each band over leaf area, for a scene of numbers and a background of each band."""
     check_background(background)
-    bands = np.shape(leaf_reflectance)
-    leaves = map(_numbers, (leaf_reflectance, leaf_transmittance, diffuse_fraction))
-    scene = _even(*leaves, bands, float(sza), float(vza), float(raa), leaf_angle_classes(leaf_angles), float(hotspot))
-    return _surface_table(_per_band(background, bands), scene)
+    return _surface_table(tuple(background), scene)
 
 
 def directional_reflectance(
@@ -219,39 +233,15 @@ def directional_reflectance(
     )
     missing = np.isnan(sza + vza + raa)
     sza, vza, raa = (np.where(missing, 0.0, angle) for angle in (sza, vza, raa))
-    leaves = leaf_angle_classes(leaf_angles)
-    scene = Scene(leaf_reflectance, leaf_transmittance, sky, sza, vza, raa, leaves, hotspot)
-    kinds = _kinds(lai.reshape(cells), brown, dissociation, (brown_reflectance, brown_transmittance))
-    scene = scene._replace(**kinds, **_crowns(lai.reshape(cells), crown_cover, crown_shape))
-    out = _exact_reflectance(lai, ground, scene)
+    scene = Scene(leaf_reflectance, leaf_transmittance, sky, sza, vza, raa, leaf_angle_classes(leaf_angles), hotspot)
+    if brown_reflectance is not None and brown_transmittance is not None:
+        dead = _leaves_by_cell(brown_reflectance, brown_transmittance, cells)
+        scene = scene._replace(brown_reflectance=dead[0], brown_transmittance=dead[1])
+    scene = with_shares(scene, cells, brown, dissociation, crown_cover)._replace(crown_shape=float(crown_shape))
+    check_cells(lai, ground, scene)
+    out = cell_by_cell(lai, ground, scene)
     out[:, np.broadcast_to(missing, lai.shape)] = np.nan
     return out.reshape(bands, *cells)
-
-
-@lru_cache(maxsize=32)
-def _even(reflectance, transmittance, sky, bands, sza, vza, raa, leaf_angles, hotspot):
-    """Scene of green leaves whose optics, directions and angles are the same in all cells."""
-    check_leaf_optics(reflectance, transmittance)
-    optics = (_per_band(each, bands) for each in (reflectance, transmittance, sky))
-    return Scene(*optics, sza, vza, raa, leaf_angles, hotspot)
-
-
-@lru_cache(maxsize=32)
-def _dead(reflectance, transmittance, bands):
-    """Optics of dead leaves that are the same in all cells."""
-    check_leaf_optics(reflectance, transmittance)
-    return _per_band(reflectance, bands), _per_band(transmittance, bands)
-
-
-def _numbers(values):
-    """Numbers that a cache can look up; of optics that are not given, None."""
-    return None if values is None else tuple(np.ravel(values).tolist())
-
-
-def _exact_reflectance(lai, background, scene):
-    """Reflectance factor of cells by the models themselves, once they are checked."""
-    check_cells(lai, background, scene)
-    return cell_by_cell(lai, background, scene)
 
 
 def _leaves_by_cell(reflectance, transmittance, cells):
@@ -265,30 +255,9 @@ def _leaves_by_cell(reflectance, transmittance, cells):
     return tuple(np.ascontiguousarray(np.broadcast_to(each, shape).reshape(-1, shape[-1]).T) for each in (rho, tau))
 
 
-def _kinds(lai, brown, dissociation, dead, bands=None):
-    """What a scene has of dead leaves; optics of all of them by band, unless it is cells that have theirs."""
-    if not np.ndim(brown) and brown == 0:
-        return {}
-    if any(optics is None for optics in dead):
-        raise ValueError("brown leaves need optics of their own: give brown_reflectance and brown_transmittance")
-    check_share("dissociation", dissociation)
-    dead = _leaves_by_cell(*dead, lai.shape) if bands is None else _dead(*dead, bands)
-    optics = dict(zip(("brown_reflectance", "brown_transmittance"), dead, strict=True))
-    return {"brown": _of_cells(brown, lai), "dissociation": _of_cells(dissociation, lai)} | optics
-
-
-def _crowns(lai, crown_cover, crown_shape):
-    """What a scene has of crowns."""
-    if not np.ndim(crown_cover) and crown_cover == 1:
-        return {}
-    if not 0 <= crown_shape < np.inf:
-        raise ValueError(f"crown_shape must be at least 0, got {crown_shape:g}: it is crown diameter over height")
-    return {"crown_cover": _of_cells(crown_cover, lai), "crown_shape": float(crown_shape)}
-
-
-def _of_cells(value, lai):
+def _of_cells(value, cells):
     """A number, or values of cells, shape (n,)."""
-    return np.broadcast_to(np.asarray(value, float), lai.shape).reshape(-1) if np.ndim(value) else float(value)
+    return np.broadcast_to(np.asarray(value, float), cells).reshape(-1) if np.ndim(value) else float(value)
 
 
 def _per_band(values, bands):
@@ -306,17 +275,214 @@ def _surface_table(background, scene):
 @lru_cache(maxsize=32)
 def _layer_table(scene):
     """Table of the terms of `interpolate_over`; the reflectance must hold for every background."""
+    sky = sky_of(scene)
+    rate = decay(scene) / (scene.crown_cover or 1.0)
+    return tabulate(lambda lai: _layer_terms(canopy_of(lai, scene), sky), rate, _over_grounds)
 
-    def terms(lai):
-        c, sky = canopy_of(lai, scene), sky_of(scene)
-        alone = reflectance_factor(c.rso, c.rdo, sky)
-        hot = (1 - sky) * (c.tsstoo - c.tss * c.too)
-        through = reflectance_factor(c.tss + c.tsd, c.tdd, sky) * (c.too + c.tdo)
-        columns = np.broadcast_arrays(alone, hot, through, c.rdd_below)
-        return np.stack(columns, axis=1).reshape(-1, lai.size)
+
+def _layer_terms(canopy, sky):
+    """Terms of `over_background` for each band: reflected above, seen beyond chance, let through, reflected below."""
+    c = canopy
+    alone = reflectance_factor(c.rso, c.rdo, sky)
+    hot = (1 - sky) * (c.tsstoo - c.tss * c.too)
+    through = reflectance_factor(c.tss + c.tsd, c.tdd, sky) * (c.too + c.tdo)
+    columns = np.broadcast_arrays(alone, hot, through, c.rdd_below)
+    return np.stack(columns, axis=1).reshape(-1, columns[0].shape[-1])
+
+
+def _over_grounds(values):
+    """Reflectances over the backgrounds for which a table of `_layer_terms` is tested."""
+    terms = values.reshape(-1, 4, values.shape[1]).swapaxes(0, 1)
+    return np.stack([over_background(*terms, r) for r in _GROUNDS])
+
+
+class Scene(NamedTuple):
+    """
+    Leaves, their order, and directions; numbers, or arrays whose last axis are cells.
+
+    Optics and the sky's share are tuples over bands, or arrays of shape (band, 1) or (band, n).
+    """
+
+    leaf_reflectance: tuple | np.ndarray
+    leaf_transmittance: tuple | np.ndarray
+    sky: tuple | np.ndarray
+    sza: float | np.ndarray
+    vza: float | np.ndarray
+    raa: float | np.ndarray
+    leaf_angles: LeafAngles
+    hotspot: float
+    brown_reflectance: tuple | np.ndarray | None = None
+    brown_transmittance: tuple | np.ndarray | None = None
+    brown: float | np.ndarray = 0.0
+    dissociation: float | np.ndarray = 0.0
+    crown_cover: float | np.ndarray = 1.0
+    crown_shape: float = SHAPE
+
+    def varies(self):
+        """
+        Whether leaves or crowns differ from cell to cell.
+
+        Returns
+        -------
+        answer : bool
+        """
+        return any(isinstance(each, np.ndarray) for each in (self.brown, self.dissociation, self.crown_cover))
+
+    def part(self, cells):
+        """
+        The same for some of the cells: of arrays that vary, whose last axis they are.
+
+        Parameters
+        ----------
+        cells : slice or array of int
+
+        Returns
+        -------
+        scene : Scene
+        """
+        by_cell = {name: v for name, v in self._asdict().items() if isinstance(v, np.ndarray) and v.shape[-1:] > (1,)}
+        return self._replace(**{name: values[..., cells] for name, values in by_cell.items()})
+
+
+def canopy_of(lai, scene):
+    """Reflectances and transmittances of the canopy of cells, a Canopy of shape (band, n) [1]."""
+    if _is(scene.crown_cover, 1):
+        return leaves_of(lai, scene)
+    shares = crown_shares(scene.crown_cover, scene.crown_shape, scene.sza, scene.vza, scene.raa)
+    return clumped(leaves_of(lai_in_crowns(lai, scene.crown_cover), scene), shares)
+
+
+def leaves_of(lai, scene):
+    """Reflectances and transmittances of leaves without gaps between crowns, from leaf area within crowns."""
+    names = "sza", "vza", "raa", "leaf_angles", "hotspot"
+    given = {name: getattr(scene, name) for name in names}
+    leaf = _by_band(scene.leaf_reflectance), _by_band(scene.leaf_transmittance)
+    if _is(scene.brown, 0):
+        return sail(lai, *leaf, **given)
+    dead = _by_band(scene.brown_reflectance), _by_band(scene.brown_transmittance)
+    return two_layers(lai, *leaf, *dead, brown=scene.brown, dissociation=scene.dissociation, **given)
+
+
+def sky_of(scene):
+    """Diffuse fraction, shape (band, 1) or (band, n) [1]."""
+    return _by_band(scene.sky)
+
+
+def reflectance_of(lai, background, scene):
+    """Reflectance factor of cells by the models themselves, shape (band, n) [1]."""
+    surface = with_background(canopy_of(lai, scene), background)
+    return reflectance_factor(surface.rso, surface.rdo, sky_of(scene))
+
+
+def cell_by_cell(lai, background, scene):
+    """Reflectance factor of cells by the models themselves, a block of cells at a time."""
+    background = np.broadcast_to(background, (len(background), lai.size))
+    out = np.empty(background.shape)
+    for start in range(0, lai.size, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        out[:, block] = reflectance_of(lai[block], background[:, block], scene.part(block))
+    return out
+
+
+def check_cells(lai, background, scene):
+    """Raise ValueError if leaf area, background, dead share or crown cover are out of range; NaN passes."""
+    check_lai(lai)
+    check_background(background)
+    check_share("brown", scene.brown)
+    if not _is(scene.crown_cover, 1):
+        check_crowns(lai, scene.crown_cover)
+
+
+def decay(scene):
+    """Fastest decay with leaf area within crowns: sunbeam and view together, or diffuse light."""
+    down, up = (extinction_coefficient(angle, scene.leaf_angles) for angle in (scene.sza, scene.vza))
+    return max(1.0, down + up)
+
+
+def _is(value, number):
+    return not isinstance(value, np.ndarray) and value == number
+
+
+def _by_band(values):
+    """Shape (band, 1) or (band, n)."""
+    return np.reshape(values, (len(values), -1))
+
+
+def varied_reflectance(lai, background, scene):
+    """
+    Reflectance factor of cells whose dead share, dissociation or crown cover are arrays.
+
+    Parameters
+    ----------
+    lai : array, shape (n,)
+        [m2 m-2]
+    background : array, shape (band, n) or (band, 1)
+        [1]
+    scene : Scene
+        All else in it are numbers.
+
+    Returns
+    -------
+    reflectance : array, shape (band, n)
+        Within 1e-6 of that of `cell_by_cell`; which it is where the dissociation is an array, and where the leaf area
+        index within crowns is above `foliage_table.LIMIT`. [1]
+
+    Raises
+    ------
+    ValueError
+        As `check_cells`.
+    """
+    if isinstance(scene.dissociation, np.ndarray):
+        check_cells(lai, background, scene)
+        return cell_by_cell(lai, background, scene)
+    by_brown = isinstance(scene.brown, np.ndarray)
+    # A table over the dead share is the same whatever that is.
+    alike, brown = (scene._replace(brown=-1.0) if by_brown else scene), np.atleast_1d(scene.brown)
+    if isinstance(scene.crown_cover, np.ndarray):
+        table = _crown_terms_table(alike._replace(crown_cover=1.0, crown_shape=SHAPE), by_brown)
+        crowns = _crown_table(scene.crown_shape, scene.sza, scene.vza, scene.raa)
+        out, wrong = interpolate_crowned(table, crowns, lai, brown, scene.crown_cover, background)
+    else:
+        inside = lai if scene.crown_cover == 1 else lai_in_crowns(lai, scene.crown_cover)
+        out, wrong = interpolate_foliage(_joined_table(alike), inside, brown, background)
+    if wrong:
+        check_cells(lai, background, scene)
+    if np.fmax.reduce(out[0], initial=0.0) == np.inf:
+        cells = np.flatnonzero(out[0] == np.inf)
+        out[:, cells] = cell_by_cell(lai[cells], np.broadcast_to(background, out.shape)[:, cells], scene.part(cells))
+    return out
+
+
+_crown_table = lru_cache(maxsize=32)(crown_table)
+
+
+@lru_cache(maxsize=32)
+def _joined_table(scene):
+    """Table of the terms of `over_background`, over leaf area within crowns and its dead share."""
+    sky = sky_of(scene)
+
+    def terms(lai, brown):
+        c = leaves_of(lai, scene._replace(brown=brown))
+        if scene.crown_cover != 1:
+            c = clumped(c, crown_shares(scene.crown_cover, scene.crown_shape, scene.sza, scene.vza, scene.raa))
+        return _layer_terms(c, sky)
+
+    return tabulate_foliage(terms, decay(scene), combine=_over_grounds)
+
+
+@lru_cache(maxsize=32)
+def _crown_terms_table(scene, by_brown):
+    """Table of the terms of `crowns_over_background`."""
+    sky = sky_of(scene)
+
+    def terms(lai, brown):
+        found = crown_terms(leaves_of(lai, scene._replace(brown=brown) if by_brown else scene), sky)
+        return np.stack(np.broadcast_arrays(*found), axis=1).reshape(-1, lai.size)
 
     def reflectances(values):
-        alone, hot, through, rdd = values.reshape(-1, 4, values.shape[1]).swapaxes(0, 1)
-        return np.stack([over_background(alone, hot, through, rdd, r) for r in (0.0, 0.5, 1.0)])
+        """Crowns without gaps have the largest errors, of all terms."""
+        by_band = tuple(values.reshape(len(sky), -1, values.shape[1]).swapaxes(0, 1))
+        over = [crowns_over_background(by_band, (1.0, 1.0, 1.0, 0.0, 1.0), r) for r in _GROUNDS]
+        return np.concatenate([values, *over])
 
-    return tabulate(terms, decay(scene) / (scene.crown_cover or 1.0), reflectances)
+    return tabulate_foliage(terms, decay(scene), by_brown, reflectances)

@@ -7,12 +7,14 @@ from functools import lru_cache
 import numpy as np
 from scipy import stats
 
+from fifesim.ground.canopy.description import TALLGRASS, Canopy
+from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.canopy.spectra import Background
 from fifesim.ground.canopy.spectrum import Spectrum
 from fifesim.ground.landscape.classes import CoverClass
 
-_KINDS = {kind.__name__: kind for kind in (Leaf, Background, Spectrum)}
+_KINDS = {kind.__name__: kind for kind in (Canopy, Leaf, Background, Spectrum)}
 
 
 def table_text(table):
@@ -31,11 +33,12 @@ def table_text(table):
 
     Examples
     --------
-    >>> table_text([CoverClass("water", lai=0, background=0.03, code=1)])
-    '[{"name": "water", "lai": 0, "background": 0.03, "code": 1}]'
+    >>> table_text([CoverClass("water", lai=0, canopy=Canopy(background=0.03), code=1)])
+    '[{"name": "water", "lai": 0, "canopy": {"Canopy": {"background": 0.03}}, "code": 1}]'
     """
-    said = [{each.name: _plain(getattr(row, each.name)) for each in fields(row)} for row in table]
-    return json.dumps([{name: value for name, value in row.items() if value is not None} for row in said])
+    rows = [{each.name: getattr(row, each.name) for each in fields(row)} for row in table]
+    rows = [{name: _plain(value) for name, value in row.items() if value is not TALLGRASS} for row in rows]
+    return json.dumps([{name: value for name, value in row.items() if value is not None} for row in rows])
 
 
 @lru_cache(maxsize=16)
@@ -70,6 +73,8 @@ def read_table(text):
 
 def _plain(value):
     """A value of a class by what JSON has."""
+    if isinstance(value, Canopy):
+        return {"Canopy": {name: _plain(getattr(value, name)) for name in PROPERTIES if name in value.given}}
     if type(value).__name__ in _KINDS:
         return {type(value).__name__: {each.name: _plain(getattr(value, each.name)) for each in fields(value)}}
     if isinstance(value, dict):

@@ -9,29 +9,22 @@ from numbers import Number
 import numpy as np
 
 from fifesim.base.annotations import Distribution, FilePath
-from fifesim.base.kinds import LEAF, described
-from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics
-from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.base.kinds import described
+from fifesim.ground.canopy.description import TALLGRASS, Canopy
 from fifesim.ground.canopy.leaf_area import check_map
 from fifesim.ground.canopy.prospect import Leaf
-from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 
 LARGEST_CODE = 2**15 - 1
 """Of a class in a map: codes are numbers of 16 bits, of which -1 is no data."""
 
-_SHARES = ("brown", "dissociation", "crown_cover", "moisture")
-_RATIOS = ("hotspot", "crown_shape")
-
-OPTICS = ("leaf", "brown_leaf", "background", "leaf_angles", *_RATIOS, *_SHARES, "soil")
-"""What a class may say of its reflectance, beside its leaf area."""
-
 
 @dataclass(frozen=True, eq=False)
 class CoverClass:
     """
-    A class of cover. What it leaves open, the landscape or the call of `surface_reflectance` says.
+    A class of cover. Fields that are not given have the values of the landscape, or of the call of
+    `surface_reflectance`.
 
     Parameters
     ----------
@@ -41,26 +34,9 @@ class CoverClass:
         Distribution of leaf area index as `lai_distribution` takes it, or one number where it is uniform. [m2 m-2]
     arp : float, optional
         Autoregressive parameter of leaf area, in [0, 0.2498]. [1]
-    leaf, brown_leaf : Leaf, mapping or pair, optional
-        Optics of green and of dead leaves, as ``leaf_optics`` of `surface_reflectance`, of numbers. [1]
-    background : float, mapping, Background or str, optional
-        Reflectance below the canopy, as in `surface_reflectance`, of numbers. [1]
-    leaf_angles : str or sequence of float, optional
-        As in `surface_reflectance`.
-    hotspot : float, optional
-        Leaf size over canopy height. [1]
-    brown : float, optional
-        Share of dead leaf area, in [0, 1]. [1]
-    dissociation : float, optional
-        0 where dead leaves are mixed with green ones, 1 where they lie below. [1]
-    crown_cover : float, optional
-        Share of the ground below crowns, in [0, 1]. [1]
-    crown_shape : float, optional
-        Crown diameter over height. [1]
-    soil : float, optional
-        Brightness of the soil, a change of its reflectance along the soil line. [1]
-    moisture : float, optional
-        Of the soil, 0 dry to 1 saturated. [1]
+    canopy : Canopy, optional
+        Leaves, their arrangement and the ground below them, none of them a raster. Fields that are not given have the
+        values of the scene.
     code : int, optional
         Of the class in a map, 0 to 32767; by default classes count from 1.
 
@@ -73,25 +49,15 @@ class CoverClass:
 
     Examples
     --------
-    >>> from fifesim import CoverClass
-    >>> CoverClass("water", lai=0.0, background=0.03).hotspot is None
-    True
+    >>> from fifesim import Canopy, CoverClass
+    >>> CoverClass("water", lai=0.0, canopy=Canopy(background=0.03)).canopy
+    Canopy(background=0.03)
     """
 
     name: str = ""
     lai: FilePath | Distribution | float | None = None
     arp: float | None = None
-    leaf: LeafOptics | None = None
-    brown_leaf: LeafOptics | None = None
-    background: BelowLeaves | None = None
-    leaf_angles: LeafAngles | None = None
-    hotspot: float | None = None
-    brown: float | None = None
-    dissociation: float | None = None
-    crown_cover: float | None = None
-    crown_shape: float | None = None
-    soil: float | None = None
-    moisture: float | None = None
+    canopy: Canopy = TALLGRASS
     code: int | None = None
 
     def __post_init__(self):
@@ -101,39 +67,25 @@ class CoverClass:
             self._check()
 
     def _check(self):
-        for name in ("arp", "soil", *_RATIOS, *_SHARES):
-            value = getattr(self, name)
-            if value is not None and not _is_number(value):
-                raise TypeError(f"{name} must be a number, got {described(value)}: rasters go to landscape()")
         if self.arp is not None:
+            if not _is_number(self.arp):
+                raise TypeError(f"arp must be a number, got {described(self.arp)}")
             check_arp(self.arp)
             if self.arp > LARGEST_STREAMING_ARP:
                 raise ValueError(f"arp must be at most {LARGEST_STREAMING_ARP} in a landscape, got {self.arp:g}")
-        for name in _SHARES:
-            if getattr(self, name) is not None and not 0 <= getattr(self, name) <= 1:
-                raise ValueError(f"{name} must be in [0, 1], got {getattr(self, name):g}: it is a share")
-        for name in _RATIOS:
-            if getattr(self, name) is not None and not 0 <= getattr(self, name) < np.inf:
-                raise ValueError(f"{name} must be at least 0, got {getattr(self, name):g}: it is a ratio")
-        if self.soil is not None:
-            check_brightness(self.soil)
         if self.code is not None:
             _check_code(self.code)
         if _is_number(self.lai):
             check_map(float(self.lai))
         elif self.lai is not None:
             lai_distribution(self.lai)
-        if self.leaf_angles is not None:
-            leaf_angle_classes(self.leaf_angles)
-        for name in ("leaf", "brown_leaf"):
-            value = getattr(self, name)
-            if value is not None and not LEAF.fits(value):
-                raise TypeError(f"{name} must be {LEAF.words}, got {described(value)}")
-        for name in ("leaf", "brown_leaf", "background"):
-            if _has_raster(getattr(self, name)):
+        if not isinstance(self.canopy, Canopy):
+            raise TypeError(f"canopy must be a fifesim.Canopy, got {described(self.canopy)}")
+        for name in self.canopy.given:
+            if _has_raster(getattr(self.canopy, name)):
                 raise TypeError(
-                    f"{name} is the same in all of a class, got one that varies: give it to surface_reflectance, and "
-                    "leave it out of the class"
+                    f"{name} is the same in all of a class, got one that varies: give it to landscape() or "
+                    "surface_reflectance, and leave it out of the class"
                 )
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 from scipy import optimize, stats
 
 from fifesim.base import datasets
-from fifesim.base.annotations import Distribution, FilePath
+from fifesim.base.annotations import Distribution, LaiDistribution
 from fifesim.base.foreign import in_a_line, read_csv
 from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS
 
@@ -42,7 +42,7 @@ def _treatments():
     return tuple(datasets.table("lai_distributions.csv")["treatment"].tolist())
 
 
-def lai_distribution(source: FilePath | Distribution) -> Distribution:
+def lai_distribution(source: LaiDistribution) -> Distribution:
     """
     A frequency distribution of leaf area index.
 

@@ -11,7 +11,7 @@ import pyproj
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Chunks, Distribution, FilePath
+from fifesim.base.annotations import Chunks, LaiDistribution, WholeNumber
 from fifesim.base.foreign import in_a_line
 from fifesim.base.seeds import check_seed
 from fifesim.base.warned import warn
@@ -23,6 +23,7 @@ from fifesim.ground.landscape.quantiles import quantile_map, quantile_table, ran
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import FileOrRaster
 from fifesim.rasters.opening import raster_file
 from fifesim.rasters.packed import scale_and_offset, unpacked
 from fifesim.rasters.sites import made_on_site
@@ -36,10 +37,10 @@ _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 
 def lai_scene(
     grid: GeoBox,
-    distribution: FilePath | Distribution = "burned-grazed",
+    distribution: LaiDistribution = "burned-grazed",
     *,
     arp: float = 0.15,
-    seed: int = 0,
+    seed: WholeNumber = 0,
     method: Literal["streaming", "periodic"] = "streaming",
     chunks: Chunks | None = None,
 ) -> xr.DataArray:
@@ -108,7 +109,7 @@ def lai_scene(
 
 
 def open_lai(
-    path_or_raster: FilePath | xr.DataArray, grid: GeoBox, chunks: Chunks | None = None, *, allow_remote: bool = False
+    path_or_raster: FileOrRaster, grid: GeoBox, chunks: Chunks | None = None, *, allow_remote: bool = False
 ) -> xr.DataArray:
     """
     A user's own map of leaf area index on a grid.

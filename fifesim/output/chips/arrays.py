@@ -56,6 +56,20 @@ class Layout(NamedTuple):
         found |= {name: (("y", "x"), np.dtype(_FLOAT)) for name in planes}
         return found | {name: ((), np.dtype(float)) for name in LIGHT}
 
+    def attributes(self, name):
+        """
+        Attributes of what is stored of each chip.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        attributes : dict
+        """
+        return cf.attributes(name) | ({"cell_methods": "area: mean"} if name in self.truth else {})
+
     def shape(self, dims):
         """
         Lengths of dimensions of a chip.
@@ -218,21 +232,3 @@ def _reflectance(found, layout):
     sza, distance = (found[name][:, None, None, None] for name in ("sza", "earth_sun_distance"))
     mu_s = np.cos(np.radians(sza))
     return calibration.radiance_to_reflectance(radiance, bands["solar_irradiance"], mu_s, distance)
-
-
-def attributes_of(name):
-    """
-    Attributes of what is stored of chips, with what stands for no data.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    attributes : dict
-    """
-    found = dict(cf.attributes(name))
-    if name in ("lai", "fpar", "green_fpar", "brown", "crown_cover", "soil", "moisture"):
-        found["cell_methods"] = "area: mean"
-    return found

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import FilePath
+from fifesim.base.annotations import FilePath, WholeNumber
 from fifesim.base.kinds import described
 from fifesim.base.warned import warn
 from fifesim.ground.landscape.field import TILE
@@ -35,7 +35,7 @@ from fifesim.output.run.saved import has_blocks, save_block, saved_block
 from fifesim.rasters.clients import found_client
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.ground import warn_of_canopy
-from fifesim.scenario.studies import Study, read_study
+from fifesim.scenario.studies import Study, StudyLike, read_study
 
 _FILES = DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.toml"
 
@@ -50,13 +50,13 @@ _LOOKED_AT, _CLOSELY = 1000, 50
 
 
 def dataset(
-    study: FilePath | Study,
+    study: StudyLike,
     folder: FilePath,
     n: int = 1000,
     *,
     overwrite: bool = False,
     resume: bool = False,
-    workers: int = 1,
+    workers: WholeNumber = 1,
     client: Any = None,
 ) -> xr.Dataset:
     """

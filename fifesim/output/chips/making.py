@@ -1,11 +1,12 @@
 """Shards of chips as they come: made in this process, by processes of this machine, or on a cluster."""
 
+from contextlib import closing
+
 import numpy as np
 
 from fifesim.output.chips.arrays import chip_arrays, empty_arrays, make_shard
 from fifesim.output.chips.makers import jobs_of
-
-_RETRIES = 3
+from fifesim.output.run.workers import RETRIES, results_of
 
 
 def made_shards(chips, layout, shards, wanted, advance, *, makers=None, client=None):
@@ -68,20 +69,12 @@ def _by_shard(numbers, shards):
 
 
 def _on_client(client, chips, layout, shards, wanted, advance):
-    from distributed import KilledWorker, as_completed  # there already, where a client is
-
-    options = {"pure": False, "retries": _RETRIES}
+    options = {"pure": False, "retries": RETRIES}
     futures = {
         client.submit(make_shard, chips.study, len(chips), *shards.range_of(shard), layout, **options): shard
         for shard in wanted
     }
-    try:
-        for future, arrays in as_completed(list(futures), loop=client.loop, with_results=True):
-            shard = futures.pop(future)
+    with closing(results_of(client, futures)) as found:
+        for shard, arrays in found:
             yield shard, arrays
             advance(np.diff(shards.range_of(shard)).item())
-            future.release()
-    except KilledWorker as error:
-        raise RuntimeError(f"{error}: has a worker too little memory? What is finished is kept, use --resume") from None
-    finally:
-        client.cancel(list(futures), force=True)

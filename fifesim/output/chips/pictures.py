@@ -3,24 +3,14 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from fifesim.output.composites import dark_and_bright
-from fifesim.output.figures import NAMES
-from fifesim.output.maps import false_colour_names
-
-_NO_DATA = (0.85, 0.85, 0.85)
+from fifesim.output.colours import NO_DATA, colours_of, dark_and_bright, percentile_limits
+from fifesim.output.composites import false_colour_names
+from fifesim.rasters import cf
 
 # Of each part of the split.
 _SHOWN = 4
 
-# Truth in this order, as far as there is any, with its colours.
-_TRUTH = {
-    "lai": "YlGn",
-    "fpar": "viridis",
-    "green_fpar": "viridis",
-    "brown": "copper_r",
-    "soil": "cividis",
-    "moisture": "Blues",
-}
+# Rows of truth at most, in the order of the table of quantities.
 _ROWS = 3
 
 
@@ -43,34 +33,30 @@ def contact_sheet(dataset, parts):
     split = dataset["split"].values
     parts = {name: chips for name in parts if (chips := np.flatnonzero(split == name)[:_SHOWN]).size}
     chosen = dataset.isel(chip=np.concatenate(list(parts.values()))).load()
-    names = [name for name in _TRUTH if name in chosen][:_ROWS]
+    names = [name for name in cf.QUANTITIES if name != "ndvi" and name in chosen and chosen[name].ndim == 3][:_ROWS]
     figure = Figure(figsize=(1.15 * chosen.sizes["chip"] + 1.4, 1.25 * (len(names) + 1) + 0.9), layout="constrained")
     axes = figure.subplots(len(names) + 1, chosen.sizes["chip"], squeeze=False)
     said, drawn = _image_row(axes[0], chosen)
     rows = [(said, drawn)]
-    rows += [
-        (NAMES.get(name, name), _row(row, chosen[name].values, _TRUTH[name]))
-        for row, name in zip(axes[1:], names, strict=True)
-    ]
+    rows += [(cf.QUANTITIES[name].label, _row(row, chosen[name])) for row, name in zip(axes[1:], names, strict=True)]
     for row, (said, drawn) in zip(axes, rows, strict=True):
         row[0].set_ylabel(said.replace(" of ", "\nof "), fontsize=8)
         if drawn is not None:
             figure.colorbar(drawn, ax=row, fraction=0.01, pad=0.005).ax.tick_params(labelsize=7)
     for axis in axes.flat:
-        axis.set(xticks=[], yticks=[], facecolor=_NO_DATA)
+        axis.set(xticks=[], yticks=[], facecolor=NO_DATA)
     shown = [(name, chip, not at) for name, chips in parts.items() for at, chip in enumerate(chips)]
     for axis, (name, chip, is_first) in zip(axes[0], shown, strict=True):
         axis.set_title(f"{name if is_first else ''}\nchip {chip}", fontsize=8, fontweight="bold" if is_first else None)
     return figure
 
 
-def _row(axes, values, colours):
+def _row(axes, array):
     """One quantity of all chips."""
-    finite = values[np.isfinite(values)]
-    low, high = np.percentile(finite, (0.5, 99.5)) if finite.size else (0.0, 1.0)
-    high = max(high, low + 1e-6)
-    style = {"cmap": colours, "vmin": low, "vmax": high, "interpolation": "nearest"}
-    drawn = [axis.imshow(each, **style) for axis, each in zip(axes, values, strict=True)]
+    colours, middle = colours_of(array.name)
+    low, high = percentile_limits(array, middle=middle)
+    style = {"cmap": colours, "vmin": low, "vmax": max(high, low + 1e-6), "interpolation": "nearest"}
+    drawn = [axis.imshow(each, **style) for axis, each in zip(axes, array.values, strict=True)]
     return drawn[0]
 
 
@@ -78,10 +64,10 @@ def _image_row(axes, chosen):
     """Images in false colours; without the bands for these their NDVI; without that one band. What it is, and a bar."""
     names = false_colour_names(chosen["toa_reflectance"])
     if not names and "ndvi" in chosen:
-        return "NDVI of the image", _row(axes, chosen["ndvi"].values, "YlGn")
+        return f"{cf.QUANTITIES['ndvi'].label} of the image", _row(axes, chosen["ndvi"])
     said, names = ",\n".join(names or chosen["band"].values[-1:]), names or [chosen["band"].values[-1]] * 3
     layers = chosen["toa_reflectance"].sel(band=names).values
-    limits = [dark_and_bright(each[np.isfinite(each)]) for each in layers.swapaxes(0, 1)]
+    limits = [dark_and_bright(each) for each in layers.swapaxes(0, 1)]
     dark, bright = np.array(limits).T[:, :, None, None]
     stretched = np.clip((layers - dark) / np.maximum(bright - dark, 1e-6), 0, 1)
     valid = np.isfinite(layers).all(axis=1, keepdims=True)

@@ -7,7 +7,6 @@ import zlib
 
 import numpy as np
 
-from fifesim.output.chips.arrays import attributes_of
 from fifesim.output.provenance import versions
 from fifesim.rasters import cf
 from fifesim.scenario.ensemble import LIGHT
@@ -118,7 +117,7 @@ def make_store(folder, chips, layout, shards):
             compressors=codec,
             fill_value=0 if number else np.nan,
             dimension_names=("chip", *dims),
-            attributes=attributes_of(name) | ({"_FillValue": 0} if number else {}),
+            attributes=layout.attributes(name) | ({"_FillValue": 0} if number else {}),
         )
     with warnings.catch_warnings():
         # All readers of Zarr 3 pass over what they do not know.

@@ -1,6 +1,7 @@
 """Blocks of lazy arrays computed by dask, in an order that leaves little waiting in memory."""
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from functools import partial
 
 import dask.threaded
@@ -8,8 +9,7 @@ from dask.core import get_deps, quote
 from dask.highlevelgraph import HighLevelGraph, MaterializedLayer
 from dask.order import order
 
-# A worker that dies takes a task with it; one that kills its workers this often is at fault itself.
-_RETRIES = 3
+from fifesim.output.run.workers import RETRIES, results_of
 
 # Outputs whose tasks are put in order together.
 _PIECE = 600
@@ -80,22 +80,16 @@ def run_on_client(graph, outputs, deliver, client):
     Exception
         Whatever a task or ``deliver`` raises.
     """
-    from distributed import KilledWorker, as_completed  # there already, where a client is
-
     ranks = {}
     for tasks, _, _ in _in_pieces(graph, outputs, deliver):
         ranks |= {key: len(ranks) + rank for key, rank in order(tasks).items()}
-    layer = MaterializedLayer(graph, annotations={"priority": _Priority(ranks), "retries": _RETRIES})
+    layer = MaterializedLayer(graph, annotations={"priority": _Priority(ranks), "retries": RETRIES})
     whole = HighLevelGraph({"blocks": layer}, {"blocks": set()})
     futures = dict(zip(client.get(whole, list(outputs), sync=False, optimize_graph=False), outputs, strict=True))
-    try:
-        for future, result in as_completed(list(futures), loop=client.loop, with_results=True):
-            deliver(*outputs[futures.pop(future)], result)
-            future.release()
-    except KilledWorker as error:
-        raise RuntimeError(f"{error}: has a worker too little memory? What is finished is kept, use --resume") from None
-    finally:
-        client.cancel(list(futures), force=True)
+    # Closed even if a delivery fails, so that no task goes on.
+    with closing(results_of(client, futures)) as found:
+        for key, result in found:
+            deliver(*outputs[key], result)
 
 
 class _Priority:

@@ -12,6 +12,9 @@ _PAGES = ("distributed.scheduler.http.routes", "distributed.worker.http.routes")
 # Without an answer for so long, there is no scheduler. [s]
 _TIMEOUT = 20
 
+RETRIES = 3
+"""How often a task is run again after its worker died; a task that ends more workers than that is at fault itself."""
+
 
 def usable_cores():
     """
@@ -82,6 +85,41 @@ def cluster(workers=None, scheduler=None):
         local.scheduler.http_server.stop()
         client.run(_without_pages)
         yield client
+
+
+def results_of(client, futures):
+    """
+    Results of a cluster, in the order in which they come.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    futures : dict of distributed.Future to object
+        Emptied on the way. Futures that are left at the end are cancelled.
+
+    Yields
+    ------
+    item : object
+        Of the future.
+    result : object
+
+    Raises
+    ------
+    RuntimeError
+        If a task has ended its workers too often.
+    Exception
+        Whatever a task raises.
+    """
+    from distributed import KilledWorker, as_completed  # there already, where a client is
+
+    try:
+        for future, result in as_completed(list(futures), loop=client.loop, with_results=True):
+            yield futures.pop(future), result
+            future.release()
+    except KilledWorker as error:
+        raise RuntimeError(f"{error}: has a worker too little memory? What is finished is kept, use --resume") from None
+    finally:
+        client.cancel(list(futures), force=True)
 
 
 def _without_pages(dask_worker):

@@ -1,6 +1,6 @@
 """Which bands of an instrument a picture of vegetation needs."""
 
-from fifesim.base.bands import GREEN, nearest
+from fifesim.base.bands import composite
 
 
 def false_colour_bands(instrument):
@@ -32,5 +32,6 @@ def false_colour_bands(instrument):
     pair = instrument.red_and_near_infrared()
     sizes = {instrument.pixel(band) for band in pair}
     beside = [band for band in instrument.bands if {instrument.pixel(band)} == sizes]
-    number = nearest([band.wavelength for band in beside], GREEN)
-    return pair if number is None else (beside[number], *pair)
+    # None of them where red and near infrared lie on different grids.
+    *_, red, green = composite([band.wavelength for band in beside])
+    return pair if green == red else (beside[green], *pair)

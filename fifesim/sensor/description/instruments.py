@@ -9,13 +9,15 @@ from __future__ import annotations
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import TypeAdapter, ValidationError
 
 from fifesim.base import datasets
 from fifesim.base.annotations import FilePath
 from fifesim.base.foreign import in_a_line, read_toml
+from fifesim.base.kinds import UNCHECKED
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.band import InstrumentBand
 from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.names import key, lookup
@@ -32,7 +34,7 @@ _KEYS = {each.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan
 
 
 def instrument(
-    name: FilePath | Instrument, response: Literal["system", "detector", "paper"] | None = None
+    name: InstrumentLike, response: Annotated[Literal["system", "detector", "paper"], UNCHECKED] | None = None
 ) -> Instrument:
     """
     Description of an instrument by its name, or from a file.

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 
 from fifesim.base.annotations import Names, Numbers
 from fifesim.base.arguments import check_fields
+from fifesim.base.kinds import PLAIN
 from fifesim.base.seeds import generator
 
 # Kinds of noise that can be requested by name.
@@ -70,7 +72,7 @@ class NoiseModel:
     along: Literal["columns", "rows"] = "rows"
 
     def __post_init__(self):
-        check_fields(self, "thermal", "shot", "detectors", "gain_spread", "offset_spread", "along")
+        check_fields(self)
         for name in ("thermal", "shot", "gain_spread", "offset_spread"):
             value = getattr(self, name)
             if not 0 <= value < np.inf:
@@ -188,6 +190,10 @@ class NoiseModel:
         """
         with np.errstate(divide="ignore"):
             return np.asarray(radiance, float) / self.noise_equivalent_radiance(radiance)
+
+
+# One model for all bands, or by band.
+NoiseModels: TypeAlias = Annotated[NoiseModel | Mapping[str, NoiseModel], PLAIN]
 
 
 def check_kinds(kinds):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from fifesim.base.annotations import FilePath, Numbers
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.base.annotations import Numbers
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.instruments import noise_of
 
 
-def noise_equivalent_radiance(instrument: FilePath | Instrument, band: str, radiance: Numbers) -> np.ndarray:
+def noise_equivalent_radiance(instrument: InstrumentLike, band: str, radiance: Numbers) -> np.ndarray:
     """
     Standard deviation of an instrument's shot and thermal noise at a radiance.
 
@@ -41,7 +41,7 @@ def noise_equivalent_radiance(instrument: FilePath | Instrument, band: str, radi
     return _noise_of(instrument, band).noise_equivalent_radiance(_checked(radiance))
 
 
-def snr(instrument: FilePath | Instrument, band: str, radiance: Numbers) -> np.ndarray:
+def snr(instrument: InstrumentLike, band: str, radiance: Numbers) -> np.ndarray:
     """
     Signal-to-noise ratio of an instrument at a radiance, with shot and thermal noise.
 

@@ -51,7 +51,7 @@ class Track:
     heading: float
 
     def __post_init__(self):
-        check_fields(self, "latitude", "longitude", "heading")
+        check_fields(self)
         if not -90 < self.latitude < 90:
             raise ValueError(f"the latitude of a track must be in (-90, 90) degrees, got {self.latitude}")
         if not np.all(np.isfinite([self.longitude, self.heading])):

@@ -18,11 +18,10 @@ from fifesim.scenario.scenario import parse_scenario
 GRID = {"west": 707970.0, "north": 4331220.0, "width": 300.0, "height": 300.0}
 FLAT = {"grid": GRID, "terrain": {"dem": "flat"}}
 ALL = {
-    "ground": {"brown": 0.2, "crown_cover": 0.8},
+    "ground": {"brown": 0.2, "crown_cover": 0.8, "moisture": 0.2},
     "landscape": {
         "cover": "voronoi",
         "size": 60.0,
-        "moisture": 0.2,
         "deviations": {"soil": 0.04, "moisture": 0.1, "brown": 0.1, "crown_cover": 0.1},
         "arps": {"soil": 0.24},
         "covary": {"soil": -0.4},
@@ -68,10 +67,10 @@ def test_properties_are_the_last_stages():
     [
         ({}, ()),
         ({"ground": {"brown": 0.2, "hotspot": 0.1}}, ()),
-        ({"landscape": {"moisture": 0.2}}, ()),
+        ({"ground": {"soil": 0.1, "moisture": 0.2}}, ()),
         ({"landscape": {"deviations": {"soil": 0.02}}}, ("soil",)),
         ({"landscape": {"deviations": {"soil": 0.0}}}, ()),
-        ({"landscape": {"moisture": 0.2, "deviations": {"moisture": 0.1}}}, ("soil",)),
+        ({"ground": {"moisture": 0.2}, "landscape": {"deviations": {"moisture": 0.1}}}, ("soil",)),
         ({"ground": {"brown": 0.2}, "landscape": {"deviations": {"brown": 0.1}}}, ("dead leaves",)),
         ({"ground": {"crown_cover": 0.8}}, ("clumping",)),
         ({"ground": {"crown_cover": 0.8}, "landscape": {"deviations": {"crown_cover": 0.1}}}, ("clumping",)),
@@ -109,7 +108,7 @@ def test_without_a_property_only_that_is_even(ideal, whole):
         found = ideal(name)
         for other in set(whole) - variables:
             np.testing.assert_array_equal(found[other], whole[other], err_msg=f"{name}: {other}")
-    assert "soil" not in ideal("soil") and ideal("soil")["moisture"].item() == 0.2
+    assert ideal("soil")["soil"].item() == 0.0 and ideal("soil")["moisture"].item() == 0.2
     assert ideal("dead leaves")["brown"].item() == 0.2
     assert ideal("clumping")["crown_cover"].item() == 1.0
     first = ideal("cover")["cover"]

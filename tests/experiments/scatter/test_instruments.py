@@ -1,10 +1,14 @@
 """The same ground through every instrument."""
 
+from pathlib import Path
+
 import numpy as np
+import pandas as pd
 import pytest
 
 import fifesim
-from fifesim.experiments.scatter.instruments import compare_instruments, instrument_scenario, window_cells
+from fifesim.experiments.scatter.instruments import KNOWN, compare_instruments, instrument_scenario, window_cells
+from fifesim.sensor.description.responses import knows_blur
 
 
 def test_an_instrument_is_flown_with_all_that_is_known_of_it():
@@ -30,6 +34,39 @@ def test_blur_and_place_take_the_most_from_sentinel_2():
     assert min(shares["point spread"], shares["registration"]) > 5 * max(shares["quantisation"], shares["noise"])
     sharp = fifesim.instrument("OLI")
     assert not np.isnan(shares["total"]) and sharp.geolocation == 8.5
+
+
+def test_terms_that_no_source_states_are_unknown_and_so_is_their_total():
+    """Of OLI the blur is unknown; of HRV blur, noise and place are."""
+    found = compare_instruments(["OLI", "HRV"], arps=(0.15,), realisations=2)
+    unknown = found[found["share"].isna() & found["alone"].isna()]
+    by_name = unknown[unknown["variable"] == "lai"].groupby("instrument")["stage"].agg(set)
+    total = {"total", "sub-pixel variation"}
+    assert by_name.to_dict() == {
+        "OLI": {"point spread"} | total,
+        "HRV": {"point spread", "registration", "noise"} | total,
+    }
+    numbers = unknown.select_dtypes("number").columns.difference(["arp", "pixel"])
+    assert unknown[numbers].isna().all(axis=None) and len(numbers) == 6
+    known = found[~found.index.isin(unknown.index)]
+    assert known["share"].notna().all() and (known.query("stage == 'quantisation'")["share"] != 0).all()
+
+
+def test_table_of_the_gallery_has_no_number_for_an_unknown_term():
+    table = pd.read_csv(Path(__file__).parents[3] / "docs" / "instruments.csv")
+    complete = table[list(KNOWN.values())].all(axis=1)
+    hidden = table["stage"].isin(["total", "sub-pixel variation"]) & ~complete
+    for stage, name in KNOWN.items():
+        hidden |= (table["stage"] == stage) & ~table[name]
+    # The ground's own variation has no share that adds up.
+    hidden |= table["stage"] == "sub-pixel variation"
+    assert (table["share"].isna() == hidden).all() and (table["share_error"].isna() == hidden).all()
+    columns = table.drop_duplicates("instrument").set_index("instrument")[list(KNOWN.values())]
+    for name, known in columns.iterrows():
+        own = fifesim.instrument(name)
+        bands = own.red_and_near_infrared()
+        stated = all(knows_blur(own, band) for band in bands), own.geolocation is not None, all(b.noise for b in bands)
+        assert tuple(known) == stated, name
 
 
 def test_a_budget_of_an_instrument_from_the_command_line(tmp_path, monkeypatch):

@@ -1,42 +1,51 @@
 """The canopy on labelled rasters: labels, laziness, and the kernel's numbers."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import xarray as xr
 from lazy import ODD_CHUNKS, check_raster_function, in_chunks, no_compute
 
 import fifesim
+from fifesim import Canopy
 from fifesim.base.geometry import Geometry
-from fifesim.ground.canopy import absorption
-from fifesim.ground.canopy.raster import level_reflectance
+from fifesim.ground.canopy import absorption, raster
+from fifesim.ground.canopy.raster import level_reflectance, reflectance_of_classes
+from fifesim.ground.canopy.rasters.evaluation import BandCanopy, Light
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
 from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
 
 SUN = Geometry(35.0, 120.0, 10.0, 200.0)
-BANDS = {
-    "bands": ["TM3", "TM4"],
-    "wavelengths": [0.66, 0.84],
-    "leaf_reflectance": [0.08, 0.45],
-    "leaf_transmittance": [0.05, 0.45],
-    "diffuse_fraction": [0.2, 0.1],
+BANDS = [SimpleNamespace(name="TM3", wavelength=0.66), SimpleNamespace(name="TM4", wavelength=0.84)]
+LEAF = [0.08, 0.45], [0.05, 0.45]
+SKY = [0.2, 0.1]
+LIGHT = Light(SUN, SKY)
+STANDS = {
+    3: BandCanopy(Canopy(), ([0.07, 0.46], [0.04, 0.41]), None, [0.1, 0.2]),
+    8: BandCanopy(Canopy(hotspot=0.2), ([0.1, 0.4], [0.1, 0.5]), None, [0.2, 0.3]),
 }
 
 
+@pytest.fixture
+def cover(lai):
+    return lai.copy(data=np.random.default_rng(5).choice([3, 8], lai.shape).astype(np.int16)).rename("cover")
+
+
 def reflectance(lai, background=(0.1, 0.2), **options):
-    return level_reflectance(lai, background=background, geometry=SUN, **BANDS, **options)
+    return level_reflectance(lai, BANDS, BandCanopy(Canopy(), LEAF, None, background), LIGHT, **options)
 
 
 def test_reflectance_keeps_its_word_and_equals_the_kernel(lai_with_hole):
     result = check_raster_function(reflectance, lai_with_hole, quantity="surface_reflectance")
     kernel = canopy_reflectance(
-        lai_with_hole.values, BANDS["leaf_reflectance"], BANDS["leaf_transmittance"], (0.1, 0.2), sza=SUN.sza,
-        vza=SUN.vza, raa=SUN.raa, diffuse_fraction=BANDS["diffuse_fraction"],
-    )  # fmt: skip
+        lai_with_hole.values, *LEAF, (0.1, 0.2), sza=SUN.sza, vza=SUN.vza, raa=SUN.raa, diffuse_fraction=SKY
+    )
     np.testing.assert_array_equal(result, kernel)
     assert result.dims == ("band", "y", "x")
-    assert result["band"].values.tolist() == BANDS["bands"]
-    assert result["wavelength"].values.tolist() == BANDS["wavelengths"]
+    assert result["band"].values.tolist() == ["TM3", "TM4"]
+    assert result["wavelength"].values.tolist() == [0.66, 0.84]
     assert directions.geometry_of(result) == SUN
     assert result.attrs["arp"] == 0.15
     for band in result:
@@ -52,9 +61,8 @@ def test_background_may_be_a_raster(lai):
         lambda lai, soil: reflectance(lai, soil), lai, soil, quantity="surface_reflectance"
     )  # fmt: skip
     expected = canopy_reflectance(
-        lai.values, BANDS["leaf_reflectance"], BANDS["leaf_transmittance"], np.stack([soil, soil]), sza=SUN.sza,
-        vza=SUN.vza, raa=SUN.raa, diffuse_fraction=BANDS["diffuse_fraction"],
-    )  # fmt: skip
+        lai.values, *LEAF, np.stack([soil, soil]), sza=SUN.sza, vza=SUN.vza, raa=SUN.raa, diffuse_fraction=SKY
+    )
     np.testing.assert_array_equal(one, expected)
     by_band = xr.concat([soil + 0.1, soil], dim="band").assign_coords(band=["TM4", "TM3"])
     two = check_raster_function(
@@ -81,7 +89,7 @@ def test_hole_in_the_background_is_a_hole_in_the_reflectance(lai):
 
 def test_fpar_keeps_its_word_and_equals_the_kernel(lai_with_hole):
     result = check_raster_function(
-        lambda lai: fifesim.fpar(lai, geometry=SUN, leaf_angles="planophile", fpar_inf=0.9),
+        lambda lai: fifesim.fpar(lai, geometry=SUN, canopy=Canopy(leaf_angles="planophile"), fpar_inf=0.9),
         lai_with_hole,
         quantity="fpar",
     )
@@ -115,3 +123,42 @@ def test_negative_leaf_area_raises_when_it_computes(lai, function):
         lazy = function(in_chunks(lai, ODD_CHUNKS))
     with pytest.raises(ValueError, match=r"negative|at least 0"):
         lazy.compute()
+
+
+def test_each_class_is_its_canopy_alone(lai, cover):
+    made = reflectance_of_classes(lai, cover, BANDS, STANDS, LIGHT, atmosphere="none")
+    for code, stand in STANDS.items():
+        alone = level_reflectance(lai, BANDS, stand, LIGHT)
+        np.testing.assert_array_equal(made.values[:, cover == code], alone.values[:, cover == code])
+    assert made.name == "surface_reflectance" and made.attrs["atmosphere"] == "none"
+    assert made.attrs["leaf_angles"] == alone.attrs["leaf_angles"] and made.attrs["background"] == "by class"
+
+
+def test_classes_of_one_canopy_are_evaluated_together(lai, cover, monkeypatch):
+    """What differs by a number, or by another raster of the same values, is not."""
+    asked = []
+    real = raster.canopy_kernel
+    monkeypatch.setattr(raster, "canopy_kernel", lambda *args, **given: asked.append(args) or real(*args, **given))
+    share = lai.drop_attrs(deep=False) / 10
+    alike = STANDS[3]._replace(canopy=Canopy(crown_cover=share, hotspot=0.1))
+    for other, kinds in (({}, 1), ({"hotspot": 0.2}, 2), ({"crown_cover": share.copy()}, 2), ({"crown_cover": 0.5}, 2)):
+        asked.clear()
+        changed = alike._replace(
+            canopy=alike.canopy.replace(**other), leaf=(np.array([0.07, 0.46]), np.array([0.04, 0.41]))
+        )
+        pair = {3: changed._replace(canopy=alike.canopy, leaf=tuple(map(np.copy, changed.leaf))), 8: changed}
+        made = reflectance_of_classes(lai, cover, BANDS, pair, LIGHT)
+        assert len(asked) == kinds
+        alone = level_reflectance(lai, BANDS, pair[8], LIGHT)
+        np.testing.assert_array_equal(made.values[:, cover == 8], alone.values[:, cover == 8])
+
+
+def test_leaf_angles_of_classes_are_told_once_each(lai, cover):
+    turned = {3: STANDS[3]._replace(canopy=Canopy(leaf_angles="planophile")), 8: STANDS[8]}
+    made = reflectance_of_classes(lai, cover, BANDS, turned, LIGHT)
+    assert made.attrs["leaf_angles"].count(" and ") == 1 and "planophile" in made.attrs["leaf_angles"]
+
+
+def test_leaf_area_of_classes_that_cannot_be_is_refused(lai, cover):
+    with pytest.raises(ValueError, match="negative"):
+        reflectance_of_classes(lai - 5, cover, BANDS, STANDS, LIGHT)

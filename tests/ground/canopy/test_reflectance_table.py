@@ -3,9 +3,24 @@
 import numpy as np
 import pytest
 
+from fifesim.ground.canopy import foliage_table
 from fifesim.ground.canopy.background import reflectance_factor, with_background
+from fifesim.ground.canopy.crowns import clumped, crown_shares
 from fifesim.ground.canopy.lai_table import LIMIT
-from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
+from fifesim.ground.canopy.layers import two_layers
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.ground.canopy.reflectance_table import (
+    Scene,
+    canopy_of,
+    canopy_reflectance,
+    cell_by_cell,
+    decay,
+    directional_reflectance,
+    leaves_of,
+    reflectance_of,
+    sky_of,
+    varied_reflectance,
+)
 from fifesim.ground.canopy.sail_model import sail
 
 RHO, TAU = np.array([0.07, 0.45, 0.5, 0.0, 0.6, 1.0]), np.array([0.04, 0.42, 0.5, 0.0, 0.4, 0.0])
@@ -145,3 +160,93 @@ def test_dead_leaves_are_mixed_evenly_unless_said_otherwise():
     angles = {name: np.full(3, angle) for name, angle in (("sza", 40.0), ("vza", 20.0), ("raa", 60.0))}
     np.testing.assert_array_equal(whole, mixed)
     np.testing.assert_allclose(directional_reflectance(lai, **angles, **options), whole, rtol=0, atol=1e-12)
+
+
+BOTH_LEAVES = {
+    "leaf_reflectance": (0.07, 0.45),
+    "leaf_transmittance": (0.04, 0.42),
+    "brown_reflectance": (0.28, 0.42),
+    "brown_transmittance": (0.12, 0.3),
+    "sky": (0.2, 1.0),
+}
+
+
+@pytest.fixture(scope="module")
+def varied_cells():
+    n = 500
+    rng = np.random.default_rng(8)
+    lai, brown, cover = rng.gamma(1.2, 1.5, n), rng.beta(0.6, 0.8, n), rng.uniform(0.05, 1, n)
+    lai[:8], brown[:8], cover[:8] = [0, 1, 1, 8, 8, 1e-9, 15, 20], [0.5, 0, 1, 0, 1, 0.3, 1e-6, 0.999], [1, 1] * 4
+    cover = np.maximum(cover, lai / 90)
+    return lai, brown, cover, rng.choice([0, 0.2, 0.99, 1], (2, n))
+
+
+def varied_scene(sza, vza, raa, hotspot, leaf_angles, **given):
+    return Scene(
+        **BOTH_LEAVES, sza=sza, vza=vza, raa=raa, hotspot=hotspot, leaf_angles=leaf_angle_classes(leaf_angles), **given
+    )
+
+
+def check_varied(lai, ground, scene):
+    exact = cell_by_cell(lai, ground, scene)
+    np.testing.assert_allclose(varied_reflectance(lai, ground, scene), exact, rtol=0, atol=1e-6)
+
+
+def test_tables_of_varied_leaves_are_within_the_bound(varied_cells):
+    lai, brown, cover, ground = varied_cells
+    view, kinds = (40, 38, 5, 0.05, "spherical"), {"brown": brown, "dissociation": 0.7}
+    check_varied(lai, ground, varied_scene(*view, **kinds))
+    check_varied(lai, ground, varied_scene(*view, **kinds, crown_cover=cover))
+    check_varied(lai, ground, varied_scene(*view, crown_cover=cover, crown_shape=0.4))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("view", [(85, 80, 0, 0.01, "erectophile"), (0, 0, 0, 0, "90: 1")])
+def test_tables_are_within_the_bound_at_the_horizon_and_overhead(varied_cells, view):
+    lai, brown, cover, ground = varied_cells
+    check_varied(lai, ground, varied_scene(*view, brown=brown, dissociation=1.0, crown_cover=cover))
+    check_varied(lai, ground[:, :1], varied_scene(*view, brown=brown, dissociation=0.5, crown_cover=0.6))
+
+
+def test_canopies_beyond_the_table_are_the_models_themselves(varied_cells):
+    lai, brown, cover, ground = (each[..., :6].copy() for each in varied_cells)
+    lai[2:4], cover[3] = foliage_table.LIMIT + 1, 1
+    given = varied_scene(28.5, 0, 0, 0, "spherical", brown=brown, dissociation=0.9, crown_cover=np.maximum(cover, 0.7))
+    found, exact = varied_reflectance(lai, ground, given), cell_by_cell(lai, ground, given)
+    np.testing.assert_array_equal(found[:, 2:4], exact[:, 2:4])
+    given = given._replace(dissociation=cover)
+    np.testing.assert_array_equal(varied_reflectance(lai, ground, given), cell_by_cell(lai, ground, given))
+
+
+GREEN, DEAD = ((0.07, 0.45), (0.04, 0.42)), ((0.28, 0.42), (0.12, 0.3))
+BY_BAND = [np.array(each)[:, None] for each in (*GREEN, *DEAD)]
+ANGLES = {"sza": 40.0, "vza": 20.0, "raa": 30.0}
+PLAIN = Scene(*GREEN, (0.2, 0.1), *ANGLES.values(), leaf_angle_classes("spherical"), 0.1)
+LAI, BROWN = np.array([0.5, 2.0, 4.0]), np.array([0.1, 0.4, 0.9])
+
+
+def test_models_are_those_that_a_scene_needs():
+    light = ANGLES | {"hotspot": 0.1}
+    np.testing.assert_array_equal(canopy_of(LAI, PLAIN).rso, sail(LAI, *BY_BAND[:2], **light).rso)
+    both = PLAIN._replace(brown_reflectance=DEAD[0], brown_transmittance=DEAD[1], brown=BROWN, dissociation=0.3)
+    expected = two_layers(LAI / 0.5, *BY_BAND, brown=BROWN, dissociation=0.3, **light)
+    crowns = both._replace(crown_cover=0.5, crown_shape=2.0)
+    np.testing.assert_array_equal(leaves_of(LAI / 0.5, both).rso, expected.rso)
+    expected = clumped(expected, crown_shares(0.5, 2.0, *ANGLES.values()))
+    np.testing.assert_array_equal(canopy_of(LAI, crowns).rso, expected.rso)
+    surface = with_background(expected, 0.2)
+    expected = reflectance_factor(surface.rso, surface.rdo, np.array([[0.2], [0.1]]))
+    np.testing.assert_array_equal(reflectance_of(LAI, np.full((2, 1), 0.2), crowns), expected)
+    np.testing.assert_array_equal(cell_by_cell(LAI, np.full((2, 1), 0.2), crowns), expected)
+    assert crowns.varies() and not PLAIN.varies()
+
+
+def test_part_of_a_scene_has_part_of_what_varies():
+    part = PLAIN._replace(brown=BROWN, sky=np.ones((2, 1))).part(slice(1, 2))
+    assert part.brown.tolist() == [0.4] and part.sky.shape == (2, 1) and part.hotspot == 0.1
+    assert sky_of(PLAIN).tolist() == [[0.2], [0.1]]
+
+
+def test_light_decays_by_sun_and_view_together():
+    mu = np.cos(np.radians([40.0, 20.0]))
+    np.testing.assert_allclose(decay(PLAIN), 0.5 / mu[0] + 0.5 / mu[1], rtol=1e-12)

@@ -89,7 +89,7 @@ def test_own_spectrum_is_a_file_or_a_dataset(tmp_path, lai):
     path = written(tmp_path, "# my soil\nwavelength,reflectance\n0.4,0.1\n1.4,0.6\n2.5,0.6\n")
     data = xr.Dataset({"reflectance": ("wavelength", [0.1, 0.6, 0.6])}, {"wavelength": [0.4, 1.4, 2.5]})
     by_file, by_data, by_mixture = (
-        fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], background=given)
+        fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(background=given))
         for given in (path, data, fifesim.Background({path: 1.0}))
     )
     xr.testing.assert_identical(by_file, by_data)
@@ -102,7 +102,7 @@ def test_own_spectrum_is_a_file_or_a_dataset(tmp_path, lai):
 
 def test_a_chosen_leaf_reaches_the_canopy(lai):
     brown, green = (
-        fifesim.surface_reflectance(lai, "MODIS", bands=["MODIS1", "MODIS2"], leaf_optics=leaf)
+        fifesim.surface_reflectance(lai, "MODIS", bands=["MODIS1", "MODIS2"], canopy=fifesim.Canopy(leaf_optics=leaf))
         for leaf in (fifesim.Leaf(chlorophyll=0, carotenoids=0, brown=0.5), fifesim.Leaf())
     )
     assert float(brown.sel(band="MODIS1").mean()) > float(green.sel(band="MODIS1").mean())
@@ -146,4 +146,6 @@ def test_spectra_need_responses():
 
 def test_dataset_without_reflectance_is_refused(lai):
     with pytest.raises(ValueError, match="background: the Dataset has no reflectance"):
-        fifesim.surface_reflectance(lai, "TM", background=xr.Dataset(coords={"wavelength": [0.4, 2.5]}))
+        fifesim.surface_reflectance(
+            lai, "TM", canopy=fifesim.Canopy(background=xr.Dataset(coords={"wavelength": [0.4, 2.5]}))
+        )

@@ -37,7 +37,10 @@ def test_leaf_spectra_are_a_file_or_a_dataset(tmp_path, lai):
     given = path, tmp_path / "mine.csv", leaf_dataset(), leaf_dataset((400, 700, 800, 2500), "nm")
     for name in ("leaf_optics", "brown_leaf"):
         made = [
-            fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], brown=0.5, **{name: each}) for each in given
+            fifesim.surface_reflectance(
+                lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(**{name: each}, brown=0.5)
+            )
+            for each in given
         ]
         for other in made[1:]:
             xr.testing.assert_allclose(made[0], other, rtol=1e-12)
@@ -46,8 +49,8 @@ def test_leaf_spectra_are_a_file_or_a_dataset(tmp_path, lai):
     assert 0.05 + 0.05 * (0.63 - 0.4) / 0.3 < reflectance[0] < 0.05 + 0.05 * (0.69 - 0.4) / 0.3
     assert 0.01 + 0.04 * (0.63 - 0.4) / 0.3 < transmittance[0] < 0.01 + 0.04 * (0.69 - 0.4) / 0.3
     numbers = {"TM3": (reflectance[0], transmittance[0]), "TM4": (reflectance[1], transmittance[1])}
-    by_band = fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], leaf_optics=numbers)
-    made = fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], leaf_optics=path)
+    by_band = fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(leaf_optics=numbers))
+    made = fifesim.surface_reflectance(lai, "TM", bands=["TM3", "TM4"], canopy=fifesim.Canopy(leaf_optics=path))
     xr.testing.assert_allclose(made, by_band, rtol=1e-12)
 
 
@@ -65,7 +68,7 @@ def test_leaf_spectra_are_a_file_or_a_dataset(tmp_path, lai):
 )
 def test_unusable_leaf_spectra_are_refused(lai, given, message):
     with pytest.raises(ValueError, match=message):
-        fifesim.surface_reflectance(lai, "TM", leaf_optics=given)
+        fifesim.surface_reflectance(lai, "TM", canopy=fifesim.Canopy(leaf_optics=given))
 
 
 @pytest.mark.parametrize("name", ["leaf_optics", "background"])
@@ -84,10 +87,11 @@ def test_a_spectrum_is_read_from_a_regular_file_only(tmp_path, lai, name, monkey
     }
     for path, message in wrong.items():
         with pytest.raises(ValueError, match=message):
-            fifesim.surface_reflectance(lai, "TM", **{name: path})
+            fifesim.surface_reflectance(lai, "TM", canopy=fifesim.Canopy(**{name: path}))
     if name == "background":
         with pytest.raises(ValueError, match="it is an address"):
-            fifesim.surface_reflectance(lai, "TM", background=fifesim.Background({"http://127.0.0.1:9/x.csv": 1}))
+            mixture = fifesim.Background({"http://127.0.0.1:9/x.csv": 1})
+            fifesim.surface_reflectance(lai, "TM", canopy=fifesim.Canopy(background=mixture))
 
 
 @pytest.mark.parametrize(
@@ -97,7 +101,7 @@ def test_errors_of_csv_files_name_the_file(tmp_path, lai, content):
     path = tmp_path / "mine.csv"
     path.write_bytes(content)
     readers = {
-        "spectrum": lambda: fifesim.surface_reflectance(lai, "TM", background=str(path)),
+        "spectrum": lambda: fifesim.surface_reflectance(lai, "TM", canopy=fifesim.Canopy(background=str(path))),
         "aerosol": lambda: fifesim.read_aerosol(path),
         "LAI samples": lambda: fifesim.lai_distribution(path),
     }

@@ -5,10 +5,19 @@ import pytest
 import xarray as xr
 from scipy import stats
 
+from fifesim.ground.canopy.description import Canopy
 from fifesim.ground.canopy.prospect import Leaf
 from fifesim.ground.landscape.classes import CoverClass, class_table, fife_classes
 
 RASTER = xr.DataArray(np.full((2, 2), 0.2), dims=("y", "x"))
+
+
+def of_canopy(**fields):
+    return {"canopy": Canopy(**fields)}
+
+
+def varies(name):
+    return f"class 'wood': {name} is the same in all of a class, got one that varies: give it to landscape"
 
 
 @pytest.mark.parametrize(
@@ -21,15 +30,12 @@ RASTER = xr.DataArray(np.full((2, 2), 0.2), dims=("y", "x"))
         ({"lai": stats.norm(1, 1)}, ValueError, "class 'wood': leaf area index cannot be negative"),
         ({"arp": 0.3}, ValueError, r"class 'wood': arp must be in \[0, 0.25\), got 0.3"),
         ({"arp": 0.2499}, ValueError, "class 'wood': arp must be at most 0.2498"),
-        ({"hotspot": -0.1}, ValueError, "class 'wood': hotspot must be at least 0, got -0.1"),
-        ({"brown": 1.2}, ValueError, r"class 'wood': brown must be in \[0, 1\], got 1.2"),
-        ({"crown_cover": np.nan}, ValueError, r"class 'wood': crown_cover must be in \[0, 1\], got nan"),
-        ({"brown": RASTER}, TypeError, "class 'wood': brown must be a number, got an xarray.DataArray"),
-        ({"background": RASTER}, TypeError, "class 'wood': background is the same in all of a class"),
-        ({"background": {"soil_dry": RASTER}}, TypeError, "class 'wood': background is the same in all of a class"),
-        ({"leaf": Leaf(chlorophyll=RASTER)}, TypeError, "class 'wood': leaf is the same in all of a class"),
-        ({"leaf": 0.4}, TypeError, "class 'wood': leaf must be a fifesim.Leaf"),
-        ({"leaf_angles": "upright"}, ValueError, "class 'wood': "),
+        ({"arp": "0.2"}, TypeError, "class 'wood': arp must be a number, got '0.2'"),
+        ({"canopy": 0.4}, TypeError, "class 'wood': canopy must be a fifesim.Canopy, got 0.4"),
+        *((of_canopy(**{name: RASTER}), TypeError, varies(name)) for name in ("brown", "moisture", "background")),
+        (of_canopy(background={"soil_dry": RASTER}), TypeError, varies("background")),
+        (of_canopy(leaf_optics=Leaf(chlorophyll=RASTER)), TypeError, varies("leaf_optics")),
+        (of_canopy(brown_leaf={"TM3": (RASTER, 0.1)}), TypeError, varies("brown_leaf")),
         ({"code": -1}, ValueError, "class 'wood': code must be in 0 to 32767, got -1"),
         ({"code": 1.5}, TypeError, "class 'wood': code must be a whole number, got 1.5"),
     ],
@@ -71,4 +77,4 @@ def test_treatments_of_fife_differ_by_their_leaf_area():
         (2, "burned-ungrazed"),
         (3, "unburned-ungrazed"),
     ]
-    assert all(each.background is None and each.leaf is None and each.arp is None for each in table)
+    assert all(not each.canopy.given and each.arp is None for each in table)

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from fifesim.output.chips.pictures import contact_sheet
-from fifesim.output.composites import dark_and_bright
+from fifesim.output.colours import dark_and_bright
 
 
 def dataset_of(bands, wavelengths, names=("lai", "fpar"), chips=7):
@@ -22,7 +22,7 @@ def test_a_few_chips_of_each_part_in_its_order():
     titles = [axis.get_title() for axis in figure.axes if axis.get_title()]
     assert titles == ["train\nchip 1", "\nchip 2", "\nchip 3", "\nchip 4", "test\nchip 0", "\nchip 6"]
     labels = [axis.get_ylabel() for axis in figure.axes if axis.get_ylabel()]
-    assert labels == ["NDVI\nof the image", "leaf area index", "FPAR"]
+    assert labels == ["NDVI\nof the image", "LAI", "FPAR"]
 
 
 def test_a_row_shares_its_colours():

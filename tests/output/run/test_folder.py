@@ -62,7 +62,7 @@ def test_report_gives_mean_and_deviation_of_its_files(folder):
     with rasterio.open(folder / "truth.tif") as truth:
         found = dict(zip(truth.descriptions, truth.read().astype(float), strict=True))
     found["ndvi"] = fifesim.open_image(folder / "image.tif").fifesim.ndvi().values
-    for name, said in (("lai", "Leaf area index"), ("fpar", "FPAR"), ("ndvi", "NDVI")):
+    for name, said in (("lai", "LAI"), ("fpar", "FPAR"), ("ndvi", "NDVI")):
         (row,) = re.findall(rf"<th>{said} of the pixels</th><td[^>]*>(.*?)</td>", page)
         assert row == f"mean {found[name].mean():.3f}, standard deviation {found[name].std():.3f}"
 

@@ -3,19 +3,23 @@
 import socket
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import dask
+import dask.array as da
+import distributed
 import numpy as np
 import psutil
 import pytest
 import rasterio
 import xarray as xr
-from distributed import Client, LocalCluster
+from distributed import Client, KilledWorker, LocalCluster
 
 import fifesim
 from fifesim.output import pages
 from fifesim.output.run.folder import simulate_to_folder
-from fifesim.output.run.workers import cluster
+from fifesim.output.run.schedule import run_on_client, tasks_of
+from fifesim.output.run.workers import cluster, results_of
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -125,3 +129,53 @@ def test_workers_listen_to_nobody_without_their_certificate():
         stranger = [sys.executable, "-c", STRANGER, address]
         told = subprocess.run(stranger, stdout=subprocess.PIPE, text=True, timeout=120, check=True)
         assert told.stdout.split() == ["refused"] * 3
+
+
+class Future:
+    def __init__(self, released):
+        self.release = lambda: released.append(self)
+
+
+class Stub:
+    """A cluster that gives one result, and then ends with an error."""
+
+    loop = None
+
+    def __init__(self, monkeypatch, error):
+        self.cancelled, self.released = [], []
+        self.futures = [Future(self.released) for _ in range(3)]
+
+        def as_completed(futures, **options):
+            yield futures[0], "first"
+            raise error
+
+        monkeypatch.setattr(distributed, "as_completed", as_completed)
+
+    def get(self, *arguments, **options):
+        return self.futures
+
+    def cancel(self, futures, force):
+        self.cancelled += futures
+
+
+def test_a_task_that_ends_its_workers_is_told_and_the_others_are_cancelled(monkeypatch):
+    error = KilledWorker("task", SimpleNamespace(address="tcp://here"), 3)
+    stub, found = Stub(monkeypatch, error), []
+    with pytest.raises(RuntimeError, match="has a worker too little memory"):
+        for item in results_of(stub, {future: n for n, future in enumerate(stub.futures)}):
+            found.append(item)
+    assert found == [(0, "first")] and stub.released == stub.futures[:1]
+    assert stub.cancelled == stub.futures[1:]
+
+
+def test_a_failed_delivery_cancels_the_other_tasks_at_once(monkeypatch):
+    stub = Stub(monkeypatch, AssertionError("the second is not asked for"))
+
+    def deliver(*output):
+        raise OSError("disk full")
+
+    tasks, outputs = tasks_of({"ones": da.ones(3, chunks=1)}, [("ones", (n,)) for n in range(3)])
+    with pytest.raises(OSError, match="disk full") as caught:
+        run_on_client(tasks, outputs, deliver, stub)
+    # The frames are alive, so that the collection of garbage has cancelled nothing.
+    assert caught.traceback and stub.cancelled == stub.futures[1:]

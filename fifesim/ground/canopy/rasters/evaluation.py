@@ -1,4 +1,4 @@
-"""What gives the reflectance of cells of one canopy, and which rasters it takes."""
+"""Reflectance of canopies on labelled rasters: the kernel of a canopy and the rasters that it takes."""
 
 from functools import partial
 from typing import NamedTuple
@@ -6,85 +6,80 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from fifesim.base.geometry import relative_azimuth
-from fifesim.ground.canopy.crowns import SHAPE
-from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.base.geometry import Geometry, relative_azimuth
+from fifesim.ground.canopy.description import Canopy, is_raster
 from fifesim.ground.canopy.leaf_area import check_map
-from fifesim.ground.canopy.rasters import canopy_shares
-from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
+from fifesim.ground.canopy.properties import NUMBERS
+from fifesim.ground.canopy.reflectance_table import (
+    Scene,
+    directional_reflectance,
+    scene_reflectance,
+    uniform_scene,
+    with_shares,
+)
 from fifesim.rasters import cf, directions
+from fifesim.rasters.axes import north_up
+from fifesim.rasters.crs import with_crs_of
+from fifesim.rasters.packed import unpacked
 
-# Largest ratio of leaf size to canopy height. [1]
-LARGEST_HOTSPOT = 10.0
+SHARES = ("brown", "dissociation", "crown_cover")
+"""Properties that SAIL takes by cell."""
+
+
+class BandCanopy(NamedTuple):
+    """A canopy with its optics in each band."""
+
+    canopy: Canopy
+    leaf: tuple
+    """Reflectance and transmittance, shape (band,), or rasters over (band, y, x). [1]"""
+    dead: tuple | None
+    """The same of dead leaves; None without any."""
+    background: np.ndarray | xr.DataArray
+    """Shape (band,), or a raster over ([band], y, x). [1]"""
+    soil_changes: tuple | None = None
+    """Kernel that makes the background of each cell from a dry one, and its rasters."""
+
+
+class Light(NamedTuple):
+    """Directions of sun and view, and the diffuse fraction of each band."""
+
+    geometry: Geometry | xr.Dataset
+    diffuse_fraction: np.ndarray | xr.DataArray
 
 
 class EvenCanopy(NamedTuple):
-    """A canopy whose cells differ in their green leaf area alone."""
+    """A canopy whose cells differ only in their green leaf area."""
 
     lai: xr.DataArray
-    parameters: dict
-    """Of `ground.canopy.reflectance_table.even_table`, numbers and tuples."""
+    background: tuple
+    scene: Scene
 
 
-def even_canopy(
-    lai, *, leaf_angles, hotspot, brown, crown_cover, soil_changes, exact, geometry, dissociation, brown_optics,
-    crown_shape, **by_band,
-):  # fmt: skip
-    """
-    A canopy whose reflectance is a function of leaf area alone, by its table.
-
-    Parameters
-    ----------
-    lai : xarray.DataArray, dims (y, x)
-    leaf_angles, hotspot, brown, crown_cover, soil_changes, exact, geometry, dissociation, brown_optics, crown_shape
-        As in `canopy_kernel`.
-    **by_band
-        Leaf reflectance, leaf transmittance, background and diffuse fraction.
-
-    Returns
-    -------
-    canopy : EvenCanopy or None
-        None where the cells differ otherwise, or the table is not used.
-    """
-    rasters = any(isinstance(each, xr.DataArray) for each in (brown, crown_cover, *by_band.values()))
-    if rasters or brown != 0 or crown_cover != 1 or soil_changes is not None or exact or directions.varying(geometry):
+def even_canopy(lai, stand, light, exact):
+    """An EvenCanopy, or None where cells differ otherwise or no table is used."""
+    own = stand.canopy
+    by_band = (*stand.leaf, stand.background, light.diffuse_fraction)
+    rasters = any(map(is_raster, (own.brown, own.crown_cover, *by_band)))
+    if rasters or own.brown != 0 or own.crown_cover != 1 or stand.soil_changes is not None or exact:
         return None
-    parameters = {name: tuple(map(float, values)) for name, values in by_band.items()}
-    parameters |= {name: float(getattr(geometry, name)) for name in ("sza", "vza", "raa")}
-    return EvenCanopy(lai, parameters | {"leaf_angles": leaf_angle_classes(leaf_angles), "hotspot": float(hotspot)})
+    if directions.varying(light.geometry):
+        return None
+    return EvenCanopy(lai, tuple(map(float, stand.background)), _uniform_scene(stand, light))
 
 
-def canopy_kernel(
-    lai,
-    bands,
-    *,
-    leaf_reflectance,
-    leaf_transmittance,
-    background,
-    diffuse_fraction,
-    geometry,
-    leaf_angles="spherical",
-    hotspot=0.0,
-    brown=0.0,
-    dissociation=0.0,
-    brown_optics=None,
-    crown_cover=1.0,
-    crown_shape=SHAPE,
-    soil_changes=None,
-    exact=False,
-):
+def canopy_kernel(lai, bands, stand, light, exact=False):
     """
-    Kernel of a canopy and the rasters that it takes, which may be evaluated on any of the cells.
+    Kernel of a canopy and the rasters that it takes.
 
     Parameters
     ----------
-    lai : xarray.DataArray, dims (y, x)
-        Whose CRS the rasters have where they lost theirs.
+    lai : xarray.DataArray, dims (y, x), or None
+        Its CRS is that of rasters that lost theirs.
     bands : sequence of str
-    leaf_reflectance, leaf_transmittance, background, diffuse_fraction, geometry
-        As in `ground.canopy.raster.level_reflectance`, and the others too.
-    soil_changes : (callable, sequence of xarray.DataArray), optional
-        What makes the background of each cell of a dry one, from `ground.canopy.rasters.soils.soil_kernel`.
+    stand : BandCanopy
+    light : Light
+    exact : bool, optional
+        Evaluate SAIL at every cell instead of interpolating a table.
 
     Returns
     -------
@@ -96,70 +91,129 @@ def canopy_kernel(
     Raises
     ------
     ValueError
-        As in `ground.canopy.raster.level_reflectance`.
+        If the optics, the background or a share are out of their range.
     """
-    if not 0 <= hotspot <= LARGEST_HOTSPOT:
-        raise ValueError(
-            f"hotspot must be in [0, {LARGEST_HOTSPOT:g}], got {hotspot:g}: "
-            "it is leaf size over canopy height, such as 0.1"
-        )
-    parameters = {"leaf_angles": leaf_angle_classes(leaf_angles), "hotspot": float(hotspot)}
-    parameters["crown_shape"] = float(crown_shape)
-    background = _per_band(_background_bands(background, bands))
-    leaves = {"leaf_reflectance": leaf_reflectance, "leaf_transmittance": leaf_transmittance}
-    if isinstance(brown, xr.DataArray) or brown != 0:
-        leaves |= dict(zip(("brown_reflectance", "brown_transmittance"), brown_optics, strict=True))
-    shares = {"brown": brown, "dissociation": dissociation, "crown_cover": crown_cover}
-    shares = {name: canopy_shares.share(name, value, lai) for name, value in shares.items()}
-    if directions.varying(geometry) or any(isinstance(each, xr.DataArray) for each in leaves.values()):
-        kernel, rasters = canopy_shares.with_shares(partial(_by_cell, parameters, tuple(leaves)), shares)
-        by_band = [_per_band(each) for each in (background, diffuse_fraction, *leaves.values())]
-        return _over_soil(kernel, [*by_band[:2], *directions.angles(geometry), *by_band[2:], *rasters], soil_changes)
-    parameters |= {name: tuple(map(float, values)) for name, values in leaves.items()}
-    parameters |= {name: getattr(geometry, name) for name in ("sza", "vza", "raa")}
-    parameters |= {"diffuse_fraction": tuple(map(float, diffuse_fraction)), "exact": exact}
-    kernel, rasters = canopy_shares.with_shares(partial(_uniform, parameters), shares)
-    return _over_soil(kernel, [background, *rasters], soil_changes)
-
-
-def _over_soil(kernel, rasters, soil_changes):
-    """Kernel whose background, its first raster, is made of the dry one."""
-    if soil_changes is None:
+    varying, numbers = shares_of(stand.canopy, SHARES, lai)
+    background = _per_band(_background_bands(stand.background, bands))
+    leaves = stand.leaf + (stand.dead or ())
+    if directions.varying(light.geometry) or any(map(is_raster, leaves)):
+        by_band = [_per_band(each) for each in (light.diffuse_fraction, *leaves)]
+        rasters = [background, by_band[0], *directions.angles(light.geometry), *by_band[1:]]
+        own = stand.canopy
+        kernel = partial(_by_cell, own.leaf_angles, own.hotspot, own.crown_shape, tuple(varying), numbers)
+    else:
+        rasters = [background]
+        kernel = partial(_uniform, _uniform_scene(stand, light), tuple(varying), numbers, exact)
+    rasters += varying.values()
+    if stand.soil_changes is None:
         return kernel, rasters
-    changed, changes = soil_changes
+    changed, changes = stand.soil_changes
     return partial(_on_soil, kernel, changed, len(changes)), [*changes, *rasters]
 
 
+def shares_of(canopy, names, lai):
+    """
+    Properties of a canopy as a kernel takes them.
+
+    Parameters
+    ----------
+    canopy : Canopy
+    names : sequence of str
+    lai : xarray.DataArray, dims (y, x), or None
+        Its CRS is that of rasters that lost theirs.
+
+    Returns
+    -------
+    varying : dict of str to xarray.DataArray, dims (y, x)
+        Rasters, rows from north to south, without coordinates other than y and x.
+    numbers : dict of str to float
+
+    Raises
+    ------
+    ValueError
+        If a raster has other units.
+    """
+    varying, numbers = {}, {}
+    for name in names:
+        given = getattr(canopy, name)
+        if not is_raster(given):
+            numbers[name] = float(given)
+            continue
+        cf.check_units(given, name)
+        raster = unpacked(with_crs_of(north_up(given), lai)).rename(name)
+        varying[name] = raster.drop_vars(set(raster.coords) - {"y", "x", "spatial_ref"})
+    return varying, numbers
+
+
+def _uniform_scene(stand, light):
+    own, at = stand.canopy, light.geometry
+    towards = at.sza, at.vza, at.raa
+    return uniform_scene(
+        stand.leaf, light.diffuse_fraction, towards, own.leaf_angles, own.hotspot, stand.dead, own.crown_shape
+    )
+
+
 def _on_soil(kernel, changed, count, lai, *blocks):
+    """Reflectance over a background that a kernel makes from the dry one."""
     changes, (background, *others) = blocks[:count], blocks[count:]
     return kernel(lai, changed(background, *changes), *others)
 
 
-def _uniform(parameters, lai, background, **shares):
+def _uniform(scene, varying, numbers, exact, lai, background, *shares):
     """Reflectance below one sun, of leaves that are all alike."""
     # apply_ufunc hands the bands over as the last axis.
     bands_first = background.transpose(-1, *range(background.ndim - 1))
-    return canopy_reflectance(check_map(lai), background=bands_first, **parameters, **shares)
+    lai = check_map(lai)
+    scene = with_shares(scene, lai.shape, **numbers, **dict(zip(varying, shares, strict=True)))
+    return scene_reflectance(lai, bands_first, scene, exact)
 
 
-def _by_cell(parameters, leaves, lai, ground, sky, sza, saa, vza, vaa, *optics, **shares):
-    """Reflectance where the directions of sun or sensor, or the leaves, vary over the scene."""
-    towards = {"sza": sza, "vza": vza, "raa": relative_azimuth(saa, vaa)}
-    light = {"background": ground, "diffuse_fraction": sky, **towards}
-    of_leaves = dict(zip(leaves, optics, strict=True))
-    return directional_reflectance(check_map(lai), **of_leaves, **light, **parameters, **shares)
+def _by_cell(
+    leaf_angles, hotspot, crown_shape, varying, numbers, lai, ground, sky, sza, saa, vza, vaa, *optics
+):  # fmt: skip
+    """Reflectance where the directions of sun or view, or the leaves, vary over the scene."""
+    count = len(optics) - len(varying)
+    dead = optics[2:count] or (None, None)
+    return directional_reflectance(
+        check_map(lai),
+        *optics[:2],
+        ground,
+        sza=sza,
+        vza=vza,
+        raa=relative_azimuth(saa, vaa),
+        leaf_angles=leaf_angles,
+        hotspot=hotspot,
+        diffuse_fraction=sky,
+        brown_reflectance=dead[0],
+        brown_transmittance=dead[1],
+        crown_shape=crown_shape,
+        **numbers,
+        **dict(zip(varying, optics[count:], strict=True)),
+    )
+
+
+def in_words(canopy, names=SHARES):
+    """Shares that are not the defaults, for a line of the history; ends in a comma and a space if not empty."""
+    texts = []
+    for name in names:
+        value = getattr(canopy, name)
+        if is_raster(value):
+            texts.append(f"{name} by cell, ")
+        elif value != NUMBERS[name].default:
+            texts.append(f"{name} {value:g}, ")
+    return "".join(texts)
 
 
 def _per_band(values):
     """A raster, or values of each band, without the names of the bands."""
-    if isinstance(values, xr.DataArray):
+    if is_raster(values):
         return values.drop_vars("band", errors="ignore")
     return xr.DataArray(np.asarray(values, float), dims="band")
 
 
 def _background_bands(background, bands):
     """A background raster with one band for each of the canopy's; numbers stay."""
-    if not isinstance(background, xr.DataArray):
+    if not is_raster(background):
         return background
     cf.check_units(background, "surface_reflectance")
     if "band" not in background.dims:

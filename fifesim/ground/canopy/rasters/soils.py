@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.ground.canopy import optics
+from fifesim.ground.canopy.description import is_raster
 from fifesim.ground.canopy.soil import brightened, soil_line
 from fifesim.ground.canopy.soil_water import moistened, water_films
 from fifesim.ground.canopy.spectra import check_shares, is_mixture
@@ -176,30 +177,15 @@ def soil_kernel(bands, lai, soil=None, moisture=None):
     return kernel, [_by_cell(name, value, lai) for name, value in given.items()]
 
 
-def in_words(soil, moisture):
-    """
-    Attributes of a surface that say what its soil is like.
+def changes_of(canopy):
+    """Brightness and moisture of the background of a canopy, numbers or rasters; None for no change."""
+    return tuple(None if not is_raster(each) and each == 0 else each for each in (canopy.soil, canopy.moisture))
 
-    Parameters
-    ----------
-    soil, moisture : float or xarray.DataArray, or None
 
-    Returns
-    -------
-    attributes : dict of str
-        Numbers, or "raster"; nothing of what is None.
-
-    Examples
-    --------
-    >>> in_words(0.02, None)
-    {'soil': 0.02}
-    """
-    given = {"soil": soil, "moisture": moisture}
-    return {
-        name: "raster" if isinstance(value, xr.DataArray) else float(value)
-        for name, value in given.items()
-        if value is not None
-    }
+def in_words(canopy):
+    """Attributes that describe the brightness and moisture of the background: numbers, or "raster"."""
+    changes = zip(("soil", "moisture"), changes_of(canopy), strict=True)
+    return {name: "raster" if is_raster(each) else float(each) for name, each in changes if each is not None}
 
 
 def _by_cell(name, value, lai):

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated, TypeAlias
 
 import dask.array as da
 import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Chunks, Distribution, FilePath
+from fifesim.base.annotations import Chunks, LaiDistribution, WholeNumber
+from fifesim.base.kinds import Kind
 from fifesim.base.lattice import assemble
 from fifesim.base.seeds import check_seed
 from fifesim.base.warned import warn
@@ -38,15 +40,21 @@ _REFERENCES = (
 )
 
 
+Variation: TypeAlias = Annotated[
+    float | Callable[[np.ndarray], np.ndarray],
+    Kind("a number, or a function of the means of pixels, such as lambda mean: 0.5 / (1 + mean)"),
+]
+
+
 @by_date
 def downscale(
     lai: xr.DataArray,
     grid: GeoBox,
     *,
     arp: float = 0.15,
-    distribution: FilePath | Distribution | None = None,
-    cv: float | Callable[[np.ndarray], np.ndarray] | None = None,
-    seed: int = 0,
+    distribution: LaiDistribution | None = None,
+    cv: Variation | None = None,
+    seed: WholeNumber = 0,
     chunks: Chunks | None = None,
 ) -> xr.DataArray:
     """

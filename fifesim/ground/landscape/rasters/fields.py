@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Chunks
+from fifesim.base.annotations import Chunks, WholeNumber
 from fifesim.base.arguments import check
 from fifesim.base.kinds import NUMBER, Kind
 from fifesim.base.seeds import check_seed
@@ -42,7 +42,7 @@ def correlated_fields(
     correlations: Mapping | None = None,
     *,
     coarser: Mapping[str, int] | None = None,
-    seed: int = 0,
+    seed: WholeNumber = 0,
     covariates: Mapping[str, xr.DataArray] | None = None,
     reference: Mapping[str, xr.DataArray] | None = None,
     chunks: Chunks | None = None,

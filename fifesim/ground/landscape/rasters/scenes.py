@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from numbers import Number
+from typing import Annotated, TypeAlias
 
 import numpy as np
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Chunks, FilePath
-from fifesim.base.kinds import described, is_path
+from fifesim.base.annotations import Chunks, FilePath, WholeNumber
+from fifesim.base.kinds import ANYTHING, UNCHECKED, described, is_path
 from fifesim.base.seeds import check_seed
 from fifesim.ground.canopy.soil import check_brightness
 from fifesim.ground.landscape.autoregression import check_arp
@@ -28,10 +29,16 @@ from fifesim.ground.landscape.rasters.drawn import drawn_fields
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions
+from fifesim.rasters.annotations import FileOrRaster
+from fifesim.rasters.directions import Directions
 from fifesim.rasters.packed import unpacked
 from fifesim.rasters.sites import is_fife, made_on_site
 from fifesim.rasters.warp import file_onto_grid, raster_onto_grid
+
+# The functions that take these name what they need in their own messages.
+GroundProperty: TypeAlias = Annotated[FilePath | xr.DataArray | Field | float, ANYTHING]
+Cover: TypeAlias = Annotated[Patches | FilePath | xr.DataArray, UNCHECKED]
+Classes: TypeAlias = Annotated[CoverClass | Sequence[CoverClass] | Mapping[str, CoverClass], UNCHECKED]
 
 FIFE_PASTURES = Patches("pastures", 1200.0)
 """Of the default landscape: rectangles of 144 ha on average, as large as ranches of the Flint Hills fence them."""
@@ -42,19 +49,19 @@ _REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
 def landscape(
     grid: GeoBox,
     *,
-    cover: Patches | FilePath | xr.DataArray | None = None,
-    classes: CoverClass | Sequence[CoverClass] | Mapping[str, CoverClass] | None = None,
-    lai: FilePath | xr.DataArray | None = None,
+    cover: Cover | None = None,
+    classes: Classes | None = None,
+    lai: FileOrRaster | None = None,
     arp: float = 0.15,
-    brown: FilePath | xr.DataArray | Field | float | None = None,
-    crown_cover: FilePath | xr.DataArray | Field | float | None = None,
-    soil: FilePath | xr.DataArray | Field | float | None = None,
-    moisture: FilePath | xr.DataArray | Field | float | None = None,
+    brown: GroundProperty | None = None,
+    crown_cover: GroundProperty | None = None,
+    soil: GroundProperty | None = None,
+    moisture: GroundProperty | None = None,
     covary: Mapping[str, float] | None = None,
     dem: xr.DataArray | None = None,
     reference: Mapping[str, xr.DataArray] | None = None,
     geometry: Directions | None = None,
-    seed: int = 0,
+    seed: WholeNumber = 0,
     chunks: Chunks | None = None,
     allow_remote: bool = False,
 ) -> xr.Dataset:

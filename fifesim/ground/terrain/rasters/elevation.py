@@ -12,18 +12,19 @@ import xarray as xr
 from affine import Affine
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Chunks, FilePath
+from fifesim.base.annotations import Chunks
 from fifesim.ground.terrain.rasters.cover import check_cover, known_cells, known_elevation, warn_of_relief
 from fifesim.ground.terrain.rasters.model import TILE, Model, model_under
 from fifesim.ground.terrain.rasters.source import placement
 from fifesim.rasters import cf, places
 from fifesim.rasters import chunks as chunking
 from fifesim.rasters import grid as grids
+from fifesim.rasters.annotations import FileOrRaster
 from fifesim.rasters.whereabouts import lies_in_words
 
 
 def fine_dem(
-    path_or_raster: FilePath | xr.DataArray,
+    path_or_raster: FileOrRaster,
     grid: GeoBox,
     *,
     fill: float | None = None,
@@ -100,7 +101,7 @@ def fine_dem(
 
 
 def source_dem(
-    path_or_raster: FilePath | xr.DataArray,
+    path_or_raster: FileOrRaster,
     grid: GeoBox,
     margin: float,
     *,

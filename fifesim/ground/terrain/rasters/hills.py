@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.base.annotations import Chunks
+from fifesim.base.annotations import Chunks, WholeNumber
 from fifesim.base.seeds import check_seed
 from fifesim.ground.terrain.flint_hills import elevation
 from fifesim.rasters import cf, places
@@ -21,7 +21,7 @@ _LARGEST_CELL = 100.0
 _REFERENCE = "terrain after the statistics of Kings Creek, Konza Prairie (USGS 3DEP)"
 
 
-def flint_hills(grid: GeoBox, seed: int = 0, *, chunks: Chunks | None = None) -> xr.DataArray:
+def flint_hills(grid: GeoBox, seed: WholeNumber = 0, *, chunks: Chunks | None = None) -> xr.DataArray:
     """
     Synthetic elevation model of the dissected Flint Hills.
 

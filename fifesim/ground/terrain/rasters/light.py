@@ -13,10 +13,11 @@ from fifesim.ground.terrain.rasters.dem import REFERENCE, elevation_grid
 from fifesim.ground.terrain.rasters.lit_slopes import on_slopes
 from fifesim.rasters import cf, directions
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions
+from fifesim.rasters.annotations import Horizon
+from fifesim.rasters.directions import Directions
 
 
-def sky_view(dem: xr.DataArray, horizon: xr.DataArray | None = None) -> xr.DataArray:
+def sky_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataArray:
     """
     Sky view factor Vd.
 
@@ -57,7 +58,7 @@ def sky_view(dem: xr.DataArray, horizon: xr.DataArray | None = None) -> xr.DataA
     return _light(dem, horizon, None, "sky_view", lambda light: light.sky_view)
 
 
-def terrain_view(dem: xr.DataArray, horizon: xr.DataArray | None = None) -> xr.DataArray:
+def terrain_view(dem: xr.DataArray, horizon: Horizon | None = None) -> xr.DataArray:
     """
     Terrain configuration factor Ct.
 
@@ -93,7 +94,7 @@ def terrain_view(dem: xr.DataArray, horizon: xr.DataArray | None = None) -> xr.D
 def illumination(
     dem: xr.DataArray,
     geometry: Directions | None = None,
-    horizon: xr.DataArray | None = None,
+    horizon: Horizon | None = None,
     *,
     time: Time | None = None,
 ) -> xr.DataArray:
@@ -140,7 +141,7 @@ def illumination(
 def shadow(
     dem: xr.DataArray,
     geometry: Directions | None = None,
-    horizon: xr.DataArray | None = None,
+    horizon: Horizon | None = None,
     *,
     time: Time | None = None,
 ) -> xr.DataArray:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import FilePath, Numbers, Time
+from fifesim.base.annotations import NumberByBand, Time
 from fifesim.base.digital_numbers import counts
+from fifesim.base.kinds import UNCHECKED
 from fifesim.rasters import cf, chunks, directions
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions
 from fifesim.rasters.axes import north_up
 from fifesim.rasters.dates import by_date
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.rasters.directions import Directions
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
 from fifesim.sensor.response.rasters import digital_numbers
@@ -30,18 +31,21 @@ _CURE = (
 # instruments of this package have 0.24 to 2.7.
 _DIMMEST, _BRIGHTEST = 0.02, 20.0
 
+# The digital number of saturated pixels; None where no number marks them.
+Saturation: TypeAlias = Annotated[int | Literal["largest"] | None, UNCHECKED]
+
 
 @by_date
 def calibrate(
     dn: xr.DataArray,
-    instrument: FilePath | Instrument,
+    instrument: InstrumentLike,
     *,
     time: Time | None = None,
     geometry: Directions | None = None,
-    gain: Numbers | Mapping[str, float] | None = None,
-    offset: Numbers | Mapping[str, float] | None = None,
+    gain: NumberByBand | None = None,
+    offset: NumberByBand | None = None,
     nodata: int = 0,
-    saturated: int | Literal["largest"] | None = "largest",
+    saturated: Saturation = "largest",
 ) -> xr.DataArray:
     """
     Make an image of digital numbers, with calibration, wavelengths and sun, in the form that `sense` gives.

@@ -12,8 +12,8 @@ from fifesim.base.geometry import ANGLES, Geometry
 from fifesim.rasters import chunks as dask_chunks
 from fifesim.rasters import directions
 from fifesim.rasters import grid as grids
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.band_names import band_called
-from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.products.landsat_metadata import read_scene
 from fifesim.sensor.products.metadata_checks import check_irradiance
@@ -40,7 +40,7 @@ def open_landsat(
     angles: Literal["centre", "pixel"] = "centre",
     quality: bool = True,
     chunks: Chunks = "auto",
-    instrument: FilePath | Instrument | None = None,
+    instrument: InstrumentLike | None = None,
 ) -> xr.DataArray:
     """
     Open a Landsat Collection-2 product: Level 1 as reflectance at the top of the atmosphere, Level 2 of the surface.

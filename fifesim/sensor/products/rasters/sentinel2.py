@@ -14,8 +14,8 @@ from fifesim.base.geometry import Geometry
 from fifesim.rasters import chunks as chunks_of
 from fifesim.rasters import directions, places
 from fifesim.rasters import grid as grids
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.band_names import band_called
-from fifesim.sensor.description.instrument_file import Instrument
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.products import scaling
 from fifesim.sensor.products.metadata_checks import check_irradiance
@@ -58,7 +58,7 @@ def open_sentinel2(
     angles: Literal["centre", "pixel"] = "centre",
     quality: bool = True,
     chunks: Chunks = "auto",
-    instrument: FilePath | Instrument | None = None,
+    instrument: InstrumentLike | None = None,
 ) -> xr.DataArray:
     """
     Open a Sentinel-2 product: Level-1C as reflectance at the top of the atmosphere, Level-2A of the surface.

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import FilePath, Names
+from fifesim.base.annotations import Names
 from fifesim.rasters import cf
+from fifesim.rasters.annotations import AnyDimensions
 from fifesim.rasters.combination import combined
 from fifesim.rasters.own_rasters import check_reflectance
 from fifesim.rasters.packed import unpacked
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.rasters.carried import attributes_of
 from fifesim.sensor.response.rasters.wavelengths import spectral_axis
@@ -24,8 +25,8 @@ _NAMED = 3
 
 
 def to_bands(
-    spectra: xr.DataArray,
-    instrument: FilePath | Instrument,
+    spectra: AnyDimensions,
+    instrument: InstrumentLike,
     *,
     bands: Names | None = None,
     min_coverage: float = MIN_COVERAGE,

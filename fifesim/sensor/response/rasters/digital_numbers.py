@@ -1,10 +1,13 @@
 """What a digital number of an image stands for: a count of the detector, or one of the agency's product."""
 
+from functools import partial
+
 import numpy as np
 import xarray as xr
 
 from fifesim.base.digital_numbers import check_counts
 from fifesim.rasters import cf, chunks, directions
+from fifesim.rasters import grid as grids
 from fifesim.sensor.response.calibration import dn_to_radiance, gain_offset, radiance_to_dn
 from fifesim.sensor.response.product_scaling import product_gain_offset
 
@@ -108,7 +111,7 @@ def recorded(radiance, description, bands, quantise, product_geometry=None):
         along_band |= {"gain": gain, "offset": offset}
         along_band |= {"compression": compression} if any(compression) else {}
     along_band["solar_irradiance"] = [band.solar_irradiance for band in bands]
-    return radiance.assign_coords(cf.band_coordinates(**along_band))
+    return grids.with_coordinates(radiance, cf.band_coordinates(**along_band))
 
 
 def _compressed(radiance, gain, offset, compression, bits):
@@ -116,21 +119,19 @@ def _compressed(radiance, gain, offset, compression, bits):
     return radiance_to_dn(radiance, gain, offset, bits, compression)
 
 
-def radiance_of(image, scale):
+def radiance_kernel(image):
     """
-    Radiance of digital numbers, whose values are checked where their type also holds other values.
+    Kernel of the radiance of digital numbers, which checks values if their type also holds other values.
 
     Parameters
     ----------
     image : xarray.DataArray
         Digital numbers. [1]
-    scale : sequence of xarray.DataArray
-        Gain, offset, and the compression if there is one.
 
     Returns
     -------
-    radiance : xarray.DataArray
-        [W m-2 sr-1 um-1]
+    kernel : callable
+        ``kernel(dn, gain, offset)``, or with the compression as well, gives the radiance. [W m-2 sr-1 um-1]
 
     Raises
     ------
@@ -146,11 +147,11 @@ def radiance_of(image, scale):
     # The fill value has the type in which the image was recorded.
     recorded = fill.dtype if isinstance(fill, np.generic) and fill.dtype.kind == "u" else None
     if image.dtype.kind == "u" and recorded in (None, image.dtype):
-        return chunks.pointwise(dn_to_radiance, image, *scale)
+        return dn_to_radiance
     largest = int(np.iinfo(np.uint16 if recorded is None else recorded).max)
-    return chunks.pointwise(_checked_radiance, image, *scale, largest=largest)
+    return partial(_checked_radiance, largest)
 
 
-def _checked_radiance(dn, *scale, largest):
+def _checked_radiance(largest, dn, *scale):
     check_counts(dn, largest, _CALIBRATE_FIRST)
     return dn_to_radiance(dn, *scale)

@@ -5,17 +5,15 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import FilePath, Names, Numbers
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.base.annotations import Names, NumberOrList
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 # Samples of a point spread over the full width of its support, when no spacing is given.
 _SAMPLES = 121
 
 
-def psf(
-    instrument: FilePath | Instrument = "TM", band: str | None = None, *, spacing: float | None = None
-) -> xr.DataArray:
+def psf(instrument: InstrumentLike = "TM", band: str | None = None, *, spacing: float | None = None) -> xr.DataArray:
     r"""
     Point spread function of an instrument on the ground at nadir.
 
@@ -74,7 +72,7 @@ def psf(
 
 
 def mtf(
-    instrument: FilePath | Instrument = "TM", bands: Names | None = None, *, frequency: Numbers | None = None
+    instrument: InstrumentLike = "TM", bands: Names | None = None, *, frequency: NumberOrList | None = None
 ) -> xr.DataArray:
     """
     Modulation transfer function of an instrument on the ground at nadir.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -10,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import FilePath, Names, Time
+from fifesim.base.annotations import Noise, Time, WholeNumber
 from fifesim.rasters import cf, chunks, directions, projection
 from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Directions
 from fifesim.rasters.dates import by_date
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.rasters.directions import Directions
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.raster import MIN_VALID, as_radiance, by_bands, labelled
-from fifesim.sensor.response.noise import NoiseModel
+from fifesim.sensor.response.noise import NoiseModels
 from fifesim.sensor.response.rasters.digital_numbers import recorded
 from fifesim.sensor.response.rasters.noise import noisy
 from fifesim.sensor.response.rasters.pixels import by_line_spread, common_size
@@ -37,14 +36,14 @@ _STEP = 100.0
 @by_date
 def sense_swath(
     toa: xr.DataArray,
-    instrument: FilePath | Instrument | None = None,
+    instrument: InstrumentLike | None = None,
     track: Track | None = None,
     *,
     nadir_offset: float = 0.0,
     heading: float = 180.0,
-    noise: Names = (),
-    seed: int = 0,
-    noise_models: NoiseModel | Mapping[str, NoiseModel] | None = None,
+    noise: Noise = (),
+    seed: WholeNumber = 0,
+    noise_models: NoiseModels | None = None,
     quantise: bool = True,
     min_valid: float = MIN_VALID,
     geometry: Directions | None = None,

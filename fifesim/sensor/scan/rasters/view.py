@@ -10,10 +10,10 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 from scipy.interpolate import RectBivariateSpline
 
-from fifesim.base.annotations import Chunks, FilePath
+from fifesim.base.annotations import Chunks
 from fifesim.rasters import cf, places, projection
 from fifesim.rasters import grid as grids
-from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.annotations import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.scan import track as scan
 from fifesim.sensor.scan.track import Track
@@ -25,7 +25,7 @@ _TILE = 512
 
 
 def scan_geometry(
-    instrument: FilePath | Instrument,
+    instrument: InstrumentLike,
     grid: GeoBox,
     track: Track | None = None,
     *,

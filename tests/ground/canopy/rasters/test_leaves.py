@@ -23,8 +23,9 @@ def by_cell(lai_values):
     return made
 
 
-def reflectance(lai, optics, **options):
-    return fifesim.surface_reflectance(lai, bands=TM34, leaf_optics=optics, **options)
+def reflectance(lai, optics, background=None, **options):
+    canopy = fifesim.Canopy(leaf_optics=optics, background=background)
+    return fifesim.surface_reflectance(lai, bands=TM34, canopy=canopy, **options)
 
 
 def test_optics_by_band_and_cell(lai, by_cell):

@@ -21,8 +21,9 @@ def share(lai_values):
     return lai_values.drop_attrs(deep=False).copy(data=values).rename(None)
 
 
-def reflectance(lai, background, **options):
-    return fifesim.surface_reflectance(lai, bands=TM34, background=background, **options)
+def reflectance(lai, background, soil=None, moisture=None, **options):
+    canopy = fifesim.Canopy(background=background, soil=soil, moisture=moisture)
+    return fifesim.surface_reflectance(lai, bands=TM34, canopy=canopy, **options)
 
 
 def test_by_band_numbers_and_rasters_mix(lai, share):
@@ -124,13 +125,13 @@ def test_kernel_holds_no_rasters(lai, share):
     [
         ({"soil": 5}, r"soil must be in \[-1, 1\], got 5"),
         ({"moisture": -0.2}, r"moisture must be in \[0, 1\], got -0.2"),
-        ({"soil": "bright"}, "soil must be a number, or an xarray.DataArray over"),
+        ({"soil": "bright"}, "soil must be a number, or an xarray.DataArray over .y, x., got 'bright'"),
     ],
 )
 def test_soil_that_cannot_be_is_one_line(lai, options, message):
     with pytest.raises((ValueError, TypeError), match=message):
         reflectance(lai, None, **options)
-    with pytest.raises(ValueError, match="moisture is a number, or a raster over"):
+    with pytest.raises(ValueError, match="moisture must be a number, or a raster over"):
         reflectance(lai, None, moisture=lai.expand_dims(band=["TM3"]))
     with pytest.raises(ValueError, match="different grids"):
         reflectance(lai, None, moisture=(lai * 0).assign_coords(x=lai["x"] + 9))
@@ -163,7 +164,9 @@ def test_soil_scatters_ndvi_as_much_as_its_variance_says(response):
     field = fifesim.correlated_fields(grid, {"soil": 0.24}, seed=3)["soil"]
     found = []
     for deviation in (0.0, 0.02, 0.04, 0.06):
-        rho = lai.fifesim.surface_reflectance(instrument, bands=TM34, soil=deviation * field if deviation else None)
+        rho = lai.fifesim.surface_reflectance(
+            instrument, bands=TM34, canopy=fifesim.Canopy(soil=deviation * field if deviation else None)
+        )
         found.append(fifesim.regress(truth, rho.fifesim.to_toa().fifesim.sense(instrument).fifesim.ndvi()).r2)
     np.testing.assert_allclose(found, SCATTER, rtol=0, atol=0.01)
     # Scatter grows as the variance does, so that each step is larger than the one before.

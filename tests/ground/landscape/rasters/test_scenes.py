@@ -15,7 +15,7 @@ from fifesim.ground.landscape.rasters.cover import classes_of
 from fifesim.rasters import cf
 
 CLASSES = {
-    "bare": fifesim.CoverClass(lai=0.0, background=0.2),
+    "bare": fifesim.CoverClass(lai=0.0, canopy=fifesim.Canopy(background=0.2)),
     "grass": fifesim.CoverClass(lai="burned-grazed", arp=0.24),
     "wood": fifesim.CoverClass(lai=stats.gamma(9, scale=0.4)),
 }

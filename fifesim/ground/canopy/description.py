@@ -1,0 +1,198 @@
+"""Description of a canopy: its leaves, their arrangement, and the ground below them."""
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self
+
+from fifesim.base.arguments import check_fields
+from fifesim.base.kinds import described, is_a
+from fifesim.base.spelling import PARTS
+from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics, NumberByCell
+from fifesim.ground.canopy.crowns import check_crowns
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
+from fifesim.ground.canopy.properties import PROPERTIES
+
+# Below it the hot spot is narrower than the sun. [1]
+LEAST_HOTSPOT = 1e-6
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Canopy:
+    """
+    A canopy: its leaves, their arrangement, and the ground below them.
+
+    A field that is not given has its default; in a class of cover it has the value of the scene.
+
+    Parameters
+    ----------
+    leaf_optics : Leaf, str, path, xarray.Dataset, or mapping of str to (float, float), optional
+        A leaf by its contents; the path of a CSV file, or a Dataset, with its spectra ``wavelength`` [um],
+        ``reflectance`` and ``transmittance``; or both by band name. By default green tallgrass.
+        Each number may be a raster over (y, x): SAIL is evaluated at every cell then. If only one content of the `Leaf`
+        is a raster, its optics are interpolated within 1e-8; otherwise each kind of leaf is computed once. [1]
+    leaf_angles : str or sequence of float, optional
+        A name such as ``"planophile"``, ``"campbell(57)"`` or ``"verhoef(-0.35,-0.15)"``, or class fractions; by
+        default ``"spherical"``.
+    hotspot : float, optional
+        Leaf size over canopy height, in [0, 10]; 0, the default, is no hot spot. [1]
+    brown : float or xarray.DataArray, dims (y, x), optional
+        Dead share of the leaf area, in [0, 1]; by default 0. [1]
+    dissociation : float or xarray.DataArray, dims (y, x), optional
+        Position of dead leaves: 0 among the green ones (default), 1 below them. If it is a raster, SAIL is evaluated at
+        every cell. [1]
+    brown_leaf : optional
+        Optics of dead leaves, like ``leaf_optics``; by default dead tallgrass.
+    crown_cover : float or xarray.DataArray, dims (y, x), optional
+        Share of the ground below crowns, which hold all leaves; 0 is bare ground, 1 (default) has no gaps. [1]
+    crown_shape : float, optional
+        Crown diameter over the height of its middle, in [0, 10]; by default 1. [1]
+    background : optional
+        Reflectance below the canopy: a number, by band name, or a raster over ([band], y, x); a `Background` or
+        ``{spectrum: fraction}`` that mixes spectra; the path of a CSV file, or a Dataset, with ``wavelength`` [um] and
+        ``reflectance``. Each number by band or spectrum may be a raster over (y, x). By default soil and litter of
+        tallgrass. [1]
+    soil : float or xarray.DataArray, dims (y, x), optional
+        Brightness of the background: change of its reflectance at 0.55 um along the soil line, in [-1, 1]; by default
+        0. All bands change, and reflectance is clipped to [0, 1]. [1]
+    moisture : float or xarray.DataArray, dims (y, x), optional
+        Moisture of the background, 0 dry (default) to 1 saturated (5 and 55 percent of the volume). Films of water
+        darken it, most in the shortwave infrared. [1]
+
+    Attributes
+    ----------
+    given : frozenset of str
+        Names of the fields that were given.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, or the leaf angles are unknown.
+    TypeError
+        If a value is of another kind.
+
+    Examples
+    --------
+    >>> from fifesim import Canopy
+    >>> grass = Canopy(brown=0.2, leaf_angles="erectophile")
+    >>> grass.brown, grass.crown_cover
+    (0.2, 1.0)
+    >>> grass.replace(brown=0.4)
+    Canopy(leaf_angles='erectophile', brown=0.4)
+    >>> Canopy(brown=20)
+    Traceback (most recent call last):
+    ...
+    ValueError: brown must be in [0, 1], got 20: it is the share of dead leaf area, not percent
+    """
+
+    _in_words: ClassVar[str] = "a fifesim.Canopy, such as fifesim.Canopy(brown=0.2)"
+
+    leaf_optics: LeafOptics | None = None
+    leaf_angles: LeafAngles | None = None
+    hotspot: float | None = None
+    brown: NumberByCell | None = None
+    dissociation: NumberByCell | None = None
+    brown_leaf: LeafOptics | None = None
+    crown_cover: NumberByCell | None = None
+    crown_shape: float | None = None
+    background: BelowLeaves | None = None
+    soil: NumberByCell | None = None
+    moisture: NumberByCell | None = None
+    given: frozenset = field(default=frozenset(), init=False)
+
+    def __post_init__(self):
+        object.__setattr__(self, "given", frozenset(name for name in PROPERTIES if getattr(self, name) is not None))
+        if self.given:
+            check_fields(self, *self.given)
+        for name, known in PROPERTIES.items():
+            if name in self.given:
+                _check(name, getattr(self, name), known)
+            else:
+                object.__setattr__(self, name, known.default)
+
+    def __repr__(self):
+        said = (f"{name}={_brief(getattr(self, name))}" for name in PROPERTIES if name in self.given)
+        return f"Canopy({', '.join(said)})"
+
+    def replace(self, **changes: Any) -> Self:
+        """
+        Canopy with other values of some fields; other fields that were not given stay so.
+
+        Parameters
+        ----------
+        **changes
+            New values by name; None for a field that is no longer given.
+
+        Returns
+        -------
+        canopy : Canopy
+        """
+        return type(self)(**{name: getattr(self, name) for name in self.given} | changes)
+
+    def over(self, other: "Canopy") -> "Canopy":
+        """
+        This canopy, with the fields that were not given taken from another one.
+
+        Parameters
+        ----------
+        other : Canopy
+
+        Returns
+        -------
+        canopy : Canopy
+        """
+        return other.replace(**{name: getattr(self, name) for name in self.given})
+
+    def check_lai(self, largest: float) -> None:
+        """
+        Check that the crowns can hold the leaves of the ground.
+
+        Parameters
+        ----------
+        largest : float
+            Largest leaf area index of the ground. [m2 m-2]
+
+        Raises
+        ------
+        ValueError
+            If the leaf area index within the crowns would exceed the largest that SAIL is evaluated for.
+        """
+        if is_raster(self.crown_cover):
+            return
+        try:
+            check_crowns(largest, self.crown_cover)
+        except ValueError as error:
+            raise ValueError(f"crown_cover = {self.crown_cover:g}: {error}") from None
+
+
+PARTS["canopy"] = "fifesim.Canopy", tuple(PROPERTIES)
+
+TALLGRASS = Canopy()
+"""The default canopy: green tallgrass of the FIFE site."""
+
+
+def is_raster(value):
+    """Whether a value of a field is a raster."""
+    return is_a(value, "DataArray")
+
+
+def _check(name, value, known):
+    """Raise ValueError if a field cannot have a value of its kind."""
+    if name == "leaf_angles":
+        leaf_angle_classes(value)
+    elif known.unit and not is_raster(value):
+        if not known.lowest <= value <= known.highest:
+            percent = ", not percent" if known.meaning.startswith("share") else ""
+            allowed = f"[{known.lowest:g}, {known.highest:g}]"
+            raise ValueError(f"{name} must be in {allowed}, got {value:g}: it is the {known.meaning}{percent}")
+        if name == "hotspot" and 0 < value < LEAST_HOTSPOT:
+            raise ValueError(f"hotspot must be 0, for no hot spot, or at least {LEAST_HOTSPOT:g}, got {value:g}")
+    elif known.unit and value.dtype.kind not in "iuf":
+        raise TypeError(
+            f"{name} must hold real numbers, got {value.dtype}: type .astype(float) if 0 and 1 are its values"
+        )
+    elif known.unit and set(value.dims) - {"time"} != {"y", "x"}:
+        raise ValueError(f"{name} must be a number, or a raster over (y, x), got dimensions {value.dims}")
+
+
+def _brief(value):
+    """A value of a field in a few words."""
+    return f"<{described(value)}>" if is_a(value, "DataArray", "Dataset") else repr(value)

@@ -1,0 +1,40 @@
+"""Properties of a canopy: default, unit, range and meaning of each."""
+
+from typing import Any, NamedTuple
+
+
+class Property(NamedTuple):
+    """A property of the canopy."""
+
+    default: Any
+    meaning: str
+    unit: str = ""
+    """Empty for a property that is not a number."""
+    lowest: float = 0.0
+    highest: float = 1.0
+    by_cell: bool = False
+    """Whether it may be a raster over (y, x)."""
+    effect: str = ""
+    """Name of its variation in a budget; a property with an effect may be a random field."""
+
+
+PROPERTIES = {
+    "leaf_optics": Property(None, "optics of green leaves"),
+    "leaf_angles": Property("spherical", "leaf angle distribution"),
+    "hotspot": Property(0.0, "leaf size over canopy height", "1", 0, 10),
+    "brown": Property(0.0, "share of dead leaf area", "1", by_cell=True, effect="dead leaves"),
+    "dissociation": Property(0.0, "position of dead leaves: 0 among the green ones, 1 below them", "1", by_cell=True),
+    "brown_leaf": Property(None, "optics of dead leaves"),
+    "crown_cover": Property(1.0, "share of the ground below crowns", "1", by_cell=True, effect="clumping"),
+    "crown_shape": Property(1.0, "crown diameter over the height of its middle", "1", 0, 10),
+    "background": Property(None, "reflectance below the canopy"),
+    "soil": Property(0.0, "change of soil reflectance at 0.55 um along the soil line", "1", -1, 1, True, "soil"),
+    "moisture": Property(0.0, "moisture of the soil, 0 dry to 1 saturated", "1", by_cell=True, effect="soil"),
+}
+"""Properties by the names of the fields of `fifesim.Canopy`. The module imports no physics, for scenarios as text."""
+
+NUMBERS = {name: each for name, each in PROPERTIES.items() if each.unit}
+"""Properties that are numbers."""
+
+DRAWN = {name: each for name, each in PROPERTIES.items() if each.effect}
+"""Properties that may be random fields of a landscape."""

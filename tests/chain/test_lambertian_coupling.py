@@ -1,0 +1,256 @@
+"""The equation of the atmosphere treats a canopy as Lambertian: docs/physics.md states what that costs."""
+
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.polynomial.legendre import leggauss
+from odc.geo.xr import wrap_xr
+from oracles_atmosphere import Air, Ground, coupled_reflectance
+
+import fifesim
+from fifesim.atmosphere.schemes.coupling import apparent_reflectance
+from fifesim.atmosphere.schemes.engines import band_terms
+from fifesim.atmosphere.schemes.mixed_air import mixed_stokes, whole_scattering
+from fifesim.atmosphere.schemes.phase_expansion import matrix_moments
+from fifesim.atmosphere.schemes.stokes import stokes_reflectance
+from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
+from fifesim.base import datasets
+from fifesim.base.geometry import scattering_angle_cosine
+from fifesim.experiments.verification import benchmarks
+from fifesim.ground.canopy.background import with_background
+from fifesim.ground.canopy.sail_model import sail
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
+
+# The paper's leaf reflectance, transmittance and background, at the middle of the band [um].
+BANDS = {"TM3": (0.66, 0.07, 0.04, 0.15), "TM4": (0.83, 0.45, 0.42, 0.19)}
+LAI = (0.25, 0.74, 2.0, 6.0)
+
+
+# Ground of RAMI4ATM: rho0, k, Theta and rhoc.
+RPV = 0.017051, 0.95, -0.1, 0.017051
+
+
+def air_of(visibility, wavelength, sza, vza, raa):
+    air, at = fifesim.Atmosphere(visibility=visibility), np.array([wavelength])
+    terms = whole_scattering(air, at, sza, np.array([vza]), np.array([raa]))
+    path, down, up, albedo = (float(np.squeeze(each)) for each in terms)
+    tau = float(air.rayleigh_optical_depth(at)[0] + air.aerosol_optical_depth(at)[0])
+    direct = (np.exp(-tau / np.cos(np.radians(zenith))) for zenith in (sza, vza))
+    sky = cache(lambda *given: mixed_stokes(air, at, *map(np.array, given), at_ground=True)[0, ..., 0])
+    return Air(path, down, up, *direct, albedo, lambda sun, *place: sky(sun, *map(tuple, place)))
+
+
+def canopy(lai, leaf_reflectance, leaf_transmittance, background, hotspot=0.0):
+    def seen(sza, vza, raa):
+        leaves = sail(lai, leaf_reflectance, leaf_transmittance, sza=sza, vza=vza, raa=raa, hotspot=hotspot)
+        return with_background(leaves, background)
+
+    return Ground(
+        lambda sza, vza, raa: seen(sza, vza, raa).rso,
+        lambda vza: seen(30.0, vza, 0.0).rdo,
+        lambda sza: seen(sza, 0.0, 0.0).rsd,
+        float(seen(30.0, 0.0, 0.0).rdd),
+    )
+
+
+def lambertian(air, ground, sza, vza, raa):
+    """One reflectance factor, in sunlight and isotropic skylight, below the equation of a Lambertian surface."""
+    mixed = (1 - air.skylight) * ground.directional(sza, vza, raa) + air.skylight * ground.of_skylight(vza)
+    return np.squeeze(apparent_reflectance(mixed, air.path, air.down, air.up, air.albedo))
+
+
+def errors(visibility, sza, vza=0.0, raa=0.0, lais=LAI, hotspot=0.0):
+    """Percent of apparent reflectance by band and leaf area, and the error of NDVI by leaf area."""
+    found = []
+    for wavelength, *optics in BANDS.values():
+        air = air_of(visibility, wavelength, sza, vza, raa)
+        grounds = [canopy(lai, *optics, hotspot=hotspot) for lai in lais]
+        found.append([[f(air, ground, sza, vza, raa) for f in (lambertian, coupled_reflectance)] for ground in grounds])
+    percent = 100 * (np.divide(*np.moveaxis(found, -1, 0)) - 1)
+    red, infrared = np.array(found)
+    ndvi = (infrared - red) / (infrared + red)
+    return percent, ndvi[:, 0] - ndvi[:, 1]
+
+
+def rpv(sza, vza, raa):
+    """Bidirectional reflectance factor of Rahman, Pinty and Verstraete (1993)."""
+    rho, k, theta, rhoc = RPV
+    sun, view, azimuth = map(np.radians, (sza, vza, raa))
+    mu_s, mu_v = np.cos(sun), np.cos(view)
+    phase = mu_s * mu_v + np.sin(sun) * np.sin(view) * np.cos(azimuth)
+    form = (1 - theta**2) / (1 + theta**2 + 2 * theta * phase) ** 1.5
+    apart = np.tan(sun) ** 2 + np.tan(view) ** 2 - 2 * np.tan(sun) * np.tan(view) * np.cos(azimuth)
+    return (
+        rho * (mu_s * mu_v * (mu_s + mu_v)) ** (k - 1) * form * (1 + (1 - rhoc) / (1 + np.sqrt(np.maximum(apart, 0))))
+    )
+
+
+@cache
+def rpv_ground():
+    """The surface of RAMI4ATM; its hemispherical factors by quadrature, the same both ways."""
+    points, weights = leggauss(48)
+    mu, share = (points + 1) / 2, (points + 1) * weights / 2  # 2 mu dmu
+    zeniths, azimuths = np.degrees(np.arccos(mu)), np.arange(1.0, 180, 2)
+
+    def mean(zenith):
+        angles = np.atleast_1d(zenith)[:, None, None]
+        return np.squeeze(rpv(zeniths[:, None], angles, azimuths).mean(axis=-1) @ share)
+
+    return Ground(rpv, mean, mean, float(mean(zeniths) @ share))
+
+
+def rami_air(vza, raa):
+    """Molecules and aerosol of the reference, the latter evenly below 2 km."""
+    table = datasets.table("verification/rami4atm_phase.csv")
+    knots, phase = table[["scattering_cosine", "phase"]].to_numpy().T
+    nodes, weights = benchmarks._between(knots, 4)
+    moments = matrix_moments(np.interp(nodes, knots, phase), np.zeros(nodes.size), nodes, weights, 48)
+    matter = benchmarks.RAMI_MOLECULES, benchmarks.RAMI_AEROSOL, benchmarks.RAMI_ALBEDO
+    options, scalar = {"depolarization": 0.0, "vertical": (0.0, 2.0)}, {"polarized": False}
+    sun = benchmarks.RAMI_SZA
+
+    def seen(zenith, views, azimuths, way=1):
+        return np.interp(way * scattering_angle_cosine(zenith, np.asarray(views)[:, None], azimuths), knots, phase)
+
+    def sky(zenith, views, azimuths):
+        found = seen(zenith, views, azimuths, -1)
+        air = *matter, moments, found, 0 * found, zenith, views, azimuths
+        return stokes_reflectance(*air, at_ground=True, **options)[0]
+
+    vza, raa = np.array([vza]), np.array([raa])
+    path = path_reflectance(*matter, moments[:, 0], seen(sun, vza, raa), sun, vza, raa, **options, **scalar)
+    (down, up), albedo = flux_transmittance(*matter, moments[:, 0], [sun, *vza], **options, **scalar)
+    direct = np.exp(-sum(matter[:2]) / np.cos(np.radians([sun, *vza])))
+    return Air(float(path[0, 0]), down, up, *direct, albedo, sky)
+
+
+@cache
+def over_rpv():
+    """Views within 61 degrees: reflectance of Eradiate without gases, its noise, and reflectance by the equation."""
+    table = pd.read_csv(ROOT / "tests" / "data" / "rami4atm_rpv.csv", comment="#").query("abs(vza) <= 61")
+    table["reflectance"] /= np.exp(-benchmarks.RAMI_GASES * benchmarks._air_mass(table))
+    table["noise"] = 100 * table["sd"] / table["reflectance"]
+    table["raa"] = np.where(table["vza"] > 0, 0.0, 180.0)
+    views = list(zip(table["vza"].abs().astype(float), table["raa"], strict=True))
+    airs = [rami_air(*view) for view in views]
+    sun, ground = benchmarks.RAMI_SZA, rpv_ground()
+    table["equation"] = [float(lambertian(air, ground, sun, *view)) for air, view in zip(airs, views, strict=True)]
+    return table.assign(air=airs)
+
+
+def percent(found, expected):
+    return 100 * (np.asarray(found) / np.asarray(expected) - 1)
+
+
+def numbers(text):
+    """Numbers that a page prints, with a true minus."""
+    return [float(each.replace("−", "-").replace("+", "")) for each in re.findall(r"[−+]?\d+(?:\.\d+)?", text)]
+
+
+ROWS = re.findall(r"^\| (\d+) km \| ([\d.]+)° \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.MULTILINE)
+
+
+def test_production_makes_one_reflectance_factor_of_sunlight_and_skylight():
+    """`surface_reflectance` and `to_toa` do what `lambertian` does, band by band."""
+    air = fifesim.Atmosphere(visibility=15)
+    grid = fifesim.grid_at("EPSG:26914", west=705000, north=4334000, width=20, height=20, cell=10)
+    lai = wrap_xr(np.full((2, 2), 0.74), grid)
+    geometry = fifesim.Geometry(sza=45.0, saa=180.0, vza=0.0, vaa=0.0)
+    case = {"geometry": geometry, "atmosphere": air}
+    leaves, soil = ({name: each[part] for name, each in BANDS.items()} for part in (slice(1, 3), 3))
+    grass = fifesim.Canopy(leaf_optics=leaves, background=soil)
+    rho = lai.fifesim.surface_reflectance("TM", bands=list(BANDS), canopy=grass, exact=True, **case)
+    toa = rho.fifesim.to_toa(**case)
+    for name, (_, *leaf) in BANDS.items():
+        (band,) = fifesim.instrument("TM").select([name])
+        terms = band_terms(air, [band.response], 45.0, 0.0, 180.0)
+        values = {field: float(each[0]) for field, each in terms._asdict().items()}
+        below = Air(
+            values["path_reflectance"],
+            values["transmittance_down"],
+            values["transmittance_up"],
+            (1 - values["diffuse_fraction"]) * values["transmittance_down"],
+            values["direct_transmittance_up"],
+            values["spherical_albedo"],
+            None,
+        )
+        expected = values["gas_transmittance"] * lambertian(below, canopy(0.74, *leaf), 45.0, 0.0, 180.0)
+        assert float(toa.sel(band=name)[0, 0]) == pytest.approx(expected, rel=1e-9)
+
+
+def test_table_has_six_cases():
+    assert [row[:2] for row in ROWS] == [(v, s) for v in ("45", "15") for s in ("28.5", "45", "60")]
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row[0]}-{row[1]}")
+def test_errors_at_nadir_are_those_of_the_page(row):
+    visibility, sza, *printed = row
+    found, ndvi = errors(float(visibility), float(sza))
+    for text, values, digit in zip(printed, (*found, ndvi), (0.1, 0.1, 0.001), strict=True):
+        np.testing.assert_allclose(numbers(text), [values.min(), values.max()], rtol=0, atol=0.6 * digit)
+
+
+def test_summary_of_the_benchmarks_is_that_of_the_table():
+    """With the sun at 45 degrees or higher."""
+    page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    found = re.search(
+        r"within ([\d.]+) % at\s+45 km visibility and ([\d.]+) % at 15 km at nadir, and up to ([\d.]+) %", page
+    )
+    high = [row for row in ROWS if float(row[1]) <= 45]
+    largest = [
+        max(abs(each) for row in high if row[0] == km for each in numbers(row[2] + row[3])) for km in ("45", "15")
+    ]
+    (in_hot_spot,) = re.findall(r"too bright at 45 km and [\d.]+ to ([\d.]+) % at 15 km", PAGE)
+    assert [float(each) for each in found.groups()] == [*largest, float(in_hot_spot)]
+
+
+def test_errors_in_the_hot_spot_are_those_of_the_page():
+    text = re.search(
+        r"the equation is ([\d.]+) to ([\d.]+) % too bright at 45 km and ([\d.]+) to ([\d.]+) % at 15 km", PAGE
+    )
+    beside = float(re.search(r"6° away the error is at most ([\d.]+) %", PAGE)[1])
+    found, around = [], []
+    for visibility in (45.0, 15.0):
+        case = {"lais": (0.74, 3.0), "hotspot": 0.05}
+        inside = errors(visibility, 30.0, 30.0, **case)[0]
+        found += [inside.min(), inside.max()]
+        around.append(np.abs(errors(visibility, 30.0, 36.0, **case)[0]).max())
+    np.testing.assert_allclose([float(each) for each in text.groups()], found, rtol=0, atol=0.06)
+    assert max(around) == pytest.approx(beside, abs=0.06)
+
+
+def test_integration_agrees_with_eradiate_and_the_equation_does_not():
+    """Over an RPV surface, in the mean of every sixth view."""
+    table = over_rpv().iloc[::6]
+    sun, ground = benchmarks.RAMI_SZA, rpv_ground()
+    exact = [coupled_reflectance(view.air, ground, sun, abs(float(view.vza)), view.raa) for view in table.itertuples()]
+    noise = np.sqrt((table["noise"] ** 2).sum()) / len(table)
+    assert abs(percent(exact, table["reflectance"]).mean()) < 3 * noise
+    assert percent(table["equation"], table["reflectance"]).mean() > 3 * noise
+
+
+def test_errors_over_the_surface_of_eradiate_are_those_of_the_page():
+    text = re.search(r"is ([\d.]+) % too bright there on average .+ and ([\d.]+) % within 8° of the hot spot", PAGE)
+    table = over_rpv()
+    found = percent(table["equation"], table["reflectance"])
+    near = (abs(table["vza"] - benchmarks.RAMI_SZA) <= 8).to_numpy()
+    np.testing.assert_allclose([float(each) for each in text.groups()], [found.mean(), found[near].mean()], atol=0.06)
+
+
+def test_lambertian_ground_needs_no_integration():
+    """The equation is exact over it; the quadrature of the sky is good to 1e-3 of the skylight."""
+    air = air_of(15, 0.66, 45.0, 30.0, 0.0)
+    even = Ground(
+        lambda sza, vza, raa: 0.3 + 0 * (sza + vza + raa),
+        lambda vza: 0.3 + 0 * vza,
+        lambda sza: 0.3 + 0 * sza,
+        0.3,
+    )
+    found = coupled_reflectance(air, even, 45.0, 30.0, 0.0)
+    assert found == pytest.approx(air.over_lambertian(0.3), rel=1e-9)

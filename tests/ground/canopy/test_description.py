@@ -1,0 +1,339 @@
+"""The description of a canopy: ranges, what was given, and the one place from which all else takes its properties."""
+
+import pickle
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim import Canopy
+from fifesim.ground.canopy.description import LEAST_HOTSPOT, TALLGRASS
+from fifesim.ground.canopy.properties import NUMBERS, PROPERTIES
+from fifesim.scenario.ground import canopy_of
+from fifesim.scenario.ground_keys import ClassKeys, GroundKeys
+from fifesim.scenario.named_keys import find_key
+from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.toml import write_scenario
+
+ROOT = Path(__file__).parents[3]
+TM34 = ["TM3", "TM4"]
+RASTER = xr.DataArray(np.full((2, 3), 0.25), dims=("y", "x"))
+BY_CELL = [name for name, known in NUMBERS.items() if known.by_cell]
+
+
+def given_by(canopy):
+    return {name: getattr(canopy, name) for name in canopy.given}
+
+
+@pytest.mark.parametrize("name", list(NUMBERS))
+def test_a_number_may_be_a_limit_and_nothing_beyond(name):
+    low, high = NUMBERS[name].lowest, NUMBERS[name].highest
+    for value in (low, high, float(low), np.float32(high), np.int64(high)):
+        assert getattr(Canopy(**{name: value}), name) == value
+    for value in (np.nextafter(float(low), -np.inf), low - 1, high + 1, high * 30, np.inf, -np.inf, np.nan):
+        message = re.escape(f"{name} must be in [{low:g}, {high:g}], got {value:g}: it is the {NUMBERS[name].meaning}")
+        with pytest.raises(ValueError, match=f"^{message}"):
+            Canopy(**{name: value})
+
+
+def test_a_share_beyond_its_range_may_be_a_percentage():
+    with pytest.raises(ValueError) as told:
+        Canopy(brown=30)
+    assert str(told.value) == "brown must be in [0, 1], got 30: it is the share of dead leaf area, not percent"
+    with pytest.raises(ValueError, match=r"crown diameter over the height of its middle$"):
+        Canopy(crown_shape=30)
+
+
+def test_a_hot_spot_narrower_than_the_sun_is_refused():
+    assert Canopy(hotspot=LEAST_HOTSPOT).hotspot == LEAST_HOTSPOT
+    with pytest.raises(ValueError, match=r"hotspot must be 0, for no hot spot, or at least 1e-06, got 9.9e-07"):
+        Canopy(hotspot=0.99 * LEAST_HOTSPOT)
+
+
+@pytest.mark.parametrize("name", list(NUMBERS))
+def test_what_is_no_number_is_refused_by_name(name):
+    raster = r", or an xarray.DataArray over \(y, x\)" if name in BY_CELL else ""
+    for value, said in (
+        ("0.3", "'0.3'"),
+        (True, "True"),
+        ([0.3], "a list of 1"),
+        (np.full(3, 0.3), r"a numpy array \(3,\)"),
+        (RASTER.to_dataset(name="a"), "an xarray.Dataset of a"),
+    ):
+        with pytest.raises(TypeError, match=f"^{name} must be a number{raster}, got {said}"):
+            Canopy(**{name: value})
+
+
+@pytest.mark.parametrize("name", BY_CELL)
+def test_a_raster_is_over_the_cells_and_holds_real_numbers(name):
+    for raster in (RASTER, RASTER.T, RASTER.astype(int), RASTER.expand_dims(time=2), RASTER.chunk()):
+        assert getattr(Canopy(**{name: raster}), name) is raster
+    for raster, dims in (
+        (RASTER.expand_dims(band=TM34), r"\('band', 'y', 'x'\)"),
+        (RASTER.isel(y=0), r"got \(x\)"),
+        (RASTER.rename(y="lat", x="lon"), r"\('lat', 'lon'\)"),
+        (RASTER.isel(y=0, x=0), r"got \(\)"),
+    ):
+        with pytest.raises(ValueError, match=rf"^{name} must (be .* a raster over|have dimensions).*{dims}"):
+            Canopy(**{name: raster})
+    for kind in ("bool", "complex64", "str", "datetime64[s]"):
+        with pytest.raises(TypeError, match=rf"^{name} must hold real numbers, got .*: type \.astype\(float\)"):
+            Canopy(**{name: RASTER.astype(kind)})
+
+
+@pytest.mark.parametrize("name", sorted(set(NUMBERS) - set(BY_CELL)))
+def test_what_is_the_same_everywhere_is_no_raster(name):
+    with pytest.raises(TypeError, match=rf"^{name} must be a number, got an xarray.DataArray \(y: 2, x: 3\)"):
+        Canopy(**{name: RASTER})
+
+
+@pytest.mark.parametrize(
+    ("field", "error", "message"),
+    [
+        ({"leaf_angles": "spheric"}, ValueError, "unknown leaf angle distribution 'spheric', did you mean 'spherical'"),
+        ({"leaf_angles": [0.5, 0.6]}, ValueError, "1.1"),
+        ({"leaf_angles": 57}, TypeError, r"leaf_angles must be .*, got 57: .*'campbell\(57\)'"),
+        ({"leaf_angles": {30: 1.0}}, TypeError, "leaf_angles must be a name such as 'planophile', .*got a dict of 1"),
+        ({"leaf_optics": 0.4}, TypeError, "^leaf_optics must be a fifesim.Leaf, .*got 0.4"),
+        ({"leaf_optics": RASTER}, TypeError, "^leaf_optics must be a fifesim.Leaf, .*got an xarray.DataArray"),
+        ({"brown_leaf": True}, TypeError, "^brown_leaf must be a fifesim.Leaf, .*got True"),
+        ({"brown_leaf": [0.1]}, TypeError, "^brown_leaf must be a fifesim.Leaf, .*got a list of 1"),
+        ({"bron": 1}, TypeError, "Canopy has no argument 'bron': did you mean 'brown'"),
+        ({"leaf": fifesim.Leaf()}, TypeError, "Canopy has no argument 'leaf': There are leaf_optics"),
+        ({"given": {"brown"}}, TypeError, "Canopy has no argument 'given'"),
+    ],
+    ids=str,
+)
+def test_other_fields_are_refused_by_name(field, error, message):
+    with pytest.raises(error, match=message):
+        Canopy(**field)
+
+
+def test_the_default_is_tallgrass_of_which_nothing_was_given():
+    assert TALLGRASS.given == frozenset() and repr(TALLGRASS) == "Canopy()"
+    assert {name: getattr(Canopy(), name) for name in PROPERTIES} == {
+        "leaf_optics": None,
+        "leaf_angles": "spherical",
+        "hotspot": 0.0,
+        "brown": 0.0,
+        "dissociation": 0.0,
+        "brown_leaf": None,
+        "crown_cover": 1.0,
+        "crown_shape": 1.0,
+        "background": None,
+        "soil": 0.0,
+        "moisture": 0.0,
+    }
+    assert fifesim.Setup().canopy is TALLGRASS and fifesim.CoverClass("grass").canopy is TALLGRASS
+
+
+def test_every_field_takes_its_default(lai):
+    """Given or not, a default leaves all bits."""
+    defaults = {name: each.default for name, each in PROPERTIES.items()}
+    rho = lai.fifesim.surface_reflectance("TM", bands=TM34)
+    xr.testing.assert_identical(lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=Canopy(**defaults)), rho)
+
+
+def test_given_fields_are_told_from_defaults():
+    canopy = Canopy(brown=0.0, leaf_angles="spherical", crown_cover=RASTER, soil=None)
+    assert canopy.given == {"brown", "leaf_angles", "crown_cover"}
+    assert canopy.soil == 0.0
+
+
+def test_replace_keeps_what_was_not_given_open():
+    canopy = Canopy(brown=0.3, hotspot=0.1)
+    changed = canopy.replace(brown=0.0, soil=0.1)
+    assert given_by(changed) == {"brown": 0.0, "hotspot": 0.1, "soil": 0.1}
+    assert given_by(canopy) == {"brown": 0.3, "hotspot": 0.1}
+    unset = changed.replace(brown=None, hotspot=None)
+    assert given_by(unset) == {"soil": 0.1} and (unset.brown, unset.hotspot) == (0.0, 0.0)
+    with pytest.raises(ValueError, match=r"brown must be in \[0, 1\], got 3"):
+        canopy.replace(brown=3)
+    with pytest.raises(TypeError, match="no argument 'bron': did you mean 'brown'"):
+        canopy.replace(bron=0.3)
+
+
+def test_over_has_precedence_where_it_was_given():
+    own, scene = Canopy(brown=0.0, background=0.1), Canopy(brown=0.3, hotspot=0.1, moisture=RASTER)
+    both = own.over(scene)
+    assert both.given == {"brown", "background", "hotspot", "moisture"}
+    assert (both.brown, both.background, both.hotspot, both.moisture is RASTER) == (0.0, 0.1, 0.1, True)
+    assert given_by(Canopy().over(own)) == given_by(own) == given_by(own.over(Canopy()))
+
+
+def test_text_of_a_canopy_makes_it_again():
+    canopy = Canopy(leaf_optics=fifesim.Leaf(chlorophyll=40), leaf_angles="erectophile", brown=0.0, soil=-0.1)
+    again = eval(repr(canopy), {"Canopy": Canopy, "Leaf": fifesim.Leaf})
+    assert given_by(again) == given_by(canopy)
+    assert repr(Canopy(brown=RASTER, hotspot=0.1)) == "Canopy(hotspot=0.1, brown=<an xarray.DataArray (y: 2, x: 3)>)"
+
+
+def test_a_canopy_is_frozen_and_goes_to_other_processes():
+    canopy = Canopy(brown=RASTER, leaf_optics=fifesim.Leaf(), hotspot=0.0)
+    with pytest.raises(AttributeError, match="brown"):
+        canopy.brown = 0.2
+    again = pickle.loads(pickle.dumps(canopy))
+    assert again.given == canopy.given == {"brown", "leaf_optics", "hotspot"}
+    xr.testing.assert_identical(again.brown, RASTER)
+    assert again.leaf_optics == fifesim.Leaf()
+
+
+@pytest.mark.parametrize("name", list(PROPERTIES))
+def test_a_loose_property_says_where_it_belongs(lai, name):
+    message = re.escape(f"has no argument '{name}': type canopy=fifesim.Canopy({name}=...)")
+    for call in (
+        lambda: lai.fifesim.surface_reflectance("TM", **{name: 0.3}),
+        lambda: fifesim.fpar(lai, **{name: 0.3}),
+        lambda: fifesim.Setup(**{name: 0.3}),
+        lambda: fifesim.CoverClass("grass", **{name: 0.3}),
+    ):
+        with pytest.raises(TypeError, match=message):
+            call()
+
+
+@pytest.mark.parametrize("value", [0.3, "grass", {"brown": 0.3}, Canopy], ids=str)
+def test_a_canopy_of_another_kind_is_refused(lai, value):
+    for call in (
+        lambda: lai.fifesim.surface_reflectance("TM", canopy=value),
+        lambda: lai.fifesim.fpar(canopy=value),
+        lambda: fifesim.CoverClass("grass", canopy=value),
+    ):
+        with pytest.raises(TypeError, match=r"canopy must be a fifesim\.Canopy"):
+            call()
+
+
+def test_rasters_over_time_go_date_by_date(lai):
+    """Those within a mapping as well; and what was not given stays so, also for classes."""
+    days = xr.Variable("time", np.array(["1987-06-06T16:35", "1987-07-06T16:35"], "M8[ns]"))
+    season = xr.concat([lai, 1.1 * lai], dim=days, combine_attrs="override")
+    share = xr.concat([lai / 10, lai / 20], dim=days, combine_attrs="override").drop_attrs(deep=False)
+    canopy = Canopy(background={"TM3": share, "TM4": 0.3}, brown=share, hotspot=0.1)
+    found = season.fifesim.surface_reflectance("TM", bands=TM34, canopy=canopy)
+    absorbed = season.fifesim.fpar(canopy=canopy, leaves="green")
+    for date in (0, 1):
+        own = Canopy(background={"TM3": share[date], "TM4": 0.3}, brown=share[date], hotspot=0.1)
+        alone = season[date].fifesim.surface_reflectance("TM", bands=TM34, canopy=own)
+        np.testing.assert_array_equal(found[date], alone)
+        np.testing.assert_array_equal(absorbed[date], season[date].fifesim.fpar(canopy=own, leaves="green"))
+    with pytest.raises(ValueError, match="has dates and the raster of surface_reflectance has none"):
+        lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=Canopy(brown=share))
+
+
+def test_dates_leave_open_what_was_not_given(site, lai):
+    """A property that all classes have is none of the call's, at each date."""
+    days = xr.Variable("time", np.array(["1987-06-06T16:35", "1987-07-06T16:35"], "M8[ns]"))
+    share = xr.concat([lai / 10, lai / 20], dim=days, combine_attrs="override").drop_attrs(deep=False)
+    classes = {"grass": fifesim.CoverClass(lai="burned-grazed", canopy=Canopy(hotspot=0.1))}
+    land = fifesim.landscape(site, classes=classes, seed=7)
+    season = land.assign(lai=xr.concat([land.lai, land.lai], dim=days, combine_attrs="override"))
+    found = season.fifesim.surface_reflectance("TM", bands=TM34, canopy=Canopy(brown=share))
+    alone = Canopy(hotspot=0.1, brown=share[1])
+    expected = season.lai[1].fifesim.surface_reflectance("TM", bands=TM34, canopy=alone)
+    np.testing.assert_array_equal(found[1], expected)
+
+
+@pytest.fixture(scope="module")
+def classes():
+    """One class that leaves dead leaves open, and one that has none."""
+    return {
+        "open": fifesim.CoverClass(lai="burned-grazed", canopy=Canopy(hotspot=0.1)),
+        "green": fifesim.CoverClass(lai="burned-grazed", canopy=Canopy(brown=0.0, moisture=0.0)),
+    }
+
+
+def test_a_class_takes_the_scenes_value_only_where_it_leaves_a_field_open(site, classes):
+    """A default that is given wins over the scene."""
+    land = fifesim.landscape(site, cover=fifesim.Patches("voronoi", 30), classes=classes, seed=7)
+    scene = Canopy(brown=0.3, moisture=0.4)
+    rho = land.fifesim.surface_reflectance("TM", bands=TM34, canopy=scene)
+    green = land.fifesim.fpar(canopy=scene, leaves="green")
+    for code, own in ((1, Canopy(brown=0.3, moisture=0.4, hotspot=0.1)), (2, Canopy())):
+        cells = (land.cover == code).values
+        assert cells.sum() > 400
+        alone = land.lai.fifesim.surface_reflectance("TM", bands=TM34, canopy=own)
+        np.testing.assert_array_equal(rho.values[:, cells], alone.values[:, cells])
+        absorbed = land.lai.fifesim.fpar(canopy=own, leaves="green")
+        np.testing.assert_array_equal(green.values[cells], absorbed.values[cells])
+
+
+@pytest.mark.parametrize("name", list(NUMBERS))
+def test_every_number_is_a_key_of_the_ground_and_of_a_class(name):
+    known = NUMBERS[name]
+    for section in (GroundKeys, ClassKeys):
+        field = section.model_fields[name]
+        limits = {kind: value for each in field.metadata for kind, value in vars_of(each).items()}
+        assert (field.default, field.description, section.unit(name)) == (known.default, known.meaning, known.unit)
+        assert (limits["ge"], limits["le"]) == (known.lowest, known.highest)
+    text = write_scenario(parse_scenario({"classes": {"wood": {name: 0.5}}, "landscape": {"cover": "voronoi"}}))
+    assert f"\n{name} = {known.default}  # {known.unit}; {known.meaning}\n" in text.split("[landscape]")[0]
+    assert f"\n{name} = 0.5  # {known.unit}; {known.meaning}\n" in text.split("[classes.wood]")[1]
+    assert find_key(name).name == f"ground.{name}"
+    assert find_key(f"classes.wood.{name}").name == f"classes.wood.{name}"
+
+
+def vars_of(limit):
+    """Limits of the metadata of a field, such as ``Ge(ge=0)``."""
+    return {name: getattr(limit, name) for name in ("ge", "le") if hasattr(limit, name)}
+
+
+def test_leaf_angles_are_a_key_too():
+    for section in (GroundKeys, ClassKeys):
+        assert section.model_fields["leaf_angles"].default == PROPERTIES["leaf_angles"].default
+
+
+@pytest.mark.parametrize("name", list(NUMBERS))
+def test_keys_out_of_range_are_refused_by_place(name):
+    for place, keys in (
+        (f"ground.{name}", lambda value: {"ground": {name: value}}),
+        (f"classes.wood.{name}", lambda value: {"classes": {"wood": {name: value}}, "landscape": {"cover": "voronoi"}}),
+    ):
+        for value in (NUMBERS[name].lowest - 0.5, NUMBERS[name].highest + 0.5):
+            with pytest.raises(ValueError, match=re.escape(f"{place} = {value:g}: must be at ")):
+                parse_scenario(keys(value))
+
+
+def test_keys_of_the_ground_and_of_a_class_are_its_canopy():
+    ground = {"brown": 0.3, "soil": -0.05, "moisture": 0.2, "leaf_angles": "planophile"}
+    case = parse_scenario(
+        {"ground": ground, "landscape": {"cover": "voronoi"}, "classes": {"green": {"brown": 0.0}, "open": {}}}
+    )
+    scene, table = canopy_of(case), case.class_table()
+    assert {name: getattr(scene, name) for name in ground} == ground
+    assert given_by(table["green"].canopy) == {"brown": 0.0} and table["open"].canopy.given == frozenset()
+    assert [table[name].canopy.over(scene).brown for name in ("green", "open")] == [0.0, 0.3]
+    assert table["green"].canopy.over(scene).moisture == 0.2
+
+
+def test_a_scenario_has_the_reflectance_of_its_canopy():
+    """Soil and moisture of one stand, and of a class."""
+    small = {"grid": {"width": 300.0, "height": 240.0}, "terrain": {"dem": "flat"}}
+    keys = {"soil": 0.05, "moisture": 0.4}
+    one = fifesim.simulate(parse_scenario(small | {"ground": keys}))["scene"]
+    assert list(one.data_vars)[:1] == ["lai"] and not {"soil", "moisture"} & set(one.data_vars)
+    expected = one["lai"].fifesim.surface_reflectance("TM", bands=TM34, canopy=Canopy(**keys))
+    np.testing.assert_array_equal(one["surface_reflectance"], expected)
+    classes = {"wet": {"moisture": 0.8}, "dry": {"moisture": 0.0}}
+    land = {"landscape": {"cover": "voronoi", "size": 60.0}, "classes": classes}
+    several = fifesim.simulate(parse_scenario(small | land | {"ground": keys}))["scene"]
+    for code, moisture in ((1, 0.8), (2, 0.0)):
+        cells = (several["cover"] == code).values
+        alone = Canopy(soil=0.05, moisture=moisture)
+        expected = several["lai"].fifesim.surface_reflectance("TM", bands=TM34, canopy=alone)
+        assert cells.any()
+        np.testing.assert_array_equal(several["surface_reflectance"].values[:, cells], expected.values[:, cells])
+
+
+def test_the_table_of_the_howto_is_that_of_the_fields():
+    page = (ROOT / "docs/howto/canopy.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in re.findall(r"^\| `.*\|$", page, re.MULTILINE)]
+    shown = {row[0].strip("`"): row[1:] for row in rows}
+    assert list(shown) == list(PROPERTIES)
+    for name, known in PROPERTIES.items():
+        meaning, default, limits, raster = shown[name]
+        assert meaning == known.meaning
+        if name in NUMBERS:
+            found = (float(default), limits, raster == "yes")
+            assert found == (known.default, f"{known.lowest:g} to {known.highest:g}", known.by_cell)

@@ -1,0 +1,185 @@
+"""One table of quantities: every picture, style, report and page has its words and colours from there."""
+
+import dataclasses
+from xml.etree import ElementTree
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+
+import fifesim
+from fifesim.base.bands import composite
+from fifesim.experiments.explorer.words import layer_words
+from fifesim.output.chips.pictures import contact_sheet
+from fifesim.output.colours import LAND, colours_of, dark_and_bright, percentile_limits, stops_of
+from fifesim.output.composites import composite_bands, false_colour_names
+from fifesim.output.figures import fit_figure
+from fifesim.output.maps import relief_map, value_map
+from fifesim.output.report import finding
+from fifesim.output.words import axis_label, long_name, short_name, unit
+from fifesim.rasters import cf
+from fifesim.scenario.ground_keys import GroundKeys
+from fifesim.sensor.description.choices import false_colour_bands
+from fifesim.sensor.description.instruments import instrument, instrument_names
+
+CLUMPING = cf.Quantity(
+    "1", "", "clumping index", "1 for leaves at random", label="clumping", shown_units="m2 m-2", lowest=0.2,
+    highest=1.0, colours="magma", middle=0.5, ends=(0.25, None),
+)  # fmt: skip
+
+
+@pytest.fixture
+def clumping(monkeypatch, lai):
+    """A raster of a quantity that is in the table for the time of a test."""
+    matplotlib.use("agg")
+    monkeypatch.setitem(cf.QUANTITIES, "clumping", CLUMPING)
+    return cf.label(0.3 + lai / 10, "clumping", history="made")
+
+
+def ramp(path):
+    root = ElementTree.parse(path).getroot()
+    return [(float(item.get("value")), item.get("color")) for item in root.iter("item")]
+
+
+def test_a_quantity_of_the_table_has_its_words_everywhere(clumping, whole):
+    assert clumping.name == "clumping" and clumping.attrs["long_name"] == "clumping index"
+    assert (short_name(clumping), unit(clumping), long_name(clumping)) == ("clumping", "[m² m⁻²]", "Clumping index")
+    assert axis_label("clumping") == "clumping [m² m⁻²]"
+    assert clumping.fifesim.plot().figure.axes[1].get_ylabel() == "clumping [m² m⁻²]"
+    image = xr.Dataset({"ndvi": whole["ndvi"]})
+    truth = xr.Dataset({"clumping": clumping.fifesim.aggregate(30).rename("clumping")})
+    fit = fifesim.regress(truth["clumping"], image["ndvi"])
+    axis = fit_figure(image, truth, "clumping", fit).axes[0]
+    assert axis.get_ylabel() == "True clumping [m² m⁻²]" and axis.get_ylim()[0] >= CLUMPING.lowest
+    assert "of true clumping." in finding(truth, {"clumping": fit}, {})
+    assert layer_words(["clumping"])["clumping"]["axis"] == "clumping [m² m⁻²]"
+    sheet = contact_sheet(chips(clumping), ["train"])
+    assert [axis.get_ylabel() for axis in sheet.axes if axis.get_ylabel()] == ["image: TM4", "clumping"]
+
+
+def test_a_quantity_of_the_table_has_its_colours_everywhere(clumping, tmp_path):
+    magma = [to_hex(colormaps["magma"](share)) for share in np.linspace(0, 1, 9)]
+    low, high = percentile_limits(clumping, middle=0.5)
+    assert (low + high) / 2 == pytest.approx(0.5) and high > 0.5 > low
+    picture = clumping.fifesim.plot().images[0]
+    assert picture.get_cmap().name == "magma" and picture.get_clim() == pytest.approx((low, high))
+    assert value_map(clumping, "").bar.stops == layer_words(["clumping"])["clumping"]["stops"] == magma
+    shown = ramp(fifesim.write_style(clumping.fifesim.to_geotiff(tmp_path / "clumping.tif")))
+    assert [colour for _, colour in shown] == magma
+    assert (shown[0][0], shown[-1][0]) == (0.25, pytest.approx(high, rel=1e-5))
+    row = contact_sheet(chips(clumping), ["train"]).axes[1].images[0]
+    assert row.get_cmap().name == "magma" and row.get_clim() == pytest.approx((low, high))
+
+
+def chips(raster):
+    """A dataset of one chip: its image in one band, and the raster as its truth."""
+    reflectance = ("chip", "band", "y", "x"), raster.values[None, None]
+    coordinates = {"band": ["TM4"], "wavelength": ("band", [0.83]), "split": ("chip", ["train"])}
+    return xr.Dataset(
+        {"toa_reflectance": reflectance, str(raster.name): (("chip", "y", "x"), raster.values[None])}, coordinates
+    )
+
+
+@pytest.mark.parametrize("name", cf.QUANTITIES)
+def test_quantities_have_short_words_a_range_and_a_colour_map(name):
+    quantity = cf.QUANTITIES[name]
+    assert quantity.label == short_name(cf.label(xr.DataArray(np.zeros((2, 2)), dims=("y", "x")), name, history=""))
+    assert 0 < len(quantity.label) <= 40
+    lowest, highest = (-np.inf if quantity.lowest is None else quantity.lowest), quantity.highest
+    assert highest is None or lowest < highest
+    colours, middle = colours_of(name)
+    assert len(set(stops_of(colours))) >= 8
+    assert middle is None or lowest <= middle
+    assert all(end is None or lowest <= end for end in quantity.ends)
+
+
+def test_land_is_the_same_in_all_pictures(lai, tmp_path):
+    dem = cf.label(400 + lai, "dem", history="made")
+    stops = [to_hex(LAND(share)) for share in np.linspace(0, 1, 9)]
+    assert relief_map(dem, "").bar.stops == value_map(dem, "").bar.stops == stops
+    assert dem.fifesim.plot().images[0].get_cmap() == LAND
+    shown = ramp(fifesim.write_style(dem.fifesim.to_geotiff(tmp_path / "dem.tif")))
+    assert [colour for _, colour in shown] == stops
+
+
+@pytest.mark.parametrize("name", ["brown", "dissociation", "crown_cover", "crown_shape", "hotspot", "soil", "moisture"])
+def test_ranges_of_canopies_are_those_of_the_verb(name, lai):
+    few, canopy = lai[:2, :2], fifesim.Canopy(brown=0.3, crown_cover=0.9)
+    quantity, step = cf.QUANTITIES[name], 1e-6
+    for value in (quantity.lowest, quantity.highest):
+        few.fifesim.surface_reflectance("TM", bands=["TM4"], canopy=canopy.replace(**{name: float(value)}))
+    for value in (quantity.lowest - step, quantity.highest + step):
+        with pytest.raises(ValueError, match=f"{name} must be"):
+            canopy.replace(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["brown", "dissociation", "crown_cover", "crown_shape", "hotspot"])
+def test_ranges_of_canopies_are_those_of_scenario_keys(name):
+    quantity = cf.QUANTITIES[name]
+    for value in (quantity.lowest, quantity.highest):
+        assert getattr(GroundKeys(**{name: value}), name) == value
+    for value in (quantity.lowest - 1e-6, quantity.highest + 1e-6):
+        with pytest.raises(ValueError, match=name):
+            GroundKeys(**{name: value})
+
+
+def test_rasters_of_a_run_lie_within_the_ranges(whole, site):
+    dem = fifesim.flint_hills(site, seed=1)
+    rasters = [
+        *whole.values(),
+        dem.fifesim.slope(),
+        dem.fifesim.aspect(),
+        dem.fifesim.sky_view(),
+        dem.fifesim.horizon(),
+    ]
+    checked = set()
+    for raster in rasters:
+        for array in (raster, *raster.coords.values()):
+            quantity = cf.QUANTITIES.get(array.name)
+            if quantity is not None and (quantity.lowest, quantity.highest) != (None, None):
+                checked.add(array.name)
+                assert quantity.lowest is None or float(array.min()) >= quantity.lowest, array.name
+                assert quantity.highest is None or float(array.max()) <= quantity.highest, array.name
+    assert {"lai", "surface_reflectance", "dn", "ndvi", "slope", "aspect", "sky_view", "horizon", "sza"} <= checked
+
+
+@pytest.mark.parametrize("name", instrument_names())
+def test_bands_of_a_composite_are_the_same_for_instruments_images_and_styles(name, lai, tmp_path):
+    own = instrument(name)
+    bands = false_colour_bands(own)
+    wavelengths = [band.wavelength for band in bands]
+    image = xr.concat([0.1 + 0.1 * lai[:4, :4]] * len(bands), "band")
+    image = image.assign_coords(band=[band.name for band in bands], wavelength=("band", wavelengths))
+    image = cf.label(image, "toa_reflectance", history="made")
+    *green, red, near = (band.name for band in bands)
+    assert composite_bands(image) == [near, red, green[0] if green else red]
+    assert false_colour_names(image) == ([near, red, *green] if green else [])
+    style = fifesim.write_style(image.fifesim.to_geotiff(tmp_path / "image.tif"))
+    renderer = ElementTree.parse(style).getroot().find("pipe/rasterrenderer")
+    numbers = [int(renderer.get(f"{colour}Band")) - 1 for colour in ("red", "green", "blue")]
+    assert numbers == composite(wavelengths)
+
+
+def test_a_composite_is_stretched_alike_in_qgis_and_in_a_picture(whole, tmp_path):
+    toa = whole["toa"]
+    style = fifesim.write_style(toa.fifesim.to_geotiff(tmp_path / "toa.tif"))
+    renderer = ElementTree.parse(style).getroot().find("pipe/rasterrenderer")
+    for colour, band in (("red", "TM4"), ("green", "TM3"), ("blue", "TM3")):
+        found = [float(renderer.find(f"{colour}ContrastEnhancement/{end}Value").text) for end in ("min", "max")]
+        dark, bright = dark_and_bright(toa.sel(band=band))
+        np.testing.assert_allclose(found, (dark, bright), rtol=1e-5)
+        values = toa.sel(band=band).values
+        expected = np.clip((values - dark) / (bright - dark), 0, 1)
+        place = {"red": 0, "green": 1, "blue": 2}[colour]
+        np.testing.assert_allclose(toa.fifesim.rgb()[..., place], expected, rtol=0, atol=1e-6)
+
+
+def test_limits_pass_over_what_is_missing():
+    assert percentile_limits([np.nan, 1.0, 3.0, np.inf], (0, 100)) == (1.0, 3.0)
+    assert percentile_limits(np.full(3, np.nan)) == (0.0, 1.0)
+    values = np.arange(101.0)
+    assert percentile_limits(xr.DataArray(values)) == (1.0, 99.0)
+    assert dataclasses.replace(CLUMPING, label="").label == "clumping index"
