@@ -129,12 +129,13 @@ def check_leaf_area(scenario):
         to the run where leaf area or a property varies in a map or field.
     """
     land, classes = scenario.ground, _classes(scenario)
-    if land.lai_file or drawn_properties(scenario).keys() & {"crown_cover"}:
+    if land.lai_file:
         return
+    drawn = dict.fromkeys(drawn_properties(scenario))
     stands = [(f"classes.{each.name}", each.lai, each.canopy.over(land.canopy())) for each in classes]
     for place, distribution, canopy in stands or [("ground", land.distribution, land.canopy())]:
         try:
-            canopy.check_lai(lai_distribution(distribution).support()[1])
+            canopy.replace(**drawn).check_lai(lai_distribution(distribution).support()[1])
         except ValueError as error:
             raise ValueError(f"{place}.{error}") from None
 

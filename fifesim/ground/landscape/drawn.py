@@ -10,10 +10,11 @@ from scipy import stats
 
 from fifesim.base.annotations import Distribution
 from fifesim.base.kinds import described
+from fifesim.ground.canopy.properties import DRAWN
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
 from fifesim.ground.landscape.coarse_lattice import check_coarser
 
-SHARES = ("moisture", "brown", "crown_cover")
+SHARES = tuple(name for name, known in DRAWN.items() if (known.lowest, known.highest) == (0, 1))
 """Properties between 0 and 1."""
 
 
