@@ -77,10 +77,11 @@ def readme(found):
     """Speed in a few lines."""
     (size, level), (_, hills), scene = *(speeds(found[name]) for name in (LEVEL, HILLS)), found[LANDSAT]
     clock, memory = float(scene["on the clock [s]"]), float(scene["peak memory [GB]"])
+    elsewhere = "" if machine(scene) == machine(found[LEVEL]) else f" (measured on an {machine(scene)})"
     text = f"""On one core ({machine(found[LEVEL])}) fifesim simulates {level} million ground cells per second on level
         ground and {hills} million on hills, from random field to digital numbers in two bands ({size} million cells of
         3.33 m). A Landsat scene of 185 km ({cells(LANDSAT)} million cells) takes {clock:.0f} s and {memory:.1f} GB
-        on two cores."""
+        on two cores{elsewhere}."""
     if EACH in found and INTERPOLATED in found:
         ours, other = "fifesim: million cells/s", "other: million cells/s"
         text += f""" SAIL in each cell reaches {found[EACH][ours]} million cells per second

@@ -104,7 +104,7 @@ def clumped(canopy, shares):
 
     References
     ----------
-    [VerhoefBach2007]_
+    [VerhoefBach2007]_; its errors in scenes of [Widlowski2007]_ are in the physics page
 
     Examples
     --------
