@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from threading import Lock
 from typing import Annotated, TypeAlias
 
 import numpy as np
@@ -249,15 +250,17 @@ def _plain(coordinates):
 @lru_cache(maxsize=64)
 def _whole(grid):
     found = xr.Coordinates(coordinates(grid))
-    _placed[id(_pandas_index(found, "x"))] = found, as_carried(grid)
-    while len(_placed) > 64:
-        del _placed[next(iter(_placed))]
+    with _placing:
+        _placed[id(_pandas_index(found, "x"))] = found, as_carried(grid)
+        if len(_placed) > 64:
+            del _placed[next(iter(_placed))]
     return found
 
 
 # Coordinates made by `place` and their grid, by the identity of the pandas index of x, which copies of a raster share.
 # Reading the grid from the coordinates takes 0.2 ms, several times in each step.
 _placed = {}
+_placing = Lock()
 
 
 def _placed_grid(array):

@@ -1,5 +1,6 @@
 """Grids: where the FIFE site lies, what a raster's grid is, and which grids are refused."""
 
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 
 import netCDF4
@@ -233,3 +234,23 @@ def test_netcdf_coordinates_have_no_fill_value(lai, tmp_path):
         with netCDF4.Dataset(path) as found:
             assert not any("_FillValue" in found[axis].ncattrs() for axis in ("x", "y"))
             assert "_FillValue" in found["lai"].ncattrs()
+
+
+def test_grid_of_a_placed_raster_is_read_anew_where_its_coordinates_change():
+    """A raster keeps its grid through copies; a window, shifted coordinates or another transform have their own."""
+    grid = fifesim.grid_at("EPSG:26914", 705000, 4334000, 300, 200, 10)
+    placed = grids.place(xr.DataArray(np.zeros((20, 30)), dims=("y", "x")), grid)
+    assert grids.geobox(placed) == grids.geobox(placed.copy()) == grids.geobox(placed.drop_encoding()) == grid
+    assert grids.geobox(placed.isel(x=slice(3, None))).affine.c == 705030
+    assert grids.geobox(placed.assign_coords(x=placed.x + 7)).affine.c == 705007
+    other = placed.copy(deep=True).rio.write_crs("EPSG:32614")
+    assert grids.geobox(other).crs.epsg == 32614
+
+
+def test_threads_may_place_rasters_on_many_grids():
+    """More grids than are kept at a time."""
+    values = xr.DataArray(np.zeros((2, 2)), dims=("y", "x"))
+    known = [fifesim.grid_at("EPSG:26914", 705000 + 10 * k, 4334000, 20, 20, 10) for k in range(300)]
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda grid: grids.geobox(grids.place(values, grid)), known))
+    assert found == known
