@@ -11,7 +11,7 @@ import xarray as xr
 from timing import both_times, seconds
 
 import fifesim
-from fifesim.atmosphere.schemes import engines, six_s
+from fifesim.atmosphere import engines, six_s
 
 CELLS = 3000
 
@@ -30,7 +30,7 @@ def terms_of_a_band(engine, band, repeat):
 def main():
     band = fifesim.instrument("TM").select("TM1")[0].response
     print("| terms of TM1, one geometry | ms |\n|---|---|")
-    for engine, repeat in (("5S", 9), ("successive-orders-scalar", 5), ("successive-orders", 5), ("6S", 3)):
+    for engine, repeat in (("5S", 9), ("successive-orders", 5), ("6S", 3)):
         if engine == "6S" and six_s.Py6S is None:
             print("| 6S | not installed |")
             continue

@@ -5,7 +5,7 @@ import time
 import numpy as np
 from chain import floor
 
-from fifesim.ground.landscape.field import TILE
+from fifesim.ground.landscape.autoregression import FIELD_TILE
 from fifesim.scenario.ensemble import realise
 from fifesim.scenario.scenario import Scenario
 
@@ -13,15 +13,17 @@ CELL = 30 / 9
 SIZES = (111, 333, 999)
 CHIP = 333
 PAIRS = 50  # of seed and arp
-SHARED = {side: (TILE // (side + 3)) ** 2 for side in SIZES}  # scenes that follow each other in a tile of one field
+SHARED = {
+    side: (FIELD_TILE // (side + 3)) ** 2 for side in SIZES
+}  # scenes that follow each other in a tile of one field
 TREATMENTS = ("burned-grazed", "burned-ungrazed", "unburned-ungrazed")
 # Where a tile of the random field begins on the site of FIFE. [m]
-_WEST, _NORTH = 210 * TILE * CELL, 1289 * TILE * CELL
+_WEST, _NORTH = 210 * FIELD_TILE * CELL, 1289 * FIELD_TILE * CELL
 
 
 def place(number, side):
     """Corner and size of a window within a tile of the random field."""
-    step, fitting = side + 3, TILE // (side + 3)
+    step, fitting = side + 3, FIELD_TILE // (side + 3)
     west, north = _WEST + CELL * step * (number % fitting), _NORTH - CELL * step * (number // fitting % fitting)
     return {"west": west, "north": north, "width": side * CELL + 1e-6, "height": side * CELL + 1e-6}
 

@@ -11,7 +11,7 @@ from chain import BANDS, CASE, floor
 from timing import seconds
 
 import fifesim
-from fifesim.ground.landscape.rasters.fields import of_elevation
+from fifesim.ground.landscape.field_labels import of_elevation
 
 ARPS = {"lai": 0.15, "soil": 0.24}
 

@@ -19,8 +19,8 @@ from scipy import fft, ndimage
 from timing import in_turn
 
 import fifesim
-from fifesim.atmosphere.raster import diffuse_fraction
-from fifesim.atmosphere.schemes import six_s
+from fifesim.atmosphere import six_s
+from fifesim.atmosphere.labels import diffuse_fraction
 from fifesim.ground.landscape.autoregression import autocorrelation, field_variance, response
 
 ARP = 0.15

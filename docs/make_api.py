@@ -13,8 +13,8 @@ PHYSICS = ("base", "ground", "atmosphere", "sensor", "analysis")
 # Modules of the lowest folder that have no formula.
 _MACHINERY = {
     f"base.{name}"
-    for name in ("arguments", "datasets", "fife", "foreign", "kinds", "logs", "metadata")
-} | {f"base.{name}" for name in ("methods", "refusals", "spelling", "times", "warned")}
+    for name in ("annotations", "arguments", "caches", "files", "messages", "times")
+}
 
 # Functions of a module of the API that is public as a whole.
 _BESIDE = {"Atmosphere": ["atmosphere.spectrum"]}
@@ -85,9 +85,7 @@ def modules():
     return [
         name
         for name in dotted
-        if not name.endswith((".raster", ".annotations"))
-        and ".rasters." not in name
-        and name not in _MACHINERY
+        if not name.endswith((".labels", "_labels")) and name not in _MACHINERY
     ]
 
 

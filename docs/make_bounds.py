@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from fifesim.experiments.verification.areas import deviations
-from fifesim.experiments.verification.listing import STAGES
+from fifesim.experiments.verification.deviations import AREA_STAGES
 
 PAGE = Path(__file__).parent / "bounds.md"
 
@@ -12,8 +12,8 @@ def write():
     """Write the table, with what this build finds."""
     lines, stage = [], None
     for each in deviations():
-        if STAGES[each.area] != stage:
-            stage = STAGES[each.area]
+        if AREA_STAGES[each.area] != stage:
+            stage = AREA_STAGES[each.area]
             lines += [
                 f"\n### {stage}\n",
                 "| compared | largest | bound | unit | with |",

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from fifesim.experiments.scatter.instruments import instrument_scenario
-from fifesim.experiments.scatter.shares import budget, table
+from fifesim.experiments.scatter.shares import budget, budget_table, instrument_scenario
 from fifesim.scenario.scenario import Scenario, default_scenario
 
 TABLE = Path(__file__).with_name("landscape_budget.csv")
@@ -30,7 +29,7 @@ def scenario_of(name):
 def rows_of(name):
     """Rows of the table of one instrument."""
     cells, realisations = WINDOWS[name]
-    found = table(budget(scenario_of(name), realisations=realisations, cells=cells))
+    found = budget_table(budget(scenario_of(name), realisations=realisations, cells=cells))
     return found.assign(instrument=name, cells=cells, realisations=realisations)
 
 

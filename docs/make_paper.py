@@ -13,16 +13,23 @@ import jinja2
 import numpy as np
 import paper_deviations
 
-from fifesim.analysis.scaling import ndvi_linearity
-from fifesim.chain.arrays import ArrayChain
+from fifesim.analysis.scaling import linearity_correlation
+from fifesim.chain.driver import Driver, cell_block_means
 from fifesim.experiments.friedl1995 import case as friedl1995
-from fifesim.experiments.friedl1995 import effects, fitted, table
-from fifesim.experiments.friedl1995.case import ARPS, VARIABLES, Case
-from fifesim.experiments.friedl1995.cells import cells_of
-from fifesim.experiments.friedl1995.pixels import ground_of
-from fifesim.experiments.friedl1995.readings import ALIGNED, CELL, NATIVE, PASSAGES, READINGS
+from fifesim.experiments.friedl1995 import effects, table
+from fifesim.experiments.friedl1995.case import (
+    ALIGNED,
+    ARPS,
+    CELL,
+    NATIVE,
+    PASSAGES,
+    READINGS,
+    VARIABLES,
+    Case,
+)
 from fifesim.experiments.friedl1995.reproduction import SEED, reproduce_case
-from fifesim.output.pages import fixed
+from fifesim.experiments.friedl1995.table import cells_of, ground_of
+from fifesim.output.report import fixed
 
 DOCS = Path(__file__).parent
 NUMBERS, TEMPLATE, PAGE = DOCS / "paper.json", DOCS / "paper.md.j2", DOCS / "paper.md"
@@ -65,7 +72,7 @@ def scenes(case):
                 "interval": case.interval, "pixels": int(found["pixel_lai"][0, 0].count())},
         "table2": {name: each.to_dict("records") for name, each in tables.items()},
         "agreement": {name: table.agreement(each) for name, each in tables.items()},
-        "limits": fitted.limits(*tables.values()),
+        "limits": effects.limits(*tables.values()),
         "text": {name: table.text_table(each).to_dict("records") for name, each in by_reading.items()},
         "spread": spread(case, range(SEED, SEED + REALISATIONS)),
         "growth_deviation": growth_deviation(found),
@@ -88,8 +95,8 @@ PARTS = {
 def words(case):
     """Numbers and text that need no simulation: origins, the number of fitted inputs, readings and pixel sizes."""
     return {
-        "origins": [vars(each) for each in fitted.origins(case)],
-        "fitted": fitted.fitted_count(case),
+        "origins": [source._asdict() for source in effects.number_sources(case)],
+        "fitted": effects.fitted_count(case),
         "reading_texts": {name: each.text for name, each in READINGS.items()},
         "passages": PASSAGES,
         "cells_per_pixel": {
@@ -113,12 +120,15 @@ def spread(case, seeds):
     spread : dict of str to dict of str to float
         By variable and arp, the mean over realisations of the standard deviation over the mean. [1]
     """
-    chain = ArrayChain(case.setup, case.grid)
+    driver, min_valid = Driver(case.setup), case.setup.min_valid
     found = {name: {} for name in VARIABLES}
     for arp in ARPS:
-        cells = [cells_of(case, "burned-grazed", arp, seed) for seed in seeds]
+        cells = [cells_of(case, "burned-grazed", arp, seed, driver=driver) for seed in seeds]
         for name in VARIABLES:
-            blocks = [chain.means(getattr(each, name), case.pixel) for each in cells]
+            arrays = [getattr(scene, name) for scene in cells]
+            blocks = [
+                cell_block_means(array, case.grid, case.pixel, min_valid) for array in arrays
+            ]
             found[name][f"{arp:g}"] = np.mean(
                 [np.nanstd(each, ddof=1) / np.nanmean(each) for each in blocks]
             )
@@ -156,7 +166,7 @@ def scaling(case, found):
         rows.append(
             {
                 "arp": arp,
-                "correlation": ndvi_linearity(*ground.reflectance.values),
+                "correlation": linearity_correlation(*ground.reflectance.values),
                 "bias": np.nanmean(bias),
                 "largest": np.nanmax(np.abs(bias)),
             }

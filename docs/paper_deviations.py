@@ -6,24 +6,22 @@ from functools import lru_cache
 import numpy as np
 
 import fifesim
-from fifesim.analysis.rasters.means import aggregate
-from fifesim.atmosphere.raster import diffuse_fraction
-from fifesim.base import fife
-from fifesim.base.geometry import sun_position
-from fifesim.chain.images import ndvi
+from fifesim.analysis.scaling_labels import aggregate_blocks
+from fifesim.atmosphere.labels import diffuse_fraction
+from fifesim.base import times
+from fifesim.base.geometry import sun_geometry
 from fifesim.chain.setup import image_of, reflectance_of
+from fifesim.chain.steps import ndvi
 from fifesim.experiments.friedl1995 import case as friedl1995
-from fifesim.experiments.friedl1995.case import Case
-from fifesim.experiments.friedl1995.pixels import pixel_values
-from fifesim.experiments.friedl1995.readings import CELL, READINGS
-from fifesim.experiments.friedl1995.table import line
-from fifesim.ground.canopy import raster as canopy
-from fifesim.ground.canopy.absorption import extinction_coefficient
-from fifesim.ground.canopy.rasters import leaves, soils
-from fifesim.ground.canopy.rasters.evaluation import BandCanopy, Light
+from fifesim.experiments.friedl1995.case import CELL, READINGS, Case
+from fifesim.experiments.friedl1995.table import line, paired
+from fifesim.ground.canopy import labels as canopy
+from fifesim.ground.canopy import optics_labels
+from fifesim.ground.canopy.labels import BandCanopy, Light
+from fifesim.ground.canopy.layers import extinction_coefficient
 from fifesim.ground.landscape.autoregression import autocorrelation, correlation_length
-from fifesim.ground.landscape.raster import lai_scene
-from fifesim.sensor.description.rasters.carried import attributes_of
+from fifesim.ground.landscape.lai_labels import lai_scene
+from fifesim.sensor.instrument_labels import attributes_of
 
 # Length scales of the three landscapes, "roughly" (Analyses). [m]
 LENGTHS = {0.05: 5, 0.15: 15, 0.24: 30}
@@ -61,8 +59,8 @@ def fits(
                 case.grid, case.densities[treatment], arp=arp, seed=seed, method=method
             )
             image = image_of(setup, reflectance(setup, lai).compute())
-            truth = aggregate(lai, case.pixel, min_valid=setup.min_valid)
-            values = pixel_values(truth, ndvi(image))
+            truth = aggregate_blocks(lai, case.pixel, min_valid=setup.min_valid)
+            values = paired(truth.values, ndvi(image).values)
             found.append(line(values[1], values[0]))
     return np.array(found).reshape(len(seeds), len(friedl1995.scenes()), 3)
 
@@ -108,7 +106,7 @@ def deviations(seeds):
         "blur": blur(case, seeds),
         "sun": sun(),
         "edge": 1 / np.cos(np.radians(case.instrument.scan.max_angle)),
-        "site": (fife.SIZE / 100) ** 2,
+        "site": (times.SIZE / 100) ** 2,
     }
 
 
@@ -181,8 +179,8 @@ def sun():
     found = []
     for minute in (27, 35, 43):
         sza = float(
-            sun_position(
-                f"1987-06-06T16:{minute}Z", fife.LATITUDE, fife.LONGITUDE, fife.ALTITUDE
+            sun_geometry(
+                f"1987-06-06T16:{minute}Z", times.LATITUDE, times.LONGITUDE, times.ALTITUDE
             ).sza
         )
         found.append(
@@ -207,8 +205,10 @@ def _by_sunlight(setup, lai):
     bands = setup.instrument.select(setup.bands)
     responses = tuple(band.response for band in bands)
     own = setup.canopy
-    leaf = leaves.leaf_optics(responses, own.leaf_optics, lai, exact=False)
-    stand = BandCanopy(own, leaf, None, soils.background(responses, own.background, lai))
+    leaf = optics_labels.leaf_optics(responses, own.leaf_optics, lai, exact=False)
+    stand = BandCanopy(
+        own, leaf, None, optics_labels.background(responses, own.background, lai)
+    )
     return canopy.level_reflectance(
         lai,
         bands,

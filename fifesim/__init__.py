@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.metadata import version
 
 from fifesim.accessor import PUBLIC, find
-from fifesim.base.spelling import nearest
+from fifesim.base.messages import nearest
 
 __version__ = version("fifesim")
 

@@ -10,26 +10,26 @@ from . import atmosphere as atmosphere
 __version__: str
 
 # Grids and geometry
-from .rasters.sites import fife_site as fife_site
-from .rasters.grid import grid_at as grid_at
+from .grids.sites import fife_site as fife_site
+from .grids.grid import grid_at as grid_at
 from .base.geometry import Geometry as Geometry
 from .base.geometry import fife_geometry as fife_geometry
-from .rasters.sun import sun_position as sun_position
+from .grids.sites import sun_position as sun_position
 
 # Ground
-from .ground.landscape.raster import lai_scene as lai_scene
-from .ground.landscape.raster import open_lai as open_lai
-from .ground.landscape.rasters.fields import correlated_fields as correlated_fields
-from .ground.landscape.rasters.downscaling import downscale as downscale  # method
+from .ground.landscape.lai_labels import lai_scene as lai_scene
+from .ground.landscape.lai_labels import open_lai as open_lai
+from .ground.landscape.field_labels import correlated_fields as correlated_fields
+from .ground.landscape.downscaling_labels import downscale as downscale  # method
 from .ground.landscape.distribution import lai_distribution as lai_distribution
 from .ground.landscape.distribution import treatments as treatments
 from .ground.landscape.autoregression import correlation_length as correlation_length
 from .ground.landscape.autoregression import arp_for_length as arp_for_length
-from .ground.landscape.rasters.scenes import landscape as landscape
+from .ground.landscape.labels import landscape as landscape
 from .ground.landscape.cover import Patches as Patches
 from .ground.landscape.classes import CoverClass as CoverClass
 from .ground.landscape.classes import fife_classes as fife_classes
-from .ground.landscape.drawn import Field as Field
+from .ground.landscape.classes import Field as Field
 from .ground.canopy.description import Canopy as Canopy
 from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
@@ -37,46 +37,46 @@ from .chain.steps import surface_reflectance as surface_reflectance  # method, o
 from .chain.landscapes import fpar as fpar  # method, of a Dataset too
 
 # Terrain
-from .ground.terrain.rasters.elevation import fine_dem as fine_dem
-from .ground.terrain.rasters.elevation import source_dem as source_dem
-from .ground.terrain.rasters.hills import flint_hills as flint_hills
-from .ground.terrain.rasters.slopes import slope as slope  # method
-from .ground.terrain.rasters.slopes import aspect as aspect  # method
-from .ground.terrain.rasters.drainage import wetness as wetness  # method
-from .ground.terrain.rasters.sky import horizon as horizon  # method
-from .ground.terrain.rasters.light import sky_view as sky_view  # method
-from .ground.terrain.rasters.light import terrain_view as terrain_view  # method
-from .ground.terrain.rasters.light import illumination as illumination  # method
-from .ground.terrain.rasters.light import shadow as shadow  # method
-from .chain.slopes import kt as kt  # method
+from .ground.terrain.elevation_labels import fine_dem as fine_dem
+from .ground.terrain.elevation_labels import source_dem as source_dem
+from .ground.terrain.elevation_labels import flint_hills as flint_hills
+from .ground.terrain.labels import slope as slope  # method
+from .ground.terrain.labels import aspect as aspect  # method
+from .ground.terrain.labels import wetness as wetness  # method
+from .ground.terrain.sky_labels import horizon as horizon  # method
+from .ground.terrain.labels import sky_view as sky_view  # method
+from .ground.terrain.labels import terrain_view as terrain_view  # method
+from .ground.terrain.labels import illumination as illumination  # method
+from .ground.terrain.labels import shadow as shadow  # method
+from .chain.steps import kt as kt  # method
 
 # Atmosphere
-from .atmosphere.air.models import Atmosphere as Atmosphere
-from .atmosphere.air.raster import read_aerosol as read_aerosol
-from .atmosphere.air.raster import aerosol_tables as aerosol_tables
+from .atmosphere.models import Atmosphere as Atmosphere
+from .atmosphere.aerosol_labels import read_aerosol as read_aerosol
+from .atmosphere.aerosol_labels import aerosol_tables as aerosol_tables
 from .chain.steps import to_toa as to_toa  # method, of a Dataset too
 from .chain.steps import to_surface as to_surface  # method, of a Dataset too
-from .chain.engines import compare_engines as compare_engines
+from .chain.comparison import compare_engines as compare_engines
 
 # Sensor
-from .sensor.raster import sense as sense  # method, of a Dataset too
-from .sensor.response.rasters.bands import to_bands as to_bands  # method
-from .sensor.scan.rasters.view import scan_geometry as scan_geometry
-from .sensor.scan.track import Track as Track
-from .sensor.scan.rasters.swath import sense_swath as sense_swath  # method
-from .rasters.swaths import grid_swath as grid_swath  # method
+from .sensor.labels import sense as sense  # method, of a Dataset too
+from .sensor.band_labels import to_bands as to_bands  # method
+from .sensor.scan_labels import scan_geometry as scan_geometry
+from .sensor.response.scan import Track as Track
+from .sensor.scan_labels import sense_swath as sense_swath  # method
+from .grids.swaths import grid_swath as grid_swath  # method
 from .chain.comparison import compare as compare  # method, of a Dataset too
 from .chain.adjustment import as_seen_by as as_seen_by  # method, of a Dataset too
 from .chain.adjustment import adjust_bands as adjust_bands  # method, of a Dataset too
 from .chain.adjustment import spectral_adjustment as spectral_adjustment
 from .chain.comparison import comparison_table as comparison_table  # method of a DataTree
-from .sensor.response.rasters.spread import psf as psf
-from .sensor.response.rasters.spread import mtf as mtf
+from .sensor.instrument_labels import psf as psf
+from .sensor.instrument_labels import mtf as mtf
 from .sensor.response.noise import NoiseModel as NoiseModel
-from .sensor.response.signal_to_noise import noise_equivalent_radiance as noise_equivalent_radiance
-from .sensor.response.signal_to_noise import snr as snr
-from .sensor.raster import to_radiance as to_radiance  # method
-from .sensor.raster import to_reflectance as to_reflectance  # method
+from .sensor.instrument_labels import noise_equivalent_radiance as noise_equivalent_radiance
+from .sensor.instrument_labels import snr as snr
+from .sensor.labels import to_radiance as to_radiance  # method
+from .sensor.labels import to_reflectance as to_reflectance  # method
 from .sensor.description.instruments import instrument as instrument
 from .sensor.description.instruments import instrument_names as instrument_names
 from .sensor.description.instruments import read_instrument as read_instrument
@@ -85,44 +85,44 @@ from .base.bands import Band as Band
 
 # Analysis
 from .chain.landscapes import aggregate as aggregate  # method, of a Dataset too
-from .chain.images import ndvi as ndvi  # method, of a Dataset too
-from .analysis.rasters.composites import composite as composite  # method
-from .analysis.rasters.regression import regress as regress  # method
+from .chain.steps import ndvi as ndvi  # method, of a Dataset too
+from .analysis.index_labels import composite as composite  # method
+from .analysis.regression_labels import regress as regress  # method
 from .analysis.regression import Regression as Regression
-from .analysis.rasters.uncertainty import relative_equivalent_noise as relative_equivalent_noise  # method
-from .analysis.rasters.inversion import invert as invert  # method
-from .analysis.rasters.inversion import inversion_error as inversion_error  # method, of a Dataset too
-from .analysis.rasters.scaling import share_kept as share_kept  # method
-from .analysis.rasters.scaling import density as density  # method
-from .analysis.rasters.scaling import scale_bias as scale_bias
-from .analysis.rasters.scaling import ndvi_linearity as ndvi_linearity  # method
-from .analysis.rasters.scaling import ndvi_bias as ndvi_bias  # method
-from .analysis.rasters.scaling import fpar_bias as fpar_bias  # method
-from .analysis.rasters.lags import autocovariance as autocovariance  # method
-from .analysis.rasters.lags import variogram as variogram  # method
-from .analysis.rasters.lags import regularized_variance as regularized_variance  # method
-from .chain.images import index as index  # method
+from .analysis.regression_labels import relative_equivalent_noise as relative_equivalent_noise  # method
+from .analysis.regression_labels import invert as invert  # method
+from .analysis.regression_labels import inversion_error as inversion_error  # method, of a Dataset too
+from .analysis.scaling_labels import share_kept as share_kept  # method
+from .analysis.scaling_labels import density as density  # method
+from .analysis.scaling_labels import scale_bias as scale_bias
+from .analysis.scaling_labels import ndvi_linearity as ndvi_linearity  # method
+from .analysis.scaling_labels import ndvi_bias as ndvi_bias  # method
+from .analysis.scaling_labels import fpar_bias as fpar_bias  # method
+from .analysis.scaling_labels import autocovariance as autocovariance  # method
+from .analysis.scaling_labels import variogram as variogram  # method
+from .analysis.scaling_labels import regularized_variance as regularized_variance  # method
+from .chain.steps import index as index  # method
 
 # Pictures
 from .output.pictures import plot as plot  # method
-from .output.composites import rgb as rgb  # method
+from .output.maps import rgb as rgb  # method
 from .output.pictures import plot_fit as plot_fit
 from .output.pictures import plot_comparison as plot_comparison  # method of a DataTree
 
 # Images of one's own
-from .sensor.products.rasters.landsat import open_landsat as open_landsat
-from .sensor.products.rasters.sentinel2 import open_sentinel2 as open_sentinel2
-from .sensor.products.rasters.calibrated import calibrate as calibrate  # method
+from .sensor.products.landsat_labels import open_landsat as open_landsat
+from .sensor.products.sentinel2_labels import open_sentinel2 as open_sentinel2
+from .sensor.products.labels import calibrate as calibrate  # method
 
 # Files and runs
-from .rasters.files import to_geotiff as to_geotiff  # method, of a Dataset too
-from .rasters.files import open_image as open_image
-from .output.styles import write_style as write_style
+from .grids.files import to_geotiff as to_geotiff  # method, of a Dataset too
+from .grids.files import open_image as open_image
+from .output.maps import write_style as write_style
 from .scenario.simulation import simulate as simulate
 from .scenario.sweeps import sweep as sweep
 from .output.chips.folder import dataset as dataset
 from .experiments.scatter.shares import budget as budget
-from .experiments.explorer.writing import explore as explore
+from .experiments.explorer.page import explore as explore
 from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import default_scenario as default_scenario
 from .scenario.scenario import read_scenario as read_scenario
@@ -133,3 +133,4 @@ from .experiments.friedl1995.reproduction import reproduce as reproduce
 from .experiments.friedl1995.figures import plot_reproduction as plot_reproduction
 from .experiments.verification.areas import verify as verify
 from .chain.setup import Setup as Setup
+from .base.caches import clear_caches as clear_caches

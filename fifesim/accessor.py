@@ -1,4 +1,9 @@
-"""Public names, found when they are first used, and the ``.fifesim`` accessor, whose methods are some of them."""
+"""
+Public names, imported when they are first used, and the ``.fifesim`` accessor, which offers many of them as methods.
+
+``lazy_loader.attach_stub`` reads modules from the same stub, but neither methods nor groups, and it puts a function
+into the package before the checks of its arguments are around it.
+"""
 
 import re
 from dataclasses import is_dataclass
@@ -11,9 +16,8 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from fifesim.base.arguments import checked
-from fifesim.base.methods import Method
-from fifesim.base.spelling import nearest, spelled
+from fifesim.base.arguments import Method, checked
+from fifesim.base.messages import nearest, spelled
 
 # One line of the table: where a name lives, and whether it is a method of a DataArray, of a Dataset too, or of a
 # DataTree instead.
@@ -22,7 +26,7 @@ _KINDS = {None: ("DataArray",), ", of a Dataset too": ("DataArray", "Dataset"), 
 
 
 class Public(NamedTuple):
-    """A public name: the module it lives in, the kinds of raster it is a method of, and its group in the API page."""
+    """Public name: its module, the kinds of raster with it as a method, and its group on the API page."""
 
     module: str
     methods_of: tuple[str, ...]
@@ -30,7 +34,7 @@ class Public(NamedTuple):
 
 
 def _table():
-    """What ``__init__.pyi`` says, by name."""
+    """Public names of ``__init__.pyi``, by name."""
     found, group = {}, ""
     for line in Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8").splitlines():
         if line.startswith("# "):
@@ -47,18 +51,7 @@ PUBLIC = _table()
 
 @cache
 def find(name):
-    """
-    A public name; a function checks its arguments first, a description their names.
-
-    Parameters
-    ----------
-    name : str
-        A key of `PUBLIC`.
-
-    Returns
-    -------
-    found : object
-    """
+    """Import a public name, and wrap it so that its arguments, or the names of its fields, are checked."""
     found = getattr(import_module(PUBLIC[name].module), name)
     if not isfunction(found):
         # What pydantic makes has messages of its own.
@@ -74,52 +67,36 @@ def find(name):
 Method.find = staticmethod(find)
 
 
-class _RasterMethod(Method):
-    """Method of the accessor, which hands the function its raster."""
-
-    def __get__(self, accessor, owner=None):
-        return super().__get__(None if accessor is None else accessor._raster)
-
-
 class _Accessor:
     def __init__(self, raster):
         self._raster = raster
 
     def __repr__(self):
-        return _summary(type(self).kind)
+        """List the methods, one line for each group."""
+        groups = {}
+        for name in self.methods:
+            groups.setdefault(PUBLIC[name].group, []).append(name)
+        indent = max(map(len, groups)) + 4
+        lines = [f"fifesim on a {self.kind}, its methods:"]
+        for group, names in groups.items():
+            lines.append(fill(f"  {group:{indent - 2}}{', '.join(names)}", 100, subsequent_indent=" " * indent))
+        return "\n".join(lines)
 
     def __getattr__(self, name):
-        raise AttributeError(_unknown(type(self).kind, name), obj=self)
-
-
-def _summary(kind):
-    """The methods of a kind of object by their group, a line for each."""
-    groups = {}
-    for name, public in PUBLIC.items():
-        if kind in public.methods_of:
-            groups.setdefault(public.group, []).append(name)
-    indent = max(map(len, groups)) + 4
-    lines = [
-        fill(f"  {group:{indent - 2}}{', '.join(names)}", 100, subsequent_indent=" " * indent)
-        for group, names in groups.items()
-    ]
-    return "\n".join([f"fifesim on a {kind}, its methods:", *lines])
-
-
-def _unknown(kind, name):
-    """What is wrong with the name of a method."""
-    if name in PUBLIC:
-        kinds = " or ".join(f"an xarray.{each}" for each in PUBLIC[name].methods_of)
-        what = f"a method of {kinds}" if kinds else "no method of a raster"
-        return f"{name} is {what}, this is an xarray.{kind}; fifesim.{name} is the function"
-    known = [each for each, public in PUBLIC.items() if kind in public.methods_of]
-    return f"fifesim has no method {name!r} of an xarray.{kind}: {nearest(name, known)}print(raster.fifesim) lists them"
+        if name in PUBLIC:
+            kinds = " or ".join(f"an xarray.{kind}" for kind in PUBLIC[name].methods_of)
+            what = f"a method of {kinds}" if kinds else "no method of a raster"
+            message = f"{name} is {what}, this is an xarray.{self.kind}; fifesim.{name} is the function"
+        else:
+            suggestion = f"{nearest(name, self.methods)}print(raster.fifesim) lists them"
+            message = f"fifesim has no method {name!r} of an xarray.{self.kind}: {suggestion}"
+        raise AttributeError(message, obj=self)
 
 
 def _accessor(kind):
-    methods = {name: _RasterMethod(name) for name, public in PUBLIC.items() if kind in public.methods_of}
-    told = {"__doc__": f"fifesim on a {kind}.", "kind": kind, "__module__": __name__}
-    return type(f"{kind}Accessor", (_Accessor,), told | methods)
+    methods = {name: Method(name, "_raster") for name, public in PUBLIC.items() if kind in public.methods_of}
+    others = {"__doc__": f"fifesim on a {kind}.", "__module__": __name__, "kind": kind, "methods": tuple(methods)}
+    return type(f"{kind}Accessor", (_Accessor,), others | methods)
 
 
 DataArrayAccessor, DatasetAccessor, DataTreeAccessor = map(_accessor, ("DataArray", "Dataset", "DataTree"))

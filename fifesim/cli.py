@@ -1,4 +1,4 @@
-"""The command line. Everything slow to import is imported by the command that needs it, so that --help is instant."""
+"""The command line. Each command imports its slow modules itself, so that --help is instant."""
 
 import os
 import time
@@ -7,10 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fifesim.output.terminal import Door, Exit, Quiet, Verbose, kept, report
-from fifesim.output.terminal import importing as _importing
-from fifesim.output.terminal import say as _say
-from fifesim.output.terminal import stop as _stop
+from fifesim.output.terminal import Door, Exit, Quiet, Verbose, importing, kept, report, say, stop
 
 app = typer.Typer(
     cls=Door,
@@ -21,8 +18,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-# For scipy, processes of workers, and what `_importing` tells numpy: dask has a thread for each core, and on small
-# matrices those of BLAS wait longer than they work. Who has set the number keeps it.
+# One BLAS thread, also in scipy and in worker processes: dask has a thread for each core, and on small matrices BLAS
+# threads wait longer than they work. A number set by the user stays.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _Paper = Annotated[bool, typer.Option("--paper", help="The paper's one stand, in the place of the landscape.")]
@@ -30,16 +27,29 @@ _Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files of 
 _Resume = Annotated[bool, typer.Option("--resume", help="Resume an interrupted run; nothing to do if it is finished.")]
 _Scheduler = Annotated[str | None, typer.Option(help="Compute on a dask cluster, such as tcp://head:8786.")]
 _AsJson = Annotated[bool, typer.Option("--json", help="Print progress as lines of JSON.")]
+_Threads = Annotated[int | None, typer.Option(min=1, help="Threads; one for each core by default.")]
+
+
+def _open_remote(context: typer.Context, wanted: bool):
+    if wanted:
+        from fifesim.grids.opening import remote_allowed
+
+        context.with_resource(remote_allowed())
+
+
 _AllowRemote = Annotated[
-    bool, typer.Option("--allow-remote", help="Rasters may come from addresses, in any format of GDAL.")
+    bool,
+    typer.Option(
+        "--allow-remote", callback=_open_remote, help="Rasters may come from addresses, in any format of GDAL."
+    ),
 ]
 
 
-def _version(asked: bool):
-    if asked:
+def _version(wanted: bool):
+    if wanted:
         from fifesim import __version__
 
-        _say(f"fifesim {__version__}")
+        say(f"fifesim {__version__}")
         raise typer.Exit
 
 
@@ -52,15 +62,14 @@ def _main(
     pass
 
 
-@app.command()
-def simulate(
-    context: typer.Context,
+@app.command("simulate")
+def simulate_command(
     scenario: Annotated[Path | None, typer.Argument(help="TOML file; a synthetic landscape by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("fife"),
     overwrite: _Overwrite = False,
     resume: _Resume = False,
     scene: Annotated[bool, typer.Option("--scene", help="Write the cells too: scene.zarr.")] = False,
-    threads: Annotated[int | None, typer.Option(min=1, help="Threads; one for each core by default.")] = None,
+    threads: _Threads = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Compute on so many processes.")] = None,
     scheduler: _Scheduler = None,
     as_json: _AsJson = False,
@@ -74,56 +83,54 @@ def simulate(
     start = time.monotonic()
     _check_spelling(scenario)
 
-    with _importing():
+    with importing():
         from fifesim.output.folders import check_folder
         from fifesim.output.progress import since_start
-        from fifesim.output.run.estimates import estimate, estimate_in_words
-        from fifesim.output.run.folder import names_of, simulate_to_folder
+        from fifesim.output.run.folder import estimate, estimate_in_words, names_of, simulate_to_folder
         from fifesim.output.run.identity import scenario_to_resume
         from fifesim.output.run.workers import cluster
         from fifesim.scenario.scenario import read_scenario
 
-    if allow_remote:
-        _open_remote(context)
     finished = check_folder(output, overwrite, resume, names_of(scene))
     if paper and scenario:
         raise ValueError("--paper stands for a scenario of its own: type either that or a file")
     found = scenario_to_resume(output) if resume and scenario is None and not paper else None
     found = found or (_default(paper) if scenario is None else read_scenario(scenario))
     if dry_run:
-        options = {"threads": workers or threads, "scene": scene, "start": since_start()}
-        _say(estimate_in_words(estimate(found, output, **options), as_json))
+        cost = estimate(found, output, threads=workers or threads, scene=scene, start=since_start())
+        say(estimate_in_words(cost, as_json))
         return
     found.complete()
     with kept(output), cluster(workers, scheduler) as client:
-        options = {"overwrite": overwrite, "resume": resume, "scene": scene, "as_json": as_json}
-        files = simulate_to_folder(found, output, threads=threads, client=client, **options)
+        files = simulate_to_folder(
+            found, output, overwrite=overwrite, resume=resume,
+            scene=scene, threads=threads, client=client, as_json=as_json,
+        )  # fmt: skip
     look = f"{output / 'report.html'} in a browser, {output / 'image.tif'} in a GIS"
     report(files, time.monotonic() - start, look, as_json, finished)
 
 
-@app.command()
-def rerun(
+@app.command("rerun")
+def rerun_command(
     file: Annotated[Path, typer.Argument(help="image.tif or truth.tif of a run.")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Keep the new file under this name.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file of that name.")] = False,
-    threads: Annotated[int | None, typer.Option(min=1, help="Threads; one for each core by default.")] = None,
+    threads: _Threads = None,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ):
     """Make a file of a run again from its own tags. Exit code 1 where its bits are not the same."""
-    with _importing():
-        from fifesim.output.run.again import in_words
-        from fifesim.output.run.again import rerun as make_again
+    with importing():
+        from fifesim.output.run.again import outcome_in_words, rerun
 
-    found = make_again(file, output, overwrite=overwrite, threads=threads)
-    _say(in_words(file, found))
+    found = rerun(file, output, overwrite=overwrite, threads=threads)
+    say(outcome_in_words(file, found))
     if found.differing:
         raise typer.Exit(Exit.FAILURE)
 
 
-@app.command()
-def dataset(
+@app.command("dataset")
+def dataset_command(
     study: Annotated[Path | None, typer.Argument(help="TOML file: a scenario, and in [draw] what varies.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the chips, a Zarr store.")] = Path(
         "chips.zarr"
@@ -139,7 +146,7 @@ def dataset(
 ):
     """Make a training set. Images and truth of many chips, as sharded Zarr with a datasheet."""
     start = time.monotonic()
-    with _importing():
+    with importing():
         from fifesim.output.chips.folder import WHOLE, dataset_to_folder, study_to_resume
         from fifesim.output.folders import check_folder
         from fifesim.output.run.workers import cluster, usable_cores
@@ -152,19 +159,18 @@ def dataset(
     found = found if study is None else read_study(study)
     if scheduler is None:
         workers = workers or usable_cores()
-        # One by itself is this process.
-        workers = workers if workers > 1 else None
     elif workers is not None:
         raise ValueError("--workers starts processes and --scheduler uses a cluster that runs: give one of them")
     with kept(output), cluster(scheduler=scheduler) as client:
-        options = {"overwrite": overwrite, "resume": resume, "workers": workers, "client": client, "as_json": as_json}
-        files = dataset_to_folder(found, output, chips or count or 1000, **options)
-    look = f"{output / 'datasheet.html'} in a browser"
-    report(files, time.monotonic() - start, look, as_json, finished)
+        count = chips or count or 1000
+        files = dataset_to_folder(
+            found, output, count, overwrite=overwrite, resume=resume, workers=workers, client=client, as_json=as_json
+        )
+    report(files, time.monotonic() - start, f"{output / 'datasheet.html'} in a browser", as_json, finished)
 
 
-@app.command()
-def reproduce(
+@app.command("reproduce")
+def reproduce_command(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("friedl1995"),
     reading: Annotated[
         str, typer.Option(help="Of Table 1: native, aligned, narrow, offset, blur-40.8 or blur-48.6.")
@@ -193,25 +199,19 @@ def reproduce(
     """Repeat the paper. Writes table2.csv, figures 3 to 9, the nine scenarios, report.html."""
     start = time.monotonic()
 
-    with _importing():
-        from fifesim.experiments.friedl1995.folder import reproduce_to_folder
+    with importing():
+        from fifesim.experiments.friedl1995.report import reproduce_to_folder
 
-    inputs = {"reading": reading, "dem": dem, "densities": densities, "optics": optics, "background": background}
-    inputs |= {
-        "sensor": sensor,
-        "west": west,
-        "north": north,
-        "realisations": realisations,
-        "cells": cells,
-        "seed": seed,
-    }
-    files = reproduce_to_folder(output, **inputs, scenes=scenes, overwrite=overwrite)
+    files = reproduce_to_folder(
+        output, reading=reading, dem=dem, densities=densities, optics=optics, background=background,
+        sensor=sensor, west=west, north=north, realisations=realisations, cells=cells, seed=seed,
+        scenes=scenes, overwrite=overwrite,
+    )  # fmt: skip
     report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
 
 
-@app.command()
-def budget(
-    context: typer.Context,
+@app.command("budget")
+def budget_command(
     scenario: Annotated[Path | None, typer.Argument(help="TOML file; the paper's case by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the results.")] = Path("budget"),
     realisations: Annotated[int, typer.Option(help="How many scenes.")] = 20,
@@ -229,26 +229,22 @@ def budget(
     if sensor and scenario:
         raise ValueError("--sensor stands for a scenario of its own: type either that or a file")
 
-    with _importing():
-        from fifesim.experiments.scatter.folder import budget_to_folder
-        from fifesim.experiments.scatter.instruments import instrument_scenario, window_cells
+    with importing():
+        from fifesim.experiments.scatter.report import budget_to_folder
+        from fifesim.experiments.scatter.shares import instrument_scenario, window_cells
         from fifesim.scenario.scenario import read_scenario
 
-    if allow_remote:
-        _open_remote(context)
     found = None if scenario is None else read_scenario(scenario)
     if sensor:
         found = instrument_scenario(sensor)
     if cells is None:
         cells = window_cells(found) if sensor else 333
-    options = {"realisations": realisations, "cells": cells, "seed": seed}
-    files = budget_to_folder(found, output, overwrite=overwrite, **options)
+    files = budget_to_folder(found, output, realisations=realisations, cells=cells, seed=seed, overwrite=overwrite)
     report(files, time.monotonic() - start, f"{output / 'report.html'} in a browser")
 
 
-@app.command()
-def explore(
-    context: typer.Context,
+@app.command("explore")
+def explore_command(
     scenario: Annotated[Path | None, typer.Argument(help="TOML file; the paper's case by default.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="The page.")] = Path("explore.html"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier page.")] = False,
@@ -260,27 +256,25 @@ def explore(
     start = time.monotonic()
     _check_spelling(scenario)
 
-    with _importing():
-        from fifesim.experiments.explorer.writing import explore as write_page
+    with importing():
+        from fifesim.experiments.explorer.page import explore
         from fifesim.scenario.scenario import read_scenario
 
-    if allow_remote:
-        _open_remote(context)
     found = None if scenario is None else read_scenario(scenario)
-    page = write_page(found, output, overwrite=overwrite)
+    page = explore(found, output, overwrite=overwrite)
     report([page], time.monotonic() - start, f"{page} in a browser")
 
 
-@app.command()
-def scenario(paper: _Paper = False):
+@app.command("scenario")
+def scenario_command(paper: _Paper = False):
     """Print the default scenario, every key with its unit, to edit."""
     from fifesim.scenario.toml import write_scenario
 
-    _say(write_scenario(_default(paper).complete()).rstrip())
+    say(write_scenario(_default(paper).complete()).rstrip())
 
 
-@app.command()
-def sensors(
+@app.command("sensors")
+def sensors_command(
     name: Annotated[str | None, typer.Argument(help="Name or alias of one, or its file; all by default.")] = None,
     check: Annotated[Path | None, typer.Option("--check", help="Check a file of your own, and say what it is.")] = None,
 ):
@@ -289,59 +283,52 @@ def sensors(
     from fifesim.sensor.description.listing import instrument_in_words, list_instruments
 
     if check is not None:
-        found = instrument_in_words(read_instrument(check))
-        _say(found, f"{check} is right: every number has a source, and none looks like another unit.")
+        say(instrument_in_words(read_instrument(check)))
+        say(f"{check} is right: every number has a source, and none looks like another unit.")
     elif name is not None:
-        _say(instrument_in_words(instrument(name)))
+        say(instrument_in_words(instrument(name)))
     else:
-        _say(list_instruments([instrument(each) for each in instrument_names()]))
+        say(list_instruments([instrument(known) for known in instrument_names()]))
 
 
-@app.command()
-def verify():
+@app.command("verify")
+def verify_command():
     """Check this installation against independent results. Exit code 1 where one deviates more than it may."""
-    # The matrices are small: threads of BLAS, loaded only now, would wait for each other longer than they work.
+    # The matrices are small: threads of BLAS, which is loaded only now, would wait longer than they work.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
     from fifesim.experiments.verification.areas import deviations
-    from fifesim.experiments.verification.listing import HEADING, by_stage, summary
+    from fifesim.experiments.verification.deviations import HEADING, by_stage, deviation_summary
 
     found = []
-    _say(HEADING)
+    say(HEADING)
     try:
         for text in by_stage(_collected(deviations(), found)):
-            _say(text)
+            say(text)
     except FileNotFoundError as error:
-        # A table that the installation lacks is no mistake of who asks.
-        _stop(error, Exit.FAILURE)
-    _say(summary(found))
+        # A table missing from the installation is a failure, not an invalid request.
+        stop(error, Exit.FAILURE)
+    say(deviation_summary(found))
     if not all(deviation.within for deviation in found):
         raise typer.Exit(Exit.FAILURE)
 
 
 def _collected(items, kept):
-    """Items as they come, which go into a list too."""
+    """Iterate over items, and append each to a list."""
     for item in items:
         kept.append(item)
         yield item
 
 
-def _open_remote(context):
-    """For as long as the command runs."""
-    from fifesim.rasters.opening import remote_allowed
-
-    context.with_resource(remote_allowed())
-
-
 def _default(paper):
-    """The scenario where none is given."""
+    """Scenario used if none is given."""
     from fifesim.scenario.scenario import Scenario, default_scenario
 
     return Scenario() if paper else default_scenario()
 
 
 def _check_spelling(scenario):
-    """Report a misspelt key, with all other mistakes, before anything else is imported."""
+    """Report misspelt keys before slow modules are imported."""
     from fifesim.scenario.toml import check_spelling
 
     if scenario is not None:

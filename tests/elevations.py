@@ -7,7 +7,7 @@ from affine import Affine
 from oracles_terrain import hills
 
 import fifesim
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 
 # The corner of the largest square of the Kings Creek model, where real terrain would be.
 WEST, NORTH = 708120.0, 4331070.0

@@ -7,8 +7,8 @@ import numpy as np
 import xarray as xr
 from affine import Affine
 
-from fifesim.rasters import cf
-from fifesim.rasters import grid as grids
+from fifesim.grids import cf
+from fifesim.grids import grid as grids
 
 # Fewer cells than a pixel has, more than one chunk, and no common factor with pixels of 9 cells.
 ODD_CHUNKS = {"y": 7, "x": 11}

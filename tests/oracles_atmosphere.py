@@ -6,6 +6,10 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from scipy.integrate import quad, solve_bvp
 
+from fifesim.atmosphere import aerosols, engines
+from fifesim.atmosphere.successive_orders import stokes_reflectance
+from fifesim.base.geometry import scattering_angle_cosine
+
 # Siewert (2000), problem IIA: beta, alpha, zeta and gamma of spheres.
 SIEWERT = np.array(
     [
@@ -145,3 +149,22 @@ def _panels(edges, nodes):
 
 def _folded(azimuth):
     return np.abs((azimuth + 180) % 360 - 180)
+
+
+def mixed_stokes(atmosphere, wavelength, sza, vza, raa, *, at_ground=False, ground=0.0):
+    """I, Q and U at the top of an atmosphere, or of its sky at the ground, without gases, shape (3, V, R, n)."""
+    cosine = scattering_angle_cosine(sza, np.asarray(vza, float)[:, None], np.asarray(raa, float))
+    cosine = -cosine if at_ground else cosine
+    vertical = aerosols.vertical(atmosphere.aerosol)
+    options = {"at_ground": at_ground, "ground": ground, "vertical": vertical}
+    found = []
+    for at in np.asarray(wavelength, float)[:, None]:
+        depths = (
+            float(depth(at)[0]) for depth in (atmosphere.rayleigh_optical_depth, atmosphere.aerosol_optical_depth)
+        )
+        *aerosol, phase = engines._aerosol(atmosphere, at, cosine, True)
+        none = np.zeros(cosine.shape)
+        polarization = aerosols.aerosol_polarization(atmosphere.aerosol, cosine, at[0]) if atmosphere.aot else none
+        optics = *depths, *aerosol, phase, polarization
+        found.append(stokes_reflectance(*optics, sza, vza, raa, **options))
+    return np.stack(found, axis=-1)

@@ -14,7 +14,7 @@ import rasterio
 import xarray as xr
 from affine import Affine
 
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 
 SHAPE = 12, 18
 

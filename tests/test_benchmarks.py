@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fifesim
+
 ROOT = Path(__file__).parents[1]
 BENCHMARKS = ROOT / "benchmarks"
 
@@ -162,3 +164,41 @@ def test_digital_numbers_of_a_block_mean_are_near_those_of_the_sensor(load):
     """Else the mean would be calibrated by another scale."""
     work = load("peers").numpy_mean(180)
     assert np.abs(work.ours().values.astype(int) - work.theirs()).max() <= 3
+
+
+def test_hashes_tell_types_and_shapes_apart(load):
+    hash_of = load("bits").of_array
+    whole = np.arange(6)
+    different = [whole, whole[::-1], whole.reshape(2, 3), whole.astype("int32"), whole.astype(float)]
+    assert len({hash_of(values) for values in different}) == len(different)
+    assert hash_of(whole.reshape(2, 3).T) == hash_of(whole.reshape(2, 3).T.copy())
+    with pytest.raises(TypeError):
+        hash_of(np.array(["lai"], object))
+
+
+def test_hashes_that_differ_are_printed(load, tmp_path, capsys):
+    compare = load("bits").compare
+    before, after = tmp_path / "before.json", tmp_path / "after.json"
+    before.write_text('{"lai": "1", "ndvi": "2", "dem": "3"}')
+    after.write_text('{"lai": "1", "ndvi": "4", "kt": "5"}')
+    assert compare(before, after)
+    assert capsys.readouterr().out.splitlines() == ["dem: only in A", "kt: only in B", "ndvi", "3 of 4 differ"]
+    assert not compare(before, before)
+
+
+def test_lines_of_code_and_docstrings(load, tmp_path):
+    sizes, path = load("sizes"), tmp_path / "sample.py"
+    path.write_text(
+        '"""Module."""\n\n# comment\ndef f(a,\n      b):\n    """One.\n\n    Two."""\n    return """x\ny"""\n'
+    )
+    tree = sizes.ast.parse(path.read_text())
+    [(name, node)] = sizes.definitions(tree)
+    assert (name, list(sizes.docstring_lines(tree)), list(sizes.docstring_lines(node))) == ("f", [1], [6, 7, 8])
+    assert sizes.code_lines(path) - {1, 6, 7, 8} == {4, 5, 9, 10}
+
+
+def test_files_that_a_call_enters(load):
+    entered = load("sizes").entered
+    assert entered(lambda: sum([1, 2])) == (0, 0, 0)
+    files, functions, depth = entered(lambda: fifesim.Canopy(brown=0.2))
+    assert 1 <= files <= functions and 1 <= depth <= functions

@@ -12,10 +12,10 @@ import rasterio
 import typer
 from typer.testing import CliRunner
 
-from fifesim.base import datasets
-from fifesim.base.warned import warn
+from fifesim.base import files
+from fifesim.base.messages import warn
 from fifesim.cli import app
-from fifesim.output import pages
+from fifesim.output import report
 from fifesim.output.run.again import Rerun
 from fifesim.output.run.folder import FILES
 from fifesim.scenario.scenario import read_scenario
@@ -71,7 +71,7 @@ def test_the_last_line_says_how_long_it_took_and_what_to_open(first):
 
 
 def test_rerun_makes_the_same_file_again(first, invoke, monkeypatch, tmp_path):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     result = invoke("rerun", first[0] / "image.tif", "-o", "again.tif")
     assert result.exit_code == 0, result.output
     assert result.stdout == f"{first[0]}/image.tif made again: the same bits in all of 1800 values\n"
@@ -88,7 +88,7 @@ def test_rerun_of_other_bits_ends_with_code_1(first, invoke, monkeypatch):
 
 
 def test_quiet_says_nothing_and_verbose_each_step(invoke, small, monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     quiet = invoke("simulate", small, "-o", "quiet", "--quiet")
     assert (quiet.exit_code, quiet.stdout, quiet.stderr) == (0, "", "")
     told = invoke("simulate", small, "-o", "told", "-v")
@@ -105,7 +105,7 @@ def test_what_writes_can_be_quiet(name, command):
 
 
 def test_explore_says_what_to_open_unless_it_is_quiet(invoke, monkeypatch):
-    monkeypatch.setattr("fifesim.experiments.explorer.writing.explore", lambda scenario, page, overwrite: page)
+    monkeypatch.setattr("fifesim.experiments.explorer.page.explore", lambda scenario, page, overwrite: page)
     assert "open page.html in a browser" in invoke("explore", "-o", "page.html").stdout
     assert invoke("explore", "-o", "page.html", "--quiet").stdout == ""
 
@@ -154,7 +154,7 @@ def test_sensors_lists_the_bands_of_one_with_their_radiances(invoke):
 
 
 def test_sensors_check_says_what_a_file_is(invoke, tmp_path):
-    text = datasets.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
+    text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text.replace('"AVHRR"', '"MINE"', 1), encoding="utf-8")
     result = invoke("sensors", "--check", "mine.toml")
     assert result.exit_code == 0, result.output
@@ -163,7 +163,7 @@ def test_sensors_check_says_what_a_file_is(invoke, tmp_path):
 
 
 def test_sensors_check_names_file_key_and_remedy_with_exit_code_2(invoke, tmp_path):
-    text = datasets.path("instruments/oli.toml").read_text(encoding="utf-8")
+    text = files.path("instruments/oli.toml").read_text(encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text.replace("altitude = 705000.0", "altitude = 705.0"), encoding="utf-8")
     result = invoke("sensors", "--check", "mine.toml")
     assert result.exit_code == 2
@@ -221,7 +221,7 @@ def test_a_mistake_is_named_with_exit_code_2_and_nothing_is_written(invoke, tmp_
 
 
 def test_a_folder_in_use_is_not_touched_without_overwrite(invoke, small, tmp_path, monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     kept = tmp_path / "out" / "notes.txt"
     kept.parent.mkdir()
     kept.write_text("mine")
@@ -261,7 +261,7 @@ def test_negative_lai_leaves_no_output_behind(invoke, tmp_path):
 
 
 def test_dry_run_estimates_and_writes_nothing(invoke, small, tmp_path, monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     result = invoke("simulate", small, "-o", "out", "--dry-run", "--json")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
@@ -272,7 +272,7 @@ def test_dry_run_estimates_and_writes_nothing(invoke, small, tmp_path, monkeypat
 
 
 def test_json_says_how_far_it_is(invoke, small, monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     lines = [json.loads(line) for line in invoke("simulate", small, "-o", "out", "--json").stdout.splitlines()]
     assert {line["event"] for line in lines[:-1]} == {"progress"}
     assert lines[-1]["event"] == "finished"
@@ -373,8 +373,8 @@ def test_ctrl_c_is_a_line_and_code_130(invoke, tmp_path, monkeypatch, command):
         raise KeyboardInterrupt
 
     for name in (
-        "friedl1995.folder.reproduce_to_folder",
-        "scatter.folder.budget_to_folder",
+        "friedl1995.report.reproduce_to_folder",
+        "scatter.report.budget_to_folder",
         "verification.areas.deviations",
     ):
         monkeypatch.setattr(f"fifesim.experiments.{name}", pressed)
@@ -419,7 +419,7 @@ def test_commands_take_one_thread_of_blas_unless_told_otherwise(given):
     """numpy's too, which is there before the command is: its threads wait for each other, longer than they work."""
     given = {} if given is None else {"OPENBLAS_NUM_THREADS": given}
     code = (
-        "from fifesim.cli import app, _importing\nwith _importing(): import scipy.linalg\n"
+        "from fifesim.cli import app, importing\nwith importing(): import scipy.linalg\n"
         "from threadpoolctl import threadpool_info\n"
         "print({each['num_threads'] for each in threadpool_info() if each['user_api'] == 'blas'})"
     )

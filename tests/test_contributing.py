@@ -12,7 +12,7 @@ from typing import get_args, get_type_hints
 import pytest
 
 import fifesim
-from fifesim.analysis.rasters.indices import INDICES
+from fifesim.analysis.index_labels import INDICES
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = "fifesim"
@@ -34,11 +34,11 @@ RECIPES = {
     ),
     "gas": (
         [
-            ("fifesim/atmosphere/air/gases.py", '"ch4": 1.72e-6}', '"ch4": 1.72e-6, "no2": 1e-6}'),
+            ("fifesim/atmosphere/gases.py", '"ch4": 1.72e-6}', '"ch4": 1.72e-6, "no2": 1e-6}'),
             ("data/gas_absorption.csv", "\nh2o,0.57,", "\nno2,0.45,0.5,0,0,0,0,0\nh2o,0.57,"),
         ],
         """
-        from fifesim.atmosphere.air.gases import gas_transmittance
+        from fifesim.atmosphere.gases import gas_transmittance
 
         air = fifesim.Atmosphere()
         one, every = gas_transmittance(0.45, air, [1.0], gases=("no2",)), gas_transmittance(0.45, air, [1.0])
@@ -46,7 +46,7 @@ RECIPES = {
         """,
     ),
     "aerosol": (
-        [("fifesim/atmosphere/air/mixtures.py", "MODELS = {\n", 'MODELS = {\n    "smoke": {"soot": 1.0},\n')],
+        [("fifesim/atmosphere/mixtures.py", "MODELS = {\n", 'MODELS = {\n    "smoke": {"soot": 1.0},\n')],
         """
         assert fifesim.Atmosphere(aerosol="soot:1").aerosol == "smoke"
         assert fifesim.Scenario(atmosphere={"aerosol": "smoke"}).atmosphere.aerosol == "smoke"
@@ -55,9 +55,9 @@ RECIPES = {
     "scheme of the atmosphere": (
         [
             (
-                "fifesim/atmosphere/schemes/bright.py",
+                "fifesim/atmosphere/bright.py",
                 """
-                from fifesim.atmosphere.schemes.five_s import five_s_scattering
+                from fifesim.atmosphere.five_s import five_s_scattering
 
 
                 def bright_scattering(*given):
@@ -66,15 +66,15 @@ RECIPES = {
                 """,
             ),
             (
-                "fifesim/atmosphere/schemes/engines.py",
+                "fifesim/atmosphere/engines.py",
                 "\nSCATTERING = {\n",
-                "\nfrom fifesim.atmosphere.schemes.bright import bright_scattering\n\n"
+                "\nfrom fifesim.atmosphere.bright import bright_scattering\n\n"
                 'SCATTERING = {\n    "bright": bright_scattering,\n',
             ),
-            ("fifesim/atmosphere/air/__init__.py", ', "6S")', ', "bright", "6S")'),
+            ("fifesim/atmosphere/__init__.py", ', "6S")', ', "bright", "6S")'),
         ],
         """
-        from fifesim.atmosphere.schemes.engines import scattering
+        from fifesim.atmosphere.engines import scattering
 
         air = fifesim.Scenario(atmosphere={"engine": "bright"}).model_atmosphere()
         wavelength, angles = np.array([0.55]), (30.0, np.array([0.0]), np.array([0.0]))
@@ -118,11 +118,11 @@ RECIPES = {
 
 
                     @dataclass(frozen=True, config=CONFIG)
-                    class TriangleResponse(OneAxis):
+                    class TriangleResponse:
                         kind: Literal["triangle"]
                         width: Positive
 
-                        def _spread(self, view):
+                        def spread(self, view):
                             return TriangleSpread(self.width * view.altitude)
 
 
@@ -130,7 +130,7 @@ RECIPES = {
                         TriangleResponse | CosineResponse |"""
                 ),
             ),
-            ("fifesim/sensor/description/wording.py", '"cosine", "boxcar"', '"triangle", "cosine", "boxcar"'),
+            ("fifesim/sensor/description/fields.py", '"cosine", "boxcar"', '"triangle", "cosine", "boxcar"'),
         ],
         """
         from pathlib import Path
@@ -162,21 +162,21 @@ RECIPES = {
                 ).lstrip(),
             ),
             (
-                "fifesim/analysis/rasters/indices.py",
+                "fifesim/analysis/index_labels.py",
                 "INDICES = {\n",
                 'INDICES = {\n    "GNDVI": (indices.green_difference, (NEAR_INFRARED, GREEN)),\n',
             ),
             (
-                "fifesim/rasters/cf.py",
+                "fifesim/grids/cf.py",
                 "QUANTITIES = {\n",
                 'QUANTITIES = {\n    "gndvi": Quantity("1", "", "green NDVI", label="GNDVI", colours="YlGn"),\n',
             ),
-            ("fifesim/chain/images.py", 'Literal["NDVI", ', 'Literal["GNDVI", "NDVI", '),
+            ("fifesim/chain/steps.py", 'Literal["NDVI", ', 'Literal["GNDVI", "NDVI", '),
         ],
         """
         from typing import get_type_hints
 
-        from fifesim.output import colours, words
+        from fifesim.output import colours, colours as words
 
         rho = reflectance(TM2=0.25, TM4=0.75)
         found = rho.fifesim.index("GNDVI")
@@ -236,7 +236,7 @@ RECIPES = {
 
                 import xarray as xr
 
-                from fifesim.rasters import cf
+                from fifesim.grids import cf
 
 
                 def gpp(fpar: xr.DataArray, efficiency: float = 2.0) -> xr.DataArray:
@@ -256,7 +256,7 @@ RECIPES = {
                 "from .analysis.gpp import gpp as gpp  # method\n\n# Pictures\n",
             ),
             (
-                "fifesim/rasters/cf.py",
+                "fifesim/grids/cf.py",
                 'QUANTITIES = {\n    "',
                 'QUANTITIES = {\n    "gpp": Quantity("g m-2 d-1", "", "gross primary production"),\n    "',
             ),
@@ -298,14 +298,14 @@ RECIPES = {
     "quantity of a raster or file": (
         [
             (
-                "fifesim/rasters/cf.py",
+                "fifesim/grids/cf.py",
                 "QUANTITIES = {\n",
                 'QUANTITIES = {\n    "gloss_map": Quantity("1", "", "gloss", label="gloss", colours="bone"),\n',
             ),
         ],
         """
         from fifesim.output import colours
-        from fifesim.rasters import cf
+        from fifesim.grids import cf
 
         found = cf.label(reflectance(TM4=0.5).isel(band=0), "gloss_map", history="made")
         assert found.attrs["long_name"] == "gloss" and colours.colours_of("gloss_map")[0].name == "bone"
@@ -317,7 +317,7 @@ RECIPES = {
                 "fifesim/base/annotations.py",
                 "from typing import ",
                 "from typing import Annotated as _Annotated\n"
-                "from fifesim.base.kinds import Kind as _Kind\n"
+                "from fifesim.base.arguments import Kind as _Kind\n"
                 'Percent = _Annotated[float, _Kind("a percentage", lambda value: 0 <= value <= 100)]\n'
                 "from typing import ",
             ),
@@ -361,7 +361,7 @@ RECIPES = {
             (
                 "fifesim/experiments/verification/benchmarks.py",
                 "\nCHECKS = (",
-                '\ndef _theirs():\n    table = datasets.table("verification/theirs.csv")\n'
+                '\ndef _theirs():\n    table = files.table("verification/theirs.csv")\n'
                 '    yield _deviation("theirs", largest(2 * table["x"], table["y"]), 1e-12, "1", "theory")\n'
                 "\n\nCHECKS = (_theirs, ",
             ),
@@ -374,11 +374,108 @@ RECIPES = {
         assert found.deviation == 0
         """,
     ),
+    "product reader": (
+        [
+            (
+                "fifesim/sensor/products/mine_labels.py",
+                '''
+                """A product of digital numbers with one file for each band."""
+
+                from __future__ import annotations
+
+                import os
+                from pathlib import Path
+
+                import xarray as xr
+
+                from fifesim.sensor.products.labels import calibrate, open_layer
+
+
+                def open_mine(folder: str | os.PathLike) -> xr.DataArray:
+                    """
+                    Image of my product.
+
+                    Examples
+                    --------
+                    >>> from fifesim import open_mine
+                    """
+                    bands = ("TM3", "TM4")
+                    layers = [open_layer(Path(folder), f"{name}.tif", None, "unpack the product") for name in bands]
+                    counts = xr.concat(layers, xr.Variable("band", list(bands)), combine_attrs="drop")
+                    return calibrate(counts, "TM", time="1987-06-06T16:35")
+                ''',
+            ),
+            (
+                "fifesim/__init__.pyi",
+                "# Pictures\n",
+                "from .sensor.products.mine_labels import open_mine as open_mine\n\n# Pictures\n",
+            ),
+        ],
+        """
+        import tempfile
+        from pathlib import Path
+
+        folder = Path(tempfile.mkdtemp())
+        for name, count in (("TM3", 40), ("TM4", 80)):
+            counts = reflectance(TM3=count).isel(band=0).astype("uint8").drop_attrs()
+            counts.rio.write_crs("EPSG:26914").rio.to_raster(folder / f"{name}.tif")
+        image = fifesim.open_mine(folder)
+        assert image["band"].values.tolist() == ["TM3", "TM4"] and image.dtype == "uint8"
+        assert 0 < float(image.fifesim.ndvi().mean()) < 1
+        try:
+            fifesim.open_mine(folder / "other")
+        except ValueError as error:
+            assert "TM3.tif is missing" in str(error) and "unpack the product" in str(error), error
+        else:
+            raise AssertionError("a missing file")
+        """,
+    ),
+    "panel of the report": (
+        [
+            (
+                "fifesim/output/report.py",
+                "        title=title(scenario),\n",
+                '        title=title(scenario),\n        greenest=float(truth["lai"].max()),\n',
+            ),
+            (
+                "fifesim/output/report.html.j2",
+                "{% block content %}\n",
+                "{% block content %}\n<section><h2>Greenest pixel</h2>{{ greenest | fixed }}</section>\n",
+            ),
+        ],
+        """
+        assert "<h2>Greenest pixel</h2>" in (run_folder() / "report.html").read_text(encoding="utf-8")
+        """,
+    ),
+    "file that a run writes": (
+        [
+            ("fifesim/output/run/folder.py", 'FILES = (\n    "image.tif"', 'FILES = (\n    "lai.csv", "image.tif"'),
+            (
+                "fifesim/output/run/folder.py",
+                "    terrain = level = None\n",
+                '    truth["lai"].drop_vars("spatial_ref").to_dataframe().to_csv(folder / "lai.csv")\n'
+                "    terrain = level = None\n",
+            ),
+            (
+                "fifesim/output/stac.py",
+                "_ASSETS = {\n",
+                '_ASSETS = {\n    "lai.csv": ("lai", "True LAI", "text/csv", ["data"]),\n',
+            ),
+        ],
+        """
+        import pandas as pd
+
+        assert len(pd.read_csv(run_folder() / "lai.csv")) == 100
+        assert "lai" in json.loads((run_folder() / "item.json").read_text())["assets"]
+        """,
+    ),
 }
 
 # Run all checks in one process, since each would import the package again.
 _RUN = """
-import json, traceback
+import json, tempfile, traceback
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -395,6 +492,17 @@ def reflectance(**bands):
     found = xr.concat(rasters, xr.DataArray(list(bands), dims="band", name="band"))
     found = found.assign_coords(wavelength=("band", [wavelengths[name] for name in bands]))
     return found.assign_attrs(units="1", standard_name="surface_bidirectional_reflectance")
+
+
+@cache
+def run_folder():
+    # A small run, whose files several checks read.
+    from fifesim.output.run.folder import simulate_to_folder
+
+    scenario = fifesim.Scenario(grid={"width": 300, "height": 300}, terrain={"dem": "flat"})
+    folder = Path(tempfile.mkdtemp()) / "run"
+    simulate_to_folder(scenario, folder)
+    return folder
 
 
 failed = {}

@@ -5,9 +5,9 @@ import re
 import pandas as pd
 import pytest
 
-from fifesim.base import datasets
+from fifesim.base import files
 
-DATA = datasets.path("lai_distributions.csv").parent
+DATA = files.path("lai_distributions.csv").parent
 TABLES = sorted(path for path in DATA.rglob("*") if path.suffix in (".csv", ".toml"))
 NAMES = [path.relative_to(DATA).as_posix() for path in TABLES]
 

@@ -68,7 +68,7 @@ def test_api_pages_follow_the_package(api):
     """Every public name, and every module of a stage that knows no labels."""
     functions, physics = "".join(api.functions().values()), api.physics()
     assert [name for name in PUBLIC if f"\n   {name}\n" not in functions] == []
-    assert "ground.canopy.sail_model" in physics and "sensor.raster" not in physics
+    assert "ground.canopy.sail_model" in physics and "sensor.labels" not in physics
 
 
 def test_every_public_name_has_an_example():

@@ -2,18 +2,22 @@
 
 import ast
 import inspect
+import re
+from collections import defaultdict
 from pathlib import Path
+from statistics import median
 
 import pytest
 
 import fifesim
+from fifesim.accessor import PUBLIC
 
 PACKAGE = Path(fifesim.__file__).parent
 STAGES = ("ground", "atmosphere", "sensor", "analysis")
 LABEL_LIBRARIES = {"xarray", "dask", "odc", "rioxarray", "rasterio"}
 
 # The rule of imports: a folder imports from those before it, and from itself. The four stages are one step.
-ORDER = ("base", "rasters", "stages", "chain", "scenario", "output", "experiments", "cli")
+ORDER = ("base", "grids", "stages", "chain", "scenario", "output", "experiments", "cli")
 
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix().replace("/", "."): path for path in PACKAGE.rglob("*.py")}
 TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
@@ -56,9 +60,8 @@ def step(name):
 
 
 def is_physics(name):
-    """Files of a stage, but for those that label it: ``raster`` and the files of folders ``rasters``."""
-    labels = name.endswith(".raster") or "rasters" in name.split(".")
-    return folder(name) in STAGES and not labels
+    """Whether a file of a stage has formulas; ``labels.py`` and files that end in ``_labels.py`` have rasters."""
+    return folder(name) in STAGES and not re.search(r"[._]labels$", name)
 
 
 ORDINARY = sorted(set(FILES) - {"__init__", "accessor"})
@@ -110,18 +113,28 @@ def test_a_folder_is_read_at_a_glance():
     assert {path.name for path in shown if path.is_dir()} - {"data"} == {*ORDER, *STAGES} - {"stages", "cli"}
 
 
-def code_lines(tree):
-    """Statements that are no docstring, import or constant."""
-    return [node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+# Parts of a stage in the order of their imports; "" are the files of the stage itself.
+PARTS = {
+    "ground": ({"canopy"}, {"terrain"}, {"landscape"}),
+    "sensor": ({"response"}, {"description"}, {""}, {"products"}),
+}
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in ORDINARY if code_lines(TREES[name]) and not name.endswith("__init__")]
-)
-def test_every_module_has_tests_of_its_name(name):
-    """Tests mirror the tree, so that a maintainer finds them."""
-    *folders, last = name.split(".")
-    assert Path(__file__).parent.joinpath(*folders, f"test_{last}.py").exists()
+def place_in_stage(name):
+    """Place of a file among the parts of its stage."""
+    stage, *folders, last = name.split(".")
+    part = folders[0] if folders else ""
+    return next(number for number, parts in enumerate(PARTS[stage]) if part in parts or last == "__init__")
+
+
+@pytest.mark.parametrize("name", [name for name in ORDINARY if folder(name) in PARTS])
+def test_parts_of_a_stage_import_down(name):
+    above = {
+        other
+        for other in own_imports(name)
+        if folder(other) == folder(name) and place_in_stage(other) > place_in_stage(name)
+    }
+    assert above == set()
 
 
 def test_only_the_package_imports_the_accessor():
@@ -163,6 +176,31 @@ def lines_of_code(name):
 def test_no_file_has_more_than_400_lines_of_code():
     """A longer file covers more than one topic; docstrings do not count."""
     assert {name: lines_of_code(name) for name in FILES if lines_of_code(name) > 400} == {}
+
+
+def test_package_has_few_and_full_files():
+    """Otherwise a reader changes files too often."""
+    assert len(FILES) <= 215
+    assert len({path.parent for path in FILES.values()}) <= 24
+    assert median(map(lines_of_code, FILES)) > 100
+
+
+# Names that more than one file may define: commands carry the names of functions, every file of verification has a
+# list of checks, and the two experiments and the sweeps each name the variables that they regress.
+SHARED_NAMES = {"CHECKS", "VARIABLES", "budget", "dataset", "explore", "reproduce", "rerun", "simulate", "verify"}
+
+
+def test_names_are_defined_in_one_file():
+    found = defaultdict(set)
+    for name, tree in TREES.items():
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                found[node.name].add(name)
+            for target in getattr(node, "targets", [getattr(node, "target", None)]):
+                if isinstance(target, ast.Name):
+                    found[target.id].add(name)
+    several = {name for name, files in found.items() if len(files) > 1 and not name.startswith("_")}
+    assert several <= SHARED_NAMES
 
 
 def public_functions():
@@ -208,11 +246,12 @@ def sections_needed(function):
 
 def test_functions_have_their_docstrings():
     """A public function has all sections; an internal one has them too, or one sentence."""
+    exported = {f"{found.module.removeprefix('fifesim.')}.{name}" for name, found in PUBLIC.items()}
     lacking = []
     for parameter in public_functions():
         (function,), name = parameter.values, parameter.id
         text = inspect.cleandoc(ast.get_docstring(function) or "")
-        public = name.rsplit(".", 1)[-1] in fifesim.__all__ or name.rsplit(".", 2)[-2] in fifesim.__all__
+        public = name in exported or name.rpartition(".")[0] in exported
         if text and "\n\n" not in text and not public:
             continue
         missing = [each for each in sections_needed(function) if f"\n{each}\n{'-' * len(each)}\n" not in text]

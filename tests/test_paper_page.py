@@ -10,7 +10,7 @@ import pytest
 
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE, PASSAGES, READINGS
+from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, PASSAGES, READINGS
 
 DOCS = Path(__file__).parents[1] / "docs"
 NUMBERS = json.loads((DOCS / "paper.json").read_text(encoding="utf-8"))
@@ -205,7 +205,7 @@ def test_noise_and_spread_are_those_of_this_program(make_paper):
     """Of three realisations, within four standard errors. Else run ``python docs/make_paper.py --only scenes``."""
     seeds = range(make_paper.SEED + 100, make_paper.SEED + 103)
     case, options = friedl1995.Case(), {"readings": [NATIVE, ALIGNED], "distributions": ["burned-grazed"]}
-    found = friedl1995_table.realise(case, seeds, **options)["ren"].mean("realisation").squeeze("distribution")
+    found = friedl1995_table.realise_scenes(case, seeds, **options)["ren"].mean("realisation").squeeze("distribution")
     for name in ("native", "aligned"):
         for (variable, arp), row in of_text("ren", name).items():
             value = float(found.sel(reading=name, variable=variable, arp=arp))

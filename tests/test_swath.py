@@ -6,7 +6,7 @@ import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
-from fifesim.rasters import directions
+from fifesim.grids import directions
 
 BANDS = ["TM3", "TM4"]
 

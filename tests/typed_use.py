@@ -121,7 +121,7 @@ def wrong(lai: xr.DataArray, dn: xr.DataArray, fit: fifesim.Regression) -> None:
     fifesim.slope("dem.tif")  # type: ignore[arg-type]
     fifesim.surface_reflectance(lai, 5)  # type: ignore[arg-type]
     fifesim.surface_reflectance(lai, time=1987)  # type: ignore[arg-type]
-    fifesim.surface_reflectance(lai, canopy=fifesim.Canopy(soil=lai.values))  # type: ignore[arg-type]
+    fifesim.surface_reflectance(lai, canopy=fifesim.Canopy(soil="bright"))  # type: ignore[arg-type]
     fifesim.to_toa(lai.values)  # type: ignore[arg-type]
     fifesim.to_toa(lai, "hazy")  # type: ignore[arg-type]
     fifesim.atmosphere.spectrum("tropical")  # type: ignore[arg-type]

@@ -1,1 +1,1 @@
-"""What an image tells: indices, regressions, noise and scale."""
+"""Analysis of images: indices, regressions, noise and scale."""

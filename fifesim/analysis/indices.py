@@ -1,4 +1,4 @@
-"""Spectral vegetation indices."""
+"""Spectral vegetation indices, and the choice of a date for each cell of a composite."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def normalized_difference(nir, red):
 
     References
     ----------
-    [Rouse1974]_; the criterion of [Friedl1995]_, Eq. 2, is `fifesim.analysis.scaling.ndvi_linearity`
+    [Rouse1974]_; the criterion of [Friedl1995]_, Eq. 2, is `fifesim.analysis.scaling.linearity_correlation`
 
     Examples
     --------
@@ -197,3 +197,52 @@ def _ratio(above, below):
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = above / below
     return np.where(below == 0, np.nan, ratio)
+
+
+def date_of_maximum(index):
+    """
+    Date with the largest value of an index.
+
+    Parameters
+    ----------
+    index : array, shape (..., date)
+        Such as NDVI; NaN where a date has no data.
+
+    Returns
+    -------
+    chosen : array of int, shape (...)
+        The first of equal ones; -1 where no date has data.
+
+    Notes
+    -----
+    The largest of n values with independent normal errors of deviation s exceeds their mean by the expected maximum
+    of n normal numbers: 0.56 s for 2 dates, 1.16 s for 5. A composite of NDVI is therefore high, the more so the more
+    dates it has.
+
+    References
+    ----------
+    [Holben1986]_
+
+    Examples
+    --------
+    >>> date_of_maximum([[0.2, 0.5, 0.4], [np.nan, -0.1, np.nan], [np.nan] * 3]).tolist()
+    [1, 1, -1]
+    """
+    index = np.asarray(index, float)
+    known = ~np.isnan(index)
+    largest = np.argmax(np.where(known, index, -np.inf), axis=-1)
+    # A cell whose values are all minus infinity has data as well.
+    first = np.argmax(known, axis=-1)
+    found = np.take_along_axis(known, largest[..., None], axis=-1)[..., 0]
+    return np.where(known.any(axis=-1), np.where(found, largest, first), -1)
+
+
+def values_of_date(values, chosen, missing):
+    """Values of the chosen date in each cell, of dates or of dates by cell, shape (...)."""
+    places = np.maximum(chosen, 0)
+    if values.ndim == 1:
+        kept = values[places]
+    else:
+        places = np.broadcast_to(places, values.shape[:-1])[..., None]
+        kept = np.take_along_axis(values, places, axis=-1)[..., 0]
+    return np.where(chosen < 0, np.asarray(missing, values.dtype), kept)

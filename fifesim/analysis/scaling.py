@@ -1,11 +1,14 @@
-"""Scale invariance: what averaging before an algorithm does to its result, simulated and to second order."""
+"""Scale effects: averaging before and after an algorithm, variograms, kernel densities and shares of causes."""
+
+from math import factorial
 
 import numpy as np
+from scipy import fft
 
 
-def ndvi_linearity(red, nir):
+def linearity_correlation(red, nir):
     r"""
-    Correlation that must be zero for NDVI to be linear in reflectance.
+    Correlation that must be 0 for NDVI to be linear in reflectance.
 
     .. math:: r = \mathrm{corr}\left[ \rho_\mathrm{nir} - \rho_\mathrm{vis},
         (\rho_\mathrm{nir} + \rho_\mathrm{vis})^{-1} \right]
@@ -31,7 +34,7 @@ def ndvi_linearity(red, nir):
     Brightness alone changes the difference and the sum together:
 
     >>> light = np.array([1.0, 2.0, 4.0])
-    >>> bool(ndvi_linearity(0.1 * light, 0.3 * light) < 0)
+    >>> bool(linearity_correlation(0.1 * light, 0.3 * light) < 0)
     True
     """
     red, nir = np.asarray(red, float).ravel(), np.asarray(nir, float).ravel()
@@ -44,7 +47,7 @@ def ndvi_linearity(red, nir):
 
 def second_order_bias(hessian, covariance):
     r"""
-    Mean of an algorithm less the algorithm of the mean, to second order in what varies within.
+    Mean of an algorithm minus the algorithm of the mean, to second order in the variation within the region.
 
     .. math:: \overline{A(\psi)} - A(\overline{\psi}) \approx
         \tfrac12 \sum_{ij} \frac{\partial^2 A}{\partial \psi_i \partial \psi_j} \mathrm{cov}(\psi_i, \psi_j)
@@ -54,7 +57,7 @@ def second_order_bias(hessian, covariance):
     hessian : array, shape (n, n, ...)
         Second derivatives at the mean.
     covariance : array, shape (n, n, ...)
-        Of the inputs within the region.
+        Covariance of the inputs within the region.
 
     Returns
     -------
@@ -143,52 +146,387 @@ def fpar_curvature(lai, extinction, fpar_inf):
 
 
 def beer_bias(mean, variance, extinction, fpar_inf):
-    r"""
-    Mean FPAR less FPAR of the mean LAI, to second order.
-
-    Parameters
-    ----------
-    mean, variance : array
-        Of LAI within the region.
-    extinction, fpar_inf : float
-        As in `fpar_curvature`. [1]
-
-    Returns
-    -------
-    bias : array, shape of the broadcast inputs
-        Never positive: FPAR saturates. [1]
-
-    Examples
-    --------
-    >>> round(float(beer_bias(0.74, 0.53**2, 0.569, 0.94)), 3)
-    -0.028
-    """
+    """Mean FPAR minus the FPAR of the mean LAI, to second order. [1]"""
     return second_order_bias(fpar_curvature(mean, extinction, fpar_inf)[None, None], np.asarray(variance)[None, None])
 
 
-def share_kept(pixels, cells):
-    """
-    Share of the range and of the variance of cells that pixels keep.
-
-    Parameters
-    ----------
-    pixels, cells : array, any shape
-        Values at the two scales; NaN is left out.
-
-    Returns
-    -------
-    of_range, of_variance : float
-        [1]
-
-    References
-    ----------
-    [Friedl1995]_, Fig. 6
-
-    Examples
-    --------
-    >>> share_kept(np.array([1.0, 3.0]), np.array([0.0, 2.0, 4.0, 2.0]))
-    (0.5, 0.5)
-    """
+def pixel_shares(pixels, cells):
+    """Share of the range and of the variance of cells that pixels keep, [Friedl1995]_, Fig. 6. [1]"""
     pixels, cells = np.asarray(pixels, float), np.asarray(cells, float)
     pixels, cells = pixels[np.isfinite(pixels)], cells[np.isfinite(cells)]
     return float(np.ptp(pixels) / np.ptp(cells)), float(pixels.var() / cells.var())
+
+
+# Number of sums over pairs.
+LAG_SUMS = 6
+
+
+def lag_sums(cells, margin, reach, origin=0.0):
+    """Sums by lag over pairs of cells, the first in the block and the second possibly in the margin, by FFT."""
+    # Rows of the result: 1, first value, second value, product, squares of both. Sums of blocks add up to those of the
+    # raster.
+    values = np.asarray(cells, float) - origin
+    valid = np.isfinite(values)
+    values = np.where(valid, values, 0.0)
+    inside = tuple(slice(before, size - after) for (before, after), size in zip(margin, values.shape, strict=True))
+    first = np.zeros(valid.shape, bool)
+    first[inside] = valid[inside]
+    # Twice the reach apart nothing wraps round.
+    shape = tuple(fft.next_fast_len(size + each, real=True) for size, each in zip(values.shape, reach, strict=True))
+    factors = 1.0, values, values**2
+    one, one_z, one_zz = (fft.rfft2(first * factor, shape) for factor in factors)
+    two, two_z, two_zz = (fft.rfft2(valid * factor, shape) for factor in factors)
+    pairs = (one, two), (one_z, two), (one, two_z), (one_z, two_z), (one_zz, two), (one, two_zz)
+    rows, columns = np.arange(reach[0] + 1), np.arange(-reach[1], reach[1] + 1)
+    sums = np.stack([fft.irfft2(np.conj(a) * b, shape)[np.ix_(rows, columns)] for a, b in pairs])
+    # Counts are whole.
+    sums[0] = np.rint(sums[0])
+    return sums
+
+
+def covariance(sums):
+    r"""
+    Covariance by lag, about the mean of all cells.
+
+    .. math:: C(h) = \frac{1}{N(h)} \sum (z_i - \bar z)(z_{i+h} - \bar z)
+
+    Parameters
+    ----------
+    sums : array, shape (6, lags down, lags across)
+        From `lag_sums`.
+
+    Returns
+    -------
+    covariance : array, shape (lags down, lags across)
+        NaN where there is no pair.
+
+    References
+    ----------
+    [Chiles2012]_, Section 2.2
+    """
+    count, first, second, product = sums[:4]
+    middle = sums.shape[2] // 2
+    mean = first[0, middle] / count[0, middle]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(count > 0, (product - mean * (first + second)) / count + mean**2, np.nan)
+
+
+def semivariance(sums):
+    r"""
+    Semivariance by lag.
+
+    .. math:: \gamma(h) = \frac{1}{2 N(h)} \sum (z_{i+h} - z_i)^2
+
+    Parameters
+    ----------
+    sums : array, shape (6, lags down, lags across)
+        From `lag_sums`.
+
+    Returns
+    -------
+    semivariance : array, shape (lags down, lags across)
+        NaN where there is no pair.
+
+    References
+    ----------
+    [Chiles2012]_, Section 2.2
+
+    Examples
+    --------
+    A plane that rises by 2 a cell across:
+
+    >>> plane = 2.0 * np.arange(5.0) * np.ones((4, 1))
+    >>> semivariance(lag_sums(plane, ((0, 0), (0, 0)), (0, 2)))[0].round(9).tolist()
+    [8.0, 2.0, 0.0, 2.0, 8.0]
+    """
+    count, _, _, product, first_square, second_square = sums
+    with np.errstate(divide="ignore", invalid="ignore"):
+        squares = (first_square + second_square - 2.0 * product) / (2.0 * count)
+    # Rounding of the transform may leave a difference of nothing below zero.
+    return np.where(count > 0, np.maximum(squares, 0.0), np.nan)
+
+
+def crossing(lag, correlation, level=0.05):
+    """Lag at which a correlation has fallen to a level, log-linear between lags; NaN if it does not. [m]"""
+    below = np.flatnonzero(correlation <= level)
+    if not below.size or below[0] == 0:
+        return np.nan
+    after = below[0]
+    upper, lower = correlation[after - 1], correlation[after]
+    if lower > 0:
+        share = np.log(upper / level) / np.log(upper / lower)
+    else:
+        share = (upper - level) / (upper - lower)
+    return float(lag[after - 1] + share * (lag[after] - lag[after - 1]))
+
+
+def weight_correlation(operator, reach):
+    """Mean autocorrelation of the weights of a footprint along one axis, for lags from -reach to reach. [1]"""
+    whole = operator.weights[operator.share > 1 - 1e-9]
+    size = whole.shape[1]
+    full = np.mean([np.correlate(weights, weights, "full") for weights in whole], axis=0)
+    products = np.zeros(2 * reach + 1)
+    kept = min(reach, size - 1)
+    products[reach - kept : reach + kept + 1] = full[size - 1 - kept : size + kept]
+    return products
+
+
+def footprint_variance(covariance, down, across):
+    r"""
+    Variance of means over a footprint.
+
+    .. math:: \sigma^2 = \sum_{h_y} \sum_{h_x} a_y(h_y) \, a_x(h_x) \, C(h_y, h_x),
+        \qquad a(h) = \sum_i w_i w_{i+h}
+
+    Parameters
+    ----------
+    covariance : array, shape (reach_y + 1, 2 reach_x + 1)
+        Covariance of the cells, by lags from 0 down and from minus to plus across; the other half is symmetric.
+    down : array, shape (2 reach_y + 1,)
+        a_y, from `weight_correlation`. [1]
+    across : array, shape (2 reach_x + 1,)
+        a_x. [1]
+
+    Returns
+    -------
+    variance : float
+
+    References
+    ----------
+    [Jupp1988]_; [Chiles2012]_, Section 2.4
+
+    Examples
+    --------
+    Means of two by two cells of white noise keep a quarter of the variance:
+
+    >>> noise = np.zeros((2, 3))
+    >>> noise[0, 1] = 1.0
+    >>> float(footprint_variance(noise, np.array([0.25, 0.5, 0.25]), np.array([0.25, 0.5, 0.25])))
+    0.25
+    """
+    half = len(down) // 2
+    # The footprint's own products are even: each lag down stands for the one up, too.
+    rows = down[half:] * np.where(np.arange(half + 1) == 0, 1.0, 2.0)
+    used = np.outer(rows, across)
+    return float(np.sum(np.where(used != 0, used * covariance, 0.0)))
+
+
+# Nodes along the axis over which memory is bounded: samples are taken in parts of this many.
+_PART = 2**14
+
+
+def silverman_bandwidth(deviation, interquartile_range, n):
+    r"""
+    Bandwidth of a Gaussian kernel by the rule of thumb.
+
+    .. math:: h = 0.9 \min(\sigma, \mathrm{IQR} / 1.34) \, n^{-1/5}
+
+    Parameters
+    ----------
+    deviation, interquartile_range : float
+        Standard deviation and interquartile range of the samples.
+    n : float
+        How many.
+
+    Returns
+    -------
+    bandwidth : float
+
+    References
+    ----------
+    [Silverman1986]_, Eq. 3.31
+
+    Examples
+    --------
+    >>> round(silverman_bandwidth(1.0, 2.0, 1.0), 12)
+    0.9
+    """
+    spread = min(deviation, interquartile_range / 1.34) if interquartile_range > 0 else deviation
+    return 0.9 * spread * n**-0.2
+
+
+def gaussian_density(samples, at, bandwidth, weights=None, *, reflect=False):
+    r"""
+    Gaussian kernel density.
+
+    .. math:: \hat f(x) = \frac{1}{h \sum w} \sum_i w_i \, \varphi\left( \frac{x - x_i}{h} \right)
+
+    For quantities that cannot be negative, the part of a kernel below zero is reflected:
+
+    .. math:: \hat f^*(x) = \hat f(x) + \hat f(-x), \quad x \ge 0
+
+    Parameters
+    ----------
+    samples : array, shape (n,)
+        Values, or middles of bins.
+    at : array, shape (m,)
+        Places at which the density is computed.
+    bandwidth : float
+        h, in units of the samples.
+    weights : array, shape (n,), optional
+        Such as counts of the bins; 1 by default.
+    reflect : bool, optional
+        Whether at zero, below which the density is then zero.
+
+    Returns
+    -------
+    density : array, shape (m,)
+        Per unit of the samples.
+
+    Raises
+    ------
+    ValueError
+        If the bandwidth is not positive, or a sample is negative that is to be reflected at zero.
+
+    References
+    ----------
+    [Silverman1986]_, Sections 2.4 and 2.10
+
+    Examples
+    --------
+    >>> at = np.linspace(-9, 9, 1001)
+    >>> round(float(np.sum(gaussian_density(np.array([0.0]), at, 1.0)) * (at[1] - at[0])), 9)
+    1.0
+    """
+    if not 0 < bandwidth < np.inf:
+        raise ValueError(f"bandwidth must be positive, got {bandwidth:g}: do the samples vary?")
+    samples, at = np.asarray(samples, float), np.asarray(at, float)
+    if reflect:
+        if np.min(samples, initial=0.0) < 0:
+            raise ValueError(f"samples must be at least 0 to be reflected there, got {np.min(samples):g}")
+        upper, mirrored = (gaussian_density(samples, each, bandwidth, weights) for each in (at, -at))
+        return np.where(at >= 0, upper + mirrored, 0.0)
+    weights = np.ones(samples.size) if weights is None else np.asarray(weights, float)
+    density = np.zeros(at.size)
+    for start in range(0, samples.size, _PART):
+        part = slice(start, start + _PART)
+        z = (at[:, None] - samples[None, part]) / bandwidth
+        density += np.exp(-0.5 * z * z) @ weights[part]
+    return density / (np.sqrt(2.0 * np.pi) * bandwidth * weights.sum())
+
+
+def sample_density(samples, at, *, reflect=False):
+    """Gaussian kernel density of samples, with the bandwidth of the rule of thumb, shape (m,)."""
+    samples = np.asarray(samples, float)
+    samples = samples[np.isfinite(samples)]
+    if samples.size < 2:
+        raise ValueError(f"a density needs at least 2 values, got {samples.size}")
+    quartiles = np.subtract(*np.percentile(samples, (75, 25)))
+    bandwidth = silverman_bandwidth(samples.std(ddof=1), quartiles, samples.size)
+    return gaussian_density(samples, at, bandwidth, reflect=reflect)
+
+
+def shapley(values, causes):
+    r"""
+    Shapley shares of an effect: mean contribution of each cause over all orders in which causes are added.
+
+    .. math::
+
+        \varphi_i = \sum_{S \not\ni i} \frac{|S|! \, (k - |S| - 1)!}{k!} \left[ v(S \cup i) - v(S) \right], \qquad
+        \sum_i \varphi_i = v(\mathrm{all}) - v(\mathrm{none})
+
+    Parameters
+    ----------
+    values : array, shape (2,) * causes + (...)
+        Effect v of each set of causes: index 1 along the axis of a cause where it is at work, 0 where it is not.
+    causes : int
+        Their number k.
+
+    Returns
+    -------
+    shares : array, shape (causes, ...)
+        Exactly 0 for a cause that changes nothing.
+
+    Raises
+    ------
+    ValueError
+        If the values have no axis of two for each cause.
+
+    References
+    ----------
+    [Shapley1953]_
+
+    Examples
+    --------
+    Two causes that only work together share alike, and one that does nothing gets nothing:
+
+    >>> together = np.zeros((2, 2, 2))
+    >>> together[1, 1, :] = 3.0
+    >>> shapley(together, 3).tolist()
+    [1.5, 1.5, 0.0]
+    """
+    values = _checked(values, causes)
+    shares = []
+    for cause in range(causes):
+        added = np.diff(values, axis=cause).squeeze(axis=cause)
+        # Number of other causes at work in each set.
+        others = np.indices((2,) * (causes - 1)).sum(axis=0) if causes > 1 else np.zeros((), int)
+        weights = np.array([factorial(n) * factorial(causes - n - 1) / factorial(causes) for n in range(causes)])
+        shares.append(np.tensordot(weights[others], added, axes=causes - 1))
+    return np.array(shares).reshape(causes, *values.shape[causes:])
+
+
+def taken_away(values, causes):
+    r"""
+    Reduction of an effect when one cause is removed, :math:`v(\mathrm{all}) - v(\mathrm{all} \setminus i)`.
+
+    Parameters
+    ----------
+    values, causes
+        As in `shapley`.
+
+    Returns
+    -------
+    changes : array, shape (causes, ...)
+
+    Raises
+    ------
+    ValueError
+        As in `shapley`.
+
+    Examples
+    --------
+    >>> taken_away(np.array([[0.0, 1.0], [2.0, 5.0]]), 2).tolist()
+    [4.0, 3.0]
+    """
+    return np.asarray(values, float)[(1,) * causes] - _one_apart(values, causes, 0)
+
+
+def by_itself(values, causes):
+    r"""
+    Effect of one cause without any other, :math:`v(i) - v(\mathrm{none})`.
+
+    Parameters
+    ----------
+    values, causes
+        As in `shapley`.
+
+    Returns
+    -------
+    changes : array, shape (causes, ...)
+
+    Raises
+    ------
+    ValueError
+        As in `shapley`.
+
+    Examples
+    --------
+    >>> by_itself(np.array([[0.0, 1.0], [2.0, 5.0]]), 2).tolist()
+    [2.0, 1.0]
+    """
+    return _one_apart(values, causes, 1) - np.asarray(values, float)[(0,) * causes]
+
+
+def _one_apart(values, causes, state):
+    """Effect with one cause at the state 1 or 0 and all others at the opposite state, shape (causes, ...)."""
+    values = _checked(values, causes)
+    sets = np.where(np.eye(causes, dtype=bool), state, 1 - state)
+    return np.array([values[tuple(each)] for each in sets]).reshape(causes, *values.shape[causes:])
+
+
+def _checked(values, causes):
+    values = np.asarray(values, float)
+    if values.shape[:causes] != (2,) * causes:
+        raise ValueError(f"values must have {causes} axes of 2 first, one for each cause, got shape {values.shape}")
+    return values

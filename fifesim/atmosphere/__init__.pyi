@@ -1,3 +1,5 @@
 """Where the public name of this folder lives, for editors and type checkers."""
 
-from .schemes.raster import spectrum as spectrum
+from .labels import spectrum as spectrum
+
+ENGINES: tuple[str, ...]

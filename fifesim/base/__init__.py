@@ -1,1 +1,1 @@
-"""What all stages speak in: directions, bands, footprints, tables. numpy only."""
+"""Common basis of all stages: directions, bands, footprints and tables, in numpy only."""

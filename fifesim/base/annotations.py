@@ -1,67 +1,48 @@
-"""Types of arguments, each with the kind that is checked: a path, a time, numbers, chunks."""
+"""Types of arguments, each with the kind by which it is checked: path, time, numbers, chunks."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from os import PathLike
 from typing import Annotated, Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 
-from fifesim.base.kinds import (
-    CHUNKS,
-    DATES,
-    LIST,
-    NAMES,
-    NUMBERS,
-    PAIR,
-    PATH,
-    PLAIN,
-    ROW,
-    UNCHECKED,
-    Kind,
-    is_path,
-)
+from fifesim.base.arguments import CHUNKS, DATES, LIST, NAMES, NUMBERS, PAIR, PATH, PLAIN, ROW, UNCHECKED, Kind, is_path
 
 
 class Array(Protocol):
-    """What numpy reads as an array, such as an array of numpy or dask, a column of pandas, an xarray.DataArray."""
+    """Anything that numpy reads as an array: of numpy or dask, a column of pandas, an xarray.DataArray."""
 
     def __array__(self) -> np.ndarray: ...
 
 
-class Distribution(Protocol):
-    """A frozen continuous distribution, as `scipy.stats` has them."""
+class FrozenDistribution(Protocol):
+    """Frozen continuous distribution, as in `scipy.stats`."""
 
-    @property
-    def ppf(self) -> Callable[..., Any]:
-        """Value below which a share of the distribution lies."""
+    def ppf(self, q: Any, /) -> Any:
+        """Quantile of a share of the distribution."""
 
-    @property
-    def cdf(self) -> Callable[..., Any]:
-        """Share of the distribution that lies below a value."""
+    def cdf(self, x: Any, /) -> Any:
+        """Share of the distribution below a value."""
 
-    @property
-    def pdf(self) -> Callable[..., Any]:
-        """Density."""
+    def pdf(self, x: Any, /) -> Any:
+        """Probability density."""
 
-    @property
-    def mean(self) -> Callable[[], Any]:
+    def mean(self) -> Any:
         """Mean."""
 
-    @property
-    def std(self) -> Callable[[], Any]:
+    def std(self) -> Any:
         """Standard deviation."""
 
-    @property
-    def support(self) -> Callable[[], tuple[Any, Any]]:
-        """Least and largest value."""
+    def support(self) -> tuple[Any, Any]:
+        """Smallest and largest value."""
 
 
 FilePath: TypeAlias = Annotated[str | PathLike[str], PATH]
 Time: TypeAlias = Annotated[str | datetime | np.datetime64, DATES]
 Times: TypeAlias = Annotated[Time | Sequence[Time] | Array, DATES]
 Names: TypeAlias = Annotated[str | Sequence[str], NAMES]
-Noise: TypeAlias = Annotated[
+NoiseKinds: TypeAlias = Annotated[
     Names, Kind("a list of kinds of noise, such as ['shot', 'thermal'], 'all', or () for none")
 ]
 # The function checks the number, and its message states the range.
@@ -88,7 +69,7 @@ Pairing: TypeAlias = Literal["coordinates", "index"]
 # The name of an aerosol, or the share of each of its components.
 AerosolMixture: TypeAlias = Annotated[str | Mapping[str, float], PLAIN]
 LaiDistribution: TypeAlias = Annotated[
-    FilePath | Distribution,
+    FilePath | FrozenDistribution,
     Kind(
         "the name of a treatment, the path of a CSV file or a frozen scipy distribution",
         lambda value: is_path(value) or hasattr(value, "ppf"),

@@ -1,33 +1,163 @@
-"""Checks of the arguments of public functions, derived from their annotations."""
+"""Kinds of arguments, and checks of the arguments of public functions by their annotations."""
 
 import inspect
+import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache, wraps
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from operator import attrgetter
+from types import MethodType, NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from fifesim.base import kinds
-from fifesim.base.kinds import Kind, described, is_a
-from fifesim.base.spelling import unknown_argument
+from fifesim.base.messages import unknown_argument
+
+
+class Kind(NamedTuple):
+    """Set of values that an argument may have: its words in messages, and its test."""
+
+    words: str
+    fits: Callable | None = None
+    # Smallest number of dimensions of a raster, which then must have cells.
+    dimensions: int | None = None
+    # Kinds of numpy's dtypes that rasters in the value may have; None for any.
+    numbers: str | None = "iuf"
+
+
+_class_name = attrgetter("__name__")
+
+
+def is_a(value, *names):
+    """Whether a class name occurs among the classes of a value, so that other libraries need not be imported."""
+    return not set(names).isdisjoint(map(_class_name, type(value).__mro__))
+
+
+def described(value):
+    """Short description of a value, whatever its size."""
+    if is_a(value, "DataArray"):
+        sizes = ", ".join(f"{name}: {size}" for name, size in value.sizes.items())
+        return f"an xarray.DataArray ({sizes})"
+    if is_a(value, "Dataset", "DataTree"):
+        names = ", ".join(str(name) for name in list(value)[:4])
+        return f"an xarray.{type(value).__name__} of {names or 'nothing'}"
+    if isinstance(value, np.ndarray):
+        masked = "masked " if is_a(value, "MaskedArray") else ""
+        return f"a {masked}numpy array {value.shape}"
+    if isinstance(value, list | tuple | dict | set):
+        return f"a {type(value).__name__} of {len(value)}"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:50]}... ({type(value).__name__})"
+
+
+def _is_number(value):
+    if isinstance(value, bool | np.bool_ | str | bytes) or is_a(value, "Dataset", "DataTree"):
+        return False
+    if np.ndim(value):
+        return False
+    return isinstance(value, int | float | np.number) or getattr(getattr(value, "dtype", None), "kind", "-") in "iuf"
+
+
+def _are_numbers(value):
+    if isinstance(value, list | tuple):
+        return all(_are_numbers(each) for each in value)
+    if is_a(value, "ndarray", "DataArray", "Array", "Index", "Series"):
+        return value.dtype.kind in "iuf"
+    return _is_number(value)
+
+
+def _is_pair(value):
+    several = isinstance(value, list | tuple | np.ndarray)
+    return _is_number(value) or (several and np.shape(value) == (2,) and _are_numbers(value))
+
+
+def _are_two(value):
+    return isinstance(value, list | tuple | np.ndarray) and getattr(value, "ndim", 1) > 0 and len(value) == 2
+
+
+def _is_plain(value):
+    return value is not None and not is_a(value, "Dataset", "DataTree", "ndarray", "DataArray", "Array")
+
+
+def _is_row(value):
+    return _is_plain(value) or (isinstance(value, np.ndarray) and value.ndim == 1)
+
+
+def _is_mapping(value):
+    return _is_plain(value) and isinstance(value, Mapping)
+
+
+def is_path(value):
+    """Whether a value may be the path of a file."""
+    return isinstance(value, str | os.PathLike)
+
+
+def _is_size(value):
+    return isinstance(value, str) and re.fullmatch(r"auto|[\d.]+ *[kMGT]?i?B", value) is not None
+
+
+NUMBER = Kind("a number", _is_number)
+NUMBERS = Kind("a number, or an array of them", _are_numbers)
+PAIR = Kind("a number, or two: down and across", _is_pair)
+LIST = Kind("a number, or a list of them", lambda value: _are_numbers(value) and np.ndim(value) < 2)
+TWO = Kind("two numbers, such as (0.5, 2.0)", _are_two)
+ROW = Kind("a name, a mapping, a description, or an array with one dimension", _is_row)
+LISTED = Kind("a list", lambda value: _is_row(value) and np.iterable(value) and not isinstance(value, str))
+FLAG = Kind("True or False", lambda value: isinstance(value, bool | np.bool_))
+TEXT = Kind("a name", lambda value: isinstance(value, str))
+NAMES = Kind("a list of names", lambda value: isinstance(value, str) or (_is_plain(value) and np.iterable(value)))
+PATH = Kind("the path of a file", is_path)
+MAPPING = Kind("a mapping of names", _is_mapping)
+FUNCTION = Kind("a function", callable)
+CHUNKS = Kind(
+    "a number of cells, 'auto', '64MB', None or a mapping such as {'y': 1024, 'x': 1024}",
+    lambda value: (
+        value is None or _is_number(value) or isinstance(value, tuple) or _is_mapping(value) or _is_size(value)
+    ),
+)
+RASTER = Kind("an xarray.DataArray over (y, x)", lambda value: is_a(value, "DataArray"), dimensions=2)
+GRID = Kind(
+    "an odc.geo.geobox.GeoBox, such as fifesim.grid_at or raster.odc.geobox give", lambda value: is_a(value, "GeoBox")
+)
+PLAIN = Kind("a name, a mapping or a description, and no raster", _is_plain)
+ANYTHING = Kind("a number, a mapping, a description or a raster", lambda value: True, dimensions=0)
+# The function checks the argument, and its message names the range.
+UNCHECKED = Kind("a value", lambda value: True)
+DATES = Kind("a date and time", lambda value: True, numbers=None)
+
+
+class Method:
+    """Method that calls the public function of a name with the instance, or an attribute of it, as first argument."""
+
+    # Finds a public function by its name: the front door of the package puts it here.
+    find = None
+
+    def __init__(self, name, attribute=None):
+        self._name, self._attribute = name, attribute
+
+    def __get__(self, instance, owner=None):
+        function = Method.find(self._name)
+        if instance is None:
+            return function
+        return MethodType(function, getattr(instance, self._attribute) if self._attribute else instance)
+
 
 # Kinds of types. Classes of slow libraries are found by name; `Annotated` states any other kind.
 _KINDS = {
-    bool: kinds.FLAG,
-    int: kinds.NUMBER,
-    float: kinds.NUMBER,
-    str: kinds.TEXT,
-    tuple[float, float]: kinds.TWO,
-    Sequence: kinds.LISTED,
-    Mapping: kinds.MAPPING,
-    Callable: kinds.FUNCTION,
-    Any: kinds.UNCHECKED,
-    "DataArray": kinds.RASTER,
+    bool: FLAG,
+    int: NUMBER,
+    float: NUMBER,
+    str: TEXT,
+    tuple[float, float]: TWO,
+    Sequence: LISTED,
+    Mapping: MAPPING,
+    Callable: FUNCTION,
+    Any: UNCHECKED,
+    "DataArray": RASTER,
     "Dataset": Kind("an xarray.Dataset", lambda value: is_a(value, "Dataset")),
     "DataTree": Kind("an xarray.DataTree", lambda value: is_a(value, "DataTree")),
-    "GeoBox": kinds.GRID,
+    "GeoBox": GRID,
 }
 
 # Remedies for values that are not real numbers, by the kind of their dtype.
@@ -41,28 +171,7 @@ _NOT_REAL = {
 
 @cache
 def kind_of(annotation):
-    """
-    Kind of the values that an annotation allows, apart from None.
-
-    Parameters
-    ----------
-    annotation : type
-        The last Kind in the metadata of an ``Annotated`` is its kind.
-
-    Returns
-    -------
-    kind : Kind
-
-    Raises
-    ------
-    TypeError
-        If nothing states the kind of the annotation.
-
-    Examples
-    --------
-    >>> kind_of(float | Mapping[str, float] | None).words
-    'a number, or a mapping of names'
-    """
+    """Kind of the values that an annotation allows, apart from None."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _named(parts[0], [each for each in parts[1:] if isinstance(each, Kind)])
@@ -83,13 +192,13 @@ def kind_of(annotation):
 
 
 def _named(type_, stated):
-    """The last of the kinds stated for a type, with the test of an earlier one or of the type where it has none."""
+    """Last of the kinds stated for a type, with the test of an earlier kind or of the type where it has none."""
     *others, kind = stated or [kind_of(type_)]
     return kind if kind.fits else kind._replace(fits=_named(type_, others).fits)
 
 
 def _either(parts):
-    """The union of kinds."""
+    """Union of kinds."""
     if len(parts) == 1:
         return parts[0]
     *others, last = [kind.words for kind in parts]
@@ -106,26 +215,7 @@ def _kinds_of(annotated):
 
 
 def check(name, value, kind):
-    """
-    Refuse a value of another kind.
-
-    Parameters
-    ----------
-    name : str
-    value : object
-    kind : Kind
-
-    Raises
-    ------
-    TypeError
-        If the value is of another kind.
-    ValueError
-        If it is a raster without cells, or without rows and columns.
-
-    Examples
-    --------
-    >>> check("hotspot", 0.1, kinds.NUMBER)
-    """
+    """Raise TypeError if a value is not of a kind."""
     if not kind.fits(value):
         raise TypeError(f"{name} must be {kind.words}, got {described(value)}{_cure(value, kind)}")
     if kind.dimensions is None or not is_a(value, "DataArray"):
@@ -139,19 +229,7 @@ def check(name, value, kind):
 
 
 def checked(function):
-    """
-    A public function that checks its arguments against its annotations.
-
-    Parameters
-    ----------
-    function : callable
-
-    Returns
-    -------
-    function : callable
-        It has the same name, documentation and signature. An argument may always have its default value. The function
-        raises TypeError for an argument of another kind, or for a raster whose cells are not real numbers.
-    """
+    """Wrap a public function to check its arguments against its annotations; a default value is always allowed."""
     signature = inspect.signature(function)
 
     @wraps(function)
@@ -173,21 +251,7 @@ def checked(function):
 
 
 def check_fields(description, *names):
-    """
-    Check fields of a description against their annotations.
-
-    Parameters
-    ----------
-    description : object
-        An instance of a dataclass.
-    *names : str
-        The fields to check; all by default. A field may always have its default value.
-
-    Raises
-    ------
-    TypeError
-        If a value is of another kind.
-    """
+    """Check fields of a description, all by default, against their annotations; a default value is always allowed."""
     expected = _kinds_of(type(description))
     for name in names or expected:
         value = getattr(description, name)
@@ -196,17 +260,19 @@ def check_fields(description, *names):
 
 
 def _check_numbers(name, value, allowed):
-    """Raise TypeError if the cells or wavelengths of the rasters in an argument have another dtype than allowed."""
+    """Raise TypeError if cells or wavelengths of the rasters in an argument do not have an allowed dtype."""
     for raster in _rasters(value) if allowed else ():
-        wavelength = (raster.coords["wavelength"],) if "wavelength" in raster.coords else ()
-        for what, each in ((name, raster), *((f"wavelength of {name}", each) for each in wavelength)):
-            if each.dtype.kind not in allowed:
-                cure = _NOT_REAL.get(each.dtype.kind, "text or objects, type .astype(float) if they stand for numbers")
-                raise TypeError(f"{what} must hold real numbers, got {each.dtype}: it holds {cure}")
+        arrays = {name: raster}
+        if "wavelength" in raster.coords:
+            arrays[f"wavelength of {name}"] = raster.coords["wavelength"]
+        for what, array in arrays.items():
+            if array.dtype.kind not in allowed:
+                cure = _NOT_REAL.get(array.dtype.kind, "text or objects, type .astype(float) if they stand for numbers")
+                raise TypeError(f"{what} must hold real numbers, got {array.dtype}: it holds {cure}")
 
 
 def _rasters(value):
-    """Rasters in an argument: itself, or those in a Dataset, a mapping, a pair or a description."""
+    """Rasters in an argument: the argument itself, or the rasters in a Dataset, a mapping, a pair or a description."""
     if value is None or isinstance(value, str | int | float):
         return []
     if is_a(value, "DataArray"):
@@ -237,8 +303,8 @@ def _cure(value, kind):
         return ": take one of its arrays, such as tree['10m/dn']"
     if takes_raster and isinstance(value, str):
         return ": open it with fifesim.open_image, rioxarray.open_rasterio, or onto a grid with fine_dem or open_lai"
-    if kind is kinds.NUMBER and is_a(value, "DataArray", "ndarray"):
+    if kind is NUMBER and is_a(value, "DataArray", "ndarray"):
         return ", where one is for all cells"
-    if kind is kinds.GRID and is_a(value, "DataArray"):
+    if kind is GRID and is_a(value, "DataArray"):
         return ": type raster.odc.geobox"
     return ""

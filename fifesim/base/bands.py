@@ -1,17 +1,17 @@
-"""Spectral bands: response-weighted means, solar irradiance, and which of them shows what."""
+"""Spectral bands: response-weighted means, solar irradiance, and the digital numbers that bands record."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import pvlib
 
 from fifesim.base.annotations import Numbers
-from fifesim.base.kinds import described
+from fifesim.base.arguments import described
+from fifesim.base.caches import cached
 
 # Wavelengths of sunlight in micrometres are shorter than this, in nanometres longer. [um]
 LONGEST = 100.0
@@ -19,7 +19,7 @@ LONGEST = 100.0
 
 class Window(NamedTuple):
     """
-    Where a band must lie to show something of the ground.
+    Spectral window in which a band must lie for a purpose.
 
     Parameters
     ----------
@@ -76,61 +76,24 @@ COMMON_NAMES = {
 }
 
 
-def nearest(wavelengths, window):
-    """
-    Which of some bands shows best what a window is for.
-
-    Parameters
-    ----------
-    wavelengths : array, shape (n,)
-        Of the bands. [um]
-    window : Window
-
-    Returns
-    -------
-    number : int or None
-        Of the band in the window that is nearest to its best place; None where there is none.
-
-    Examples
-    --------
-    >>> nearest([0.56, 0.61, 0.67, 0.83], RED), nearest([0.56, 0.61], NEAR_INFRARED)
-    (2, None)
-    """
+def nearest_band(wavelengths, window):
+    """Index of the band inside a window that is nearest to its best wavelength, None if there is none."""
     wavelengths = np.asarray(wavelengths, float)
     inside = np.flatnonzero((wavelengths >= window.low) & (wavelengths <= window.high))
     return int(inside[np.argmin(np.abs(wavelengths[inside] - window.best))]) if inside.size else None
 
 
-def composite(wavelengths, name="false colour"):
-    """
-    Bands of a colour composite.
-
-    Parameters
-    ----------
-    wavelengths : array, shape (n,)
-        Of the bands. [um]
-    name : str, optional
-        A key of `COMPOSITES`.
-
-    Returns
-    -------
-    numbers : list of (int or None), length 3
-        Of the bands that become red, green and blue; None where the window holds no band. Without a green band the
-        false-colour composite takes its red band twice.
-
-    Examples
-    --------
-    >>> composite([0.56, 0.66, 0.83]), composite([0.66, 0.83]), composite([0.66, 0.83], "natural colour")
-    ([2, 1, 0], [1, 0, 0], [0, None, None])
-    """
-    numbers = [nearest(wavelengths, window) for window in COMPOSITES[name]]
+def colour_composite(wavelengths, name="false colour"):
+    """Indices of the red, green and blue band of a colour composite, None where a window holds no band."""
+    # Without a green band the false-colour composite repeats the red one.
+    numbers = [nearest_band(wavelengths, window) for window in COMPOSITES[name]]
     if name == "false colour" and numbers[2] is None:
         numbers[2] = numbers[1]
     return numbers
 
 
 class Quadrature(NamedTuple):
-    """Means over a band of spectra at the same wavelengths: where its nodes lie among these, and their weights."""
+    """Means over a band of spectra at the same wavelengths: places of the nodes among these, and weights."""
 
     nodes: np.ndarray
     index: np.ndarray
@@ -139,17 +102,7 @@ class Quadrature(NamedTuple):
     total: float
 
     def mean(self, values):
-        """
-        Mean of a spectrum over the response.
-
-        Parameters
-        ----------
-        values : array, shape (..., n)
-
-        Returns
-        -------
-        mean : array, shape (...)
-        """
+        """Mean of a spectrum over the response, shape (...)."""
         values = np.asarray(values, float)
         spectrum = values[..., self.index] * (1 - self.share) + values[..., self.index + 1] * self.share
         return np.trapezoid(spectrum * self.weight, self.nodes) / self.total
@@ -260,7 +213,7 @@ class Band:
         return Quadrature(nodes, index, share, weight, np.trapezoid(weight, nodes))
 
     def _nodes(self, wavelength):
-        """Wavelengths of both the response and a spectrum inside the band, with the response there."""
+        """Wavelengths of the response and of a spectrum inside the band, with the response there."""
         low, high = self.limits
         if wavelength[0] > low or wavelength[-1] < high:
             raise ValueError(
@@ -273,7 +226,7 @@ class Band:
         return nodes, np.interp(nodes, self.wavelength, self.response)
 
 
-@lru_cache(maxsize=1024)
+@cached(1024, "central wavelength of a band")
 def _center(band):
     return float(band.mean(band.wavelength, band.wavelength))
 
@@ -289,49 +242,16 @@ def _numbers(band, name):
     return tuple(numbers.tolist())
 
 
-@lru_cache
+@cached(128, "solar spectrum")
 def solar_spectrum():
-    """
-    Extraterrestrial solar spectral irradiance at one astronomical unit.
-
-    Returns
-    -------
-    wavelength : array, shape (2002,)
-        0.28 to 4 um. [um]
-    irradiance : array, shape (2002,)
-        [W m-2 um-1]
-
-    References
-    ----------
-    ASTM G173-03, column "extraterrestrial", as distributed with pvlib
-    """
+    """Wavelength [um] and extraterrestrial solar irradiance [W m-2 um-1] at 1 AU from ASTM G173-03, shape (2002,)."""
     table = pvlib.spectrum.get_reference_spectra(standard="ASTM G173-03")
     return table.index.to_numpy() / 1000, table["extraterrestrial"].to_numpy() * 1000
 
 
 def solar_irradiance_steps(wavelength):
-    """
-    Solar irradiance at one astronomical unit, averaged over the steps of a coarser spectrum.
-
-    Parameters
-    ----------
-    wavelength : array, shape (n,)
-        Increasing, 0.28 to 4. A step reaches half way to its neighbours. [um]
-
-    Returns
-    -------
-    irradiance : array, shape (n,)
-        [W m-2 um-1]
-
-    Notes
-    -----
-    Fraunhofer lines are narrower than a step, so the irradiance at its centre does not stand for it.
-
-    Examples
-    --------
-    >>> bool(solar_irradiance_steps([0.5, 0.6])[0] > solar_irradiance_steps([1.5, 1.6])[0])
-    True
-    """
+    """Solar irradiance at 1 AU, averaged over the steps of a coarser spectrum. [W m-2 um-1]"""
+    # Fraunhofer lines are narrower than a step, so the irradiance at its centre is not representative.
     fine, irradiance = solar_spectrum()
     wavelength = np.asarray(wavelength, float)
     middle = (wavelength[1:] + wavelength[:-1]) / 2
@@ -341,17 +261,27 @@ def solar_irradiance_steps(wavelength):
 
 
 def solar_irradiance(band):
-    """
-    Response-weighted solar irradiance of a band at one astronomical unit.
-
-    Parameters
-    ----------
-    band : Band
-
-    Returns
-    -------
-    irradiance : float
-        [W m-2 um-1]
-    """
+    """Response-weighted solar irradiance of a band at 1 AU. [W m-2 um-1]"""
     wavelength, irradiance = solar_spectrum()
     return float(band.mean(irradiance, wavelength))
+
+
+def check_counts(dn, largest, cure):
+    """Raise ValueError if a value cannot be a digital number; NaN is no data."""
+    dn = np.asarray(dn)
+    wrong = (dn < 0) | (dn > largest)
+    if dn.dtype.kind == "f":
+        wrong |= (dn != np.rint(dn)) & ~np.isnan(dn)
+    if np.any(wrong):
+        raise ValueError(f"a digital number of {dn[wrong].flat[0]:g} is not a whole number from 0 to {largest}: {cure}")
+
+
+def counts(dn, nodata, largest, cure, saturated=None):
+    """Digital numbers as stored in images: uint8 or uint16, with 0 for no data."""
+    dn = np.asarray(dn)
+    missing = (dn == nodata) | (np.isnan(dn) if dn.dtype.kind == "f" else False)
+    kept = np.where(missing, 0, dn)
+    check_counts(kept, largest, cure)
+    if saturated is not None:
+        kept = np.where(kept == saturated, 0, kept)
+    return kept.astype(np.uint8 if largest < 256 else np.uint16)

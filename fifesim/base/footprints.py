@@ -47,7 +47,7 @@ class AxisOperator:
         return len(self.start)
 
     def __getitem__(self, pixels):
-        """Operator of a slice of pixels, whose window holds the cells that these need, and at least one."""
+        """Operator of a slice of pixels, whose window holds the cells that they need, and at least one."""
         if not isinstance(pixels, slice) or pixels.step not in (None, 1):
             raise TypeError(f"an axis operator is cut by a slice of step 1, got {pixels!r}")
         start, count = self.start[pixels], self.count[pixels]
@@ -123,7 +123,7 @@ def axis_operator(lsf, *, cell_origin, cell_size, n_cells, pixel_origin, pixel_s
 
 
 def _trim(first, weights, n_cells):
-    """Operator whose pixels begin and end with a cell that has weight."""
+    """Operator whose pixels begin and end with a cell of nonzero weight."""
     k = weights.shape[1]
     used = np.abs(weights) > _DUST
     begin = used.argmax(axis=1)
@@ -144,7 +144,7 @@ def regularize(values, rows, columns, *, min_valid=0.98):
         L_{ij} = \sum_{kl} w_{ik} w_{jl} \, v_{kl} \Big/ \sum_{kl} w_{ik} w_{jl}
 
     with both sums over the valid cells. A pixel whose footprint holds no NaN takes the separable form, and
-    only the others the sum over both axes. The value of a pixel therefore depends on nothing but its own
+    only the others the sum over both axes. The value of a pixel therefore depends only on its
     footprint: the same bits come out of any window.
 
     Parameters
@@ -192,14 +192,16 @@ def regularize(values, rows, columns, *, min_valid=0.98):
     if not 0 <= min_valid <= 1:
         raise ValueError(f"min_valid must be in [0, 1], got {min_valid}: it is a share of the footprint")
     means = np.empty((*values.shape[:-2], len(rows), len(columns)), dtype)
-    down, across = _axis(rows), _axis(columns)
+    down, across = (
+        _Axis(axis.start - axis.window.start, axis.count, axis.weights, axis.share) for axis in (rows, columns)
+    )
     for layer in np.ndindex(values.shape[:-2]):
         _regularize(*_rows_of(values[layer], dtype), down, across, min_valid, means[layer])
     return means
 
 
 class _Axis(NamedTuple):
-    """Operator of an axis as the kernel takes it, its first cells counted from those at hand."""
+    """Operator of one axis in the form of the kernel, with first cells counted from the given window."""
 
     start: np.ndarray
     count: np.ndarray
@@ -207,12 +209,8 @@ class _Axis(NamedTuple):
     share: np.ndarray
 
 
-def _axis(operator):
-    return _Axis(operator.start - operator.window.start, operator.count, operator.weights, operator.share)
-
-
 def _rows_of(cells, dtype):
-    """Cells as one row after another, how far these lie apart, and their length; a part of an array is not copied."""
+    """Cells as a flat array, the distance between rows, and the row length; a contiguous part is not copied."""
     inside = cells.dtype == dtype and cells.size and cells.strides[1] == cells.itemsize
     if not inside or cells.strides[0] < cells.shape[1] * cells.itemsize or cells.strides[0] % cells.itemsize:
         cells = np.ascontiguousarray(cells, dtype)

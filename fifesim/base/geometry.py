@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 import pvlib
 
-from fifesim.base import fife
-from fifesim.base.arguments import check_fields
-from fifesim.base.kinds import is_a
+from fifesim.base import times as fife
+from fifesim.base.arguments import check_fields, is_a
+from fifesim.base.caches import cached
+from fifesim.base.messages import warn
 from fifesim.base.times import utc
-from fifesim.base.warned import warn
 
 ANGLES = ("sza", "saa", "vza", "vaa")
 
@@ -102,20 +101,7 @@ class Geometry:
 
 
 def warn_of_radians(sza, saa):
-    """
-    Warn if the directions of the sun look like radians.
-
-    Parameters
-    ----------
-    sza, saa : float
-        The largest zenith and azimuth angles. [degree]
-
-    Warns
-    -----
-    UserWarning
-        If both are above 0 and at most a quarter and a whole turn in radians. The sun is rarely that near to the
-        zenith, and then seldom that near to north.
-    """
+    """Warn if the directions of the sun look like radians."""
     if 0 < sza <= np.pi / 2 and 0 < saa <= 2 * np.pi:
         warn(
             f"sza={sza:g} and saa={saa:g} are taken as degrees and look like radians: if they are, convert them with "
@@ -124,24 +110,7 @@ def warn_of_radians(sza, saa):
 
 
 def relative_azimuth(saa, vaa):
-    """
-    Relative azimuth of sun and sensor.
-
-    Parameters
-    ----------
-    saa, vaa : array
-        Azimuths toward sun and sensor, clockwise from north. [degree]
-
-    Returns
-    -------
-    raa : array
-        Folded to [0, 180]; 0 is backscatter, with sun and sensor on the same side. [degree]
-
-    Examples
-    --------
-    >>> float(relative_azimuth(350.0, 10.0))
-    20.0
-    """
+    """Relative azimuth of sun and sensor, folded to [0, 180]; 0 is backscatter. [degree]"""
     difference = np.abs(np.asarray(saa, float) - vaa) % 360
     return np.where(difference > 180, 360 - difference, difference)
 
@@ -171,66 +140,21 @@ def scattering_angle_cosine(sza, vza, raa):
     return -np.cos(sza) * np.cos(vza) - np.sin(sza) * np.sin(vza) * np.cos(raa)
 
 
-def sun_position(time, latitude, longitude, altitude=0.0):
-    """
-    Geometry of the sun at a time and place, with a nadir view.
-
-    Parameters
-    ----------
-    time : str or datetime
-        Taken as UTC where it names no time zone.
-    latitude, longitude : float
-        [degree north, degree east]
-    altitude : float, optional
-        [m]
-
-    Returns
-    -------
-    geometry : Geometry
-
-    Raises
-    ------
-    ValueError
-        If the sun is below the horizon.
-
-    References
-    ----------
-    NREL solar position algorithm, as implemented in pvlib; true (not refracted) zenith
-    """
+def sun_geometry(time, latitude, longitude, altitude=0.0):
+    """Geometry of the sun at a time (UTC by default) and place, with a nadir view, by the NREL algorithm in pvlib."""
+    # The zenith is true, not refracted.
     return _sun(utc(time)[0], float(latitude), float(longitude), float(altitude))
 
 
 # Many scenes share their sun, and to find it takes as long as all that is done to their cells.
-@lru_cache(maxsize=256)
+@cached(256, "sun position")
 def _sun(time, latitude, longitude, altitude):
     sun = pvlib.solarposition.get_solarposition(utc(time), latitude, longitude, altitude=altitude).iloc[0]
     return Geometry(float(sun["zenith"]), float(sun["azimuth"]), earth_sun_distance=earth_sun_distance(time))
 
 
 def sun_positions(times, latitude, longitude, altitude=0.0):
-    """
-    Directions and distance of the sun at many times, or times and places.
-
-    Parameters
-    ----------
-    times : sequence of str or datetime, shape (n,)
-        As in `sun_position`.
-    latitude, longitude, altitude : float, or array of shape (n,)
-        As in `sun_position`.
-
-    Returns
-    -------
-    utc : array of datetime64, shape (n,)
-    sza, saa : array, shape (n,)
-        A zenith beyond 90 is a sun below the horizon. [degree]
-    earth_sun_distance : array, shape (n,)
-        [astronomical unit]
-
-    Raises
-    ------
-    ValueError
-        If one is no time, or the shapes differ.
-    """
+    """Times in UTC, solar zeniths, possibly above 90, and azimuths [degree], and distances [AU], shape (n,)."""
     stamps = pd.DatetimeIndex([utc(time)[0] for time in times])
     numbers = [np.asarray(each, float) for each in (latitude, longitude, altitude)]
     if any(each.shape not in ((), (1,), stamps.shape) for each in numbers):
@@ -250,38 +174,17 @@ def sun_positions(times, latitude, longitude, altitude=0.0):
 
 
 def earth_sun_distance(time):
-    """
-    Distance of Earth and Sun.
-
-    Parameters
-    ----------
-    time : str or datetime
-        Taken as UTC where it names no time zone.
-
-    Returns
-    -------
-    distance : float
-        [astronomical unit]
-
-    References
-    ----------
-    NREL solar position algorithm, as implemented in pvlib
-
-    Examples
-    --------
-    >>> round(earth_sun_distance("1987-06-06T16:35:00Z"), 3)
-    1.015
-    """
+    """Earth-Sun distance at a time, by the NREL algorithm in pvlib. [AU]"""
     return _distance(time) if isinstance(time, str) else _distance(utc(time)[0])
 
 
-# Of one time it is asked by each of many scenes.
-@lru_cache(maxsize=256)
+# Many scenes ask for the distance at one time.
+@cached(256, "distance of the sun")
 def _distance(time):
     return float(pvlib.solarposition.nrel_earthsun_distance(utc(time)).iloc[0])
 
 
-@lru_cache
+@cached(128, "geometry of the FIFE site")
 def fife_geometry() -> Geometry:
     """
     The sun over the FIFE site on the paper's day, 6 June 1987 (Data), at 16:35 UTC and a nadir view, which are assumed.
@@ -297,7 +200,7 @@ def fife_geometry() -> Geometry:
     >>> round(fife_geometry().sza, 1)
     28.5
     """
-    return sun_position(fife.TIME, fife.LATITUDE, fife.LONGITUDE, fife.ALTITUDE)
+    return sun_geometry(fife.TIME, fife.LATITUDE, fife.LONGITUDE, fife.ALTITUDE)
 
 
 def angle_between(zenith, azimuth, other_zenith, other_azimuth):

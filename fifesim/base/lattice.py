@@ -1,94 +1,62 @@
 """
-An unbounded lattice of cells, counted from the origin of a coordinate reference system, and fixed tiles of it.
+Unbounded lattice of cells, and random numbers by seed and place on it.
 
-Coordinates counted from that origin are the same to the bit in a window and in the whole; summed from each grid's own
-they differ by 1e-10 m, and xarray aligns exactly. What is made by the tile is the same in every window and chunk.
+Each stage draws from separate streams, so that one seed serves them all: 1 is the periodic field, 2 the library of
+spectra, 3 to 6 the parameters and landscapes of the chips of a study, 16 and up the synthetic hills, 2**40 and up the
+bands of a sensor, 2**50 and up the seeds of the fields of a landscape. The streaming field has a separate generator.
+
+Coordinates counted from this origin are identical to the bit in a window and in the whole. Coordinates summed from the
+origin of each grid would differ by 1e-10 m, and xarray aligns exactly. A value computed by tile is the same in every
+window and chunk.
 """
 
 from functools import lru_cache
 
 import numpy as np
 
-# What is left over beside whole cells is rounded to this many decimals of a metre.
+from fifesim.base.arguments import described
+
+SEED_LIMIT = 2**63  # scenario files hold signed whole numbers
+
+
+def check_seed(seed):
+    """Check that a seed is a whole number in [0, 2**63)."""
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
+        raise TypeError(
+            f"seed must be a whole number from 0 to 2**63 - 1, got {described(seed)}: give for instance seed=7"
+        )
+    if not 0 <= seed < SEED_LIMIT:
+        raise ValueError(f"seed must be a whole number from 0 to 2**63 - 1, got {seed}: give for instance seed=7")
+    return int(seed)
+
+
+def generator(seed, stream, place=(0, 0, 0, 0)):
+    """Random generator [Salmon2011]_ keyed by seed and stream, with the place as its counter."""
+    # Arrays of words: a list of numbers from 2**63 up would go through floating point, and neighbours be the same.
+    key = np.array([seed, stream], np.uint64)
+    counter = np.array([word % 2**64 for word in place], np.uint64)
+    return np.random.Generator(np.random.Philox(counter=counter, key=key))
+
+
+# The offset from whole cells is rounded to this many decimals of a metre.
 _DECIMALS = 6
 
 
 def whole_cells(origin, cell):
-    """
-    Whole cells from the origin of the reference system to the edge of a grid.
-
-    Parameters
-    ----------
-    origin : float
-        Edge of the grid. [m]
-    cell : float
-        Negative along rows that count southward. [m]
-
-    Returns
-    -------
-    index : int
-    offset : float
-        What is left over. [m]
-
-    Examples
-    --------
-    >>> whole_cells(100.5, 10.0), whole_cells(100.5, -10.0)
-    ((10, 0.5), (-11, -9.5))
-    """
+    """Number of whole cells from the origin of the CRS to the edge of a grid, and the rest. [m]"""
     # The floor, not the nearest: halves rounded to even would move a window of a lattice at half cells by two cells.
     index = int(np.floor(origin / cell + 1e-6))
     return index, round(origin - index * cell, _DECIMALS)
 
 
 def centres(origin, cell, cells):
-    """
-    Coordinates of the centres of cells.
-
-    Parameters
-    ----------
-    origin, cell : float
-        As in `whole_cells`. [m]
-    cells : array of int
-        Counted from the edge of the grid; they may lie outside of it.
-
-    Returns
-    -------
-    centres : array, shape of cells
-        [m]
-
-    Examples
-    --------
-    >>> centres(100.5, 10.0, np.array([0, 3])).tolist()
-    [105.5, 135.5]
-    """
+    """Coordinates of the centres of cells, counted from the edge of the grid. [m]"""
     index, offset = whole_cells(origin, cell)
     return (index + cells + 0.5) * cell + offset
 
 
 def assemble(make_tile, tile, row, column, shape):
-    """
-    Window of a lattice, cut from the fixed tiles that it touches.
-
-    Parameters
-    ----------
-    make_tile : callable
-        ``make_tile(tile_row, tile_column)`` gives one tile, shape (tile, tile).
-    tile : int
-        Size of a tile. [cell]
-    row, column : int
-        First row and column of the window.
-    shape : (int, int)
-        Rows and columns of the window.
-
-    Returns
-    -------
-    window : array, shape (rows, columns)
-
-    Examples
-    --------
-    >>> assemble(lambda i, j: np.full((2, 2), 10 * i + j), 2, 1, 1, (2, 3)).tolist()
-    [[0.0, 1.0, 1.0], [10.0, 11.0, 11.0]]
-    """
+    """Window of a lattice, cut from the fixed tiles that it touches, shape (rows, columns)."""
     height, width = shape
     window = np.empty(shape)
     if not window.size:
@@ -109,14 +77,7 @@ def _overlap(tile, index, window_start, window_size):
 
 
 class KeptTiles:
-    """
-    Make tiles and keep the last ones; a copy in another process starts with none.
-
-    Parameters
-    ----------
-    make : callable
-        ``make(tile_row, tile_column)`` gives one tile.
-    """
+    """Cache of the last tiles of ``make(tile_row, tile_column)``; a copy in another process starts empty."""
 
     def __init__(self, make):
         self._make = make

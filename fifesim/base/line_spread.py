@@ -13,57 +13,27 @@ from typing import Annotated, TypeAlias
 import numpy as np
 
 from fifesim.base.annotations import Numbers
-from fifesim.base.kinds import Kind
+from fifesim.base.arguments import Kind
 
 
 class Transfer:
-    """
-    What a part of an instrument leaves of waves on the ground.
-
-    Each kind of part gives the formula, ``_mtf(frequency)``.
-    """
+    """Transfer function of a part of an instrument; subclasses give the formula, ``_mtf(frequency)``."""
 
     def mtf(self, frequency: Numbers) -> np.ndarray:
-        """
-        Modulation transfer function, the Fourier transform of the line spread function.
-
-        Parameters
-        ----------
-        frequency : array
-            Spatial frequency. [cycles m-1]
-
-        Returns
-        -------
-        mtf : array, shape of frequency
-            Factor by which a sinusoid's amplitude is reduced, negative where bright and dark change places. [1]
-        """
+        """Modulation transfer function at spatial frequencies [cycles m-1], negative where contrast is reversed. [1]"""
         return self._mtf(np.asarray(frequency, float))
 
 
 class LineSpread(Transfer):
-    """
-    Response of a sensor to a line, by the line's distance from the pixel centre.
+    """Line spread function by the distance from the pixel centre."""
 
-    Each shape gives ``half_width``, the distance from the pixel centre beyond which it is zero [m], and two formulas:
-    ``_cumulative(x)``, and its transform ``_mtf(frequency)``.
-    """
+    # Subclasses give `half_width`, beyond which it is zero [m], and the formulas `_cumulative(x)` and
+    # `_mtf(frequency)`.
 
     half_width: float
 
     def cumulative(self, x: Numbers) -> np.ndarray:
-        """
-        Share of the response that lies before a distance from the pixel centre.
-
-        Parameters
-        ----------
-        x : array
-            Distance from the pixel centre. [m]
-
-        Returns
-        -------
-        share : array, shape of x
-            0 before the support, 1 behind it. [1]
-        """
+        """Share of the response before a distance [m] from the pixel centre. [1]"""
         return self._cumulative(np.asarray(x, float))
 
     @staticmethod
@@ -85,7 +55,7 @@ Spread: TypeAlias = Annotated[
 @dataclass(frozen=True)
 class FiniteSpread(LineSpread):
     """
-    Line spread function that ends at half of its width to either side.
+    Line spread function that ends at half of its width on either side.
 
     Parameters
     ----------
@@ -105,14 +75,14 @@ class FiniteSpread(LineSpread):
 
     @property
     def half_width(self):
-        """Half of the width [m]."""
+        """Half of the width. [m]"""
         return self.width / 2
 
 
 @dataclass(frozen=True)
 class Boxcar(FiniteSpread):
     r"""
-    Uniform line spread function of a width W: with it a footprint is an area and its mean the true one.
+    Uniform line spread function of width W, whose footprint mean is the true areal mean.
 
     .. math:: C(x) = \frac{1}{2} + \frac{x}{W}, \quad |x| \le \frac{W}{2}; \qquad
         M(f) = \mathrm{sinc}(f W), \quad \mathrm{sinc}\,t = \frac{\sin \pi t}{\pi t}

@@ -1,4 +1,4 @@
-"""Pixels of a scan on the cells of a map: which of them is nearest to a cell, and how much of it each covers."""
+"""Pixels of a scan on the cells of a map: nearest pixels and area-weighted means."""
 
 import numpy as np
 from numba import njit
@@ -8,29 +8,7 @@ _MOST = 64
 
 
 def corners(row, column):
-    """
-    Corners of pixels that tile a swath, half way between their centres.
-
-    Parameters
-    ----------
-    row, column : array, shape (line, sample)
-        Centres on a map. [cell]
-
-    Returns
-    -------
-    rows, columns : array, shape (line + 1, sample + 1)
-        At the border as far out as the pixels before them are wide. [cell]
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than two lines or samples, which do not tell how large a pixel is.
-
-    Examples
-    --------
-    >>> corners(*np.mgrid[0.5:2.5, 0.5:3.5])[0][:, 0]
-    array([0., 1., 2.])
-    """
+    """Corners of the pixels of a swath, half way between their centres, shape (line + 1, sample + 1). [cell]"""
     if min(np.shape(row)) < 2:
         raise ValueError(
             f"a swath of {' x '.join(map(str, np.shape(row)))} pixels does not tell how large they are: "
@@ -40,32 +18,13 @@ def corners(row, column):
 
 
 def _between(values):
-    """Values half way between the rows of an array, and beyond the first and the last of them."""
+    """Values half way between the rows of an array, and extrapolated beyond the first and the last row."""
     inside = (values[1:] + values[:-1]) / 2
     return np.concatenate([values[:1] * 1.5 - values[1:2] / 2, inside, values[-1:] * 1.5 - values[-2:-1] / 2])
 
 
 def reach(row, column, cell):
-    """
-    Distance from the centre of each pixel to its farthest corner.
-
-    Parameters
-    ----------
-    row, column : array, shape (line, sample)
-        Centres on a map. [cell]
-    cell : (float, float)
-        Size of a cell, down and across. [m]
-
-    Returns
-    -------
-    reach : array, shape (line, sample)
-        [m]
-
-    Examples
-    --------
-    >>> bool(np.allclose(reach(*np.mgrid[0:2.0, 0:3.0], (30.0, 40.0)), 25.0))
-    True
-    """
+    """Distance from the centre of each pixel to its farthest corner, shape (line, sample). [m]"""
     rows, columns = corners(row, column)
     farthest = np.zeros(np.shape(row))
     for down in (slice(-1), slice(1, None)):
@@ -77,25 +36,7 @@ def reach(row, column, cell):
 
 @njit(nogil=True, cache=True)
 def nearest_pixels(row, column, reach, cell, rows, columns):
-    """
-    Pixel whose centre is nearest to that of each cell, among those that reach it.
-
-    Parameters
-    ----------
-    row, column : array, shape (n_pixels,)
-        Centres on the map. [cell]
-    reach : array, shape (n_pixels,)
-        How far each counts. [m]
-    cell : (float, float)
-        Size of a cell, down and across. [m]
-    rows, columns : (int, int)
-        First cell and the one after the last of the window.
-
-    Returns
-    -------
-    number : array of int, shape (n_rows, n_columns)
-        The first of those that are equally near; -1 where none reaches.
-    """
+    """Number of the pixel nearest to each cell among the pixels that reach it, -1 if none does."""
     number = np.full((rows[1] - rows[0], columns[1] - columns[0]), -1)
     least = np.full(number.shape, np.inf)
     for pixel in range(row.size):
@@ -116,7 +57,7 @@ def nearest_pixels(row, column, reach, cell, rows, columns):
 
 @njit(nogil=True, cache=True)
 def _between_cells(center, half, limits):
-    """Cells of an axis within half a width of a place, as far as they lie in a window; none where it is no number."""
+    """Range of cells within a half width of a place and inside a window; empty if the place is not finite."""
     if not np.isfinite(center + half):
         return 0, 0
     first = max(np.floor(center - half) - 1, limits[0])
@@ -126,25 +67,7 @@ def _between_cells(center, half, limits):
 
 @njit(nogil=True, cache=True)
 def covered_means(values, row, column, rows, columns):
-    """
-    Means over cells of the pixels that cover them, each by the area that it covers.
-
-    Parameters
-    ----------
-    values : array, shape (band, line, sample)
-        NaN where they are missing.
-    row, column : array, shape (line + 1, sample + 1)
-        Corners of the pixels on the map, as `corners` gives them. [cell]
-    rows, columns : (int, int)
-        First cell and the one after the last of the window.
-
-    Returns
-    -------
-    means : array, shape (band, n_rows, n_columns)
-        NaN where no valid pixel lies.
-    covered : array, shape (band, n_rows, n_columns)
-        Area of valid pixels over that of the cell; over 1 where pixels overlap. [1]
-    """
+    """Area-weighted means of the valid pixels over cells, and the covered share, shape (band, rows, columns)."""
     shape = values.shape[0], rows[1] - rows[0], columns[1] - columns[0]
     total, covered = np.zeros(shape), np.zeros(shape)
     pixel, cut, other = np.empty((4, 2)), np.empty((_MOST, 2)), np.empty((_MOST, 2))
@@ -168,14 +91,14 @@ def covered_means(values, row, column, rows, columns):
 
 @njit(nogil=True, cache=True)
 def _touched(places, limits):
-    """Cells of an axis that a polygon touches, as far as they lie in a window."""
+    """Range of cells along an axis that a polygon touches inside a window."""
     low, high = places.min(), places.max()
     return _between_cells((low + high) / 2, (high - low) / 2, limits)
 
 
 @njit(nogil=True, cache=True)
 def _area_in_cell(pixel, i, j, cut, other):
-    """Area of a pixel inside the cell of row i and column j: cut along its four sides, then the shoelace formula."""
+    """Area of a pixel inside the cell of row i and column j: clipped to its four sides, then the shoelace formula."""
     count = _cut(pixel, 4, cut, 0, i, 1.0)
     count = _cut(cut, count, other, 0, i + 1.0, -1.0)
     count = _cut(other, count, cut, 1, j, 1.0)
@@ -190,7 +113,7 @@ def _area_in_cell(pixel, i, j, cut, other):
 
 @njit(nogil=True, cache=True)
 def _cut(polygon, corners, kept, axis, limit, side):
-    """Put the part of a polygon on one side of a line along an axis into an array; the number of its corners."""
+    """Clip a polygon to one side of a line along an axis; return the number of corners that are written."""
     count, before = 0, corners - 1
     for here in range(corners):
         inside, was_inside = side * (polygon[here, axis] - limit), side * (polygon[before, axis] - limit)

@@ -1,11 +1,26 @@
-"""Date and time of day, as people write them."""
+"""Date and time of day as people write them, and the time and place of the paper's site."""
 
 import re
 
 import numpy as np
 import pandas as pd
 
-from fifesim.base.kinds import described
+from fifesim.base.arguments import described
+
+# A hypothetical overpass: the paper simulates TM for this day (section Data), on which no Landsat passed the FIFE site
+# (WRS-2 cycle). It states no time: this is about when one passed on other days.
+TIME = "1987-06-06T16:35:00Z"
+LATITUDE = 39.06  # [degree north]
+LONGITUDE = -96.54  # [degree east]
+ALTITUDE = 400.0  # [m]
+
+
+# The site is a square, in UTM zone 14. [m]
+SIZE = 15000.0
+# FIFE's own corner in NAD27, and the nearest point of the 30 m lattice of today's NAD83 elevation models to the place
+# that a Helmert transformation (EPSG:1173, good to 7 m) gives it: 704968 E 4334211 N.
+CORNERS = {"NAD83": ("EPSG:26914", 704970.0, 4334220.0), "NAD27": ("EPSG:26714", 705000.0, 4334000.0)}
+
 
 # Day and month in another order are another season, and a time alone is today's.
 _WRITTEN = re.compile(r"\s*\d{4}-?\d{2}-?\d{2}[T ]\d{2}(:?\d{2}.*)?\s*", re.ASCII)
@@ -13,23 +28,7 @@ _YEARS = 1700, 2200  # what dates in nanoseconds hold
 
 
 def utc(time):
-    """
-    A time in UTC.
-
-    Parameters
-    ----------
-    time : str or datetime
-        Taken as UTC where it names no time zone; a text after ISO 8601, with the time of day.
-
-    Returns
-    -------
-    time : pandas.DatetimeIndex, shape (1,)
-
-    Raises
-    ------
-    ValueError
-        If it is no time, a date alone, for midnight is another sun, a text in another order, or of another age.
-    """
+    """Time in UTC, from text after ISO 8601 or a datetime; UTC is assumed if no time zone is given."""
     if isinstance(time, str) and re.fullmatch(r"\s*\d{4}-?\d{2}-?\d{2}\s*", time):
         raise ValueError(f"time = {time!r} is a date alone: add the time of day, such as {time.strip()}T17:10Z")
     if isinstance(time, str) and not _WRITTEN.fullmatch(time):

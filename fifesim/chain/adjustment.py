@@ -1,37 +1,34 @@
-"""From one sensor to another: the bands of an image as those of another instrument, and what it would have recorded."""
+"""Spectral adjustment: the bands of an image converted to the bands of another instrument, and its digital numbers."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.base import datasets
-from fifesim.base.annotations import Names, Noise, Time, WholeNumber
-from fifesim.chain.carried import as_bands_of
-from fifesim.chain.steps import to_toa
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.base import files
+from fifesim.base.annotations import Names, NoiseKinds, Time, WholeNumber
+from fifesim.base.caches import cached
+from fifesim.chain.steps import as_bands_of, to_toa
+from fifesim.grids import cf, directions
+from fifesim.grids import grid as grids
+from fifesim.grids.dates import by_date
+from fifesim.grids.directions import Directions
+from fifesim.grids.inputs import Image, RasterOrDataset
+from fifesim.grids.reductions import combined
 from fifesim.ground.canopy.library import library_spectra
-from fifesim.rasters import cf, directions
-from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import Image, RasterOrDataset
-from fifesim.rasters.combination import combined
-from fifesim.rasters.dates import by_date
-from fifesim.rasters.directions import Directions
-from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.annotations import InstrumentLike
+from fifesim.sensor import labels as sensor
+from fifesim.sensor.band_labels import MIN_COVERAGE
+from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.description.rasters.carried import attributes_of, carried_instrument
 from fifesim.sensor.description.spectral_response import half_peak
-from fifesim.sensor.response.adjustment import band_moments, best_linear, line_between
-from fifesim.sensor.response.rasters.bands import MIN_COVERAGE
-from fifesim.sensor.response.rasters.matching import matching_bands
-from fifesim.sensor.response.spectral import band_weights, covered_steps
+from fifesim.sensor.instrument_labels import attributes_of, carried_instrument, matching_bands
+from fifesim.sensor.response.spectral import band_moments, band_weights, best_linear, covered_steps, line_between
 
 UNCERTAINTY = 0.0005
 """Standard error of the reflectance that an adjustment allows for by default [1]."""
@@ -86,7 +83,7 @@ def adjust_bands(
 
     See Also
     --------
-    fifesim.sensor.response.adjustment.best_linear, fifesim.ground.canopy.library.library_spectra
+    fifesim.sensor.response.spectral.best_linear, fifesim.ground.canopy.library.library_spectra
 
     Examples
     --------
@@ -128,7 +125,7 @@ def as_seen_by(
     time: Time | None = None,
     geometry: Directions | None = None,
     onto: GeoBox | None = None,
-    noise: Noise = (),
+    noise: NoiseKinds = (),
     seed: WholeNumber = 0,
     uncertainty: float = UNCERTAINTY,
 ) -> Image:
@@ -197,7 +194,8 @@ def as_seen_by(
 
 
 def _with_error(image, surface):
-    """The adjustment's error of the bands of an image; as a variable, for a DataArray would bring its sun with it."""
+    """Add the adjustment error of the bands to an image."""
+    # As a variable: a DataArray would bring the coordinates of its sun.
     error = surface["adjustment_error"].sel(band=image["band"].values)
     return image.assign_coords(adjustment_error=error.variable)
 
@@ -231,7 +229,7 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
 
     See Also
     --------
-    fifesim.sensor.response.adjustment.line_between
+    fifesim.sensor.response.spectral.line_between
 
     Examples
     --------
@@ -244,7 +242,8 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
     to = target.select(bands) if bands is not None else [band for band in target.bands if _beside(source.bands, band)]
     _check_neighbours(source.bands, to or target.bands, target)
     nearest = [min(source.bands, key=lambda band: abs(band.wavelength - each.wavelength)) for each in to]
-    own, other = (_library_means(_responses(each)) for each in (nearest, to))
+    _, spectra = library_spectra()
+    own, other = (spectra @ _weights(_responses(each)).T for each in (nearest, to))
     lines = [line_between(own[:, number], other[:, number]) for number in range(len(to))]
     columns = {name: [getattr(line, name) for line in lines] for name in ("slope", "offset", "error", "difference")}
     pairs = zip(nearest, to, strict=True)
@@ -256,7 +255,7 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
 
 
 def _source_bands(array, source):
-    """Bands that a raster has, of the instrument given or carried."""
+    """Bands of a raster, from the given or carried instrument."""
     description = carried_instrument(array) if source is None else find_instrument(source)
     if description is None:
         raise ValueError(
@@ -268,7 +267,7 @@ def _source_bands(array, source):
 
 
 def _geometry(array, time, geometry):
-    """Directions of sun and sensor: the sun of a time over the middle of a scene, with its own view."""
+    """Directions of sun and sensor: as given, or the sun at a time over the middle of a scene with its view."""
     if time is None:
         return geometry
     if geometry is not None:
@@ -283,13 +282,13 @@ def _responses(bands):
 
 
 def _beside(sources, band):
-    """Whether a band of the source responds where a band does, both with half of their peak."""
+    """Whether any band of the source overlaps a band, both within half of their peak response."""
     low, high = half_peak(band.response)
     return any(limits[0] <= high and low <= limits[1] for limits in (half_peak(each.response) for each in sources))
 
 
 def _check_neighbours(sources, bands, instrument):
-    """Refuse bands about which the source knows nothing but by the library."""
+    """Raise ValueError for bands that no band of the source overlaps."""
     alone = [band.name for band in bands if not _beside(sources, band)]
     if alone:
         others = [band.name for band in bands if band.name not in alone]
@@ -299,9 +298,9 @@ def _check_neighbours(sources, bands, instrument):
         )
 
 
-@lru_cache(maxsize=64)
+@cached(64, "weights of library spectra in bands")
 def _weights(responses):
-    """Weights of the library's wavelengths in bands."""
+    """Weights of the wavelengths of the library in each band."""
     wavelength, _ = library_spectra()
     found = [band_weights(band, wavelength, covered_steps(wavelength)) for band in responses]
     for band, each in zip(responses, found, strict=True):
@@ -314,24 +313,18 @@ def _weights(responses):
     return np.stack([each.weights for each in found])
 
 
-@lru_cache(maxsize=64)
+@cached(64, "regressions between bands")
 def _estimate(sources, targets, uncertainty):
-    """Best linear estimate of bands from others over the library."""
+    """Best linear estimate of bands from other bands over the library."""
     wavelength, spectra = library_spectra()
     moments = band_moments(_weights(sources + targets), wavelength, spectra)
     return best_linear(moments, len(sources), uncertainty)
 
 
-def _library_means(responses):
-    """Band means of the library, shape (spectrum, band)."""
-    _, spectra = library_spectra()
-    return spectra @ _weights(responses).T
-
-
 def _published(pairs):
-    """Published lines of (source, its band, target, its band), as columns."""
+    """Published lines of (source, band, target, band), as columns."""
     keys = ["source", "source_band", "target", "target_band"]
-    table = datasets.table("spectral_adjustment.csv").set_index(keys)
+    table = files.table("spectral_adjustment.csv").set_index(keys)
     rows = table.reindex(pd.MultiIndex.from_tuples(pairs, names=keys))
     return {
         "published_slope": rows["slope"].to_numpy(float),

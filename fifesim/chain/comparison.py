@@ -1,24 +1,34 @@
-"""One scene through many instruments."""
+"""Comparison of one scene through many instruments, and of the engines of the atmosphere."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
-from fifesim.analysis.rasters.regression import regress
-from fifesim.base.annotations import Names
-from fifesim.base.bands import NEAR_INFRARED, RED, nearest
-from fifesim.chain.images import ndvi
+from fifesim.analysis.indices import normalized_difference
+from fifesim.analysis.regression_labels import regress
+from fifesim.atmosphere import coupling
+from fifesim.atmosphere import engines as schemes
+from fifesim.atmosphere.engines import whole_scattering
+from fifesim.atmosphere.labels import LONG_NAMES
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.base.annotations import Names, Numbers
+from fifesim.base.arguments import described
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
+from fifesim.base.geometry import fife_geometry
 from fifesim.chain.setup import Setup, image_of, reflectance_of
-from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import RasterOrDataset
-from fifesim.rasters.reductions import computed
-from fifesim.rasters.regularization import areas, regularized
-from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.annotations import InstrumentsLike
+from fifesim.chain.steps import ndvi
+from fifesim.grids import cf, directions
+from fifesim.grids import grid as grids
+from fifesim.grids.inputs import RasterOrDataset
+from fifesim.grids.reductions import areas, computed, regularized
+from fifesim.grids.sites import fife_site, made_on_site
+from fifesim.sensor import labels as sensor
+from fifesim.sensor.description.instrument_file import InstrumentsLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 
 
@@ -69,9 +79,7 @@ def compare(
     >>> list(images.children)
     ['TM', 'OLI']
     """
-    setup = Setup() if setup is None else setup
-    if not isinstance(setup, Setup):
-        raise TypeError(f"setup must be a fifesim.Setup, got {setup!r}: see fifesim.Setup")
+    setup = _checked(setup)
     descriptions = [find_instrument(each) for each in ([instruments] if isinstance(instruments, str) else instruments)]
     names = [description.name for description in descriptions]
     if not names or len(set(names)) < len(names):
@@ -144,23 +152,7 @@ def comparison_table(images: xr.DataTree, truth: xr.DataArray | None = None) -> 
 
 
 def recorded_images(images):
-    """
-    What instruments recorded, as `compare` keeps it.
-
-    Parameters
-    ----------
-    images : xarray.DataTree
-
-    Returns
-    -------
-    images : dict of str to xarray.DataArray, dims (band, y, x)
-        By the name of the instrument, with its pixel where it has several.
-
-    Raises
-    ------
-    ValueError
-        If a node holds neither digital numbers nor radiance.
-    """
+    """Recorded images in a tree from `compare`, by the name of the instrument."""
     found = {}
     for node in images.leaves:
         name = node.path.strip("/") or "the tree"
@@ -173,16 +165,125 @@ def recorded_images(images):
 
 
 def shows_ndvi(image):
+    """Whether an image has a red and a near infrared band."""
+    return all(nearest_band(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))
+
+
+TYPICAL_LAI = 2.0  # of the surface that stands for all [m2 m-2]
+
+_TERMS = ("path_reflectance", "transmittance_down", "transmittance_up", "spherical_albedo")
+_LONG_NAMES = {name: LONG_NAMES[name] for name in _TERMS}
+_LONG_NAMES["gas_transmittance"] = "transmittance of the absorbing gases, down and up"
+
+
+def compare_engines(
+    setup: Setup | None = None, *, reflectance: Numbers | None = None, engines: Names = ("5S", "successive-orders")
+) -> xr.Dataset:
     """
-    Whether an image has a red and a near infrared band.
+    What the atmosphere of a setup does by several engines.
 
     Parameters
     ----------
-    image : xarray.DataArray, dims (band, y, x)
-        With a coordinate ``wavelength``. [um]
+    setup : Setup, optional
+        Its air, directions, instrument, bands, leaves and background count; by default the paper's.
+    reflectance : number or sequence of float, shape (band,), optional
+        Of an even surface; by default that of the setup's canopy of leaf area 2. [1]
+    engines : sequence of str, optional
+        Of those of `Atmosphere`.
 
     Returns
     -------
-    shows : bool
+    terms : xarray.Dataset, dims (engine, band)
+        Path reflectance, transmittances, spherical albedo, and ``toa_reflectance`` of the surface; ``ndvi`` of it by
+        engine where there are a red and a near infrared band. [1]
+
+    Raises
+    ------
+    ValueError
+        If an engine is unknown, sun or view vary or are out of its range, or the reflectance is not one for each band.
+
+    See Also
+    --------
+    fifesim.atmosphere.engines.band_terms, fifesim.atmosphere.coupling.apparent_reflectance
+
+    Examples
+    --------
+    >>> from fifesim import Atmosphere, Setup, compare_engines
+    >>> haze = Setup(atmosphere=Atmosphere(visibility=8), bands=("TM3", "TM4"))
+    >>> compare_engines(haze, engines=["5S"])["toa_reflectance"].dims
+    ('engine', 'band')
     """
-    return all(nearest(image["wavelength"].values, window) is not None for window in (RED, NEAR_INFRARED))
+    setup, air, bands, geometry = _case(setup)
+    surface = _surface(setup, air, reflectance, len(bands))
+    responses = tuple(band.response for band in bands)
+    names = [engines] if isinstance(engines, str) else list(engines)
+    airs = [replace(air, engine=engine) for engine in names]
+    found = [schemes.band_terms(each, responses, geometry.sza, geometry.vza, geometry.raa).uniform for each in airs]
+    values = {name: np.array([terms[name] for terms in found]) for name in _LONG_NAMES}
+    toa = np.array([coupling.apparent_reflectance(surface, **terms) for terms in found])
+    attrs = {name: {"long_name": text, "units": "1"} for name, text in _LONG_NAMES.items()}
+    data = {name: (("engine", "band"), each, attrs[name]) for name, each in values.items()}
+    data["surface_reflectance"] = "band", surface, cf.attributes("surface_reflectance")
+    data["toa_reflectance"] = ("engine", "band"), toa, cf.attributes("toa_reflectance")
+    wavelength = [band.wavelength for band in bands]
+    red, near_infrared = (nearest_band(wavelength, window) for window in (RED, NEAR_INFRARED))
+    if red is not None and near_infrared is not None:
+        ndvi = normalized_difference(toa[:, near_infrared], toa[:, red])
+        data["ndvi"] = "engine", ndvi, cf.attributes("ndvi")
+    coords = {
+        "engine": names,
+        "band": [band.name for band in bands],
+        "wavelength": ("band", wavelength, cf.attributes("wavelength")),
+    }
+    return directions.with_geometry(xr.Dataset(data, coords, {"atmosphere": air.text}), geometry)
+
+
+def engine_error(setup=None):
+    """Relative error of the apparent reflectance by the engine of a setup against successive orders, by band. [1]"""
+    # For the canopy of the setup with a leaf area of 2, at the mean wavelength of each band, which is quick.
+    setup, air, bands, geometry = _case(setup)
+    surface = _surface(setup, air, None, len(bands))
+    wavelength = np.array([band.response.center for band in bands])
+    increasing = np.argsort(wavelength)
+    views = geometry.sza, np.array([geometry.vza]), np.array([geometry.raa])
+    toa = []
+    for scattering in (schemes.scattering, whole_scattering):
+        light = scattering(air, wavelength[increasing], *views)
+        down, up = light.transmittance_down, light.transmittance_up
+        terms = light.reflectance, down, up, light.spherical_albedo, 1.0
+        toa.append(np.ravel(coupling.apparent_reflectance(surface[increasing], *terms)))
+    error = dict(zip(increasing.tolist(), (toa[0] / toa[1] - 1).tolist(), strict=True))
+    return {band.name: error[number] for number, band in enumerate(bands)}
+
+
+def _checked(setup: Setup | None) -> Setup:
+    """Setup as given, or the default one."""
+    if setup is not None and not isinstance(setup, Setup):
+        raise TypeError(f"setup must be a fifesim.Setup, got {setup!r}: see fifesim.Setup")
+    return setup or Setup()
+
+
+def _case(setup):
+    """Setup, atmosphere, bands and uniform geometry."""
+    setup = _checked(setup)
+    air = Atmosphere() if setup.atmosphere is None else setup.atmosphere
+    geometry = fife_geometry() if setup.geometry is None else setup.geometry
+    bands = find_instrument(setup.instrument).select(setup.bands)
+    return setup, air, bands, directions.uniform_geometry(geometry, "a comparison of engines")
+
+
+def _surface(setup, air, reflectance, n_bands):
+    """Reflectance of the surface in each band, shape (band,). [1]"""
+    if reflectance is None:
+        # One cell, under the same light for all engines.
+        cell = fife_site(30, window=((0, 1), (0, 1)))
+        lai = grids.place(xr.DataArray([[TYPICAL_LAI]], dims=("y", "x"), attrs=made_on_site(cell)), cell)
+        level = replace(setup, atmosphere=replace(air, engine="5S"), dem=None, horizon=None)
+        return reflectance_of(level, lai).values.ravel()
+    surface = np.asarray(reflectance, float)
+    if surface.shape not in ((), (n_bands,)) or not np.all((surface >= 0) & (surface <= 1)):
+        raise ValueError(
+            f"reflectance must be one number from 0 to 1, or {n_bands}, one for each band, got "
+            f"{described(reflectance)}: leave it out to have that of a canopy"
+        )
+    return np.broadcast_to(surface, n_bands)

@@ -1,40 +1,127 @@
-"""Landscapes in the chain: what a Dataset says of the ground, each class with its own canopy, and its true means."""
+"""Landscapes in the chain: the canopy of each class and cell, seen through the air, and true means."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from numbers import Number
 from types import MappingProxyType
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numba import njit
 
-from fifesim.analysis.rasters import means
+from fifesim.analysis import scaling_labels
+from fifesim.atmosphere.coupling import apparent_reflectance, apparent_reflectance_of_cell
 from fifesim.base.annotations import Metres, Time
 from fifesim.base.line_spread import Spread
-from fifesim.chain.stands import stands_of
-from fifesim.ground.canopy import absorption
-from fifesim.ground.canopy import raster as ground
+from fifesim.base.messages import warn
+from fifesim.grids import cf
+from fifesim.grids import chunks as chunking
+from fifesim.grids import grid as grids
+from fifesim.grids.classes import NO_CLASS, by_class
+from fifesim.grids.dates import by_date
+from fifesim.grids.directions import Directions
+from fifesim.grids.grid import north_up
+from fifesim.grids.inputs import MASKS_TOO, Raster, RasterOrDataset
+from fifesim.grids.windows import origin_of
+from fifesim.ground.canopy import labels as ground
+from fifesim.ground.canopy import layers, optics_labels
 from fifesim.ground.canopy.description import TALLGRASS, Canopy, is_raster
+from fifesim.ground.canopy.interpolation import RUN, table_places, value_at
+from fifesim.ground.canopy.labels import BandCanopy, EvenCanopy
+from fifesim.ground.canopy.leaf_area import LARGEST_OF_MAPS, check_map
 from fifesim.ground.canopy.optics import DEAD_LEAF
-from fifesim.ground.canopy.properties import NUMBERS, PROPERTIES
-from fifesim.ground.canopy.rasters import leaves, soils
-from fifesim.ground.canopy.rasters.evaluation import BandCanopy
+from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES, PROPERTIES
+from fifesim.ground.canopy.reflectance_table import scene_reflectance, surface_table
 from fifesim.ground.landscape.classes import CoverClass
-from fifesim.ground.landscape.compression import NO_CLASS
-from fifesim.ground.landscape.rasters.cover import classes_of
-from fifesim.ground.landscape.rasters.evaluation import by_class
-from fifesim.rasters import cf
-from fifesim.rasters import grid as grids
-from fifesim.rasters.annotations import MASKS_TOO, Raster, RasterOrDataset
-from fifesim.rasters.axes import north_up
-from fifesim.rasters.dates import by_date
-from fifesim.rasters.directions import Directions
+from fifesim.ground.landscape.labels import classes_of
+
+_TALLGRASS = {"background": "soil and litter", "brown_leaf": "dead leaves", "leaf_optics": "green leaves"}
+"""Optics that are those of FIFE's tallgrass by default."""
+
+_CURES = {
+    "background": "give background={'soil_dry': 1.0} or your own ([ground.background_spectra] of a scenario)",
+    "brown_leaf": "give brown_leaf=fifesim.Leaf(...) ([ground.brown_leaf])",
+    "leaf_optics": "give leaf_optics=fifesim.Leaf(...) ([ground.leaf])",
+}
+
+
+def stands_of(classes, canopy, cells=MappingProxyType({})):
+    """Canopies of a scene by class code; the code is None without classes."""
+    if not classes:
+        return {None: canopy.replace(**cells)}
+    return {kind.code: kind.canopy.over(canopy).replace(**cells) for kind in classes}
+
+
+def warn_of_tallgrass(scene, classes, canopy, cells=MappingProxyType({})):
+    """Warn if the default optics, of the tallgrass of FIFE, are used for a scene elsewhere."""
+    bare = {kind.code for kind in classes if isinstance(kind.lai, Number) and kind.lai == 0}
+    taken = set()
+    for code, stand in stands_of(classes, canopy, cells).items():
+        dead = is_raster(stand.brown) or stand.brown != 0
+        needed = {"background": True, "leaf_optics": code not in bare, "brown_leaf": dead and code not in bare}
+        taken |= {name for name, is_needed in needed.items() if is_needed and getattr(stand, name) is None}
+    if taken:
+        warn(
+            f"nothing says what grows on {scene}: FIFE's tallgrass is taken for "
+            f"{', '.join(_TALLGRASS[name] for name in sorted(taken))}; "
+            f"{'; '.join(_CURES[name] for name in sorted(taken))}"
+        )
+
+
+def seen_through_air(reflectance):
+    """Function that computes the top-of-atmosphere reflectance of a lazy surface reflectance in one pass, or None."""
+    # None where cells differ in more than leaf area and background. The bits are those of the two separate steps.
+    canopy = origin_of(reflectance)
+    if not isinstance(canopy, EvenCanopy):
+        return None
+
+    def made(terms):
+        by_band = {name: tuple(map(float, values)) for name, values in terms.uniform.items()}
+        kernel = partial(seen_reflectance, background=canopy.background, scene=canopy.scene, terms=by_band)
+        return chunking.pointwise(kernel, canopy.lai, bands=reflectance.sizes["band"])
+
+    return made
+
+
+def seen_reflectance(lai, *, background, scene, terms):
+    """Apparent reflectance of a canopy at the top of the atmosphere, from its table, shape (band, y, x). [1]"""
+    cells, table = np.ascontiguousarray(lai, float), surface_table(background, scene)
+    out = np.empty((table.coefficients.shape[1], cells.size))
+    if _seen(cells.reshape(-1), table, np.array(list(terms.values())), out):
+        # The functions themselves say what is wrong.
+        ground = scene_reflectance(check_map(lai), np.array(background), scene)
+        return apparent_reflectance(ground, **{name: np.array(each)[:, None, None] for name, each in terms.items()})
+    return out.reshape(-1, *cells.shape)
+
+
+# Where no light comes through, division by zero is no error but what numpy makes of it.
+@njit(nogil=True, cache=True, error_model="numpy")
+def _seen(lai, table, terms, out):
+    """Fill in the apparent reflectance; return whether any leaf area or reflectance is invalid."""
+    interval, share, ground = np.empty(RUN, np.int64), np.empty(RUN), np.empty(RUN)
+    refused = False
+    for first in range(0, lai.size, RUN):
+        cells = lai[first : first + RUN]
+        table_places(cells, table, interval, share)
+        for k in range(cells.size):
+            refused |= (cells[k] < 0) | (cells[k] > LARGEST_OF_MAPS)
+        for band in range(out.shape[0]):
+            for k in range(cells.size):
+                ground[k] = value_at(table, interval[k], band, share[k])
+            path, down, up = terms[0, band], terms[1, band], terms[2, band]
+            albedo, gas, seen = terms[3, band], terms[4, band], out[band, first : first + RUN]
+            for k in range(cells.size):
+                toa = apparent_reflectance_of_cell(ground[k], ground[k], path, down, up, albedo, gas)
+                refused |= np.isinf(toa)
+                seen[k] = toa
+    return refused
 
 
 class Land(NamedTuple):
-    """A scene: leaf area; codes of its classes and what they are; and what else its cells say."""
+    """Parts of a scene: leaf area, codes and descriptions of its classes, and other properties of its cells."""
 
     lai: xr.DataArray
     cover: xr.DataArray | None = None
@@ -43,23 +130,7 @@ class Land(NamedTuple):
 
 
 def land_of(scene):
-    """
-    Parts of a scene.
-
-    Parameters
-    ----------
-    scene : xarray.DataArray, dims (y, x), or xarray.Dataset
-        Leaf area, or a landscape that has it as ``lai``.
-
-    Returns
-    -------
-    land : Land
-
-    Raises
-    ------
-    ValueError
-        If the Dataset has no ``lai``, or its ``cover`` does not say its classes.
-    """
+    """Split a scene into its parts."""
     if not isinstance(scene, xr.Dataset):
         return Land(scene)
     if "lai" not in scene.data_vars:
@@ -67,103 +138,43 @@ def land_of(scene):
             f"a landscape has a variable lai, this Dataset has {', '.join(map(str, scene.data_vars)) or 'none'}: "
             "make it with fifesim.landscape(grid, ...), or rename one with .rename(LAI='lai')"
         )
-    cells = {name: scene[name] for name in NUMBERS if name in scene.data_vars}
+    cells = {name: scene[name] for name in NUMERIC_PROPERTIES if name in scene.data_vars}
     cells = {name: each if each.ndim else float(each) for name, each in cells.items()}
     if "cover" not in scene.data_vars:
         return Land(scene["lai"], cells=cells)
     return Land(scene["lai"], north_up(scene["cover"]), classes_of(scene["cover"]), cells)
 
 
-def canopies_of(land, bands, canopy, exact=False):
-    """
-    Canopies of a scene with their optics in each band.
-
-    Parameters
-    ----------
-    land : Land
-    bands : sequence of fifesim.sensor.description.band.InstrumentBand
-    canopy : Canopy
-        For what neither cells nor classes have.
-    exact : bool, optional
-        As in `fifesim.surface_reflectance`.
-
-    Returns
-    -------
-    canopies : dict of int to fifesim.ground.canopy.rasters.evaluation.BandCanopy
-        By codes of the classes; None is the code without classes.
-
-    Raises
-    ------
-    ValueError
-        As in `fifesim.surface_reflectance`; if a property is given that all classes have.
-    """
-    optics = _Optics(tuple(band.response for band in bands), land.lai, exact)
+def canopies_of(land, responses, canopy, exact=False):
+    """Canopies of a scene with their optics for spectral responses, by class code, which is None without classes."""
     _check_used(land, canopy)
-    return {code: optics.of(stand) for code, stand in stands_of(land.classes, canopy, land.cells).items()}
+    known, found, leaf_optics = {}, {}, partial(optics_labels.leaf_optics, exact=exact)
 
+    def once(name, make, given):
+        # Stands share optics. The argument is kept too, so that no other object takes its identity.
+        if (name, id(given)) not in known:
+            known[name, id(given)] = given, make(responses, given, land.lai)
+        return known[name, id(given)][1]
 
-def level_reflectance(land, bands, canopies, light, **options):
-    """
-    Reflectance factor of the canopies of a scene, for flat ground.
-
-    Parameters
-    ----------
-    land : Land
-    bands : sequence of fifesim.sensor.description.band.InstrumentBand
-    canopies : dict
-        From `canopies_of`.
-    light : fifesim.ground.canopy.rasters.evaluation.Light
-    **options
-        ``exact`` and attributes, as in `fifesim.ground.canopy.raster.level_reflectance`.
-
-    Returns
-    -------
-    reflectance : xarray.DataArray, dims (band, y, x)
-        [1]
-
-    Raises
-    ------
-    ValueError
-        As in `fifesim.surface_reflectance`.
-    """
-    if land.cover is None:
-        return ground.level_reflectance(land.lai, bands, canopies[None], light, **options)
-    return ground.reflectance_of_classes(land.lai, land.cover, bands, canopies, light, **options)
-
-
-class _Optics:
-    """Canopies by their numbers in each band; what several have is looked up once."""
-
-    def __init__(self, responses, lai, exact):
-        self._responses, self._lai, self._exact = responses, lai, exact
-        self._known = {}
-
-    def of(self, canopy):
-        """Canopy with its optics in each band."""
-        leaf = self._once("leaf_optics", leaves.leaf_optics, canopy.leaf_optics, exact=self._exact)
-        below = self._once("background", soils.background, canopy.background)
-        dead = None
-        if is_raster(canopy.brown) or canopy.brown != 0:
-            given = DEAD_LEAF if canopy.brown_leaf is None else canopy.brown_leaf
-            dead = self._once("leaf_optics", leaves.leaf_optics, given, exact=self._exact)
-        soil, moisture = soils.changes_of(canopy)
-        if not any(map(is_raster, (soil, moisture))):
-            return BandCanopy(canopy, leaf, dead, soils.as_it_lies(self._responses, below, self._lai, soil, moisture))
-        key = "soil", id(soil), id(moisture)
-        if key not in self._known:
-            self._known[key] = soils.soil_kernel(self._responses, self._lai, soil, moisture)
-        return BandCanopy(canopy, leaf, dead, below, self._known[key])
-
-    def _once(self, name, function, given, **options):
-        # What is given is kept beside, so that its identity stays its own.
-        key = name, id(given)
-        if key not in self._known:
-            self._known[key] = given, function(self._responses, given, self._lai, **options)
-        return self._known[key][1]
+    for code, stand in stands_of(land.classes, canopy, land.cells).items():
+        leaf, dead, changed = once("leaf_optics", leaf_optics, stand.leaf_optics), None, None
+        below = once("background", optics_labels.background, stand.background)
+        if is_raster(stand.brown) or stand.brown != 0:
+            dead = once("leaf_optics", leaf_optics, DEAD_LEAF if stand.brown_leaf is None else stand.brown_leaf)
+        soil, moisture = optics_labels.changes_of(stand)
+        if is_raster(soil) or is_raster(moisture):
+            key = "soil", id(soil), id(moisture)
+            if key not in known:
+                known[key] = optics_labels.soil_kernel(responses, land.lai, soil, moisture)
+            changed = known[key]
+        else:
+            below = optics_labels.as_it_lies(responses, below, land.lai, soil, moisture)
+        found[code] = BandCanopy(stand, leaf, dead, below, changed)
+    return found
 
 
 def _check_used(land, canopy):
-    """Raise ValueError if a property is given that would change nothing."""
+    """Raise ValueError if a given property would have no effect."""
     for name in canopy.given:
         value, default = getattr(canopy, name), PROPERTIES[name].default
         if isinstance(value, str | int | float) and value == default:
@@ -183,7 +194,7 @@ def fpar(
     canopy: Canopy | None = None,
     geometry: Directions | None = None,
     time: Time | None = None,
-    fpar_inf: float = absorption.FPAR_INF,
+    fpar_inf: float = layers.FPAR_INF,
     leaves: Literal["all", "green"] = "all",
 ) -> xr.DataArray:
     """
@@ -217,7 +228,7 @@ def fpar(
     Notes
     -----
     Both kinds of leaf absorb alike here, as in Eq. 6. SAIL's own shares, of each wavelength, are in
-    `ground.canopy.light_sharing`.
+    `ground.canopy.layers`.
 
     References
     ----------
@@ -225,7 +236,7 @@ def fpar(
 
     See Also
     --------
-    fifesim.ground.canopy.absorption.fpar, fifesim.ground.canopy.absorption.green_fpar
+    fifesim.ground.canopy.layers.beer_fpar, fifesim.ground.canopy.layers.green_fpar
 
     Examples
     --------
@@ -236,16 +247,19 @@ def fpar(
     0.3
     """
     land, canopy = land_of(lai), canopy or TALLGRASS
-    light = {"geometry": geometry, "time": time, "fpar_inf": fpar_inf, "leaves": leaves}
     _check_used(land, canopy)
+
+    def absorbed(stand):
+        return ground.canopy_fpar(land.lai, stand, geometry=geometry, time=time, fpar_inf=fpar_inf, leaves=leaves)
+
     stands = stands_of(land.classes, canopy, land.cells)
     if land.cover is None:
-        return ground.fpar(land.lai, stands[None], **light)
+        return absorbed(stands[None])
     # Classes whose canopies absorb alike are computed once.
     kernels, known = {}, []
     for code, stand in stands.items():
         alike = [kernel for other, kernel in known if ground.same_properties(stand, other, ground.ABSORBING)]
-        kernels[code] = alike[0] if alike else (np.positive, [ground.fpar(land.lai, stand, **light)])
+        kernels[code] = alike[0] if alike else (np.positive, [absorbed(stand)])
         known.append((stand, kernels[code]))
     distinct = list({id(kernel): kernel for kernel in kernels.values()}.values())
     out = grids.place(by_class(kernels, land.cover), grids.geobox(land.lai))
@@ -296,7 +310,7 @@ def aggregate(
     >>> lai.fifesim.aggregate(30).shape
     (10, 10)
     """
-    mean = partial(means.aggregate, pixel=pixel, min_valid=min_valid, lsf=lsf)
+    mean = partial(scaling_labels.aggregate_blocks, pixel=pixel, min_valid=min_valid, lsf=lsf)
     if not isinstance(array, xr.Dataset):
         return mean(array)
     by_cell = {name: each for name, each in array.data_vars.items() if {"y", "x"} <= set(each.dims)}
@@ -311,7 +325,7 @@ def aggregate(
 
 
 def _class_shares(cover, mean):
-    """Share of the ground of each class."""
+    """Area share of each class."""
     table = classes_of(cover)
     known = cover.where(cover != NO_CLASS)
     shares = [mean((known == each.code).where(known.notnull())) for each in table]

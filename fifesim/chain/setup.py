@@ -1,4 +1,4 @@
-"""Everything between the leaf area of a scene and its digital numbers, said once."""
+"""Description of all steps between the leaf area of a scene and its digital numbers."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass, fields
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.base.annotations import Interval, Names, Noise, Offset, Surroundings, WholeNumber
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.base.annotations import Interval, Names, NoiseKinds, Offset, Surroundings, WholeNumber
 from fifesim.base.arguments import check_fields
-from fifesim.base.foreign import in_a_line
+from fifesim.base.files import in_a_line
 from fifesim.chain import steps
+from fifesim.grids.directions import Directions
+from fifesim.grids.inputs import Horizon
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
-from fifesim.rasters.annotations import Horizon
-from fifesim.rasters.directions import Directions
-from fifesim.sensor import raster as sensor
-from fifesim.sensor.description.annotations import InstrumentLike
+from fifesim.sensor import labels as sensor
+from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.response.noise import NoiseModels
 
-# What surface_reflectance and sense take of a setup, by the same names.
+# Fields of a setup that `surface_reflectance` and `sense` take under the same names.
 _GROUND = ("canopy", "bands", "dem", "horizon", "upwelling", "atmosphere")
 _SENSOR = ("onto", "interval", "offset", "noise", "seed", "noise_models", "quantise", "min_valid")
 
@@ -74,7 +74,7 @@ class Setup:
     interval: Interval | None = None
     offset: Offset = (0.0, 0.0)
     min_valid: float = sensor.MIN_VALID
-    noise: Noise = ()
+    noise: NoiseKinds = ()
     noise_models: NoiseModels | None = None
     seed: WholeNumber = 0
     quantise: bool = True
@@ -86,19 +86,19 @@ class Setup:
 
     def __repr__(self):
         others = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "instrument"}
-        said = [f"{name}={_brief(value)}" for name, value in others.items() if not _is_default(self, name)]
+        changed = [f"{name}={_brief(value)}" for name, value in others.items() if not _is_default(self, name)]
         name = getattr(self.instrument, "name", self.instrument)
-        return f"Setup({', '.join([f'instrument={name!r}', *said])})"
+        return f"Setup({', '.join([f'instrument={name!r}', *changed])})"
 
 
 def _is_default(setup, name):
-    """Whether a field has its default; no raster is one."""
+    """Whether a field has its default value; a raster never has."""
     value, default = getattr(setup, name), Setup.__dataclass_fields__[name].default
     return value is default or (isinstance(value, (str, int, float, tuple)) and value == default)
 
 
 def _brief(value):
-    """A value in a few words: what is large by its kind and size."""
+    """Short text of a value; large values are described by type and size."""
     if isinstance(value, xr.DataArray | xr.Dataset | GeoBox):
         sizes = dict(zip(value.dims, value.shape, strict=True)) if isinstance(value, GeoBox) else dict(value.sizes)
         return f"<{type(value).__name__} of {' x '.join(f'{name} {size}' for name, size in sizes.items())}>"
@@ -106,46 +106,12 @@ def _brief(value):
 
 
 def reflectance_of(setup, lai):
-    """
-    Reflectance of a scene of leaf area in the bands of a setup.
-
-    Parameters
-    ----------
-    setup : Setup
-    lai : xarray.DataArray, dims (y, x)
-        [m2 m-2]
-
-    Returns
-    -------
-    reflectance : xarray.DataArray, dims (band, y, x)
-        Of the ground; lazy where an input is. [1]
-
-    See Also
-    --------
-    fifesim.chain.steps.surface_reflectance
-    """
+    """Surface reflectance of leaf area in the bands of a setup, dims (band, y, x), lazy where an input is. [1]"""
     return steps.surface_reflectance(lai, setup.instrument, geometry=setup.geometry, **_of(setup, _GROUND))
 
 
 def image_of(setup, reflectance):
-    """
-    What the instrument of a setup records of the ground.
-
-    Parameters
-    ----------
-    setup : Setup
-    reflectance : xarray.DataArray, dims (band, y, x)
-        From `reflectance_of`, or of one's own. [1]
-
-    Returns
-    -------
-    image : xarray.DataArray, dims (band, y, x)
-        Digital numbers, or radiance without ``quantise``; lazy where an input is.
-
-    See Also
-    --------
-    fifesim.chain.steps.to_toa, fifesim.sensor.raster.sense
-    """
+    """Image of a surface reflectance by the instrument of a setup, dims (band, y, x), lazy where an input is."""
     toa = steps.to_toa(reflectance, instrument=setup.instrument, **_of(setup, ("adjacency", "surroundings")))
     return sensor.sense(toa, setup.instrument, **_of(setup, _SENSOR))
 

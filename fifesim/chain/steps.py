@@ -1,32 +1,302 @@
-"""The steps of Figure 1 that need more than one stage: what a stage needs of another is handed to it here."""
+"""Steps of Figure 1 that need more than one stage: each passes on what a stage needs of another."""
 
 from __future__ import annotations
 
+from typing import Annotated, Literal
+
+import numpy as np
 import xarray as xr
 
-from fifesim.atmosphere import raster as atmosphere_raster
-from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.analysis import index_labels
+from fifesim.atmosphere import engines
+from fifesim.atmosphere import labels as atmosphere_labels
+from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.annotations import Names, Surroundings, Time
+from fifesim.base.arguments import UNCHECKED, described
+from fifesim.base.bands import Band
+from fifesim.base.caches import cached
+from fifesim.base.messages import warn
 from fifesim.chain import landscapes
-from fifesim.chain.carried import air_bands_and_geometry, air_of, as_bands_of
-from fifesim.chain.images import planetary_reflectance
-from fifesim.chain.seen_canopy import seen_through_air
-from fifesim.chain.slopes import sunlight
-from fifesim.chain.stands import warn_of_tallgrass
+from fifesim.chain.landscapes import seen_through_air, warn_of_tallgrass
+from fifesim.grids import cf, directions
+from fifesim.grids.dates import by_date
+from fifesim.grids.directions import Directions
+from fifesim.grids.grid import north_up
+from fifesim.grids.inputs import Horizon, RasterOrDataset, incoming
+from fifesim.grids.sites import check_same_sun, is_fife
+from fifesim.ground.canopy import labels as canopy_labels
+from fifesim.ground.canopy import optics_labels
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
-from fifesim.ground.canopy.rasters import soils
-from fifesim.ground.canopy.rasters.evaluation import Light
-from fifesim.ground.terrain.rasters import lit_slopes
-from fifesim.rasters import directions
-from fifesim.rasters.annotations import Horizon, RasterOrDataset
-from fifesim.rasters.axes import north_up
-from fifesim.rasters.dates import by_date
-from fifesim.rasters.directions import Directions
-from fifesim.rasters.sites import is_fife
-from fifesim.rasters.sun import check_same_sun
-from fifesim.sensor.description.annotations import InstrumentLike
+from fifesim.ground.canopy.labels import Light
+from fifesim.ground.terrain import labels as terrain_labels
+from fifesim.ground.terrain.source_labels import beside_altitude
+from fifesim.sensor import labels as sensor
+from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
-from fifesim.sensor.description.rasters.carried import attributes_of, given_instrument
+from fifesim.sensor.instrument_labels import (
+    attributes_of,
+    carried_instrument,
+    check_wavelengths,
+    given_instrument,
+    matching_bands,
+    warn_of_others,
+)
+
+# Half width of the triangular response that stands for a band known by its wavelength alone: the step of the gas
+# tables. [um]
+_NARROW = 0.0025
+
+
+_default_atmosphere = cached(1, "default atmosphere")(Atmosphere)
+
+
+def air_of(atmosphere, array, assume=False):
+    """Atmosphere: as given, else as carried by an array, else midlatitude summer with continental aerosol."""
+    # The default is a warning for rasters that are not made by fifesim on the FIFE site.
+    if atmosphere is not None and not isinstance(atmosphere, Atmosphere):
+        raise TypeError(f"atmosphere must be a fifesim.Atmosphere, got {described(atmosphere)}: see fifesim.Atmosphere")
+    carried = array.attrs.get("atmosphere")
+    if assume:
+        if atmosphere is None:
+            raise ValueError("assume=True needs the atmosphere to assume: give it too, such as fifesim.Atmosphere(...)")
+        return atmosphere
+    if carried is not None:
+        carried = Atmosphere.parse(carried)
+        if atmosphere is not None and atmosphere != carried:
+            raise ValueError(
+                f"the reflectance was made for another atmosphere ({carried.text}) than the one given "
+                f"({atmosphere.text}): give it to surface_reflectance(atmosphere=...); or, to correct with the wrong "
+                "air on purpose, to_surface(..., assume=True)"
+            )
+    if atmosphere is None and carried is None and not is_fife(array):
+        warn(
+            f"nothing says what air lies over {array.name or 'the raster'}: {_default_atmosphere().text} is taken; "
+            "give atmosphere=fifesim.Atmosphere(...), with the altitude of its ground in km"
+        )
+    return atmosphere or carried or _default_atmosphere()
+
+
+def air_bands_and_geometry(array, atmosphere, geometry, instrument, time=None, *, assume=False):
+    """Atmosphere, spectral responses and geometry: as given, else as carried by the array."""
+    geometry = directions.given_geometry(geometry, array, time)
+    return air_of(atmosphere, array, assume), _responses(array, instrument), geometry
+
+
+def as_bands_of(raster, instrument, name):
+    """Reflectance as the chain takes it, with bands named after the bands of an instrument, dims ([band], y, x)."""
+    array = incoming(raster, name)
+    description = carried_instrument(array) if instrument is None else find_instrument(instrument)
+    if description is None or "band" not in array.coords:
+        return array
+    other = array.attrs.get("instrument") not in (None, description.name)
+    if "wavelength" in array.coords and not other:
+        return array
+    bands = matching_bands(array, description)
+    warn_of_others(array, description, bands)
+    names, centres = [band.name for band in bands], [band.wavelength for band in bands]
+    along_band = cf.band_coordinates(band=names, wavelength=centres)
+    return array.assign_coords({key: each if array["band"].ndim else each[0] for key, each in along_band.items()})
+
+
+def _responses(array, instrument):
+    """Spectral responses of the given instrument, or of the carried one if its wavelengths agree."""
+    description = carried_instrument(array) if instrument is None else find_instrument(instrument)
+    if description is not None:
+        bands = matching_bands(array, description)
+        centres = [band.wavelength for band in bands]
+        if instrument is None and "wavelength" in array.coords and not np.allclose(array["wavelength"], centres, 1e-6):
+            raise ValueError(
+                f"the raster says that it was made for {description.name} and has other wavelengths than its bands: "
+                "give instrument="
+            )
+        return tuple(band.response for band in bands)
+    if "wavelength" not in array.coords:
+        raise ValueError(
+            "the raster has neither an instrument nor a wavelength: give instrument=, or assign a coordinate "
+            "'wavelength' [um] along band"
+        )
+    centres = np.atleast_1d(array["wavelength"].values).astype(float)
+    return tuple(Band(f"{at:g} um", (at - _NARROW, at, at + _NARROW), (0.0, 1.0, 0.0)) for at in centres)
+
+
+@by_date
+def ndvi(image: RasterOrDataset) -> xr.DataArray:
+    """
+    Normalized difference vegetation index, from planetary reflectance as in the paper (Results).
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+        Digital numbers, radiance or reflectance, with a coordinate ``wavelength`` [um] along band.
+
+    Returns
+    -------
+    ndvi : xarray.DataArray, dims (y, x)
+        NaN where there are no data. [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no red or no near infrared band, or no calibration.
+
+    See Also
+    --------
+    fifesim.analysis.indices.normalized_difference
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> ndvi = image.fifesim.ndvi()
+    >>> round(float(ndvi.mean()), 2)
+    0.36
+    """
+    return _index(image, "NDVI")
+
+
+@by_date
+def index(
+    image: xr.DataArray,
+    name: Annotated[Literal["NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"], UNCHECKED],
+) -> xr.DataArray:
+    """
+    Spectral index of an image.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+        Reflectance, of the ground or planetary, with a coordinate ``wavelength`` [um] along band. Digital numbers and
+        radiance are brought to planetary reflectance first.
+    name : {"NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"}
+        As in the catalogue of spyndex: NDWI shows open water (green and near infrared), NDMI the water of leaves (near
+        and shortwave infrared). EVI is meant for reflectance of the ground: take it after `to_surface`.
+
+    Returns
+    -------
+    index : xarray.DataArray, dims (y, x)
+        NaN where there are no data. [1]
+
+    Raises
+    ------
+    ValueError
+        If there is no such index, the image lacks a band of it, or its calibration.
+
+    References
+    ----------
+    [Rouse1974]_; [Huete1988]_; [Qi1994]_; [McFeeters1996]_; [Gao1996]_; [Huete2002]_; [Jiang2008]_; [Badgley2017]_
+
+    See Also
+    --------
+    fifesim.analysis.indices
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM1", "TM3", "TM4"])
+    >>> round(float(rho.fifesim.index("EVI").mean()), 2)
+    0.27
+    """
+    return _index(image, name)
+
+
+def _index(image, name):
+    """Spectral index of an image, without labelling the intermediate reflectance."""
+    if not _is_recorded(image):
+        return index_labels.reflectance_index(planetary_reflectance(image), name)
+    reflectance, history = sensor.planetary(image)
+    check_wavelengths(reflectance)
+    return index_labels.reflectance_index(reflectance, name, source=image, history=history)
+
+
+def _is_recorded(image):
+    """Whether an image holds digital numbers or radiance."""
+    return "gain" in image.coords or image.attrs.get("units") == cf.QUANTITIES["toa_radiance"].units
+
+
+def planetary_reflectance(image):
+    """Reflectance of an image, converted from digital numbers or radiance, dims (band, y, x). [1]"""
+    reflectance = sensor.to_reflectance(image) if _is_recorded(image) else incoming(image, "toa_reflectance")
+    check_wavelengths(reflectance)
+    return reflectance
+
+
+@by_date
+def kt(
+    reflectance: xr.DataArray,
+    dem: xr.DataArray,
+    *,
+    horizon: Horizon | None = None,
+    atmosphere: Atmosphere | None = None,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    instrument: InstrumentLike | None = None,
+) -> xr.DataArray:
+    """
+    Topographic correction factor Kt: the effect of terrain on the irradiance in each band.
+
+    Parameters
+    ----------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        Reflectance of level ground, from `surface_reflectance` without a dem. [1]
+    dem : xarray.DataArray, dims (y, x)
+        As in `surface_reflectance`. [m]
+    horizon : xarray.DataArray, dims (direction, y, x), optional
+        As in `surface_reflectance`. [degree]
+    atmosphere, geometry, time, instrument : optional
+        As in `to_toa`.
+
+    Returns
+    -------
+    kt : xarray.DataArray, dims (band, y, x)
+        Lazy where an input is. [1]
+
+    Raises
+    ------
+    ValueError
+        As in `surface_reflectance`.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 4; [Dubayah1992]_
+
+    See Also
+    --------
+    fifesim.ground.terrain.slope.topographic_factor
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> dem = fifesim.flint_hills(grid, seed=7)
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM4"])
+    >>> kt = rho.fifesim.kt(dem)
+    >>> kt.dims, bool(abs(kt.mean() - 1) < 0.1)
+    (('band', 'y', 'x'), True)
+    """
+    reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
+    air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
+    return terrain_labels.kt_on_slopes(directions.dated(reflectance, time), sunlight(dem, horizon, *air, "kt"))
+
+
+def kt_and_reflectance(level, dem, horizon=None, upwelling=True):
+    """Kt and the reflectance on slopes from the reflectance of level ground, in one pass, dims (band, y, x). [1]"""
+    air = air_bands_and_geometry(level, None, None, None)
+    light = sunlight(dem, horizon, *air, "surface_reflectance on slopes")
+    return terrain_labels.slope_kt_and_reflectance(level, light, upwelling)
+
+
+def sunlight(dem, horizon, atmosphere, bands, geometry, purpose):
+    """Sunlight on an elevation model, or ValueError naming the purpose if sun or sensor have several directions."""
+    geometry = directions.uniform_geometry(geometry, purpose)
+    terms = engines.band_terms(atmosphere, bands, geometry.sza, geometry.vza, geometry.raa)
+    dem = beside_altitude(dem, atmosphere.altitude)
+    return terrain_labels.Sunlight(dem, geometry, terms.direct_transmittance_down, terms.transmittance_down, horizon)
 
 
 @by_date
@@ -60,16 +330,16 @@ def surface_reflectance(
         Names of its bands; all by default.
     dem : xarray.DataArray, dims (y, x), optional
         Elevation on the cells of ``lai``, or on more of them, whose horizons then count; without it the ground is
-        level. The reflectance is that of level ground times Kt (Eq. 4) and the view's cosine (Eq. 5). [m]
+        level. The reflectance of level ground is multiplied by Kt (Eq. 4) and the view's cosine (Eq. 5). [m]
     horizon : xarray.DataArray, dims (direction, y, x), optional
-        Of an elevation model that reaches further than ``dem``, from `horizon`. [degree]
+        Horizon of an elevation model that extends further than ``dem``, from `horizon`. [degree]
     upwelling : bool, optional
         Whether with the view's cosine on slopes, Eq. 5.
     atmosphere : Atmosphere, optional
         Decides the share of skylight; by default midlatitude summer, continental aerosol, 45 km visibility, 0.4 km
-        above the sea, which is a warning for a map of one's own. It travels on with the result.
+        above the sea, with a warning for a map that fifesim did not make. The result carries it.
     geometry : Geometry, optional
-        Of sun and sensor; by default that of ``lai``, else of the sun at its time and place. A scene that was made on
+        Directions of sun and sensor; by default those of ``lai``, else the sun at its time and place. A scene made on
         the FIFE site has the paper's sun.
     time : str or datetime, optional
         In the place of ``geometry``: when the sun stood over the middle of the grid, below a nadir view.
@@ -85,7 +355,7 @@ def surface_reflectance(
     ------
     ValueError
         If an argument is out of its range; on lazy data, a negative LAI when it computes. If the dem is not in metres,
-        does not cover ``lai``, or lies on other cells. If nothing says which instrument, or where the sun stands.
+        does not cover ``lai``, or lies on other cells. If the instrument or the position of the sun is unknown.
 
     Warns
     -----
@@ -101,7 +371,7 @@ def surface_reflectance(
     --------
     fifesim.ground.canopy.sail_model.sail, fifesim.ground.canopy.layers.two_layers,
     fifesim.ground.canopy.crowns.clumped,
-    fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil_water.moistened,
+    fifesim.ground.canopy.soil.brightened, fifesim.ground.canopy.soil.moistened,
     fifesim.ground.terrain.lit_slopes.slope_reflectance
 
     Examples
@@ -125,15 +395,18 @@ def surface_reflectance(
     land, canopy = land._replace(lai=lai), canopy or TALLGRASS
     if not is_fife(lai):
         warn_of_tallgrass(lai.name or "the raster", land.classes, canopy, land.cells)
-    canopies = landscapes.canopies_of(land, selected, canopy, exact)
-    light = Light(geometry, atmosphere_raster.diffuse_fraction(atmosphere, responses, geometry))
-    soil = soils.in_words(canopy.replace(**land.cells))
+    canopies = landscapes.canopies_of(land, responses, canopy, exact)
+    light = Light(geometry, atmosphere_labels.diffuse_fraction(atmosphere, responses, geometry))
+    soil = optics_labels.background_attributes(canopy.replace(**land.cells) if land.cells else canopy)
     provenance = {"atmosphere": atmosphere.text, **soil, **attributes_of(description)}
-    level = landscapes.level_reflectance(land, selected, canopies, light, exact=exact, **provenance)
+    if land.cover is None:
+        level = canopy_labels.level_reflectance(lai, selected, canopies[None], light, exact, provenance)
+    else:
+        level = canopy_labels.reflectance_of_classes(lai, land.cover, selected, canopies, light, exact, provenance)
     if dem is None:
         return level
-    light = sunlight(dem, atmosphere, responses, geometry, "surface_reflectance on slopes")
-    return lit_slopes.terrain_reflectance(level, upwelling=upwelling, horizon=horizon, **light)
+    light = sunlight(dem, horizon, atmosphere, responses, geometry, "surface_reflectance on slopes")
+    return terrain_labels.terrain_reflectance(level, light, upwelling)
 
 
 @by_date
@@ -158,7 +431,7 @@ def to_toa(
         whole numbers say their scale by ``scale_factor``. [1]
     atmosphere : Atmosphere, optional
         By default that which the array carries, else midlatitude summer, continental aerosol, 45 km visibility, 0.4 km
-        above the sea, which is a warning for a raster of one's own.
+        above the sea, with a warning for a raster that fifesim did not make.
     geometry : Geometry, optional
         Its angles are numbers or rasters; by default that which the array carries, else of the sun at its time and
         place.
@@ -168,7 +441,7 @@ def to_toa(
         Whose spectral response the bands have; by default that which the array carries. Without one, each band is as
         narrow as the gas tables, 2.5 nm.
     elevation : xarray.DataArray, dims (y, x), optional
-        Of the ground, in the place of the atmosphere's one altitude, where relief matters. [m]
+        Elevation of the ground, which replaces the altitude of the atmosphere where relief matters. [m]
     adjacency : bool, optional
         Whether light that the surroundings reflect is scattered into the view of a cell.
     surroundings : number, sequence or xarray.DataArray, optional
@@ -189,7 +462,7 @@ def to_toa(
     Notes
     -----
     Without ``elevation`` all of the scene lies at the altitude of the atmosphere: 100 m of relief is 1 % of the
-    molecules, .001 of reflectance in the blue and less elsewhere.
+    molecules, 0.001 of reflectance in the blue and less elsewhere.
 
     References
     ----------
@@ -197,7 +470,7 @@ def to_toa(
 
     See Also
     --------
-    fifesim.atmosphere.schemes.coupling.apparent_reflectance
+    fifesim.atmosphere.coupling.apparent_reflectance
 
     Examples
     --------
@@ -211,10 +484,12 @@ def to_toa(
     array([ 0.01, -0.03])
     """
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
-    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
-    scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
-    scene["made"] = seen_through_air(reflectance)
-    return _of(instrument, atmosphere_raster.to_toa(directions.dated(reflectance, time), *light, **scene))
+    air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
+    toa = atmosphere_labels.toa_from_surface(
+        directions.dated(reflectance, time), *air,
+        elevation=elevation, adjacency=adjacency, surroundings=surroundings, made=seen_through_air(reflectance),
+    )  # fmt: skip
+    return _of(instrument, toa)
 
 
 @by_date
@@ -238,10 +513,10 @@ def to_surface(
     reflectance : xarray.DataArray, dims (band, y, x), or xarray.Dataset of bands
         Reflectance at the top of the atmosphere; radiance and digital numbers are converted first.
     atmosphere : Atmosphere, optional
-        As in `to_toa`; another than that which the array carries is an error, unless it is assumed.
+        As in `to_toa`. If it differs from the atmosphere of the array, an error, except with ``assume``.
     assume : bool, optional
-        Whether to correct for the atmosphere given, whatever air the image was taken through: what a wrong haze costs.
-        The result carries the assumed one.
+        Correct with the given atmosphere even if the image was simulated with a different one, to study the effect of
+        a wrong aerosol load. The result carries the given atmosphere.
     geometry, time, instrument, elevation, adjacency, surroundings : optional
         As in `to_toa`.
 
@@ -257,7 +532,7 @@ def to_surface(
 
     See Also
     --------
-    fifesim.atmosphere.schemes.coupling.corrected_reflectance
+    fifesim.atmosphere.coupling.corrected_reflectance
 
     Examples
     --------
@@ -270,15 +545,18 @@ def to_surface(
     True
     """
     reflectance = as_bands_of(planetary_reflectance(reflectance), instrument, "toa_reflectance")
-    light = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time, assume=assume)
+    air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time, assume=assume)
     if not assume:
-        check_same_sun(light[-1], reflectance)
-    scene = {"elevation": elevation, "adjacency": adjacency, "surroundings": surroundings}
-    return _of(instrument, atmosphere_raster.to_surface(directions.dated(reflectance, time), *light, **scene))
+        check_same_sun(air[-1], reflectance)
+    surface = atmosphere_labels.surface_from_toa(
+        directions.dated(reflectance, time), *air,
+        elevation=elevation, adjacency=adjacency, surroundings=surroundings,
+    )  # fmt: skip
+    return _of(instrument, surface)
 
 
 def _of(instrument, array):
-    """Raster that carries the instrument which was given."""
+    """Raster with the attributes of the given instrument."""
     if instrument is None:
         return array
     attrs = {key: value for key, value in array.attrs.items() if key != "instrument_description"}

@@ -1,1 +1,1 @@
-"""What people get: figures, pages and folders."""
+"""Output: figures, pages and folders."""

@@ -1,6 +1,8 @@
-"""Folders of results: refused where in use, held by one run, and filled with whole files only."""
+"""Folders of results: locks, refusal of folders in use, whole files only, and provenance."""
 
+import importlib.metadata
 import os
+import platform
 import shutil
 import socket
 import stat
@@ -8,6 +10,21 @@ from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 
 from filelock import FileLock, Timeout
+
+from fifesim.base.caches import cached
+
+_PACKAGES = (
+    "fifesim", "numpy", "scipy", "xarray", "dask", "numba", "rasterio", "odc-geo", "pvlib", "pyrsr", "matplotlib",
+)  # fmt: skip
+
+# Cached, because each call parses a file, and a run asks for all versions five times.
+_version = cached(128, "versions of libraries")(importlib.metadata.version)
+
+
+def versions():
+    """Versions of Python and of the packages that affect numbers and pictures."""
+    return {"python": platform.python_version()} | {name: _version(name) for name in _PACKAGES}
+
 
 # Hidden folder of an unfinished run, in the folder of its results.
 UNFINISHED = ".unfinished"
@@ -18,27 +35,7 @@ _LOCK, _HOLDER, BEGUN, _REPLACED = "lock", "holder", "run.toml", "replaced"
 
 
 def check_folder(folder, overwrite, resume=False, names=None):
-    """
-    Refuse an output folder that is in use.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-    overwrite, resume : bool
-    names : sequence of str, optional
-        Files of the run, by which ``resume`` recognises a finished run.
-
-    Returns
-    -------
-    finished : bool
-        Whether a run is to be resumed that is finished already.
-
-    Raises
-    ------
-    ValueError
-        If the folder is a file, if another run is writing into it, or if it is not empty and neither ``overwrite``
-        allows that nor ``resume`` finds an unfinished or a finished run.
-    """
+    """Raise ValueError for an output folder in use; return whether the run to be resumed is finished."""
     if os.path.lexists(folder) and not folder.is_dir():
         raise ValueError(f"the output folder {str(folder)!r} is a file: name another with -o")
     if not folder.is_dir():
@@ -72,45 +69,17 @@ def _check_contents(folder, overwrite, resume):
 
 @contextmanager
 def results(folder, names, *, overwrite=False, resume=False, worth_keeping=None, stale=()):
-    """
-    Hidden folder to write results into, which are moved into place when all of them are whole; a context manager.
-
-    The folder is held meanwhile: no other run can begin in it, on this machine or on another that sees it.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Made if it does not exist, and removed again if the run leaves nothing in it.
-    names : sequence of str
-        Files and folders that are moved into place, and replace earlier ones. The last one marks the results as
-        complete.
-    overwrite : bool, optional
-        Accept a folder that is not empty.
-    resume : bool, optional
-        Go on with what an earlier run kept.
-    worth_keeping : callable, optional
-        ``worth_keeping(hidden, error)`` tells whether the hidden folder is kept after an error, so that another run
-        can go on with it. It is always removed by default.
-    stale : sequence of str, optional
-        Files and folders of an earlier run that this run does not replace. They are removed.
-
-    Yields
-    ------
-    hidden : pathlib.Path
-        Empty apart from what was kept, and the name of the process that holds the folder.
-
-    Raises
-    ------
-    ValueError
-        As in `check_folder`.
-    """
+    """Context manager of a hidden folder for results, which are moved into place when complete, and a lock."""
     existed = folder.is_dir()
     (folder / UNFINISHED).mkdir(parents=True, exist_ok=True)
     try:
         with _held(folder) as hidden:
             _check_contents(folder, overwrite, resume)
             if resume:
-                _remove_links_and_devices(hidden)
+                # The run makes the files again that were replaced by links or devices.
+                for parent, folders, files in os.walk(hidden):
+                    for name in (*folders, *files):
+                        _remove_unless_plain(os.path.join(parent, name))
             else:
                 _empty(hidden)
             try:
@@ -130,31 +99,19 @@ def results(folder, names, *, overwrite=False, resume=False, worth_keeping=None,
 
 @contextmanager
 def errors_with_their_file(folder):
-    """
-    Have errors of the system say which file they met, and what can be done; a context manager.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Of results.
-
-    Raises
-    ------
-    OSError
-        In place of another.
-    """
+    """Context manager that adds the file and the remedy to operating system errors."""
     try:
         yield
     except OSError as error:
         name = f" ({error.filename})" if error.filename and str(error.filename) not in str(error.strerror) else ""
-        said = f"{error.strerror}{name}" if error.strerror else str(error)
+        message = f"{error.strerror}{name}" if error.strerror else str(error)
         hint = f"; what is finished is kept, go on with --resume -o {folder}"
-        raise OSError(f"{said}{hint if (folder / UNFINISHED).exists() else ''}") from error
+        raise OSError(f"{message}{hint if (folder / UNFINISHED).exists() else ''}") from error
 
 
 @contextmanager
 def _held(folder):
-    """Hidden folder of a run, held by a lock that ends with this process, and removed if nothing is left in it."""
+    """Hidden folder of a run, locked until this process ends, and removed if it remains empty."""
     hidden = folder / UNFINISHED
     holder = hidden / _HOLDER
     if hidden.is_symlink():
@@ -182,16 +139,9 @@ def _held(folder):
 
 
 def _remove_unless_plain(path):
-    """Remove a link, pipe, socket or device, which a run would follow, or wait for without end."""
+    """Remove a link, pipe, socket or device, which a run would follow or wait for."""
     if os.path.lexists(path) and stat.S_IFMT(os.lstat(path).st_mode) not in (stat.S_IFREG, stat.S_IFDIR):
         os.unlink(path)
-
-
-def _remove_links_and_devices(hidden):
-    """Remove from a hidden folder what no run writes; the run makes those files again."""
-    for parent, folders, files in os.walk(hidden):
-        for name in (*folders, *files):
-            _remove_unless_plain(os.path.join(parent, name))
 
 
 def _empty(hidden):
@@ -204,12 +154,9 @@ def _empty(hidden):
 
 
 def _move_into_place(hidden, folder, names, stale):
-    """
-    Replace earlier results with new ones.
-
-    The last name marks results as complete. The earlier mark is moved out of the way first and the new one comes last.
-    A process that is killed in between leaves files of one run only, without the mark. An error undoes all moves.
-    """
+    """Replace earlier results with new ones, the mark of completeness last; an error undoes all moves."""
+    # The last name marks results as complete. The earlier mark is moved away first, so that a process that is killed
+    # leaves files of one run only, without the mark.
     replaced = hidden / _REPLACED
     shutil.rmtree(replaced, ignore_errors=True)
     replaced.mkdir()

@@ -1,4 +1,4 @@
-"""Pictures that a person looks at while working: a raster, a regression, one scene through many instruments."""
+"""Pictures for interactive work: a raster, a regression, one scene seen by many instruments."""
 
 from __future__ import annotations
 
@@ -9,21 +9,23 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
-from fifesim.analysis.rasters.pairs import matched
 from fifesim.analysis.regression import Regression
+from fifesim.analysis.regression_labels import matched
 from fifesim.base.annotations import Pairing
 from fifesim.base.scan_pixels import corners
 from fifesim.chain.comparison import recorded_images, shows_ndvi
-from fifesim.chain.images import ndvi
-from fifesim.output.colours import BAND, LINE, NO_DATA, PERCENTILES, colours_of, percentile_limits
-from fifesim.output.composites import Composite, composite_bands, rgb, thinned, valid
-from fifesim.output.words import axis_label, capital, long_name, short_name, subject, unit
-from fifesim.rasters import grid as grids
-from fifesim.rasters import swaths
-from fifesim.rasters.reductions import computed
+from fifesim.chain.steps import ndvi
+from fifesim.grids import grid as grids
+from fifesim.grids import swaths
+from fifesim.grids.reductions import computed
+from fifesim.output import colours
+from fifesim.output.maps import Composite, composite_bands, rgb, thinned, valid
 
 # Pixels that are drawn along the longer side at most.
 _SIZE = 1500
+
+# Width of a figure. [inch]
+_WIDTH = 6.4
 
 # Above this a map has its axes in kilometres. [m]
 _KILOMETRES = 3000.0
@@ -50,7 +52,7 @@ def plot(
     band : str, optional
         The band to draw; by default three of them as colours, or the only one.
     composite, stretch : optional
-        As in `fifesim.output.composites.rgb`; of one band or quantity the percentiles are 1 and 99 by default.
+        As in `fifesim.output.maps.rgb`; of one band or quantity the percentiles are 1 and 99 by default.
     cmap : str or matplotlib.colors.Colormap, optional
         By default that of the quantity.
     limits : (float, float), optional
@@ -83,20 +85,26 @@ def plot(
     few = raster.sel(band=list(dict.fromkeys(names))) if names else valid(raster)
     shown = computed(thinned(few, size))[0]
     if axes is None:
-        _, axes = plt.subplots(figsize=_figure_size(shown), layout="constrained")
-    axes.set_facecolor(NO_DATA)
+        height = float(np.clip(0.9 + 0.72 * _WIDTH * _ratio(shown), 2.4, 9.0))
+        _, axes = plt.subplots(figsize=(_WIDTH, height), layout="constrained")
+    axes.set_facecolor(colours.NO_DATA)
     if names:
         picture = rgb(shown, names, stretch=stretch)
-        _draw(axes, picture, colours=np.dstack([np.nan_to_num(picture.values), picture.notnull().all("rgb").values]))
+        _draw(axes, picture, rgba=np.dstack([np.nan_to_num(picture.values), picture.notnull().all("rgb").values]))
         what = picture.attrs["long_name"]
     else:
-        style = _style(shown, stretch or PERCENTILES, cmap, limits)
-        drawn = _draw(axes, shown, **style)
-        extend = _extend(shown, style["vmin"], style["vmax"])
-        words = " ".join(filter(None, [short_name(shown), unit(shown)]))
+        own, middle = colours.colours_of(shown.name)
+        if limits is None:
+            middle = middle if cmap is None else None
+            limits = colours.percentile_limits(shown, stretch or colours.PERCENTILES, middle)
+        low, high = map(float, limits)
+        drawn = _draw(axes, shown, cmap=own if cmap is None else cmap, vmin=low, vmax=high)
+        beyond = bool((shown < low).any()), bool((shown > high).any())
+        extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
+        words = " ".join(filter(None, [colours.short_name(shown), colours.unit(shown)]))
         axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label=words, extend=extend)
-        what = long_name(shown)
-    where = subject(raster)
+        what = colours.long_name(shown)
+    where = colours.subject(raster)
     axes.set_title(what + (f"\n{where}" if where else ""), fontsize="medium")
     return axes
 
@@ -154,7 +162,9 @@ def plot_fit(
     spread = 2.5 * np.sqrt(fit.x_sum_of_squares / fit.n)
     span = fit.x_mean - spread, fit.x_mean + spread
     if y is not None:
-        labels = tuple(" ".join(filter(None, [capital(long_name(each)), unit(each)])) for each in (y, x))
+        labels = tuple(
+            " ".join(filter(None, [colours.capital(colours.long_name(each)), colours.unit(each)])) for each in (y, x)
+        )
         pairs = computed(*(thinned(each, _SIZE) for each in matched(y, x, pair)))
         ordinate, abscissa = (np.asarray(each, float).ravel() for each in pairs)
         both = np.isfinite(ordinate) & np.isfinite(abscissa)
@@ -163,10 +173,7 @@ def plot_fit(
             abscissa[both], ordinate[both], gridsize=60, mincnt=1, bins="log", cmap="Greys", linewidths=0.1
         )
         axes.figure.colorbar(density, ax=axes, shrink=0.8, label="pixels")
-    line = np.linspace(*span, 50)
-    interval = f"{100 * level:g} % prediction interval"
-    axes.fill_between(line, *fit.prediction_interval(line, level), color=BAND, alpha=0.3, linewidth=0, label=interval)
-    axes.plot(line, fit.predict(line), color=LINE, linewidth=2, label="least-squares line")
+    colours.draw_line(axes, fit, span, level, alpha=0.3)
     sign = "+" if fit.slope >= 0 else "−"
     title = f"y = {fit.intercept:.4g} {sign} {abs(fit.slope):.4g} x,  R² = {fit.r2:.3f},  n = {fit.n}"
     title = title.replace("-", "−")
@@ -223,7 +230,7 @@ def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None =
     maps = dict(zip(found, computed(*found.values()), strict=True))
     if limits is None:
         values = np.concatenate([each.values.ravel() for each in maps.values()])
-        limits = percentile_limits(values)
+        limits = colours.percentile_limits(values)
     columns = min(len(maps), 4)
     rows = -(-len(maps) // columns)
     width = 3.0 * columns + 0.8
@@ -232,19 +239,19 @@ def plot_comparison(images: xr.DataTree, *, limits: tuple[float, float] | None =
     for axes in panels.ravel()[len(maps) :]:
         axes.set_axis_off()
     for axes, (name, array) in zip(panels.ravel(), maps.items(), strict=False):
-        axes.set_facecolor(NO_DATA)
-        drawn = _draw(axes, array, cmap=colours_of("ndvi")[0], vmin=limits[0], vmax=limits[1])
+        axes.set_facecolor(colours.NO_DATA)
+        drawn = _draw(axes, array, cmap=colours.colours_of("ndvi")[0], vmin=limits[0], vmax=limits[1])
         pixel = grids.cell_size(grids.geobox(recorded[name]))[0]
         mean, deviation = float(array.mean()), float(array.std())
         axes.set_title(f"{name}, {pixel:g} m\nmean {mean:.3f}, sd {deviation:.3f}", fontsize="medium")
     for axes in panels[:, 1:].ravel():
         axes.set_ylabel("")
-    figure.colorbar(drawn, ax=panels, shrink=0.8, label=axis_label("ndvi"), extend="both")
+    figure.colorbar(drawn, ax=panels, shrink=0.8, label=colours.axis_label("ndvi"), extend="both")
     return figure
 
 
 def _checked(raster, band):
-    """A raster that can be drawn: of several bands, or of one quantity."""
+    """Raster that can be drawn: of several bands, or of one quantity."""
     if not isinstance(raster, xr.DataArray):
         raise TypeError(f"plot draws a DataArray, got a {type(raster).__name__}: select a variable, such as run['dn']")
     if band is not None:
@@ -262,9 +269,9 @@ def _checked(raster, band):
     return raster.transpose(..., *(swaths.DIMS if "line" in raster.dims else ("y", "x")))
 
 
-def _draw(axes, array, colours=None, **style):
-    """A raster as a map with the same scale along both axes, in metres or kilometres."""
-    values = array.values if colours is None else colours
+def _draw(axes, array, rgba=None, **style):
+    """Draw a raster as a map with equal scales in metres or kilometres."""
+    values = array.values if rgba is None else rgba
     if "line" in array.dims and "x" not in array.coords:
         latitude, longitude = corners(array["latitude"].values, array["longitude"].values)
         drawn = axes.pcolormesh(longitude, latitude, values, **style)
@@ -291,27 +298,9 @@ def _length(width, height):
 
 
 def _ratio(array):
-    """Height of a map over its width."""
+    """Ratio of height to width of a map."""
     if "line" in array.dims:
         up, right = ("y", "x") if "x" in array.coords else ("latitude", "longitude")
         return float(np.ptp(array[up].values) / max(np.ptp(array[right].values), 1e-6))
     down, across = grids.cell_size(grids.geobox(array))
     return array.sizes["y"] * down / (array.sizes["x"] * across)
-
-
-def _figure_size(array):
-    width = 6.4
-    return width, float(np.clip(0.9 + 0.72 * width * _ratio(array), 2.4, 9.0))
-
-
-def _style(array, stretch, cmap, limits):
-    own, middle = colours_of(array.name)
-    if limits is None:
-        limits = percentile_limits(array, stretch, middle if cmap is None else None)
-    return {"cmap": own if cmap is None else cmap, "vmin": float(limits[0]), "vmax": float(limits[1])}
-
-
-def _extend(array, low, high):
-    """Ends of a colour bar beyond which there are values."""
-    below, above = bool((array < low).any()), bool((array > high).any())
-    return {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")

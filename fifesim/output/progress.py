@@ -1,4 +1,4 @@
-"""How far a run is: a bar on a terminal or in a notebook, lines of JSON for batch systems, else a line a minute."""
+"""Progress of a run: a bar on a terminal or in a notebook, lines of JSON for batch systems, else a line a minute."""
 
 import json
 import sys
@@ -9,44 +9,24 @@ from operator import length_hint
 
 import psutil
 from dask.utils import format_time
+from rich import progress
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    SpinnerColumn,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-    track,
-)
 
-from fifesim.base.logs import LOG, is_quiet
+from fifesim.base.messages import LOG, is_quiet
+
+_LABEL = progress.TextColumn("{task.description}")
 
 # Between two lines of JSON, and between two in words where no terminal shows a bar. [s]
 _PAUSE, _LONG_PAUSE = 1.0, 60.0
 
 
 def since_start():
-    """
-    Time since this process began, which began with imports.
-
-    Returns
-    -------
-    seconds : float
-    """
+    """Time since this process was started, imports included. [s]"""
     return time.time() - psutil.Process().create_time()
 
 
 def memory():
-    """
-    Resident memory of this process and of those that it started.
-
-    Returns
-    -------
-    memory : int
-        [byte]
-    """
+    """Resident memory of this process and its children. [byte]"""
     here = psutil.Process()
     total = 0
     for process in (here, *here.children(recursive=True)):
@@ -60,37 +40,35 @@ def memory():
 
 class CellProgress:
     """
-    Count of cells done; a context manager around the work.
+    Progress of cells, as a context manager around the work.
 
     Parameters
     ----------
     cells : int
         In all.
     done : int, optional
-        Of them from an earlier run.
+        Cells done in an earlier run.
     as_json : bool, optional
         One line of JSON a second at most, on standard output, instead of a bar on a terminal, or a line a minute on
         standard error where that is none.
     """
 
-    # What is done, the word for what is counted, and decimals of how many a second.
+    # Work and its counted units; decimals of the rate in JSON, and the text of a line with its scale.
     label, counted, decimals = "simulating", "cells", None
+    text, scale = "{done:.1f} of {cells:.1f} million cells, {rate:.1f} million/s", 1e6
 
     def __init__(self, cells, done=0, as_json=False):
         self._cells, self._before, self._done, self._as_json = cells, done, done, as_json
-        self._start, self._said = time.monotonic(), -_PAUSE
-        self._told = self._start
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TaskProgressColumn(),
-            TextColumn("{task.fields[said]}"),
-            TimeRemainingColumn(),
-            console=Console(file=sys.stderr),
-            disable=as_json or not _shows_bars(),
-            transient=True,
+        self._start, self._last_report = time.monotonic(), -_PAUSE
+        self._last_line = self._start
+        columns = (
+            _LABEL,
+            progress.BarColumn(),
+            progress.TaskProgressColumn(),
+            progress.TextColumn("{task.fields[rate]}"),
         )
-        self._task = self._bar.add_task(self.label, total=cells, completed=done, said="")
+        self._bar = _bar(*columns, progress.TimeRemainingColumn(), disable=as_json)
+        self._task = self._bar.add_task(self.label, total=cells, completed=done, rate="")
 
     def __enter__(self):
         self._bar.start()
@@ -102,43 +80,27 @@ class CellProgress:
         self._bar.stop()
 
     def advance(self, cells):
-        """
-        Say that more cells are done.
-
-        Parameters
-        ----------
-        cells : int
-        """
+        """Report that more cells are done."""
         self._done += cells
         now = time.monotonic()
-        if now - self._said < _PAUSE and self._done < self._cells:
+        if now - self._last_report < _PAUSE and self._done < self._cells:
             return
-        self._said = now
+        self._last_report = now
         if self._as_json:
             print(json.dumps(self.state()), flush=True)
         elif not self._bar.disable:
-            self._bar.update(self._task, completed=self._done, said=self._in_words(self.state()))
-        elif now - self._told >= _LONG_PAUSE and not is_quiet():
-            self._told, state = now, self.state()
+            self._bar.update(self._task, completed=self._done, rate=self._in_words(self.state()))
+        elif now - self._last_line >= _LONG_PAUSE and not is_quiet():
+            self._last_line, state = now, self.state()
             left = f", {format_time(state['seconds_left'])} left" if state["seconds_left"] else ""
             print(f"{self.label}: {self._in_words(state)}{left}", file=sys.stderr, flush=True)
 
     def _in_words(self, state):
-        rate = state[f"{self.counted}_per_second"]
-        return f"{self._counted_in_words(rate)}, {state['memory'] / 1e9:.2f} GB"
-
-    def _counted_in_words(self, rate):
-        return f"{self._done / 1e6:.1f} of {self._cells / 1e6:.1f} million cells, {rate / 1e6:.1f} million/s"
+        done, cells, rate = (state[f"{self.counted}{each}"] / self.scale for each in ("_done", "", "_per_second"))
+        return f"{self.text.format(done=done, cells=cells, rate=rate)}, {state['memory'] / 1e9:.2f} GB"
 
     def state(self):
-        """
-        Where the run is.
-
-        Returns
-        -------
-        state : dict
-            ``cells_done``, ``cells``, ``cells_per_second``, ``seconds_left`` and ``memory`` [byte].
-        """
+        """State of the progress: cells, rate, seconds left and memory [byte]."""
         elapsed = max(time.monotonic() - self._start, 1e-9)
         rate = (self._done - self._before) / elapsed
         left = (self._cells - self._done) / rate if rate else None
@@ -153,57 +115,39 @@ class CellProgress:
 
 
 class ChipProgress(CellProgress):
-    """Count of chips done, as `CellProgress` counts cells."""
+    """Progress of chips, as `CellProgress` for cells."""
 
     label, counted, decimals = "making chips", "chips", 1
-
-    def _counted_in_words(self, rate):
-        return f"{self._done} of {self._cells} chips, {rate:.1f}/s"
+    text, scale = "{done:.0f} of {cells:.0f} chips, {rate:.1f}/s", 1
 
 
 def steps(sequence, label):
-    """
-    Go through a sequence and show how far it is, on a terminal or in a notebook.
-
-    Parameters
-    ----------
-    sequence : sequence
-    label : str
-        What is being done.
-
-    Returns
-    -------
-    sequence : iterator
-    """
+    """Iterate over a sequence with a progress bar on a terminal or in a notebook."""
     total = length_hint(sequence)
     LOG.info("%s: %d", label, total)
-    console = Console(file=sys.stderr)
-    for number, each in enumerate(
-        track(sequence, label, console=console, disable=not _shows_bars(), transient=True), 1
-    ):
-        yield each
+    shown = progress.track(sequence, label, console=Console(file=sys.stderr), disable=not _shows_bars(), transient=True)
+    for number, item in enumerate(shown, 1):
+        yield item
         LOG.debug("%s: %d of %d", label, number, total)
 
 
 @contextmanager
 def doing(label):
-    """
-    A context around work of unknown length, which a terminal or a notebook shows going on.
-
-    Parameters
-    ----------
-    label : str
-        What is being done.
-    """
+    """Context with a spinner on a terminal or in a notebook, for work of unknown length."""
     LOG.info(label)
-    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
-    with Progress(*columns, console=Console(file=sys.stderr), disable=not _shows_bars(), transient=True) as bar:
+    with _bar(progress.SpinnerColumn(), _LABEL, progress.TimeElapsedColumn()) as bar:
         bar.add_task(label)
         yield
 
 
+def _bar(*columns, disable=False):
+    """Progress bar on standard error that disappears at its end."""
+    console = Console(file=sys.stderr)
+    return progress.Progress(*columns, console=console, disable=disable or not _shows_bars(), transient=True)
+
+
 def _shows_bars():
-    """Whether there is a terminal or a notebook that shows a bar; a notebook needs ipywidgets for it."""
+    """Whether a terminal or a notebook shows bars; a notebook needs ipywidgets."""
     if is_quiet():
         return False
     return sys.stderr.isatty() or (Console().is_jupyter and find_spec("ipywidgets") is not None)

@@ -1,67 +1,219 @@
-"""Pictures and the HTML page of a run."""
+"""Report of a run as one HTML page, with its maps, figures and regressions."""
 
+import base64
+import io
 from pathlib import Path
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
 
-from fifesim.analysis.rasters.pairs import matched
-from fifesim.chain.engines import TYPICAL_LAI, engine_error
-from fifesim.output import pages
-from fifesim.output.colours import percentile_limits
-from fifesim.output.composites import false_colour_names
-from fifesim.output.figures import fit_figure, histogram_figures, reflectance_change
-from fifesim.output.maps import encoded, image_map, relief_map, stretch_of, value_map
-from fifesim.output.pairing import pairing_rows
-from fifesim.output.words import axis_label, capital
-from fifesim.rasters import cf
-from fifesim.rasters import grid as grids
+from fifesim.analysis.regression_labels import matched, regress
+from fifesim.base import files
+from fifesim.chain.comparison import TYPICAL_LAI, engine_error
+from fifesim.grids import cf
+from fifesim.grids import grid as grids
+from fifesim.output.colours import axis_label, capital, draw_line, finite, percentile_limits
+from fifesim.output.folders import versions
+from fifesim.output.maps import encoded, false_colour_names, image_map, relief_map, rendered, stretch_of, value_map
+from fifesim.scenario.ensemble import realise
+from fifesim.scenario.scenario import grid_keys, summary
 from fifesim.scenario.simulation import setup_of
-from fifesim.scenario.synthetic import summary
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words, sensor_in_words
+from fifesim.sensor.labels import to_reflectance
+
+# Colours of the palette of a picture.
+_SHADES = 256
+
+
+def page_html(template, **values):
+    """Render a self-contained page from a template with values; ``versions`` is defined in all."""
+    filters = {"fixed": fixed, "plus_minus": plus_minus, "embedded": _embedded}
+    return rendered(template, filters, versions=versions(), **values)
+
+
+def png(figure, dpi):
+    """Bytes of a PNG file of a figure, reproducible, with a palette."""
+    figure.set_dpi(dpi)
+    # Unlike savefig, this lays the figure out and draws it once.
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    drawn, buffer = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]), io.BytesIO()
+    drawn.quantize(_SHADES, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(buffer, "png")
+    return buffer.getvalue()
+
+
+def fixed(value, digits=2, sign=False):
+    """Text of a number with a true minus sign; a dash if it is unknown."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    text = f"{value:{'+' if sign else ''}.{digits}f}"
+    if float(text) == 0:
+        text = text.lstrip("+-")
+    return text.replace("-", "−")
+
+
+def plus_minus(value, digits=1):
+    """Text of a standard error to follow its number."""
+    return f" ± {value:.{digits}f}" if np.isfinite(value) else ""
+
+
+def _embedded(picture):
+    """Data URL of a PNG or WebP picture."""
+    kind = "webp" if picture[8:12] == b"WEBP" else "png"
+    return f"data:image/{kind};base64," + base64.b64encode(picture).decode("ascii")
+
+
+# Cells along the edge of the part paired as in the paper, as in `fifesim reproduce`, and length of the edge. [m]
+_CELLS, _EDGE = 333, 1110.0
+# Least number of pixels along an edge for a regression to be meaningful.
+_FEWEST_PIXELS = 10
+_PAPERS_INSTRUMENT = "TM"
+
+
+def pairing_rows(scenario, fits):
+    """R2 in Table 2 of Friedl et al. (1995) for the ground of a run, and why it is lower, as two rows or none."""
+    paper, own = _paper_r2(scenario), scenario.sensor
+    if paper is None or "lai" not in fits or own.interval != "product" or own.description.name != _PAPERS_INSTRUMENT:
+        return []
+    interval = own.description.ground_intervals(own.description.select(own.bands)[0])[0]
+    why = (
+        f"{paper:.2f}, and {fits['lai'].r2:.2f} here, where pixels lie on the blocks of ground that they are compared "
+        f"with. There, as fifesim reads Table 1, they lie {interval:.3f} m apart, and drift from blocks of "
+        f"{own.size:g} m"
+    )
+    typed = f'type interval = "native" in [sensor] and width = height = {_EDGE:g} in [grid], or fifesim reproduce'
+    found = _papers_pairing(scenario)
+    if found is not None:
+        cells, r2 = found
+        typed = f"R² {r2:.2f} over {cells} x {cells} cells of this ground, level: {typed}"
+    return [("R² in Table 2 of Friedl et al. (1995), LAI", why), ("With pixels paired so", typed)]
+
+
+def _paper_r2(scenario):
+    """Published R2 of LAI for the ground of a scenario, None if there is none."""
+    ground = scenario.ground
+    if ground.lai_file or not scenario.landscape.is_one():
+        return None
+    table = files.table("friedl1995_table2.csv").set_index(["variable", "distribution", "arp"])["r2"]
+    return table.get(("lai", ground.distribution, ground.arp))
+
+
+def _papers_pairing(scenario):
+    """Cells along the edge of a part of the ground, and R2 of LAI with pixels at the native sampling interval."""
+    box = scenario.geobox()
+    cells = min(_CELLS, *box.shape)
+    if cells * max(grids.cell_size(box)) < _FEWEST_PIXELS * scenario.sensor.size:
+        return None
+    sensor = scenario.sensor.model_copy(update={"interval": "native", "offset": [0.0, 0.0]})
+    terrain = scenario.terrain.model_copy(update={"dem": "flat", "fill": None, "vertical_units": None})
+    part = {"grid": grid_keys(box[:cells, :cells]), "terrain": terrain, "sensor": sensor}
+    run = realise(scenario.model_copy(update=part))
+    truth, image = matched(run["truth"]["lai"], run["image"]["ndvi"], "index")
+    return cells, regress(truth, image, pair="index").r2
+
+
+_COLORS = ("#2166ac", "#b2182b", "#1a9850", "#762a83", "#e08214", "#35978f")
+
+# Fixed positions of axes and colour bar, because automatic layout takes longer than drawing. [1]
+_PANEL, _BESIDE = (0.15, 0.17, 0.82, 0.72), (0.88, 0.14, 0.025, 0.66)
+_PLOT = (0.125, 0.14, 0.73, 0.77)
+
+
+def fit_figure(image, truth, name, fit):
+    """Figure of truth against NDVI of the pixels, with the regression."""
+    y, x = (each.values.ravel() for each in matched(truth[name], image["ndvi"], "index"))
+    both = np.isfinite(x) & np.isfinite(y)
+    figure = Figure(figsize=(5.2, 4.1))
+    axis = figure.add_axes(_PLOT)
+    _density(axis, figure.add_axes(_BESIDE), x[both], y[both])
+    draw_line(axis, fit, (x[both].min(), x[both].max()))
+    sign = "+" if fit.slope >= 0 else "−"
+    index = cf.QUANTITIES["ndvi"].label
+    title = f"{fit.intercept:.3f} {sign} {abs(fit.slope):.3f} {index},  R² = {fit.r2:.3f},  n = {fit.n}"
+    axis.set(xlabel=f"{index} at the top of the atmosphere", ylabel=f"True {axis_label(name)}")
+    axis.set_title(title.replace("-", "−"), fontsize=10)
+    # Above all that is drawn, whichever way the line goes; not below the least that the quantity can be.
+    low, high = axis.get_ylim()
+    lowest = cf.QUANTITIES[name].lowest
+    low = low if lowest is None else max(low, lowest)
+    axis.set_ylim(low, high + 0.16 * (high - low))
+    axis.legend(frameon=False, loc="upper left", fontsize=8.5, ncols=2, columnspacing=1.2)
+    return figure
+
+
+def _density(axis, beside, x, y):
+    """Draw the density of pixels as an image; hexagons would be drawn one by one."""
+    bins = int(np.clip(np.sqrt(x.size) / 3, 25, 72))
+    count, across, up = np.histogram2d(x, y, bins=bins)
+    shown = np.log10(np.where(count > 0, count, np.nan)).T
+    extent = [across[0], across[-1], up[0], up[-1]]
+    most = max(float(np.nanmax(shown)), 0.5)
+    # Even one pixel is to be seen: the lightest colour is a grey.
+    style = {"cmap": "Greys", "vmin": -0.35 * most, "vmax": most, "aspect": "auto", "origin": "lower"}
+    drawn = axis.imshow(shown, extent=extent, interpolation="nearest", **style)
+    bar = axis.figure.colorbar(drawn, cax=beside, boundaries=np.linspace(0, most, 64))
+    ticks = np.arange(0, np.floor(most) + 1)
+    bar.set_ticks(ticks, labels=[f"{10**each:.0f}" for each in ticks])
+    bar.ax.tick_params(labelsize=8)
+    bar.ax.set_title("pixels", fontsize=8.5)
+    axis.margins(0.02)
+    axis.autoscale()
+
+
+def histogram_figures(image, truth, detail):
+    """Figures of the frequencies of leaf area index, FPAR and digital numbers."""
+    figures = [Figure(figsize=(3.6, 2.6)) for _ in range(3)]
+    leaves, fpar, counts = (figure.add_axes(_PANEL) for figure in figures)
+    top = max((float(each.max()) for each in (detail, truth["lai"]) if each.notnull().any()), default=1.0)
+    bins = np.linspace(0, max(top, 1e-6), 60)
+    for values, label, color in (
+        (detail, "cells in the middle", "#a6d96a"),
+        (truth["lai"], "means over all pixels", "#1a9850"),
+    ):
+        leaves.hist(finite(values), bins=bins, density=True, alpha=0.7, label=label, color=color, histtype="stepfilled")
+    leaves.set(xlabel=axis_label("lai"), ylabel="density", title=capital(cf.QUANTITIES["lai"].long_name))
+    leaves.set_ylim(top=1.22 * leaves.get_ylim()[1])
+    leaves.legend(frameon=False, fontsize=7.5, ncols=2, loc="upper center", columnspacing=1.0)
+    fpar.hist(finite(truth["fpar"]), bins=60, density=True, histtype="stepfilled", color="#1a9850")
+    fpar.set(xlabel=axis_label("fpar"), ylabel="density", title=f"True {cf.QUANTITIES['fpar'].label} of the pixels")
+    for number, band in enumerate(image["dn"]["band"].values):
+        values = image["dn"].sel(band=band).values
+        dn, times = np.unique(values[values > 0], return_counts=True)
+        color = _COLORS[number % len(_COLORS)]
+        counts.step(dn, times / max(times.sum(), 1), where="mid", label=str(band), color=color, linewidth=1)
+    counts.set(xlabel=axis_label("dn"), ylabel="share of pixels", title="Image")
+    counts.legend(frameon=False, fontsize=8)
+    for axis in (leaves, fpar, counts):
+        axis.title.set_size(10)
+        axis.tick_params(labelsize=8)
+    return figures
+
+
+def reflectance_change(dn, level, band):
+    """Planetary reflectance of an image minus the reflectance for level ground, dims (y, x). [1]"""
+    with_terrain, flat = (to_reflectance(each.sel(band=[band])) for each in (dn, level))
+    return (with_terrain - flat).isel(band=0)
+
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
-# Of figures, which are shown at half of it or less.
+# Resolution of figures, which pages show at half of it or less. [dots per inch]
 _DPI = 200
-# Maps show every so many pixels of an image that has more rows or columns. [pixel]
+# Rows or columns beyond which maps skip pixels of an image. [pixel]
 _MOST = 600
-# Difference of 5S from successive orders from which a reader is told to change. [1]
+# Difference of 5S from successive orders beyond which the report advises another engine. [1]
 _ENGINE_BOUND = 0.02
 
 
 def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
-    """
-    One self-contained HTML page on a run, and a picture of its image.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    image : xarray.Dataset
-        ``dn`` and perhaps ``ndvi``, lazy or in memory.
-    truth : xarray.Dataset
-        ``lai`` and ``fpar`` over the ground of the pixels.
-    detail : xarray.DataArray, dims (y, x)
-        LAI of the cells in the middle.
-    terrain : xarray.Dataset or None
-        ``dem``, ``slope`` and ``kt`` over pixels, and how far the elevation is known; None if flat.
-    level : xarray.DataArray or None
-        Digital numbers on level ground, over as many pixels; None if flat.
-    fits : mapping of str to fifesim.analysis.regression.Regression
-        Of the true means on NDVI.
-    reasons : mapping of str to str
-        Why there is none of them, by name.
-
-    Returns
-    -------
-    quicklook : bytes
-        The image without a frame, a PNG: in false colours, else its NDVI, else one band in grey.
-    html : str
-    """
+    """Quicklook PNG and self-contained HTML page of a run."""
     # Pixels and their truth are paired by row and column.
-    step = max(_step(image), _step(truth))
+    step = -(-max(rasters.sizes[axis] for rasters in (image, truth) for axis in ("y", "x")) // _MOST)
     shown, means = _thinned(image, step), _thinned(truth, step)
-    whole, *close = _seen(shown, _below(image, detail), detail)
-    figures = {name: pages.png(fit_figure(shown, means, name, fit), _DPI) for name, fit in fits.items()}
-    html = pages.html(
+    whole, *close = _seen(shown, image, detail)
+    figures = {name: png(fit_figure(shown, means, name, fit), _DPI) for name, fit in fits.items()}
+    html = page_html(
         _TEMPLATE,
         title=title(scenario),
         provenance=scenario.provenance(),
@@ -75,7 +227,7 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
         maps=_maps(shown, means, fits),
         terrain=[] if terrain is None else _terrain_maps(image, terrain, level),
         band=str(image["dn"]["band"].values[-1]),
-        histograms=[pages.png(figure, _DPI) for figure in histogram_figures(shown, means, detail)],
+        histograms=[png(figure, _DPI) for figure in histogram_figures(shown, means, detail)],
         fits=[(_label(name), fit, figures[name]) for name, fit in fits.items()],
         parameters=_parameters(scenario),
         history=image["dn"].attrs.get("history", "").splitlines(),
@@ -84,20 +236,7 @@ def run_page(scenario, image, truth, detail, terrain, level, fits, reasons):
 
 
 def finding(truth, fits, reasons):
-    """
-    What a run shows, in a sentence or two.
-
-    Parameters
-    ----------
-    truth : xarray.Dataset
-    fits : mapping of str to fifesim.analysis.regression.Regression
-    reasons : mapping of str to str
-        Why there is none of them, by name.
-
-    Returns
-    -------
-    text : str
-    """
+    """Result of a run in one or two sentences."""
     if not fits:
         why = "; ".join(dict.fromkeys(reasons.values()))
         return f"No line was fitted: {why}" if why else "The bands make no NDVI, so that no line was fitted."
@@ -110,18 +249,7 @@ def finding(truth, fits, reasons):
 
 
 def pairing(scenario, image, truth):
-    """
-    Which pixel is compared with which ground, in words.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    image, truth : xarray.Dataset
-
-    Returns
-    -------
-    text : str
-    """
+    """Sentence about the ground with which each pixel is compared."""
     block, cell = grids.cell_size(grids.geobox(truth["lai"]))[1], grids.cell_size(scenario.geobox())[1]
     pairs = ((image[axis].values, truth[axis].values) for axis in ("y", "x"))
     apart = [np.abs(np.subtract(*(each[: min(map(len, pair))] for each in pair))).max() for pair in pairs]
@@ -139,9 +267,10 @@ def pairing(scenario, image, truth):
     return text + "."
 
 
-def _seen(shown, part, detail):
-    """The whole image; the cells in its middle, and the pixels over them."""
+def _seen(shown, image, detail):
+    """Maps of the whole image, of the cells in its middle, and of the pixels over them."""
     box = grids.geobox(detail).boundingbox
+    part = image.sel(x=slice(box.left, box.right), y=slice(box.top, box.bottom)).compute()
     cell, pixel = (grids.cell_size(grids.geobox(each))[1] for each in (detail, part["dn"]))
     high = max(percentile_limits(detail)[1], 1e-6)
     cells = value_map(detail, f"{_label('lai')} in cells of {cell:.2f} m", limits=(0.0, high))
@@ -150,21 +279,21 @@ def _seen(shown, part, detail):
     if not names and "ndvi" in shown:
         limits = percentile_limits(shown["ndvi"])
         whole, pixels = (
-            value_map(each["ndvi"], f"{said}: {_label('ndvi')}", limits=limits, frame=frame)
-            for each, said, frame in zip((shown, part), titles, (box, None), strict=True)
+            value_map(pixels["ndvi"], f"{title}: {_label('ndvi')}", limits=limits, frame=frame)
+            for pixels, title, frame in zip((shown, part), titles, (box, None), strict=True)
         )
         return whole, cells, pixels
     stretch = stretch_of(shown["dn"])
-    said = "" if names else f": {stretch[0][0]}"
-    return (
-        image_map(shown["dn"], titles[0] + said, stretch, box),
-        cells,
-        image_map(part["dn"], titles[1] + said, stretch),
+    band = "" if names else f": {stretch[0][0]}"
+    whole, pixels = (
+        image_map(shown["dn"], titles[0] + band, stretch, box),
+        image_map(part["dn"], titles[1] + band, stretch),
     )
+    return whole, cells, pixels
 
 
 def _maps(shown, means, fits):
-    """True leaf area index, NDVI, and what a line on it makes of the ground."""
+    """Maps of true leaf area index, NDVI, and the estimate by a line."""
     maps = [value_map(means["lai"], f"True {_label('lai')}")]
     if "ndvi" not in shown:
         return [*maps, value_map(means["fpar"], f"True {_label('fpar')}")]
@@ -178,7 +307,7 @@ def _maps(shown, means, fits):
 
 
 def _terrain_maps(image, terrain, level):
-    """Elevation, slope, Kt, and the image less that of level ground."""
+    """Maps of elevation, slope, Kt, and the difference of the image from level ground."""
     band = str(image["dn"]["band"].values[-1])
     dn = image["dn"].sel(y=level["y"], x=level["x"]).compute()
     change = reflectance_change(dn, level, band)
@@ -191,22 +320,7 @@ def _terrain_maps(image, terrain, level):
 
 
 def engine_rows(scenario):
-    """
-    What the closed forms cost a run, beside successive orders.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    rows : list of (str, str)
-        One, that names the bands beyond 2 %; none where another engine is used.
-
-    See Also
-    --------
-    fifesim.chain.engines.engine_error
-    """
+    """Row on the error of 5S against successive orders, naming bands beyond 2 %; none for other engines."""
     if scenario.atmosphere.engine != "5S":
         return []
     error = engine_error(setup_of(scenario))
@@ -217,17 +331,7 @@ def engine_rows(scenario):
 
 
 def title(scenario):
-    """
-    Title of a run or a budget: ground, instrument and synthetic parts.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    title : str
-    """
+    """Title of a run or a budget: ground, instrument and synthetic parts."""
     ground = scenario.ground
     scene = Path(ground.lai_file).name if ground.lai_file else f"{ground.distribution}, arp {ground.arp:g}"
     if scenario.landscape.cover != "none":
@@ -240,24 +344,19 @@ def _label(name):
     return cf.QUANTITIES[name].label
 
 
-def _step(rasters):
-    return -(-max(rasters.sizes[axis] for axis in ("y", "x")) // _MOST)
-
-
 def _thinned(rasters, step):
-    """Every so many pixels, in memory: a picture shows no more, and numbers in text are of all of them."""
+    """Every n-th pixel in memory, for pictures only; numbers in the text use all pixels."""
     return rasters.isel({axis: slice(step // 2, None, step) for axis in ("y", "x")}).compute()
 
 
 def _summary(scenario, image, truth, fits, reasons):
-    """Rows of a small table: what a reader wants to know first."""
-    grid, pixels = scenario.grid, image["dn"]
+    """Rows of a small table with the main facts of a run."""
+    grid, own, pixels = scenario.grid, scenario.sensor, image["dn"]
     valid = float((pixels != 0).all("band").mean())
     size = f"{pixels.sizes['y']} x {pixels.sizes['x']}"
-    own = scenario.sensor
     rows = [
         ("Scene", f"{grid.width / 1000:g} km x {grid.height / 1000:g} km in cells of {grid.cell:.3g} m, {grid.crs}"),
-        ("Image", f"{size} pixels of {scenario.sensor.pixel:g} m, {100 * valid:.1f} % of them with data"),
+        ("Image", f"{size} pixels of {own.pixel:g} m, {100 * valid:.1f} % of them with data"),
         ("Sensor", sensor_in_words(own.description, own.bands)),
         ("Blur", blur_in_words(own.description, own.bands)),
         ("Noise", noise_in_words(own.description, own.bands, own.noise)),
@@ -265,14 +364,14 @@ def _summary(scenario, image, truth, fits, reasons):
     ]
     for name, values in [*truth.data_vars.items(), *([("ndvi", image["ndvi"])] if "ndvi" in image else [])]:
         label = f"{capital(_label(name))} of the pixels"
-        mean, deviation = (pages.fixed(float(each), 3) for each in (values.mean(), values.std()))
+        mean, deviation = (fixed(float(each), 3) for each in (values.mean(), values.std()))
         rows.append((label, f"mean {mean}, standard deviation {deviation}"))
     found = {name: f"{fit.r2:.3f}" for name, fit in fits.items()} | {name: f"none, {reasons[name]}" for name in reasons}
     return rows + [(f"R² of {_label(name)} on NDVI", text) for name, text in found.items()]
 
 
 def _ground(terrain):
-    """Rows on the elevation."""
+    """Table rows on the elevation."""
     if terrain is None:
         return [("Ground", "flat")]
     dem, kt = terrain["dem"], terrain["kt"]
@@ -289,7 +388,7 @@ def _parameters(scenario):
     sections = []
     for place, section in scenario.sections().items():
         rows = []
-        for key, known in section.said.items():
+        for key, known in section.written.items():
             value, unit = getattr(section, key), section.unit(key)
             if isinstance(value, dict):
                 value = ", ".join(f"{band} {number:g}" for band, number in value.items())
@@ -304,9 +403,3 @@ def _parameters(scenario):
             rows.append((key, "not given" if value is None else value, unit, known.description))
         sections.append((".".join(place), rows))
     return sections
-
-
-def _below(image, detail):
-    """The pixels of some cells, in memory."""
-    box = grids.geobox(detail).boundingbox
-    return image.sel(x=slice(box.left, box.right), y=slice(box.top, box.bottom)).compute()

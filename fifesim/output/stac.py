@@ -1,4 +1,4 @@
-"""Results as STAC: an item says what lies in a folder, where and when, a collection what several items share."""
+"""STAC metadata: an item describes a folder of results in space and time, a collection several items."""
 
 import hashlib
 import json
@@ -9,10 +9,10 @@ import pyproj
 import rasterio
 
 from fifesim.base.bands import COMMON_NAMES
-from fifesim.output.provenance import versions
-from fifesim.rasters import cf
-from fifesim.rasters.geozarr import crs_fields
-from fifesim.rasters.tags import read_tag
+from fifesim.grids import cf
+from fifesim.grids.grid import crs_fields
+from fifesim.grids.tags import read_tag
+from fifesim.output.folders import versions
 from fifesim.scenario.toml import write_scenario
 
 VERSION = "1.1.0"
@@ -24,7 +24,7 @@ _EXTENSIONS = [
 ]
 _COG = "image/tiff; application=geotiff; profile=cloud-optimized"
 
-# What a folder may hold, in the order of the item: key, title, media type and roles by file.
+# Files of a folder in the order of the item: key, title, media type and roles.
 _ASSETS = {
     "image.tif": ("image", "What the instrument records, digital numbers", _COG, ["data"]),
     "truth.tif": ("truth", "True means of the ground below the pixels", _COG, ["data"]),
@@ -35,44 +35,25 @@ _ASSETS = {
     "scenario.toml": ("scenario", "All that the run needs to be made again", "application/toml", ["metadata"]),
 }
 
-# Fields of a band that the extension for electro-optical bands has too.
+# Fields of a band that are also part of the extension for electro-optical bands.
 _EO_FIELDS = ("name", "description", "eo:common_name", "eo:center_wavelength", "eo:solar_illumination")
 
-# Names of the same bands that STAC has not.
+# Common aliases of bands that STAC does not define.
 _ALIASES = {"rededge1", "rededge2", "rededge3", "swir1", "swir2"}
 
-# Where a scenario names no date: STAC asks for one, or for a range.
+# Range for a scenario without a date, because STAC requires a date or a range.
 _ANY_TIME = ("1900-01-01T00:00:00Z", "2100-01-01T00:00:00Z")
 
-# Mean radius of the Earth, as spherical trigonometry has it. [m]
+# Mean radius of the Earth. [m]
 _EARTH = 6_371_000.0
 
-# Of an edge of a footprint, which is straight on the map and bent in degrees.
+# Points along an edge of a footprint, which is straight on the map and curved in degrees.
 _POINTS = 5
 
 
 def item(scenario, folder, title):
-    """
-    STAC item of the folder of a simulated scenario.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-        Complete.
-    folder : str or path
-        That holds ``image.tif``, and perhaps truth, scene, pictures and scenario by their usual names.
-    title : str
-
-    Returns
-    -------
-    item : dict
-        That JSON holds, of STAC 1.1.0 with its extensions for projection, electro-optical bands, rasters, view and
-        processing. Paths are relative to the folder. The same scenario gives the same item.
-
-    Notes
-    -----
-    A scenario without a date has ``datetime`` null, and a range that says nothing.
-    """
+    """STAC 1.1.0 item of the folder of a simulated scenario, with paths relative to the folder."""
+    # A scenario without a date has a null datetime, and an uninformative range.
     folder = Path(folder)
     found = {name: about for name, about in _ASSETS.items() if (folder / name).exists()}
     assets = {about[0]: _asset(folder / name, *about[1:]) for name, about in found.items()}
@@ -94,30 +75,7 @@ def item(scenario, folder, title):
 
 
 def collection(identifier, description, items, *, license="other"):
-    """
-    STAC collection of items.
-
-    Parameters
-    ----------
-    identifier, description : str
-    items : mapping of str to dict
-        Items by their paths, relative to the collection, such as ``"a/item.json"``.
-    license : str, optional
-        SPDX identifier, or ``"other"``.
-
-    Returns
-    -------
-    collection : dict
-    items : dict of str to dict
-        The items with links to the collection, ``collection.json``, by their paths.
-
-    Examples
-    --------
-    >>> one = {"id": "a", "bbox": [0.0, 1.0, 2.0, 3.0], "properties": {"datetime": "2022-06-01T10:00:00Z"}}
-    >>> whole, linked = collection("trial", "Two scenes.", {"a/item.json": one})
-    >>> whole["extent"]["spatial"]["bbox"], linked["a/item.json"]["links"][0]["href"]
-    ([[0.0, 1.0, 2.0, 3.0]], '../collection.json')
-    """
+    """STAC collection, and its items with links to it, by path."""
     boxes = np.array([each["bbox"] for each in items.values()])
     whole = [*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist()]
     starts, ends = zip(*(_times(each["properties"]) for each in items.values()), strict=True)
@@ -140,30 +98,14 @@ def collection(identifier, description, items, *, license="other"):
 
 
 def write_collection(folder, identifier, description, items, *, license="other"):
-    """
-    Write a collection, ``collection.json``, and its items.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Of the collection; those of the items are there.
-    identifier, description, items, license
-        As in `collection`.
-    """
+    """Write a collection, ``collection.json``, and its items."""
     found, linked = collection(identifier, description, items, license=license)
     for path, each in {"collection.json": found, **linked}.items():
-        write(each, folder / path)
+        write_stac(each, folder / path)
 
 
-def write(thing, path):
-    """
-    Write an item or a collection.
-
-    Parameters
-    ----------
-    thing : dict
-    path : pathlib.Path
-    """
+def write_stac(thing, path):
+    """Write a STAC item or collection as JSON."""
     path.write_text(json.dumps(thing, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
@@ -172,7 +114,7 @@ def _link(relation, href, kind="application/json"):
 
 
 def _times(properties):
-    """First and last time of an item; text in this form sorts as time does."""
+    """First and last time of an item, as text that sorts by time."""
     if properties["datetime"]:
         return properties["datetime"], properties["datetime"]
     return properties["start_datetime"], properties["end_datetime"]
@@ -183,7 +125,9 @@ def _properties(scenario):
     view = {"view:sun_azimuth": directions.saa, "view:sun_elevation": 90 - directions.sza}
     # fifesim's azimuth points from the ground to the sensor, STAC's from below the sensor to the scene.
     view |= {"view:incidence_angle": directions.vza, "view:azimuth": (directions.vaa + 180) % 360}
-    view["view:off_nadir"] = _off_nadir(directions.vza, own.description.altitude)
+    # Angle at the sensor between nadir and the pixel, over a spherical Earth.
+    ratio = _EARTH / (_EARTH + own.description.altitude)
+    view["view:off_nadir"] = np.degrees(np.arcsin(ratio * np.sin(np.radians(directions.vza))))
     when = {"datetime": time}
     if time is None:
         when |= dict(zip(("start_datetime", "end_datetime"), _ANY_TIME, strict=True))
@@ -195,11 +139,6 @@ def _properties(scenario):
         "processing:software": versions(),
         "processing:lineage": "Simulated by fifesim; the asset scenario holds every number that it took.",
     }
-
-
-def _off_nadir(vza, altitude):
-    """Angle at the sensor between nadir and the pixel, over a spherical Earth. [degree]"""
-    return np.degrees(np.arcsin(_EARTH / (_EARTH + altitude) * np.sin(np.radians(vza))))
 
 
 def _footprint(source):
@@ -214,7 +153,7 @@ def _footprint(source):
 
 
 def _crs(source):
-    """The CRS of a file; one without a code says so."""
+    """CRS of a file, with a null code if it has none."""
     return {"proj:code": None} | crs_fields(source.crs.to_wkt())
 
 
@@ -242,7 +181,7 @@ def _asset(path, title, kind, roles):
 
 
 def _band(source, number, coords):
-    """A band of a file, as its own metadata have it."""
+    """Band of a file, from its metadata."""
     name, nodata, unit = source.descriptions[number - 1], source.nodata, source.units[number - 1]
     band = {"name": name, "data_type": source.dtypes[number - 1]}
     if name in cf.QUANTITIES:

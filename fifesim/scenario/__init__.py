@@ -1,1 +1,1 @@
-"""Scenarios: every number of a run with its unit, and what it simulates."""
+"""Scenarios: every number of a run with its unit, and its simulation."""

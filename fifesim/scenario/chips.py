@@ -1,23 +1,52 @@
-"""The chips of a study: which landscape each lies in and where, and what is drawn for it."""
+"""Chips of a study: the landscape and window of each, and the values drawn for it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from fifesim.base.seeds import generator
-from fifesim.ground.landscape.field import TILE
-from fifesim.rasters import grid as grids
-from fifesim.scenario.chip_places import place_of
-from fifesim.scenario.named_keys import NamedKey, in_text
-from fifesim.scenario.sequences import points
+from fifesim.base.lattice import generator
+from fifesim.grids import grid as grids
+from fifesim.ground.landscape.autoregression import FIELD_TILE
+from fifesim.scenario.distributions import points
+from fifesim.scenario.scenario import NamedKey, in_text
 from fifesim.scenario.simulation import setup_of, with_margin
 from fifesim.scenario.studies import Study
 
-# Streams of random numbers, as `fifesim.base.seeds` lists them.
+
+def first_cell_of_chip(number, size, corner, tile, margin=(0, 0)):
+    """First row and column on the lattice of a chip of a landscape."""
+    # Chips fill one tile of the lattice after the other, in squares around the tile of the corner, without overlap. A
+    # tile also holds the margin around its chips, so that no chip needs two.
+    fitting = [max(tile - 2 * around, 0) // length for length, around in zip(size, margin, strict=True)]
+    if not all(fitting):
+        down, across = ring_place(number)
+        return corner[0] + down * size[0], corner[1] + across * size[1]
+    at, inside = divmod(number, math.prod(fitting))
+    down, across = ring_place(at)
+    row, column = divmod(inside, fitting[1])
+    return (
+        (corner[0] // tile + down) * tile + margin[0] + row * size[0],
+        (corner[1] // tile + across) * tile + margin[1] + column * size[1],
+    )
+
+
+def ring_place(number):
+    """Row and column of a number on a square spiral."""
+    if not number:
+        return 0, 0
+    ring = (math.isqrt(number) + 1) // 2
+    side, step = divmod(number - (2 * ring - 1) ** 2, 2 * ring)
+    # Up the right side first, then leftward, down and rightward.
+    along = step - ring + 1
+    return [(-along, ring), (-ring, -along), (along, -ring), (ring, along)][side]
+
+
+# Streams of random numbers, as `fifesim.base.lattice` lists them.
 _OF_CHIPS, _OF_LANDSCAPES, _ORDER, _SPLIT = 3, 4, 5, 6
 
 
@@ -32,11 +61,11 @@ class Chips:
     landscape : array of int, shape (n,)
         Number of the landscape of each.
     split : array of str, shape (n,)
-        Which part of the dataset it belongs to: that of its landscape.
+        Part of the dataset, which is the one of its landscape.
     corners : array, shape (n, 2)
         Easting and northing of the upper left corner. [m]
     columns : mapping of NamedKey to list
-        What is drawn, by chip.
+        Drawn values, by chip.
     """
 
     study: Study
@@ -49,23 +78,7 @@ class Chips:
         return len(self.landscape)
 
     def scenario(self, chip):
-        """
-        Scenario of one chip.
-
-        Parameters
-        ----------
-        chip : int
-
-        Returns
-        -------
-        scenario : fifesim.scenario.scenario.Scenario
-            ``fifesim.simulate(scenario, complete=True)`` gives the chip.
-
-        Raises
-        ------
-        ValueError
-            If what is drawn cannot be together, or the chip lies where its CRS does not hold.
-        """
+        """Scenario of one chip."""
         drawn = {key.path: column[chip] for key, column in self.columns.items()}
         west, north = self.corners[chip].tolist()
         drawn |= {("grid", "west"): west, ("grid", "north"): north}
@@ -75,15 +88,7 @@ class Chips:
             raise ValueError(f"chip {chip}: {error}") from None
 
     def table(self):
-        """
-        What is drawn, and where chips lie.
-
-        Returns
-        -------
-        table : xarray.Dataset, dims (chip,)
-            By the whole name of a key what is drawn, with its unit; ``landscape``, ``split``, ``west`` and ``north``
-            [m]. Values that are lists stand as text.
-        """
+        """Drawn values and places of the chips, dims (chip,), by full key name."""
         variables = {
             "landscape": (self.landscape, {"long_name": "number of the landscape, which chips of one split share"}),
             "split": (self.split, {"long_name": "part of the dataset"}),
@@ -111,7 +116,7 @@ def chips_of(study: Study, n: int) -> Chips:
     Returns
     -------
     chips : Chips
-        The first are the same however many there are, unless they are drawn from a Latin hypercube.
+        The first are the same however many there are.
 
     Raises
     ------
@@ -125,7 +130,7 @@ def chips_of(study: Study, n: int) -> Chips:
 
     References
     ----------
-    [Sobol1967]_, scrambled after [Matousek1998]_; [McKay1979]_
+    [Sobol1967]_, scrambled after [Matousek1998]_
 
     Examples
     --------
@@ -162,14 +167,14 @@ def _corners(study, rounds):
     grid = study.scenario.geobox()
     here, (down, across) = np.array(grids.lattice_position(grid)), grids.cell_size(grid)
     _, _, inside = with_margin(study.scenario, setup_of(study.scenario))
-    tiling = tuple(grid.shape), tuple(here.tolist()), TILE, tuple(each.start for each in inside.values())
-    places = [place_of(number, *tiling) for number in range(rounds)]
+    tiling = tuple(grid.shape), tuple(here.tolist()), FIELD_TILE, tuple(each.start for each in inside.values())
+    places = [first_cell_of_chip(number, *tiling) for number in range(rounds)]
     rows, columns = (np.array(places) - here).T
     return np.stack([grid.affine.c + across * columns, grid.affine.f - down * rows], axis=1)
 
 
 def _drawn(study, count, landscape):
-    """Values of the keys that are drawn, by landscape or by chip."""
+    """Values of the drawn keys, by landscape or by chip."""
     shared = {key: distribution for key, distribution in study.drawn.items() if is_of_a_landscape(key)}
     own = {key: distribution for key, distribution in study.drawn.items() if key not in shared}
     found = {}
@@ -181,22 +186,12 @@ def _drawn(study, count, landscape):
 
 
 def is_of_a_landscape(key):
-    """
-    Whether a key is drawn for each landscape: it makes the random field itself, whose tiles are shared by chips.
-
-    Parameters
-    ----------
-    key : fifesim.scenario.named_keys.NamedKey
-
-    Returns
-    -------
-    answer : bool
-    """
+    """Whether a key is drawn for each landscape, because it determines the random field whose tiles chips share."""
     return key.key in ("arp", "arps") or (key.key == "seed" and key.place != ("sensor",))
 
 
 def _seeds(study, count, landscape):
-    """Seeds of landscapes, of hills where they are synthetic, and of noise where there is some."""
+    """Seeds of landscapes, of synthetic hills and of noise, as far as needed."""
     scenario = study.scenario
     found = {NamedKey(("ground",), "seed"): [scenario.ground.seed + int(at) for at in landscape]}
     if scenario.terrain.dem == "flint-hills":

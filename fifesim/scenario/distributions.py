@@ -1,16 +1,60 @@
-"""Distributions that a key of a scenario is drawn from, as a table of TOML says them."""
+"""Distributions and space-filling sequences from which the keys of a scenario are drawn."""
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
+from scipy.stats import qmc
 
-from fifesim.base.foreign import in_a_line, shown
-from fifesim.base.spelling import nearest
+from fifesim.base.files import in_a_line, shown
+from fifesim.base.messages import nearest
 
-# What each kind is given, in words, and what stands beside it.
+
+def points(sequence, seed, stream, count, dimensions):
+    """
+    Points in the unit cube.
+
+    Parameters
+    ----------
+    sequence : {"sobol", "random"}
+        The first points are the same however many there are.
+    seed, stream : int
+        Seed, and number of the sequence.
+    count, dimensions : int
+
+    Returns
+    -------
+    points : array, shape (count, dimensions)
+        In [0, 1). [1]
+
+    References
+    ----------
+    [Sobol1967]_ with the scrambling of [Matousek1998]_
+
+    Examples
+    --------
+    >>> some, more = (points("sobol", 7, 3, count, 2) for count in (5, 12))
+    >>> bool((some == more[:5]).all())
+    True
+    """
+    if not count or not dimensions:
+        return np.empty((count, dimensions))
+    random = np.random.default_rng((seed, stream))
+    if sequence == "random":
+        return random.random((count, dimensions))
+    with warnings.catch_warnings():
+        # A training set has as many chips as its user wants, not a power of two.
+        warnings.filterwarnings("ignore", "The balance properties of Sobol")
+        return qmc.Sobol(dimensions, scramble=True, seed=random).random(count)
+
+
+SEQUENCES = ("sobol", "random")
+"""Names of the sequences of points."""
+
+# Values of each kind of distribution in words, and the second key of its table.
 _KINDS = {
     "uniform": "[low, high]",
     "log-uniform": "[low, high], both above 0",
@@ -23,7 +67,7 @@ _BESIDE = {"normal": "within", "choice": "weights"}
 
 @dataclass(frozen=True)
 class Distribution:
-    """What a key of a scenario is drawn from; from `distribution_of`."""
+    """Distribution from which a key of a scenario is drawn; from `distribution_of`."""
 
     kind: str
     values: tuple
@@ -31,28 +75,8 @@ class Distribution:
     weights: tuple = ()
 
     def quantile(self, share):
-        """
-        Value below which a share of all draws lies.
-
-        Parameters
-        ----------
-        share : array, shape (n,)
-            In [0, 1). [1]
-
-        Returns
-        -------
-        values : list of float, int or object
-            Numbers in the unit of the key.
-
-        Notes
-        -----
-        The inverse of the distribution function, so that evenly spaced shares are evenly spaced draws.
-
-        Examples
-        --------
-        >>> Distribution("log-uniform", (5.0, 45.0)).quantile(np.array([0.0, 0.5]))
-        [5.0, 15.0]
-        """
+        """Values at shares of the distribution, in the unit of the key, shape (n,)."""
+        # The inverse of the distribution function, so that evenly spaced shares give evenly spaced draws.
         share = np.asarray(share, float)
         if self.kind == "choice":
             edges = np.cumsum(self.weights or np.ones(len(self.values)))
@@ -73,17 +97,17 @@ class Distribution:
 
     @property
     def usual(self):
-        """The median, or the first choice."""
+        """Median, or the first choice."""
         return self.values[0] if self.kind == "choice" else self.quantile([0.5])[0]
 
     @property
     def extremes(self):
-        """What may be refused: both ends, or all that there is to choose, a list."""
+        """Extreme values for checks: both ends, or all choices."""
         return list(self.values) if self.kind == "choice" else list(self.within or self.values)
 
     @property
     def in_words(self):
-        """Kind and numbers as a table of them has it, a str."""
+        """Text of kind and numbers."""
         listed = ", ".join(map(_plain, self.values))
         if self.kind == "normal":
             return f"normal, mean and deviation {listed}, within {_plain(self.within[0])} to {_plain(self.within[1])}"
@@ -95,32 +119,13 @@ class Distribution:
 
     @property
     def table(self):
-        """As TOML has it, a dict."""
+        """TOML table of the distribution."""
         beside = {name: list(found) for name in _BESIDE.values() if (found := getattr(self, name))}
         return {self.kind: list(self.values)} | beside
 
 
-def distribution_of(table, convert=lambda value: value):
-    """
-    Distribution of a table.
-
-    Parameters
-    ----------
-    table : mapping
-        One of ``{"uniform": [5, 45]}``, ``{"log-uniform": [5, 45]}``, ``{"normal": [0.2, 0.1], "within": [0, 1]}``,
-        ``{"choice": ["TM3", "TM4"], "weights": [1, 2]}`` and ``{"integers": [1, 6]}``, of which 6 is one.
-    convert : callable, optional
-        Makes a value of the key of what the table says, such as 45.0 of "45 km".
-
-    Returns
-    -------
-    distribution : Distribution
-
-    Raises
-    ------
-    ValueError
-        If it is no distribution.
-    """
+def distribution_of(table, convert=None):
+    """Distribution of a TOML table."""
     if not isinstance(table, Mapping):
         raise ValueError(f"a distribution is a table such as {{ uniform = [5, 45] }}, got {shown(table)}")
     kinds = [name for name in table if name in _KINDS]
@@ -151,15 +156,12 @@ def distribution_of(table, convert=lambda value: value):
 
 
 def _listed(name, values, convert):
-    """Values of a list, of which all but choices are two numbers."""
-    if not isinstance(values, list | tuple | np.ndarray) or not len(values):
+    """Values of a list, which are two numbers except for choices."""
+    is_list = isinstance(values, list | tuple | np.ndarray) and len(values) > 0
+    found = tuple(map(convert, values) if convert else values) if is_list else ()
+    if not found or (name != "choice" and not (len(found) == 2 and all(map(_is_number, found)))):
         raise ValueError(f"{name} = {shown(values)} must be {_KINDS.get(name, '[low, high]')}")
-    found = tuple(convert(value) for value in values)
-    if name == "choice":
-        return found
-    if len(found) != 2 or not all(_is_number(value) for value in found):
-        raise ValueError(f"{name} = {shown(values)} must be {_KINDS.get(name, '[low, high]')}")
-    return found if name == "integers" else tuple(map(float, found))
+    return found if name in ("choice", "integers") else tuple(map(float, found))
 
 
 def _range(kind, values):

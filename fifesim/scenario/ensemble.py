@@ -1,110 +1,59 @@
 """Many realisations of scenarios in memory: small scenes as arrays, without labels and graphs for each."""
 
-from dataclasses import replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import dask
 import numpy as np
 import xarray as xr
+from odc.geo.geobox import GeoBox
 
-from fifesim.chain.arrays import ArrayChain
-from fifesim.chain.kernels import Kernels, labelled_only
+from fifesim.base.caches import cached
+from fifesim.chain.driver import Driver, cell_block_means, varying_parts
 from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, reflectance_of
-from fifesim.ground.landscape.raster import scene_cells
-from fifesim.ground.terrain.rasters.dem import beside_altitude
-from fifesim.ground.terrain.rasters.lit_slopes import light_on_slopes
-from fifesim.rasters import cf, directions
-from fifesim.rasters import grid as grids
-from fifesim.scenario.ground import fpar_kinds, ground_scene, truth_of
-from fifesim.scenario.land import elevation, in_memory, light_on_hills
+from fifesim.grids import cf, directions
+from fifesim.grids import grid as grids
+from fifesim.grids.grid import as_carried
+from fifesim.ground.landscape.lai_labels import scene_cells
+from fifesim.ground.terrain.labels import light_on_slopes
+from fifesim.ground.terrain.source_labels import beside_altitude
+from fifesim.scenario.ground import elevation, fpar_kinds, ground_scene, in_memory, scenario_light_on_hills, truth_of
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of, simulate, with_margin
-from fifesim.sensor.description.rasters.carried import attributes_of
-
-# Of a run, what a regression takes.
-KEPT = ("image", "truth")
+from fifesim.sensor.instrument_labels import attributes_of
 
 # Light of an image, by the names of its coordinates.
 LIGHT = ("sza", "saa", "vza", "vaa", "earth_sun_distance")
 
-# Larger scenes go by chunks. [cell]
+# Larger scenes are computed by chunks. [cell]
 _LARGEST = 4_000_000
 
 
-def realise(scenario, keep=KEPT, *, complete=False):
-    """
-    Nodes of a scenario's run, in memory.
-
-    Scenes of the same grid, air, canopy or instrument share what is made of it, and scenes of the same seed and arp the
-    tiles of their field: let them follow each other.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    keep : sequence of str, optional
-        Among ``scene``, ``image``, ``truth``, ``terrain`` and ``level``; the others are not computed.
-    complete : bool, optional
-        As in `fifesim.simulate`.
-
-    Returns
-    -------
-    nodes : dict of str to xarray.Dataset
-        With the bits and the coordinates of `fifesim.simulate`. Image and truth come without the history of how they
-        were made.
-
-    Raises
-    ------
-    ValueError
-        If the run has no such node, or the scenario asks for what cannot be.
-
-    See Also
-    --------
-    fifesim.chain.arrays.ArrayChain
-    """
+def realise(scenario, *, complete=False):
+    """Image and truth of a scenario in memory, with the bits and coordinates of `fifesim.simulate`."""
+    # Scenes of the same grid, air, canopy or instrument share intermediate results, and scenes of the same seed and arp
+    # the tiles of their field: let them follow each other.
     if not isinstance(scenario, Scenario):
         raise TypeError(f"realise takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     grid, setup = scenario.geobox(), setup_of(scenario)
-    if _is_small(grid) and set(keep) <= set(KEPT) and not labelled_only(setup):
-        return _of_arrays(scenario, grid, setup, keep, complete)
+    if _is_small(grid) and not varying_parts(setup):
+        scene = _scene(scenario, grid, setup, complete)
+        return {"image": _labelled_image(scene), "truth": _labelled_truth(scenario, scene)}
     run = simulate(scenario, chunks=None if _is_small(grid) else "auto", complete=complete)
-    missing = [name for name in keep if name not in run.children]
-    if missing:
-        raise ValueError(f"keep names {', '.join(missing)}, and this run has {', '.join(run.children)}")
-    return {name: run[name].to_dataset().compute(scheduler="synchronous") for name in keep}
+    return {name: run[name].to_dataset().compute(scheduler="synchronous") for name in ("image", "truth")}
 
 
 def realise_arrays(scenario, *, complete=False):
-    """
-    Image and truth of a scenario's run as arrays; for many small scenes, labels would take longer than the simulation.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    complete : bool, optional
-        As in `fifesim.simulate`.
-
-    Returns
-    -------
-    image : dict of str to array
-        ``dn``, ``ndvi`` where there are the bands for one, and numbers, or arrays, of `LIGHT`.
-    truth : dict of str to array
-        The bits of `realise` in both.
-
-    Raises
-    ------
-    ValueError
-        If the scenario asks for what cannot be.
-    """
+    """Image and truth of a run as arrays, for small scenes whose labels would take longer than the simulation."""
     grid, setup = scenario.geobox(), setup_of(scenario)
-    if not _is_small(grid) or labelled_only(setup):
+    if not _is_small(grid) or varying_parts(setup):
         image, truth = realise(scenario, complete=complete).values()
         return _values(image) | {name: image[name].values for name in LIGHT}, _values(truth)
-    chain, blocks, land, reflectance = _scene(scenario, grid, setup, True, complete)
-    truth = _truth(scenario, blocks, land)
+    scene = _scene(scenario, grid, setup, complete)
+    truth = _truth(scenario, scene)
     light = {name: getattr(setup.geometry, name) for name in LIGHT}
-    return _image(chain, reflectance) | light, truth if isinstance(truth, dict) else _values(truth)
+    return _image(scene) | light, truth if isinstance(truth, dict) else _values(truth)
 
 
 def _values(dataset):
@@ -115,123 +64,116 @@ def _is_small(grid):
     return grid.shape.x * grid.shape.y <= _LARGEST
 
 
-def _of_arrays(scenario, grid, setup, keep, complete):
-    """Image and truth by the kernels alone, with the labels that they have."""
-    chain, blocks, land, reflectance = _scene(scenario, grid, setup, "image" in keep, complete)
-    made = {}
-    if "image" in keep:
-        made["image"] = _labelled_image(chain, _image(chain, reflectance))
-    if "truth" in keep:
-        made["truth"] = _labelled_truth(scenario, blocks, _truth(scenario, blocks, land))
-    return made
+class _Scene(NamedTuple):
+    """Land and reflectance of a scenario in memory: of one stand as arrays, else the land as a dataset."""
+
+    driver: Driver
+    setup: Setup
+    grid: GeoBox
+    """Cells of the scene, without a margin."""
+    land: np.ndarray | xr.Dataset
+    """Within the scene."""
+    lit_grid: GeoBox
+    """Cells of the reflectance, with the margin of a complete image."""
+    reflectance: np.ndarray
 
 
-def _scene(scenario, grid, setup, lit, complete):
-    """
-    Chains of the image and of the truth, the ground of the truth, and if lit the reflectance; of one stand as arrays.
-
-    The chains differ where the image sees ground around the scene.
-    """
-    blocks, own, inside = ArrayChain(setup, grid, _kernels(scenario, setup)), scenario.ground, {}
-    chain = blocks
+def _scene(scenario, grid, setup, complete):
+    """Scene of a scenario."""
+    driver, own, inside, wide = _driver(scenario, setup), scenario.ground, {}, grid
     if complete:
-        grid, setup, inside = with_margin(scenario, setup)
-        chain = ArrayChain(setup, grid, blocks.kernels)
+        wide, setup, inside = with_margin(scenario, setup)
+    wide = as_carried(wide)
     is_one, dem, horizon = scenario.landscape.is_one() and not own.lai_file, None, None
-    light = light_on_hills(scenario, grid, setup.geometry) if is_one and lit else None
-    if light is None and scenario.terrain.dem != "flat" and (lit or not is_one):
-        # Threads take longer to start than so few cells to make.
+    light = scenario_light_on_hills(scenario, wide, setup.geometry) if is_one else None
+    if light is None and scenario.terrain.dem != "flat":
+        # Starting threads takes longer than computing so few cells.
         with dask.config.set(scheduler="synchronous"):
-            dem, horizon = in_memory(*elevation(scenario, grid)[:2])
+            dem, horizon = in_memory(*elevation(scenario, wide)[:2])
     if not is_one:
-        land = ground_scene(scenario, grid, dem=dem)
-        lit = lit and reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
-        return chain, blocks, land.isel(inside), lit
-    land, reflectance = scene_cells(grid, own.distribution, own.arp, own.seed, own.method), None
-    if lit:
-        reflectance = chain.kernels.reflectance(land)
-        if dem is not None:
-            on_cells = beside_altitude(dem, chain.kernels.air.altitude), chain.grid, setup.geometry, horizon
-            light = light_on_slopes(*on_cells)
-        reflectance = reflectance if light is None else chain.kernels.on_slopes(reflectance, light)
-    return chain, blocks, land[tuple(inside.values())], reflectance
+        land = ground_scene(scenario, wide, dem=dem)
+        reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land).values
+        return _Scene(driver, setup, grid, land.isel(inside), wide, reflectance)
+    lai = scene_cells(wide, own.distribution, own.arp, own.seed, own.method)
+    reflectance = driver.reflectance(lai)
+    if dem is not None:
+        light = light_on_slopes(beside_altitude(dem, driver.air.altitude), wide, setup.geometry, horizon)
+    if light is not None:
+        reflectance = driver.on_slopes(reflectance, light)
+    return _Scene(driver, setup, grid, lai[tuple(inside.values())], wide, reflectance)
 
 
-def _image(chain, reflectance):
-    """Image and its NDVI."""
-    dn = chain.image(chain.kernels.toa(reflectance))
-    if not chain.kernels.shows_ndvi:
-        return {"dn": dn}
-    return {"dn": dn, "ndvi": chain.kernels.ndvi(chain.kernels.planetary(dn))}
+def _image(scene):
+    """Digital numbers of a scene, and their NDVI."""
+    driver = scene.driver
+    dn = driver.image(driver.toa(scene.reflectance), scene.lit_grid, scene.setup)
+    return {"dn": dn, "ndvi": driver.ndvi(driver.planetary(dn))} if driver.shows_ndvi else {"dn": dn}
 
 
-def _labelled_image(chain, image):
-    """The same with its coordinates."""
-    kernels, dn = chain.kernels, image["dn"]
-    gain, offset, _ = kernels.scale
-    along = {"band": [band.name for band in kernels.bands], "wavelength": [band.wavelength for band in kernels.bands]}
+def _labelled_image(scene):
+    """Image of a scene with its coordinates."""
+    image, driver = _image(scene), scene.driver
+    gain, offset, _ = driver.scale
+    along = {"band": [band.name for band in driver.bands], "wavelength": [band.wavelength for band in driver.bands]}
     along |= {"gain": gain, "offset": offset}
-    along |= {"compression": kernels.compression} if kernels.compression.any() else {}
-    along |= {"solar_irradiance": kernels.irradiance}
-    own = attributes_of(kernels.instrument) | {"atmosphere": kernels.air.text}
-    attrs = cf.attributes("dn") | own | {"_FillValue": dn.dtype.type(0)}
-    variables = {"dn": xr.Variable(("band", "y", "x"), dn, attrs)}
-    if "ndvi" in image:
-        variables["ndvi"] = xr.Variable(("y", "x"), image["ndvi"], cf.attributes("ndvi") | own)
-    coords = grids.coordinates(chain.pixels) | cf.band_coordinates(**along)
-    return _placed(variables, coords, directions.coordinates_of(kernels.setup.geometry))
+    along |= {"compression": driver.compression} if driver.compression.any() else {}
+    along |= {"solar_irradiance": driver.irradiance}
+    own = attributes_of(driver.instrument) | {"atmosphere": driver.air.text}
+    fill = {"dn": {"_FillValue": image["dn"].dtype.type(0)}}
+    variables = {
+        name: xr.Variable(("band", "y", "x")[-each.ndim :], each, cf.attributes(name) | own | fill.get(name, {}))
+        for name, each in image.items()
+    }
+    pixels = driver.pixels(scene.lit_grid, scene.setup)[0]
+    coords = grids.coordinates(pixels) | cf.band_coordinates(**along)
+    return _placed(variables, coords, directions.coordinates_of(scene.setup.geometry))
 
 
-def _truth(scenario, chain, land):
-    """Means over the blocks of the truth: of one stand as arrays, else as a dataset."""
-    size = scenario.sensor.size
+def _truth(scenario, scene):
+    """Means over the blocks of the truth: as arrays for one stand, else as a dataset."""
+    size, own = scenario.sensor.size, scene.setup
     if not scenario.landscape.is_one():
-        return aggregate(truth_of(scenario, chain.setup, land), size, min_valid=chain.setup.min_valid)
-    fpar_inf = scenario.ground.fpar_inf
-    lai = land if isinstance(land, np.ndarray) else land["lai"].values
-    kinds = fpar_kinds(scenario)
-    cells = {"lai": lai} | {name: chain.kernels.fpar(lai, fpar_inf, leaves) for name, leaves in kinds.items()}
-    return {name: chain.means(each, size) for name, each in cells.items()}
+        return aggregate(truth_of(scenario, own, scene.land), size, min_valid=own.min_valid)
+    lai = scene.land if isinstance(scene.land, np.ndarray) else scene.land["lai"].values
+    kinds, fpar_inf = fpar_kinds(scenario), scenario.ground.fpar_inf
+    cells = {"lai": lai} | {name: scene.driver.fpar(lai, fpar_inf, leaves) for name, leaves in kinds.items()}
+    return {name: cell_block_means(each, scene.grid, size, own.min_valid) for name, each in cells.items()}
 
 
-def _labelled_truth(scenario, chain, truth):
+def _labelled_truth(scenario, scene):
+    """Truth of a scene with its coordinates."""
+    truth = _truth(scenario, scene)
     if not isinstance(truth, dict):
         return truth
     variables = {name: xr.Variable(("y", "x"), means, cf.attributes(name)) for name, means in truth.items()}
-    return _placed(variables, grids.coordinates(chain.blocks(scenario.sensor.size)))
+    return _placed(variables, grids.coordinates(grids.aligned_grid(as_carried(scene.grid), scenario.sensor.size)))
 
 
 def _placed(variables, coordinates, others=None):
-    """Dataset on a grid; coordinates are not compared with each other, for they are made for it."""
+    """Dataset on a grid; coordinates made for it are not compared."""
     for each in variables.values():
         each.encoding = {"grid_mapping": "spatial_ref"}
     bare = {name: each.variable for name, each in coordinates.items()}
     return xr.Dataset(variables, bare | (others or {}))
 
 
-def _kernels(scenario, setup):
-    """What does not depend on place and seeds, made once for all scenes that say the same."""
+def _driver(scenario, setup):
+    """Driver of a setup, shared by scenarios that differ only in place and seeds."""
     others = {"grid": True, "ground": {"seed", "arp", "distribution", "method"}, "sensor": {"seed", "offset"}}
-    said = scenario.model_dump_json(exclude=others)
     if scenario.files:
         # A file may change under its name.
-        return Kernels(setup)
-    return _known(_Keyed((said, setup.geometry), setup))
+        return Driver(setup)
+    return _known(_Keyed((scenario.model_dump_json(exclude=others), setup.geometry), setup))
 
 
-class _Keyed(NamedTuple):
-    """A setup by what it is told."""
+@dataclass(frozen=True)
+class _Keyed:
+    """A setup that is compared by a key."""
 
     key: tuple
-    setup: Setup
-
-    def __hash__(self):
-        return hash(self.key)
-
-    def __eq__(self, other):
-        return self.key == other.key
+    setup: Setup = field(compare=False)
 
 
-@lru_cache(maxsize=32)
+@cached(32, "kernels of setups")
 def _known(keyed):
-    return Kernels(keyed.setup)
+    return Driver(keyed.setup)

@@ -1,41 +1,122 @@
-"""The ground of a scenario: leaf area or a landscape, its canopies, and what of it an image is compared with."""
+"""Ground of a scenario: leaf area or a landscape, its canopies, elevation and horizon."""
 
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
-from fifesim.chain.landscapes import fpar
-from fifesim.chain.stands import warn_of_tallgrass
-from fifesim.ground.landscape.classes import CoverClass, class_table
+from fifesim.chain.landscapes import fpar, warn_of_tallgrass
+from fifesim.grids import grid as grids
+from fifesim.grids.sites import on_fife_site
+from fifesim.ground.landscape.classes import CoverClass, Field, class_table
 from fifesim.ground.landscape.cover import PATTERNS, Patches
 from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.ground.landscape.drawn import Field
-from fifesim.ground.landscape.raster import lai_scene, lai_window
-from fifesim.ground.landscape.rasters.scenes import landscape
-from fifesim.rasters.sites import on_fife_site
-from fifesim.scenario.ground_keys import COVARIATES
-from fifesim.scenario.land import cut
+from fifesim.ground.landscape.labels import landscape
+from fifesim.ground.landscape.lai_labels import lai_scene, lai_window
+from fifesim.ground.terrain import labels as terrain_labels
+from fifesim.ground.terrain import sky_labels
+from fifesim.ground.terrain.elevation_labels import fine_dem, flint_hills, source_dem
+from fifesim.ground.terrain.sky_labels import horizon_places
+from fifesim.ground.terrain.source_labels import elevation_grid
+from fifesim.scenario.keys import COVARIATES
+
+# The synthetic hills around a scene are made at this resolution, as its own horizons are. [m]
+_HILLS_AROUND = 30.0
+
+# A horizon has 32 numbers a cell: 16 MB in chunks of this size. [cell]
+_AROUND_CHUNK = 252
+
+
+def elevation(scenario, grid, chunks=None):
+    """Elevation of a scenario, the horizon of the land around, and their attributes; None on flat ground."""
+    terrain = scenario.terrain
+    if terrain.dem == "flat":
+        return None, None, {}
+    if terrain.dem == "flint-hills":
+        # One cell more on each side: slopes at the border are those of the wider land.
+        dem = flint_hills(grid.pad(1), terrain.seed, chunks=chunks)
+        wider = _padded(grid, terrain.horizon_reach)
+        around = flint_hills(wider, terrain.seed, chunks=_AROUND_CHUNK)
+        middle = flint_hills(wider[_middle(wider.shape)], terrain.seed)
+        reach = dict.fromkeys(("north", "east", "south", "west"), terrain.horizon_reach)
+    else:
+        fill, units = terrain.fill, terrain.vertical_units
+        dem = fine_dem(terrain.dem, grid, chunks=chunks, fill=fill, vertical_units=units)
+        around, reach = source_dem(
+            terrain.dem, grid, terrain.horizon_reach, chunks="auto", fill=fill, vertical_units=units
+        )
+        # A few blocks of the file, at once: whether the sun shines is asked before anything is made.
+        middle = around[_middle(around.shape)].compute(scheduler="synchronous")
+    horizon = sky_labels.horizon(around, reach=terrain.horizon_reach, beside=dem)
+    _check_sun(middle, around, horizon, scenario.sun_and_view())
+    return dem, horizon, reach
+
+
+def scenario_light_on_hills(scenario, grid, geometry):
+    """Last arguments of `slope_reflectance` for synthetic hills, in memory, with the bits of `elevation`, or None."""
+    # None where the sun is so low that all of the land around must be checked.
+    terrain = scenario.terrain
+    if terrain.dem != "flint-hills":
+        return None
+    around = _padded(grid, terrain.horizon_reach)
+    if not terrain_labels.steepest(around[_middle(around.shape)], terrain.seed) < 90 - geometry.sza:
+        return None
+    return terrain_labels.light_on_hills(
+        grid, around, terrain.seed, terrain.horizon_reach, geometry, scenario.atmosphere.altitude
+    )
+
+
+def in_memory(dem, horizon):
+    """Elevation and horizon in memory, the horizon only above the elevation."""
+    if horizon is None:
+        return dem if dem is None else dem.compute(), None
+    _, (rows, columns) = horizon_places(elevation_grid(dem), horizon)
+    # A scene of a thousand pixels needs a hundredth of what lies within reach.
+    return dem.compute(), horizon.isel(y=rows, x=columns).compute()
+
+
+def cut(raster, grid):
+    """Cut a raster to a grid of its cells."""
+    rows, columns = grids.lattice_offset(grids.geobox(raster), grid)
+    return raster.isel(y=slice(rows, rows + grid.shape.y), x=slice(columns, columns + grid.shape.x))
+
+
+def _middle(shape):
+    return tuple(slice(max(size // 2 - 8, 0), size // 2 + 8) for size in shape)
+
+
+def _check_sun(middle, around, horizon, geometry):
+    """Raise ValueError if the sun is below the horizon everywhere; single chunks of lazy elevation cannot know."""
+    # Where no slope is as steep as the sun is high, all face it, and what hides it from them is lit itself.
+    if float(terrain_labels.slope(middle).max()) < 90 - geometry.sza:
+        return
+    light = terrain_labels.illumination(around, geometry, horizon)
+    for block in light.data.blocks.ravel():
+        if np.any(block.compute() > 0):
+            return
+    # Nowhere: the same on elevation in memory says so.
+    terrain_labels.illumination(around.compute(), geometry, horizon.compute())
+
+
+def _padded(grid, margin):
+    """Coarse grid, on multiples of its cells from the origin of the CRS, that extends a margin around a fine one."""
+    height, width = grids.cell_size(grid)
+    down, across = max(round(_HILLS_AROUND / height), 1) * height, max(round(_HILLS_AROUND / width), 1) * width
+    box = grid.boundingbox
+    west, east = np.floor((box.left - margin) / across), np.ceil((box.right + margin) / across)
+    south, north = np.floor((box.bottom - margin) / down), np.ceil((box.top + margin) / down)
+    return grids.grid_at(
+        grid.crs.to_wkt(),
+        west * across,
+        north * down,
+        width=(east - west) * across,
+        height=(north - south) * down,
+        cell=(down, across),
+    )
 
 
 def ground_scene(scenario, grid, chunks=None, dem=None):
-    """
-    The ground of a scenario.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    grid : odc.geo.geobox.GeoBox
-        Of ground cells.
-    chunks : mapping or int, optional
-        Makes it lazy.
-    dem : xarray.DataArray, dims (y, x), optional
-        Elevation on the grid or more, which leaf area may go with. [m]
-
-    Returns
-    -------
-    land : xarray.Dataset
-        ``lai`` [m2 m-2], and ``cover`` and properties that vary where the scenario has them.
-    """
+    """Ground of a scenario: a Dataset with ``lai`` [m2 m-2], ``cover`` and varying properties."""
     land, own = scenario.ground, scenario.landscape
     if not own.is_one():
         return _landscape(scenario, grid, chunks, dem)
@@ -48,7 +129,6 @@ def ground_scene(scenario, grid, chunks=None, dem=None):
 
 def _landscape(scenario, grid, chunks, dem):
     land, own = scenario.ground, scenario.landscape
-    properties = drawn_properties(scenario)
     if own.cover == "none":
         cover, classes = None, CoverClass("ground", lai=land.distribution)
     else:
@@ -68,44 +148,22 @@ def _landscape(scenario, grid, chunks, dem):
         geometry=scenario.sun_and_view() if "illumination" in covary else None,
         seed=land.seed,
         chunks=chunks,
-        **properties,
+        **drawn_properties(scenario),
     )
 
 
 def warn_of_canopy(scenario):
-    """
-    Warn if optics of FIFE's tallgrass are taken for a map of leaf area, or for another site.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-        As it was written, without completed keys.
-
-    Warns
-    -----
-    UserWarning
-        As `fifesim.chain.stands.warn_of_tallgrass`.
-    """
+    """Warn if the optics of FIFE's tallgrass are used for a map of leaf area, or at another site."""
     own = scenario.ground.lai_file
     if own or not on_fife_site(scenario.geobox()):
         name, classes = Path(own).name if own else "the scene", _classes(scenario)
-        # A mean stands for what is drawn.
+        # Drawn properties are represented by their means.
         cells = {name: each.mean for name, each in drawn_properties(scenario).items()}
         warn_of_tallgrass(name, class_table(classes) if classes else (), canopy_of(scenario), cells)
 
 
 def drawn_properties(scenario):
-    """
-    Properties of the ground of a scenario that vary in fields.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    properties : dict of str to fifesim.ground.landscape.drawn.Field
-    """
+    """Properties of the ground of a scenario that vary as fields, by name."""
     land, own = scenario.ground, scenario.landscape
     return {
         name: Field(mean=getattr(land, name), sd=deviation, arp=own.arps.get(name, land.arp), coarser=own.coarser)
@@ -115,19 +173,7 @@ def drawn_properties(scenario):
 
 
 def check_leaf_area(scenario):
-    """
-    Check that the canopy of each stand can hold the largest leaf area index of its distribution.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Raises
-    ------
-    ValueError
-        If the leaf area index within the crowns could exceed the largest that SAIL is evaluated for. The check is left
-        to the run where leaf area or a property varies in a map or field.
-    """
+    """Check that the canopy of each stand can hold the largest leaf area index of its distribution."""
     land, classes = scenario.ground, _classes(scenario)
     if land.lai_file:
         return
@@ -141,91 +187,39 @@ def check_leaf_area(scenario):
 
 
 def canopy_of(scenario):
-    """
-    Canopy of the keys of [ground], without what is drawn, and without what every class has itself.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    canopy : fifesim.ground.canopy.description.Canopy
-    """
+    """Canopy of the keys of [ground], without drawn properties and properties that every class defines."""
     found = scenario.ground.canopy()
     left_out = {name for name in found.given if _all_have(scenario, name)} | set(drawn_properties(scenario))
     return found.replace(**dict.fromkeys(left_out))
 
 
 def truth_of(scenario, setup, land):
-    """
-    What of the ground of a scenario an image is compared with, by cells.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    setup : fifesim.chain.setup.Setup
-        From `setup_of`.
-    land : xarray.Dataset
-        From `ground_scene`.
-
-    Returns
-    -------
-    truth : xarray.Dataset
-        ``lai``, ``fpar`` and where leaves are dead ``green_fpar``, and all else that varies but ``cover``.
-    """
+    """True properties of the ground of a scenario with which an image is compared, by cells."""
     absorbed = {name: absorbed_light(scenario, setup, land, kind) for name, kind in fpar_kinds(scenario).items()}
     varying = {name: each for name, each in land.data_vars.items() if name not in ("lai", "cover") and each.ndim == 2}
     return xr.Dataset({"lai": land["lai"], **absorbed, **varying})
 
 
 def fpar_kinds(scenario):
-    """
-    Which leaves absorb the light that an image of a scenario is compared with.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    kinds : dict of str to str
-        By name of the truth, what `fifesim.fpar` takes as ``leaves``.
-    """
-    return {"fpar": "all"} | ({"green_fpar": "green"} if _has_dead_leaves(scenario) else {})
+    """Leaves whose absorbed light is part of the truth, by the name of the variable."""
+    has_dead_leaves = any(numbers_of_stands(scenario, "brown")) or "brown" in drawn_properties(scenario)
+    return {"fpar": "all"} | ({"green_fpar": "green"} if has_dead_leaves else {})
 
 
 def absorbed_light(scenario, setup, land, leaves="all"):
-    """
-    Share of light that the leaves of a scenario absorb, by cells.
-
-    Parameters
-    ----------
-    scenario, setup, land
-        As in `truth_of`.
-    leaves : {"all", "green"}, optional
-
-    Returns
-    -------
-    fpar : xarray.DataArray, dims (y, x)
-        [1]
-    """
+    """Share of light absorbed by the leaves of a scenario, dims (y, x). [1]"""
     fpar_inf = scenario.ground.fpar_inf
     return fpar(land, canopy=setup.canopy, geometry=setup.geometry, leaves=leaves, fpar_inf=fpar_inf)
 
 
-def _has_dead_leaves(scenario):
-    return any(numbers_of_stands(scenario, "brown")) or "brown" in drawn_properties(scenario)
-
-
 def numbers_of_stands(scenario, name):
-    """Values of a property in the stands of a scenario, where it is not drawn, a list of float."""
+    """Values of a property in the stands of a scenario where it is not drawn."""
     ground = [] if _all_have(scenario, name) else [getattr(scenario.ground, name)]
     return [*ground, *(getattr(each.canopy, name) for each in _classes(scenario) if name in each.canopy.given)]
 
 
 def _all_have(scenario, name):
-    """Whether every class of cover has a value of its own."""
+    """Whether every class of cover defines a property."""
     classes = _classes(scenario)
     return bool(classes) and all(name in each.canopy.given for each in classes)
 
@@ -235,6 +229,6 @@ def _classes(scenario):
 
 
 def _shares(scenario):
-    """Shares of the classes that are drawn, None where they are equal."""
+    """Shares of the drawn classes, None if they are equal."""
     shares = {name: stand.share for name, stand in scenario.classes.items()}
     return shares if any(shares.values()) else None

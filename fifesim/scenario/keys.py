@@ -1,18 +1,267 @@
-"""Every key of a scenario: its default, unit, range and meaning. What physics says of a value is beside its meaning."""
+"""Every key of a scenario: default, unit, range and meaning. Physical limits are stated with the meaning."""
 
 import math
+import re
 from datetime import date, time
-from typing import get_args
+from pathlib import Path
+from typing import Annotated, Literal, get_args
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
 
-from fifesim.atmosphere.air import ENGINES
-from fifesim.base import fife
-from fifesim.base.foreign import shown
-from fifesim.base.spelling import nearest
-from fifesim.base.times import utc
-from fifesim.scenario.ground_keys import LONGEST_NAME, ByName, ClassKeys, GroundKeys, LandscapeKeys
-from fifesim.scenario.section import Section, file, number, seed, text
+from fifesim.atmosphere import ENGINES
+from fifesim.base import times
+from fifesim.base.files import check_regular, shown
+from fifesim.base.messages import nearest
+from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
+
+_QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
+
+# Units of length by their power of ten. [m]
+_LENGTHS = {"km": 3, "m": 0, "cm": -2}
+
+
+def number(default, unit, description, **limits):
+    """Field of a key with a number, which may be optional by a default of None."""
+    return Field(default, description=description, json_schema_extra={"unit": unit}, allow_inf_nan=False, **limits)
+
+
+def text(default, description):
+    """Field of a key with text or a switch."""
+    return Field(default, description=description)
+
+
+def seed(default, description):
+    """Field of a key with a seed."""
+    return Field(default, description=description, ge=0, lt=2**63, strict=True)
+
+
+def file(default, description, *, names=(), suffix=None):
+    """Field of a key with the path of a file, or one of some names."""
+    return Field(default, description=description, json_schema_extra={"file": {"names": names, "suffix": suffix}})
+
+
+class Section(BaseModel):
+    """A table of the scenario. A number may be written with its unit, ``"45 km"``, a length in km, m or cm."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _strip_units(cls, values):
+        if not isinstance(values, dict):
+            raise ValueError(f"expected a table of keys, got {shown(values)}")
+        return {key: cls.in_unit(key, value) for key, value in values.items()}
+
+    @classmethod
+    def in_unit(cls, key, value):
+        """Value of a key in its unit, from a number or a text such as ``"45 km"``."""
+        unit = cls.unit(key) if key in cls.model_fields else ""
+        if unit and isinstance(value, bool):
+            raise ValueError(f"{key} = {value}: {key} is in {unit}; write a number")
+        if not unit or not isinstance(value, str):
+            return value
+        match = _QUANTITY.fullmatch(value.strip())
+        if match is None and str in get_args(cls.model_fields[key].annotation):
+            # A key that takes words beside numbers.
+            return value
+        given = (match[2] or unit) if match else None
+        if given != unit and not {given, unit} <= set(_LENGTHS):
+            units = " or ".join(repr(each) for each in (_LENGTHS if unit in _LENGTHS else [unit]))
+            raise ValueError(f"{key} = {shown(value)}: {key} is in {unit}; write a number, or a number and {units}")
+        # Division by a power of ten is exact where possible.
+        value, shift = float(match[1]), 0 if given == unit else _LENGTHS[given] - _LENGTHS[unit]
+        return value * 10**shift if shift > 0 else value / 10**-shift
+
+    @classmethod
+    def unit(cls, key):
+        """Unit of a key, empty if it has none."""
+        return (cls.model_fields[key].json_schema_extra or {}).get("unit", "")
+
+    @classmethod
+    def names_a_file(cls, key, value):
+        """Whether the value of a key is the path of a file."""
+        if not isinstance(value, str) or key not in cls.model_fields:
+            return False
+        kind = (cls.model_fields[key].json_schema_extra or {}).get("file")
+        if kind is None or value in kind["names"]:
+            return False
+        found, suffix = Path(value).suffix.lower(), kind["suffix"]
+        if suffix in (None, "*"):
+            return suffix is None or bool(found)
+        return found in suffix if isinstance(suffix, tuple) else found == suffix
+
+    @classmethod
+    def name_or_raster(cls, key, value):
+        """Value of a key that is one of its names or the path of a raster file, else a ValueError."""
+        names = cls.model_fields[key].json_schema_extra["file"]["names"]
+        if value not in names and not cls.names_a_file(key, value):
+            allowed = f"allowed are {', '.join(names)}, or a raster file such as {key}.tif"
+            raise ValueError(nearest(value, names) + allowed)
+        return value
+
+    @field_validator("*")
+    @classmethod
+    def _openable(cls, value, info):
+        """Check that a path can be written and is not empty; a missing file is reported by its reader."""
+        if cls.names_a_file(info.field_name, value):
+            if not value:
+                raise ValueError("name a file, or drop the key")
+            value.encode()  # a ValueError where it could not be written
+            try:
+                check_regular(value)
+            except (FileNotFoundError, NotADirectoryError):
+                pass
+            except OSError as error:
+                raise ValueError(f"the file cannot be opened: {error.strerror}") from None
+        return value
+
+    @property
+    def written(self):
+        """Keys of the table in order."""
+        return type(self).model_fields
+
+    @property
+    def files(self):
+        """Paths of the files that the section names, by key."""
+        return {key: value for key, value in self if self.names_a_file(key, value)}
+
+    def with_paths(self, change):
+        """Section with changed paths of its files."""
+        return self.model_copy(update={key: change(value) for key, value in self.files.items()})
+
+
+COVERS = ("none", "pastures", "voronoi", "levels")
+VARYING = tuple(DRAWN)
+KEYS = {name: known for name, known in PROPERTIES.items() if known.default is not None}
+"""Properties of the canopy that are one key of a scenario."""
+COVARIATES = ("elevation", "wetness", "illumination")
+
+# By the name of a band, a spectrum or a part of a leaf.
+ByName = dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False)]]
+LONGEST_NAME = 60
+_LEAF = "structure [1], chlorophyll, carotenoids, anthocyanins [ug cm-2], brown [1], water [cm], dry_matter [g cm-2]"
+
+
+class _LeafArea(Section):
+    """Leaf area of a stand of plants."""
+
+    distribution: str = file("burned-grazed", "LAI distribution: a treatment, or a .csv of LAI samples", suffix=".csv")
+    arp: float = number(0.15, "1", "autoregressive parameter; larger is smoother", ge=0, lt=0.25)
+
+
+def _key(known):
+    """Type and field of a key for a property of the canopy."""
+    if not known.unit:
+        return str, text(known.default, known.meaning)
+    return float, number(known.default, known.unit, known.meaning, ge=known.lowest, le=known.highest)
+
+
+_Structure = create_model("_Structure", __base__=_LeafArea, **{name: _key(known) for name, known in KEYS.items()})
+
+
+# mypy does not know classes that are made of a table.
+class StandKeys(_Structure):  # type: ignore[valid-type]
+    """Leaf area, leaves and what lies below them, of a stand of plants."""
+
+    leaf_reflectance: ByName = text({}, "by band [1]; all bands or none")
+    leaf_transmittance: ByName = text({}, "by band [1]; all bands or none")
+    background: ByName = text({}, "reflectance below the canopy by band [1]; all bands or none")
+    leaf: ByName = text({}, f"instead of leaf optics by band: {_LEAF}")
+    brown_leaf: ByName = text({}, f"dead leaves, by default dead tallgrass: {_LEAF}")
+    background_spectra: ByName = text(
+        {}, "instead of background by band: shares of soil_dry, soil_wet, dead_grass, golden_grass, shade"
+    )
+
+    @field_validator("leaf_reflectance", "leaf_transmittance", "background", "leaf", "brown_leaf", "background_spectra")
+    @classmethod
+    def _names_that_print(cls, value):
+        for name in value:
+            if len(name) > LONGEST_NAME or not name.isprintable():
+                raise ValueError(f"{shown(name)} is no name: names have up to {LONGEST_NAME} characters that print")
+        return value
+
+    @model_validator(mode="after")
+    def _one_description(self):
+        for spectra, by_band in (("leaf", "leaf_reflectance"), ("background_spectra", "background")):
+            if getattr(self, spectra) and getattr(self, by_band):
+                raise ValueError(f"{spectra} and {by_band} are both given: drop one of them")
+        return self
+
+
+class GroundKeys(StandKeys):
+    """Leaf area, leaves and what lies below them."""
+
+    seed: int = seed(7, "of the random fields, a whole number")
+    method: Literal["streaming", "periodic"] = text("streaming", "streaming, or the paper's periodic (in memory)")
+    lai_file: str | None = file(None, "a LAI map to use instead of a random field")
+    fpar_inf: float = number(0.94, "1", "FPAR of an infinitely thick canopy", gt=0, le=1)
+
+
+class ClassKeys(StandKeys):
+    """A class of cover; what it leaves out is that of [ground]."""
+
+    share: float | None = number(None, "1", "of the ground, where cover is drawn; by default that of all", gt=0, le=1)
+    code: int | None = text(None, "in the map of cover; by default classes count from 1")
+
+    @property
+    def written(self):
+        """Keys that differ from the ground's."""
+        return {key: known for key, known in super().written.items() if key in self.model_fields_set}
+
+
+class LandscapeKeys(Section):
+    """Classes of cover, and properties of the ground that vary; without them one stand is everywhere."""
+
+    cover: str = file(
+        "none",
+        "how classes lie: none; pastures, voronoi or levels, which are drawn; or a raster file of their codes",
+        names=COVERS,
+        suffix="*",
+    )
+    size: float = number(1200.0, "m", "of a pasture or patch that is drawn, along an edge or across", gt=0)
+    deviations: ByName = text(
+        {}, f"standard deviations [1] of what varies in fields that are drawn: {', '.join(VARYING)}"
+    )
+    arps: ByName = text({}, "autoregressive parameters [1] of these fields; by default that of [ground]")
+    coarser: int = number(
+        1,
+        "1",
+        "ground cells along a side of a cell of these fields' lattice, which arps count in",
+        ge=1,
+        le=100,
+        strict=True,
+    )
+    covary: ByName = text({}, f"correlations [1] of leaf area with {', '.join(COVARIATES + VARYING)}")
+
+    def is_one(self):
+        """Whether one stand is everywhere, and only its leaf area varies."""
+        return self.cover == "none" and not any((*self.deviations.values(), *self.covary.values()))
+
+    @field_validator("cover")
+    @classmethod
+    def _known_cover(cls, value):
+        return cls.name_or_raster("cover", value)
+
+    @field_validator("deviations", "arps", "covary")
+    @classmethod
+    def _known_properties(cls, values, info):
+        known = VARYING + (COVARIATES if info.field_name == "covary" else ())
+        low, high = {"deviations": (0, 1), "arps": (0, 0.2498), "covary": (-1, 1)}[info.field_name]
+        for name, value in values.items():
+            if name not in known:
+                raise ValueError(f"unknown name {shown(name)}: {nearest(name, known)}allowed are {', '.join(known)}")
+            if not low <= value <= high:
+                raise ValueError(f"{name} = {value:g}: must be in [{low:g}, {high:g}]")
+        return values
+
+    @model_validator(mode="after")
+    def _drawn_fields(self):
+        for key in ("arps", "covary"):
+            for name in getattr(self, key):
+                if name in VARYING and name not in self.deviations:
+                    raise ValueError(f"{key}.{name} is for a field that is drawn: give deviations.{name} too")
+        return self
+
 
 LAND_FORMS = ("flint-hills", "flat")
 INTERVALS = ("product", "native")
@@ -22,11 +271,11 @@ EXTENT = ("west", "north", "width", "height")
 class GridKeys(Section):
     """Ground cells. Without corner and size, a scene that reads a LAI file covers that file."""
 
-    crs: str = text(fife.CORNERS["NAD83"][0], "projected coordinate reference system in metres")
-    west: float = number(fife.CORNERS["NAD83"][1], "m", "easting of the upper left corner")
-    north: float = number(fife.CORNERS["NAD83"][2], "m", "northing of the upper left corner")
-    width: float = number(fife.SIZE, "m", "west to east", gt=0)
-    height: float = number(fife.SIZE, "m", "north to south", gt=0)
+    crs: str = text(times.CORNERS["NAD83"][0], "projected coordinate reference system in metres")
+    west: float = number(times.CORNERS["NAD83"][1], "m", "easting of the upper left corner")
+    north: float = number(times.CORNERS["NAD83"][2], "m", "northing of the upper left corner")
+    width: float = number(times.SIZE, "m", "west to east", gt=0)
+    height: float = number(times.SIZE, "m", "north to south", gt=0)
     cell: float = number(30 / 9, "m", "size of a cell", ge=0.001)
 
 
@@ -55,10 +304,7 @@ class TerrainKeys(Section):
     @field_validator("dem")
     @classmethod
     def _known_land(cls, value):
-        if value not in LAND_FORMS and not cls.names_a_file("dem", value):
-            allowed = f"allowed are {', '.join(LAND_FORMS)}, or a raster file such as dem.tif"
-            raise ValueError(nearest(value, LAND_FORMS) + allowed)
-        return value
+        return cls.name_or_raster("dem", value)
 
 
 class SunAndViewKeys(Section):
@@ -83,7 +329,7 @@ class SunAndViewKeys(Section):
             return value
         # TOML has dates of its own.
         written = value.isoformat() if isinstance(value, date | time) else value
-        utc(written)  # refuses what it cannot read
+        times.utc(written)  # refuses what it cannot read
         return written
 
     @model_validator(mode="after")
@@ -201,19 +447,7 @@ class Keys(Section):
 
     @classmethod
     def section(cls, place):
-        """
-        What knows the keys of a table.
-
-        Parameters
-        ----------
-        place : sequence of str
-            ``("ground",)``, or ``("classes", NAME)``.
-
-        Returns
-        -------
-        section : type, or None
-            Where there is none.
-        """
+        """Section type of a table by its place, None if there is none."""
         name, *inside = place
         if name not in cls.model_fields or (name == "classes") != bool(inside):
             return None
@@ -221,23 +455,20 @@ class Keys(Section):
         return get_args(annotation)[1] if inside else annotation
 
     def sections(self):
-        """The tables of a scenario, a dict of `Section` by place as in `section`."""
+        """Sections of a scenario by place."""
         found = {}
-        for name in type(self).model_fields:
-            value = getattr(self, name)
-            found |= {(name, key): each for key, each in value.items()} if name == "classes" else {(name,): value}
+        for name, value in self:
+            found |= {(name, key): section for key, section in value.items()} if name == "classes" else {(name,): value}
         return found
 
     @model_validator(mode="before")
     @classmethod
     def _no_invented_hills(cls, values):
-        """A map of real ground without an elevation is flat: synthetic hills are for synthetic landscapes."""
+        """Set a map of real ground without an elevation to flat: synthetic hills are for synthetic landscapes."""
         if not isinstance(values, dict):
             return values
-        ground, terrain = values.get("ground", {}), values.get("terrain", {})
-        lai_file = (
-            ground.lai_file if isinstance(ground, GroundKeys) else isinstance(ground, dict) and ground.get("lai_file")
-        )
+        ground, terrain = values.get("ground"), values.get("terrain", {})
+        lai_file = ground.get("lai_file") if isinstance(ground, dict) else getattr(ground, "lai_file", None)
         if lai_file and isinstance(terrain, dict) and "dem" not in terrain:
             return values | {"terrain": {"dem": "flat"} | terrain}
         return values

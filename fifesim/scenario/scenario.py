@@ -1,31 +1,177 @@
-"""The scenario of a run: every number with its unit and range, and what they mean."""
+"""Scenario of a run: every number with its unit and range, its keys by name, and its summary in words."""
 
 import os
-from collections.abc import Callable
-from typing import Any, ClassVar, Self
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, NamedTuple, Self
 
+import numpy as np
 from odc.geo.geobox import GeoBox
 from pydantic import Field, ValidationError, model_validator
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes import six_s
-from fifesim.atmosphere.schemes.engines import check_zenith
-from fifesim.base import datasets, fife, geometry
+from fifesim.atmosphere import six_s
+from fifesim.atmosphere.engines import check_zenith
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.base import files, geometry, times
 from fifesim.base.annotations import FilePath
-from fifesim.base.foreign import shown
-from fifesim.ground.landscape.classes import CoverClass, fife_classes
-from fifesim.ground.landscape.drawn import SHARES
-from fifesim.rasters import grid as grids
-from fifesim.rasters import whereabouts
-from fifesim.rasters.covering import covering_grid
-from fifesim.rasters.sites import on_fife_site
-from fifesim.scenario import synthetic
-from fifesim.scenario.colours import with_false_colour
+from fifesim.base.files import shown
+from fifesim.base.messages import nearest
+from fifesim.base.times import utc
+from fifesim.grids import grid as grids
+from fifesim.grids import projection
+from fifesim.grids.opening import covering_grid
+from fifesim.grids.sites import on_fife_site
+from fifesim.ground.landscape.classes import SHARES, CoverClass, fife_classes
+from fifesim.ground.landscape.distribution import treatments
 from fifesim.scenario.ground import check_leaf_area, drawn_properties
-from fifesim.scenario.ground_keys import COVARIATES
-from fifesim.scenario.keys import EXTENT, GridKeys, Keys
+from fifesim.scenario.keys import COVARIATES, EXTENT, ByName, GridKeys, Keys
 from fifesim.scenario.sections import Air, CoverStand, Ground, Sensor, Terrain
 from fifesim.scenario.toml import full_path, load_values, mistakes
+from fifesim.sensor.description.fields import false_colour_bands
+from fifesim.sensor.description.instruments import instrument
+
+_DEFAULT = "TM"
+_BY_BAND = ("leaf_reflectance", "leaf_transmittance", "background")
+
+
+def with_false_colour(values):
+    """Values of a file with the default bands green, red and near infrared."""
+    # Unchanged where bands are named, where the instrument has no green on their grid or is unknown, where optics are
+    # given by band without green, and where a noise model is.
+    sensor = values.get("sensor", {})
+    if not isinstance(sensor, Mapping) or "bands" in sensor:
+        return values
+    bands = _found(sensor.get("instrument", _DEFAULT))
+    if len(bands) < 3 or any(bands[0].name not in each for each in _given_by_band(values)):
+        return values
+    if sensor.get("noise") and not sensor.get("noise_model") and bands[0].noise is None:
+        return values
+    return values | {"sensor": sensor | {"bands": [band.name for band in bands]}}
+
+
+def _found(name):
+    """Bands of an instrument, none if it is unknown, which is reported when the scenario is made."""
+    if not isinstance(name, str) or (name.endswith(".toml") and not os.path.isfile(name)):
+        return ()
+    try:
+        return false_colour_bands(instrument(name))
+    except (ValueError, OSError):
+        return ()
+
+
+def _given_by_band(values):
+    classes = values.get("classes", {})
+    stands = [values.get("ground"), *(classes.values() if isinstance(classes, Mapping) else ())]
+    tables = (stand.get(key) for stand in stands if isinstance(stand, Mapping) for key in _BY_BAND)
+    return [table for table in tables if isinstance(table, Mapping) and table]
+
+
+_PATTERNS = {"pastures": "fields", "voronoi": "patches", "levels": "patches"}
+_VARYING = {"soil": "soil brightness", "moisture": "soil moisture", "brown": "dead leaves"}
+_PLURALS = {*_PATTERNS.values(), "dead leaves", "hills"}
+_COUNTS = {1: "grass type", 2: "two grass types", 3: "three grass types"}
+
+
+def statement(scenario):
+    """Sentence on the synthetic parts of a scenario, the parts from files, and the overpass."""
+    # Identical for a scenario and its completed form, unless a LAI file determines the grid.
+    synthetic, given = _parts(scenario)
+    clauses = [f"{_listed(synthetic)} {_are(synthetic)} synthetic"] if synthetic else []
+    if given:
+        clauses.append(f"{_listed(given)} {_are(given)} from {'files' if len(given) > 1 else 'a file'}")
+    if scenario.terrain.dem == "flat":
+        clauses.append("the ground is level")
+    of_fife = () if given else _of_fife(scenario)
+    if of_fife:
+        clauses.append(f"only {_listed(of_fife)} {_are(of_fife)} FIFE's")
+    text = ": ".join(filter(None, [_landscape(synthetic, given), "; ".join(clauses)]))
+    return f"{text[0].upper()}{text[1:]}. {_overpass(scenario)}".rstrip()
+
+
+def summary(scenario):
+    """Short text of the synthetic parts of a scenario for a title, empty if there are none."""
+    overpass = "hypothetical overpass" if _is_hypothetical(scenario) else ""
+    return ", ".join(filter(None, (_landscape(*_parts(scenario)), overpass)))
+
+
+def _parts(scenario):
+    """Names of the synthetic parts of the landscape, and of the parts from files."""
+    ground, cover, dem = scenario.ground, scenario.landscape.cover, scenario.terrain.dem
+    synthetic, given = [], ["leaf area"] if ground.lai_file else []
+    if cover in _PATTERNS:
+        synthetic.append(_PATTERNS[cover])
+    else:
+        synthetic += [] if ground.lai_file else ["leaf area"]
+        given += [] if cover == "none" else ["land cover"]
+        varying = [name for name, deviation in scenario.landscape.deviations.items() if deviation]
+        synthetic += [_VARYING.get(name, name.replace("_", " ")) for name in varying]
+    if dem == "flint-hills":
+        synthetic.append("hills")
+    elif dem != "flat":
+        given.append("elevation")
+    return synthetic, given
+
+
+def _landscape(synthetic, given):
+    if not synthetic:
+        return ""
+    return "partly synthetic landscape" if given else "synthetic landscape"
+
+
+def _of_fife(scenario):
+    """Parts from FIFE of a landscape without files."""
+    types = _distributions(scenario)
+    found = [f"the {_COUNTS[len(types)]}"] if types <= set(treatments()) else []
+    return found + ["the location"] * _is_on_site(scenario)
+
+
+def _distributions(scenario):
+    """Sources of the leaf area of a landscape without files."""
+    if scenario.landscape.cover == "none":
+        return {scenario.ground.distribution}
+    return {stand.lai_source(scenario.ground) for stand in scenario.classes.values()} or set(treatments())
+
+
+def _is_on_site(scenario):
+    """Whether the scenario is known to be on the FIFE site, without opening a file."""
+    if scenario.ground.lai_file and not scenario.grid.model_fields_set.intersection(EXTENT):
+        return False
+    try:
+        return on_fife_site(scenario.geobox())
+    except ValueError:
+        # An invalid grid is refused where the scenario is completed.
+        return False
+
+
+def _is_hypothetical(scenario):
+    """Whether the time is the default one on the FIFE site, when no Landsat passed."""
+    given = scenario.geometry
+    default = given.time is None or utc(given.time)[0] == utc(times.TIME)[0]
+    return given.sza is None and default and _is_on_site(scenario)
+
+
+def _overpass(scenario):
+    given = scenario.geometry
+    if given.sza is not None:
+        return "Sun angles as given."
+    if _is_hypothetical(scenario):
+        return f"Hypothetical overpass, {_time(times.TIME)}."
+    return "" if given.time is None else f"Time as given, {_time(given.time)}."
+
+
+def _time(time):
+    (known,) = utc(time)
+    return f"{known.day} {known.month_name()} {known.year} {known:%H:%M} UTC"
+
+
+def _listed(names):
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _are(names):
+    plural = len(names) > 1 or names[0] in _PLURALS or names[0].endswith("types")
+    return "are" if plural else "is"
+
 
 # Shares of classes may miss 1 by rounding.
 _WHOLE = 1e-6
@@ -113,7 +259,7 @@ class Scenario(Keys):
             return covering_grid(self.ground.lai_file, grid.cell, self.sensor.size, crs)
         box = grids.grid_at(grid.crs, grid.west, grid.north, grid.width, grid.height, grid.cell)
         corner = [key for key in ("west", "north") if key in lacking]
-        if "crs" in own and corner and box.crs != fife.CORNERS["NAD83"][0]:
+        if "crs" in own and corner and box.crs != times.CORNERS["NAD83"][0]:
             raise ValueError(
                 f"grid.crs = {shown(grid.crs)} is given without {' and '.join(corner)}: type the upper left corner in "
                 "metres of that CRS"
@@ -127,24 +273,24 @@ class Scenario(Keys):
         distance = 1.0 if time is None else geometry.earth_sun_distance(time)
         if given.sza is not None:
             return geometry.Geometry(given.sza, given.saa, given.vza, given.vaa, distance)
-        sun = geometry.sun_position(time, *self.sun_place(), 1000 * self.atmosphere.altitude)
+        sun = geometry.sun_geometry(time, *self.sun_place(), 1000 * self.atmosphere.altitude)
         return geometry.Geometry(sun.sza, sun.saa, given.vza, given.vaa, distance)
 
     def _time(self):
-        """Date and time: as given, else that of FIFE on its site."""
-        return self.geometry.time or (fife.TIME if on_fife_site(self.geobox()) else None)
+        """Date and time: as given, else of FIFE on its site."""
+        return self.geometry.time or (times.TIME if on_fife_site(self.geobox()) else None)
 
     def sun_place(self) -> tuple[float, float]:
         """Latitude and longitude of the sun: as given, else FIFE's on its site, else those of the grid's middle."""
-        longitude, latitude = whereabouts.middle(self.geobox())
+        longitude, latitude = projection.middle(self.geobox())
         if on_fife_site(self.geobox()):
-            longitude, latitude = fife.LONGITUDE, fife.LATITUDE
+            longitude, latitude = times.LONGITUDE, times.LATITUDE
         given = self.geometry
         latitude = latitude if given.latitude is None else given.latitude
         return latitude, longitude if given.longitude is None else given.longitude
 
     def _check_place(self):
-        """The paper's overpass, altitude and hills are those of its site: elsewhere they are asked for."""
+        """Raise ValueError if the defaults of the FIFE site for overpass, altitude and hills are used elsewhere."""
         wanted = []
         if self.geometry.time is None and self.geometry.sza is None:
             wanted.append('geometry.time, such as "2022-06-01T10:05:00Z", or geometry.sza and saa')
@@ -153,11 +299,11 @@ class Scenario(Keys):
         if "dem" not in self.terrain.model_fields_set:
             wanted.append('terrain.dem, a file of elevation or "flat"')
         if wanted and not on_fife_site(self.geobox()):
-            where = whereabouts.place_in_words(*whereabouts.middle(self.geobox()))
+            where = projection.place_in_words(*projection.middle(self.geobox()))
             raise ValueError(f"grid: its middle, {where}, is not on the site of FIFE: give {'; and '.join(wanted)}")
 
     def model_atmosphere(self) -> Atmosphere:
-        """The atmosphere, a `fifesim.atmosphere.air.models.Atmosphere`."""
+        """The atmosphere, a `fifesim.atmosphere.models.Atmosphere`."""
         self._check_place()
         return self.atmosphere.model()
 
@@ -183,15 +329,16 @@ class Scenario(Keys):
         box, own = self.geobox(), self.sensor
         bands = [band.response for band in own.description.select(own.bands)]
         self._check_image(box)
-        self._check_air()
+        check_zenith("sza", self.sun_and_view().sza)
+        if self.atmosphere.engine == "6S":
+            six_s.check_installed()
         self._check_fields()
         check_leaf_area(self)
         ground = self.ground.model_copy(update=self.ground.complete_optics(bands))
         sensor = own.model_copy(update={"pixel": own.size, "bands": [band.name for band in bands]})
         own_time = self.geometry.model_copy(update={"time": self._time()})
-        known = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor}
-        found = self.model_copy(update=known)
-        return found.with_paths(full_path)
+        update = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor}
+        return self.model_copy(update=update).with_paths(full_path)
 
     def with_paths(self, change: Callable[[str], str]) -> Self:
         """
@@ -211,7 +358,7 @@ class Scenario(Keys):
         return self.model_copy(update={place[0]: each for place, each in changed.items()} | {"classes": classes})
 
     def _check_image(self, box):
-        """Pixels must be at least cells, and see them."""
+        """Check that pixels are at least as large as cells and see enough of them."""
         own, cell = self.sensor, max(grids.cell_size(box))
         spaced = {"pixel": (own.size, own.size)}
         if own.interval == "native":
@@ -237,7 +384,7 @@ class Scenario(Keys):
                 )
 
     def _check_fields(self):
-        """Shares that are drawn must be able to vary as they are asked to."""
+        """Check that drawn shares can have their deviations."""
         for name, drawn in drawn_properties(self).items():
             if name in SHARES:
                 try:
@@ -245,15 +392,9 @@ class Scenario(Keys):
                 except ValueError as error:
                     raise ValueError(f"landscape.deviations: {error}") from None
 
-    def _check_air(self):
-        """Light must come through it, by an engine that is there."""
-        check_zenith("sza", self.sun_and_view().sza)
-        if self.atmosphere.engine == "6S":
-            six_s.check_installed()
-
     def provenance(self) -> str:
         """The synthetic parts of the landscape, the parts from files, and the overpass, in one line of text."""
-        return synthetic.statement(self)
+        return statement(self)
 
     @property
     def files(self) -> dict[tuple[str, ...], str]:
@@ -275,50 +416,18 @@ def default_scenario() -> Scenario:
     >>> sorted(fifesim.default_scenario().classes)
     ['burned-grazed', 'burned-ungrazed', 'unburned-ungrazed']
     """
-    return read_scenario(datasets.path("fife.toml"))
+    return read_scenario(files.path("fife.toml"))
 
 
 def grid_keys(box):
-    """
-    Keys of a scenario that make a grid.
-
-    Parameters
-    ----------
-    box : odc.geo.geobox.GeoBox
-        Of square cells.
-
-    Returns
-    -------
-    keys : GridKeys
-    """
+    """Grid section of a scenario for a grid of square cells."""
     a = box.affine
     crs = f"EPSG:{box.crs.epsg}" if box.crs.epsg else box.crs.to_wkt()
     return GridKeys(crs=crs, west=a.c, north=a.f, width=a.a * box.shape.x, height=-a.e * box.shape.y, cell=a.a)
 
 
 def parse_scenario(values):
-    """
-    Scenario of nested mappings.
-
-    Parameters
-    ----------
-    values : mapping
-        As TOML gives it.
-
-    Returns
-    -------
-    scenario : Scenario
-
-    Raises
-    ------
-    ValueError
-        One line a mistake.
-
-    Examples
-    --------
-    >>> parse_scenario({"atmosphere": {"visibility": "23 km"}}).atmosphere.visibility
-    23.0
-    """
+    """Scenario from nested mappings, as in TOML."""
     return Scenario(**values)
 
 
@@ -353,3 +462,90 @@ def read_scenario(path: FilePath) -> Scenario:
     0.24
     """
     return parse_scenario(with_false_colour(load_values(path)))
+
+
+class NamedKey(NamedTuple):
+    """Key of a scenario, or an entry of a key that is a table, such as ``ground.leaf.chlorophyll``."""
+
+    place: tuple[str, ...]
+    key: str
+    entry: str | None = None
+
+    @property
+    def path(self):
+        """Names from the section down."""
+        return (*self.place, self.key) + (() if self.entry is None else (self.entry,))
+
+    @property
+    def name(self):
+        """Names joined by dots."""
+        return ".".join(self.path)
+
+    @property
+    def section(self):
+        """Section of the key."""
+        return Keys.section(self.place)
+
+    @property
+    def attributes(self):
+        """Meaning and unit of the key as attributes of a coordinate, for plots."""
+        # The description's first words name the key; ranges and hints follow them.
+        meaning = self.section.model_fields[self.key].description.split(";")[0]
+        entry = f"{self.key.replace('_', ' ')}: {self.entry}"
+        found = {"long_name": entry if self.entry else meaning, "units": self.section.unit(self.key)}
+        return {name: text for name, text in found.items() if text}
+
+
+def find_key(name, called="the axis"):
+    """Key of a scenario by name, such as ``visibility``, ``ground.seed`` or ``ground.leaf.chlorophyll``."""
+    parts = tuple(str(name).split("."))
+    tables = [(each,) for each in Keys.model_fields if each != "classes"]
+    if parts[0] == "classes":
+        tables, parts = [parts[:2]], parts[2:]
+    elif parts[:1] in tables and len(parts) > 1:
+        tables, parts = [parts[:1]], parts[1:]
+    found = [NamedKey(table, *parts) for table in tables if _has(Keys.section(table), parts)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        written = " or ".join(each.name for each in found)
+        raise ValueError(f"{called} {shown(name)} is a key of several sections: write {written}")
+    known = {each for place in Scenario().sections() for each in Keys.section(place).model_fields}
+    hint = nearest(parts[-1] if parts else "classes", sorted(known))
+    raise ValueError(
+        f"{called} {shown(name)} is no key of a scenario: {hint}`fifesim scenario` prints all that there are"
+    )
+
+
+def _has(section, parts):
+    """Whether a section has a key, and whether the key has entries if one is named."""
+    if section is None or not parts or parts[0] not in section.model_fields or "" in parts:
+        return False
+    return len(parts) == 1 or (len(parts) == 2 and section.model_fields[parts[0]].annotation == ByName)
+
+
+def values_of(scenario):
+    """Explicit values of a scenario, without defaults, as nested mappings."""
+    return scenario.model_dump(exclude_unset=True)
+
+
+def put(values, path, value):
+    """Put a value into nested mappings in place, with numpy numbers as Python numbers."""
+    *tables, last = path
+    for name in tables:
+        values = values.setdefault(name, {})
+    values[last] = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+
+
+def changed(key, scenario, value):
+    """Scenario with a changed value of a key."""
+    values = values_of(scenario)
+    put(values, key.path, value)
+    return parse_scenario(values)
+
+
+def in_text(value):
+    """Value for one cell of a table: text for a list."""
+    if np.ndim(value) == 0:
+        return value
+    return ", ".join(str(part) for part in np.ravel(value).tolist()) or "none"

@@ -1,14 +1,14 @@
-"""What the values of a scenario mean, section by section, and what physics refuses of them."""
+"""Meaning of the values of a scenario, section by section, and their physical limits."""
 
 import os
 from dataclasses import asdict, fields
 
 from pydantic import field_validator, model_validator
 
-from fifesim.atmosphere.air import ENGINES, mixtures, models
-from fifesim.atmosphere.air.raster import read_aerosol
-from fifesim.base.foreign import shown
-from fifesim.base.spelling import nearest
+from fifesim.atmosphere import ENGINES, mixtures, models
+from fifesim.atmosphere.aerosol_labels import read_aerosol
+from fifesim.base.files import shown
+from fifesim.base.messages import nearest
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.description import Canopy
 from fifesim.ground.canopy.prospect import Leaf
@@ -16,14 +16,21 @@ from fifesim.ground.canopy.spectra import Background, spectrum_names
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP
 from fifesim.ground.landscape.classes import CoverClass
 from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.ground.terrain.units import metres_per_unit
-from fifesim.scenario.ground_keys import KEYS, ClassKeys, GroundKeys, StandKeys
-from fifesim.scenario.keys import AirKeys, SensorKeys, TerrainKeys
+from fifesim.ground.terrain.slope import metres_per_unit
+from fifesim.scenario.keys import KEYS, AirKeys, ClassKeys, GroundKeys, SensorKeys, StandKeys, TerrainKeys
 from fifesim.sensor.description.instruments import instrument
+from fifesim.sensor.labels import noise_models
 from fifesim.sensor.response.noise import NoiseModel, check_kinds
-from fifesim.sensor.response.rasters.noise import noise_models
 
 _BY_BAND = ("leaf_reflectance", "leaf_transmittance")
+
+
+def _check_keys(values, kind, without=None):
+    """Raise ValueError for keys that are no fields of a dataclass."""
+    known = [field.name for field in fields(kind) if field.name != without]
+    for name in values:
+        if name not in known:
+            raise ValueError(f"unknown key {name!r}: {nearest(name, known)}allowed are {', '.join(known)}")
 
 
 class Stand(StandKeys):
@@ -45,10 +52,7 @@ class Stand(StandKeys):
     @field_validator("leaf", "brown_leaf")
     @classmethod
     def _known_leaf(cls, value):
-        known = [each.name for each in fields(Leaf)]
-        for name in value:
-            if name not in known:
-                raise ValueError(f"unknown key {name!r}: {nearest(name, known)}allowed are {', '.join(known)}")
+        _check_keys(value, Leaf)
         Leaf(**value)
         return value
 
@@ -61,19 +65,7 @@ class Stand(StandKeys):
         return Background(value).fractions if value else value
 
     def leaf_optics(self):
-        """
-        Leaf optics, by band or of a leaf.
-
-        Returns
-        -------
-        optics : dict of str to (float, float), Leaf, or None
-            Reflectance and transmittance by band, or what a leaf is made of; None for the default. [1]
-
-        Raises
-        ------
-        ValueError
-            If only one of the two is given for a band.
-        """
+        """Leaf optics by band, or a Leaf, None for the default. [1]"""
         if self.leaf:
             return Leaf(**self.leaf)
         if set(self.leaf_reflectance) != set(self.leaf_transmittance):
@@ -81,11 +73,11 @@ class Stand(StandKeys):
         return {band: (value, self.leaf_transmittance[band]) for band, value in self.leaf_reflectance.items()} or None
 
     def below_canopy(self):
-        """Background by band or as a mixture of spectra, a dict or `Background`; None for the default."""
+        """Background by band or as a mixture of spectra, None for the default."""
         return Background(self.background_spectra) if self.background_spectra else self.background or None
 
     def canopy(self, keys=KEYS):
-        """Canopy of these keys, a `Canopy`; optics are given where the table has them."""
+        """Canopy of some keys, with optics if the table has them."""
         return Canopy(
             leaf_optics=self.leaf_optics(),
             brown_leaf=Leaf(**self.brown_leaf) if self.brown_leaf else None,
@@ -106,25 +98,10 @@ class Ground(Stand, GroundKeys):
         return self
 
     def complete_optics(self, bands):
-        """
-        Keys of leaf and background with what they leave to defaults.
-
-        Parameters
-        ----------
-        bands : sequence of fifesim.base.bands.Band
-
-        Returns
-        -------
-        keys : dict
-
-        Raises
-        ------
-        ValueError
-            If a band has no optics.
-        """
+        """Keys of leaf and background with their defaults filled in."""
         names = [band.name for band in bands]
-        leaf = optics.leaf_optics(bands, self.leaf_optics())
-        background = optics.background(bands, self.below_canopy())
+        leaf = optics.band_leaf_optics(bands, self.leaf_optics())
+        background = optics.band_background(bands, self.below_canopy())
         keys = {"leaf": asdict(Leaf(**self.leaf))} if self.leaf else {}
         if not self.leaf:
             keys |= {key: _by_band(names, each) for key, each in zip(_BY_BAND, leaf, strict=True)}
@@ -141,22 +118,13 @@ class CoverStand(Stand, ClassKeys):
             raise ValueError(f"must be at most {LARGEST_STREAMING_ARP} in a landscape")
         return value
 
+    def lai_source(self, ground):
+        """LAI distribution of the class: as given, else the one of [ground]."""
+        return (self if "distribution" in self.model_fields_set else ground).distribution
+
     def cover_class(self, name, ground):
-        """
-        The class; what it leaves out of its canopy is said by the call of `surface_reflectance`.
-
-        Parameters
-        ----------
-        name : str
-        ground : Ground
-            Whose leaf area it has where it says none.
-
-        Returns
-        -------
-        cover_class : fifesim.ground.landscape.classes.CoverClass
-        """
-        given = self.model_fields_set
-        lai = (self if "distribution" in given else ground).distribution
+        """Class of cover; missing canopy properties come from the call of `surface_reflectance`."""
+        given, lai = self.model_fields_set, self.lai_source(ground)
         canopy = self.canopy([key for key in KEYS if key in given])
         return CoverClass(name, lai=lai, arp=self.arp if "arp" in given else None, canopy=canopy, code=self.code)
 
@@ -198,7 +166,7 @@ class Air(AirKeys):
         return self
 
     def model(self):
-        """The atmosphere that these keys describe, a `fifesim.atmosphere.air.models.Atmosphere`."""
+        """Atmosphere of the keys."""
         keys = self.model_dump(exclude={"adjacency"})
         if "aerosol" in self.files:
             keys["aerosol"] = read_aerosol(self.aerosol)
@@ -211,7 +179,7 @@ class Sensor(SensorKeys):
     @model_validator(mode="before")
     @classmethod
     def _own_bands(cls, values):
-        """Without names the red and near infrared band are meant, which scenes of vegetation are seen in."""
+        """Default bands: red and near infrared."""
         if not isinstance(values, dict) or "bands" in values or not isinstance(values.get("instrument"), str):
             return values
         if cls.names_a_file("instrument", values["instrument"]) and not os.path.isfile(values["instrument"]):
@@ -236,10 +204,7 @@ class Sensor(SensorKeys):
     @field_validator("noise_model")
     @classmethod
     def _known_noise_model(cls, value):
-        known = [each.name for each in fields(NoiseModel) if each.name != "along"]
-        for name in value:
-            if name not in known:
-                raise ValueError(f"unknown key {name!r}: {nearest(name, known)}allowed are {', '.join(known)}")
+        _check_keys(value, NoiseModel, without="along")
         if value:
             NoiseModel(**{"thermal": 0.0, "shot": 0.0} | value)
         if value.get("detectors", 1) % 1:
@@ -247,7 +212,7 @@ class Sensor(SensorKeys):
         return value
 
     def given_noise(self):
-        """The noise that the keys describe, a `fifesim.sensor.response.noise.NoiseModel`; None for the instrument's."""
+        """Noise model of the keys, None for the model of the instrument."""
         if not self.noise_model:
             return None
         scan = self.description.scan
@@ -257,14 +222,7 @@ class Sensor(SensorKeys):
 
     @property
     def description(self):
-        """
-        The instrument, a `fifesim.sensor.description.instruments.Instrument`.
-
-        Raises
-        ------
-        ValueError
-            If there is no such instrument, or its file is not right.
-        """
+        """Instrument with the requested response."""
         try:
             return instrument(self.instrument, self.response)
         except OSError as error:
@@ -272,12 +230,12 @@ class Sensor(SensorKeys):
 
     @property
     def size(self):
-        """Size of a pixel: as given, else that of the bands' gridded product. [m]"""
+        """Size of a pixel: as given, else from the gridded product of the bands. [m]"""
         return self.pixel or _shared_pixel(self.description, self.bands)
 
 
 def _shared_pixel(description, names):
-    """Pixel of the gridded product of some bands, which must share one. [m]"""
+    """Pixel size of the gridded product of some bands, which must agree. [m]"""
     sizes = {}
     for band in description.select(names):
         sizes.setdefault(description.pixel(band), []).append(band.name)

@@ -1,4 +1,4 @@
-"""Figure 1 end to end: a scenario as scene, image and truth."""
+"""Figure 1 from end to end: a scenario as scene, image and truth."""
 
 from __future__ import annotations
 
@@ -11,17 +11,14 @@ from odc.geo.geobox import GeoBox
 
 from fifesim.base.annotations import Chunks
 from fifesim.chain.comparison import shows_ndvi
-from fifesim.chain.images import ndvi
 from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import Setup, image_of, reflectance_of
-from fifesim.chain.slopes import kt_and_reflectance
-from fifesim.ground.terrain.rasters import slopes
-from fifesim.rasters import grid as grids
-from fifesim.scenario.ground import canopy_of, ground_scene, truth_of
-from fifesim.scenario.land import cut, elevation
+from fifesim.chain.steps import kt_and_reflectance, ndvi
+from fifesim.grids import grid as grids
+from fifesim.ground.terrain import labels as terrain_labels
+from fifesim.scenario.ground import canopy_of, cut, elevation, ground_scene, truth_of
 from fifesim.scenario.scenario import Scenario
-from fifesim.sensor.response.rasters.footprints import shifts_of
-from fifesim.sensor.response.rasters.pixels import pixel_grid
+from fifesim.sensor.pixel_labels import pixel_grid, shifts_of
 
 
 def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = False) -> xr.DataTree:
@@ -76,7 +73,7 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
         reflectance = level
     else:
         kt, reflectance = kt_and_reflectance(level, dem, horizon, setup.upwelling)
-        dem, slope = cut(dem, grid), cut(slopes.slope(dem), grid)
+        dem, slope = cut(dem, grid), cut(terrain_labels.slope(dem), grid)
         nodes["scene"]["dem"] = dem
         nodes["terrain"] = {"dem": means(dem), "slope": means(slope), "kt": means(kt.isel(inside))}
         nodes["level"] = {"dn": image_of(setup, level)}
@@ -90,23 +87,7 @@ def simulate(scenario: Scenario, chunks: Chunks = "auto", *, complete: bool = Fa
 
 
 def setup_of(scenario):
-    """
-    Ground, air and instrument of a scenario, without its elevation.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    setup : fifesim.chain.setup.Setup
-        Its pixels are those of ``onto`` or at ``interval``.
-
-    Raises
-    ------
-    ValueError
-        If the instrument or its bands are unknown.
-    """
+    """Setup of a scenario with ground, atmosphere and instrument, without elevation."""
     own = scenario.sensor
     aligned = own.interval == "product"
     return Setup(
@@ -117,7 +98,7 @@ def setup_of(scenario):
         canopy=canopy_of(scenario),
         upwelling=scenario.terrain.upwelling,
         adjacency=scenario.atmosphere.adjacency,
-        onto=grids.aligned(scenario.geobox(), own.size) if aligned else None,
+        onto=grids.aligned_grid(scenario.geobox(), own.size) if aligned else None,
         interval=None if aligned else own.interval,
         offset=tuple(own.offset),
         min_valid=own.min_valid,
@@ -128,29 +109,7 @@ def setup_of(scenario):
 
 
 def with_margin(scenario, setup):
-    """
-    Ground that the footprints of all pixels of a scenario's image cover.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    setup : fifesim.chain.setup.Setup
-        From `setup_of`.
-
-    Returns
-    -------
-    ground : odc.geo.geobox.GeoBox
-        The grid of the scenario and whole cells around it.
-    setup : fifesim.chain.setup.Setup
-        The same, with pixels where they lie over the grid of the scenario.
-    inside : dict of str to slice
-        Rows and columns of the scenario's grid among those of the ground.
-
-    Raises
-    ------
-    ValueError
-        If the random field is periodic.
-    """
+    """Grid that the footprints of all pixels of an image cover, its setup, and slices of the scenario in it."""
     if scenario.ground.method == "periodic":
         raise ValueError('ground.method = "periodic" has no ground beyond the scene: type method = "streaming"')
     grid, bands = scenario.geobox(), setup.instrument.select(setup.bands)

@@ -1,32 +1,29 @@
-"""Studies: a scenario, and what of it is drawn anew for each of many chips."""
+"""Studies: a scenario, and the keys that are drawn anew for each of many chips."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeAlias
 
 from fifesim.base.annotations import FilePath
-from fifesim.base.foreign import shown
-from fifesim.base.kinds import Kind
-from fifesim.base.seeds import check_seed
-from fifesim.base.spelling import nearest
-from fifesim.scenario.distributions import distribution_of
-from fifesim.scenario.ground_keys import COVERS
-from fifesim.scenario.keys import LAND_FORMS
-from fifesim.scenario.named_keys import find_key, put, values_of
-from fifesim.scenario.scenario import Scenario, grid_keys, parse_scenario
-from fifesim.scenario.sequences import SEQUENCES
-from fifesim.scenario.toml import full_path, load_values, plain_table
+from fifesim.base.arguments import Kind
+from fifesim.base.files import shown
+from fifesim.base.lattice import check_seed
+from fifesim.base.messages import nearest
+from fifesim.scenario.distributions import SEQUENCES, distribution_of
+from fifesim.scenario.keys import COVERS, LAND_FORMS
+from fifesim.scenario.scenario import Scenario, find_key, grid_keys, parse_scenario, put, values_of
+from fifesim.scenario.toml import full_path, load_values, write_tables
 
-_HEADING = "# Study of a fifesim dataset. Make it with: fifesim dataset THIS_FILE -o chips.zarr -n 1000"
+_HEADING = "Study of a fifesim dataset. Make it with: fifesim dataset THIS_FILE -o chips.zarr -n 1000"
 _SPLIT = MappingProxyType({"train": 0.8, "validation": 0.1, "test": 0.1})
 
-# What makes the shape of a chip or the map that it is cut from.
+# Keys that determine the shape of a chip or the map from which it is cut.
 _FIXED = {
     ("ground", "lai_file"),
     ("ground", "method"),
@@ -51,8 +48,8 @@ class Study:
         By name of a key, as `fifesim.sweep` has them, the table of a distribution: ``{"visibility": {"uniform":
         [10, 60]}, "ground.brown": {"normal": [0.2, 0.1], "within": [0, 1]}}``; also ``log-uniform``, ``choice``,
         perhaps with ``weights``, and ``integers``. An ``arp`` is drawn for each landscape, all else for each chip.
-    sequence : {"sobol", "latin-hypercube", "random"}, optional
-        Of the draws. A chip of a Latin hypercube depends on how many there are, others do not.
+    sequence : {"sobol", "random"}, optional
+        Sequence of points from which values are drawn.
     seed : int, optional
         Of the draws.
     landscapes : int, optional
@@ -82,7 +79,7 @@ class Study:
 
     scenario: Scenario
     draws: Mapping[str, Mapping]
-    sequence: Literal["sobol", "latin-hypercube", "random"] = "sobol"
+    sequence: Literal["sobol", "random"] = "sobol"
     seed: int = 0
     landscapes: int = 50
     split: Mapping[str, float] = field(default_factory=lambda: dict(_SPLIT))
@@ -120,8 +117,7 @@ class Study:
         tables = {("dataset",): plan, ("draw",): self.draws}
         for place, section in self.scenario.sections().items():
             tables[place] = section.with_paths(full_path).model_dump(exclude_unset=True)
-        written = ("\n".join(plain_table(place, values)) for place, values in tables.items() if values)
-        return "\n\n".join([_HEADING, *written]) + "\n"
+        return write_tables(_HEADING, tables)
 
     def scenario_with(self, drawn: Mapping[tuple[str, ...], Any]) -> Scenario:
         """
@@ -195,7 +191,7 @@ def read_study(path: FilePath) -> Study:
 
 
 def _with_whole_paths(name, table, folder):
-    """A distribution whose choices of files have their full paths."""
+    """Distribution whose choices of files have full paths."""
     key = find_key(name, called="draw:")
     if not isinstance(table, Mapping) or not isinstance(table.get("choice"), list) or key.entry:
         return table
@@ -204,13 +200,10 @@ def _with_whole_paths(name, table, folder):
 
 
 def _check_ground(scenario):
-    """A study draws its ground: maps of real ground have one landscape."""
-    for path, names in {
-        ("ground", "lai_file"): (None,),
-        ("terrain", "dem"): LAND_FORMS,
-        ("landscape", "cover"): COVERS,
-    }.items():
-        section, key = path
+    """Raise ValueError for maps of real ground, which have one landscape: a study draws its ground."""
+    for section, key, names in (
+        ("ground", "lai_file", (None,)), ("terrain", "dem", LAND_FORMS), ("landscape", "cover", COVERS),
+    ):  # fmt: skip
         value = getattr(getattr(scenario, section), key)
         if value not in names:
             drawn = " or ".join(name for name in names if name) or "none"
@@ -228,17 +221,16 @@ def _check_ground(scenario):
 
 
 def _check_plan(study):
-    """Sequence, number of landscapes and their split."""
+    """Check the sequence, the number of landscapes and their split."""
     if study.sequence not in SEQUENCES:
-        hint = nearest(str(study.sequence), list(SEQUENCES))
+        hint = nearest(str(study.sequence), SEQUENCES)
         raise ValueError(f"dataset.sequence = {shown(study.sequence)}: {hint}must be one of {', '.join(SEQUENCES)}")
     split, landscapes = study.split, study.landscapes
     if not isinstance(landscapes, int) or isinstance(landscapes, bool) or landscapes < 1:
         raise ValueError(f"dataset.landscapes = {shown(landscapes)}: must be a whole number from 1 up")
-    numbers = isinstance(split, Mapping) and all(
-        isinstance(share, int | float) and share > 0 for share in split.values()
-    )
-    if not numbers or not split or abs(sum(split.values()) - 1) > 1e-6:
+    shares = list(split.values()) if isinstance(split, Mapping) else []
+    are_positive = bool(shares) and all(isinstance(share, int | float) and share > 0 for share in shares)
+    if not are_positive or abs(sum(shares) - 1) > 1e-6:
         raise ValueError(
             f"dataset.split = {shown(split)} must be shares that sum to 1, such as {{ train = 0.8, test = 0.2 }}"
         )
@@ -250,7 +242,7 @@ def _check_plan(study):
 
 
 def _draws(draws, scenario):
-    """Keys that are drawn, and their distributions."""
+    """Drawn keys and their distributions."""
     if not isinstance(draws, Mapping) or not draws:
         raise ValueError("a study draws something: give a table [draw], such as visibility = { uniform = [10, 60] }")
     known = set()
@@ -261,13 +253,13 @@ def _draws(draws, scenario):
             raise ValueError(f"draw.{key.name} is given twice")
         known.add(key)
         try:
-            yield key, distribution_of(table, lambda value, key=key: _in_unit(key, value))
+            yield key, distribution_of(table, None if key.entry else partial(key.section.in_unit, key.key))
         except ValueError as error:
             raise ValueError(f"draw.{key.name}: {error}") from None
 
 
 def _flat(table, above=""):
-    """Names of tables within tables with dots between them, and what they are drawn from."""
+    """Iterate over nested tables with dotted names, and their distributions."""
     for name, found in table.items():
         if isinstance(found, Mapping) and found and all(isinstance(each, Mapping) for each in found.values()):
             yield from _flat(found, f"{above}{name}.")
@@ -275,13 +267,8 @@ def _flat(table, above=""):
             yield f"{above}{name}", found
 
 
-def _in_unit(key, value):
-    return value if key.entry else key.section.in_unit(key.key, value)
-
-
 def _check_may_be_drawn(key, scenario):
-    *_, last = key.path
-    if last == "seed":
+    if key.path[-1] == "seed":
         raise ValueError(
             f"draw.{key.name}: landscapes and noise have seeds of their own, from {key.name} on: leave it out"
         )
@@ -293,11 +280,8 @@ def _check_may_be_drawn(key, scenario):
 
 
 def _settled(scenario, drawn):
-    """
-    Values that chips share, with what depends on the place written out.
-
-    Chips lie beside the scenario's grid, and sun and air are not meant to change with their place.
-    """
+    """Values that chips share, with explicit sun and atmosphere."""
+    # Chips lie outside the grid of the scenario, but sun and atmosphere must not change with their position.
     whole, values = scenario.complete(), values_of(scenario)
     latitude, longitude = scenario.sun_place()
     sun = {"time": whole.geometry.time, "latitude": latitude, "longitude": longitude}
@@ -308,7 +292,7 @@ def _settled(scenario, drawn):
     settled |= {("atmosphere", "altitude"): scenario.atmosphere.altitude, ("terrain", "dem"): scenario.terrain.dem}
     settled |= {("grid", key): value for key, value in grid_keys(scenario.geobox())}
     for keys in _BY_BAND:
-        # One band is drawn, the others have to be there.
+        # If one band is drawn, the other bands are needed too.
         if any(path[:2] == ("ground", key) for path in drawn for key in keys if len(path) == 3):
             settled |= {("ground", key): dict(getattr(whole.ground, key)) for key in keys}
     for path, value in settled.items():
@@ -317,16 +301,15 @@ def _settled(scenario, drawn):
 
 
 def _check_extremes(study):
-    """Each key takes the ends of its distribution, where others are usual."""
+    """Check each key at the ends of its distribution, with the others at usual values."""
     middle = {key: distribution.usual for key, distribution in study.drawn.items()}
-    _check(study, middle, "draw, all at their medians or first choices: ")
+    cases = [(middle, "draw, all at their medians or first choices: ")]
     for key, distribution in study.drawn.items():
         for value in distribution.extremes:
-            _check(study, middle | {key: value}, f"draw.{key.name} = {shown(distribution.table)} at {shown(value)}: ")
-
-
-def _check(study, drawn, said):
-    try:
-        study.scenario_with({key.path: value for key, value in drawn.items()}).complete()
-    except ValueError as error:
-        raise ValueError(f"{said}{error}") from None
+            where = f"draw.{key.name} = {shown(distribution.table)} at {shown(value)}: "
+            cases.append((middle | {key: value}, where))
+    for drawn, where in cases:
+        try:
+            study.scenario_with({key.path: value for key, value in drawn.items()}).complete()
+        except ValueError as error:
+            raise ValueError(f"{where}{error}") from None

@@ -1,4 +1,4 @@
-"""Scenarios along axes: what a regression becomes as a parameter varies, in one lazy Dataset."""
+"""Scenarios along axes: regressions for a range of parameters, in one lazy Dataset."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ import dask.array as da
 import numpy as np
 import xarray as xr
 
-from fifesim.analysis.rasters.regression import regress
+from fifesim.analysis.regression_labels import regress
 from fifesim.base.annotations import Array, Pairing
-from fifesim.base.kinds import PLAIN, described
+from fifesim.base.arguments import PLAIN, described
 from fifesim.scenario.ensemble import realise
-from fifesim.scenario.named_keys import changed, find_key, in_text
-from fifesim.scenario.scenario import Scenario
+from fifesim.scenario.scenario import Scenario, changed, find_key, in_text
 from fifesim.scenario.simulation import simulate
 
 # What is kept of a regression of the truth on NDVI.
@@ -81,29 +80,29 @@ def sweep(
     names = STATISTICS if measures is None else tuple(measures)
     shape = (len(names),) + ((len(VARIABLES),) if measures is None else ())
     points = []
-    for values in product(*(values for values, _ in steps.values())):
+    for values in product(*(values for values, _, _ in steps.values())):
         one = scenario
-        for value, (_, change) in zip(values, steps.values(), strict=True):
+        for value, (_, change, _) in zip(values, steps.values(), strict=True):
             one = change(one, value)
         one.complete()
         points.append(da.from_delayed(dask.delayed(_point)(one, measures, pair), shape=shape, dtype=float))
-    sizes = tuple(len(values) for values, _ in steps.values())
+    sizes = tuple(len(values) for values, _, _ in steps.values())
     # Statistics first, then the axes.
     found = da.stack(points, axis=1).reshape(shape[0], *sizes, *shape[1:])
     dims = (*steps, *(("variable",) if measures is None else ()))
-    coordinates = {name: (name, _labels(values), _meaning(name, axes[name])) for name, (values, _) in steps.items()}
+    coordinates = {name: (name, _labels(values), attributes) for name, (values, _, attributes) in steps.items()}
     if measures is None:
         coordinates["variable"] = list(VARIABLES)
     return xr.Dataset({name: (dims, found[k]) for k, name in enumerate(names)}, coords=coordinates)
 
 
 def _point(scenario, measures, pair):
-    """Results of one scenario, computed in this thread: the points are what runs in parallel."""
+    """Results of one scenario, computed in this thread, because points run in parallel."""
     if measures is not None:
         run = simulate(scenario)
         kept = xr.DataTree.from_dict({name: run[name].to_dataset() for name in ("image", "truth")})
-        # What measures a run may look at all that it says.
-        kept = kept.map_over_datasets(lambda each: each.compute(scheduler="synchronous"))
+        # A measure may need any part of the run.
+        kept = kept.map_over_datasets(lambda node: node.compute(scheduler="synchronous"))
         return np.array([float(measure(kept)) for measure in measures.values()])
     kept = realise(scenario)
     fits = [regress(kept["truth"][name], kept["image"]["ndvi"], pair=pair) for name in VARIABLES]
@@ -111,28 +110,19 @@ def _point(scenario, measures, pair):
 
 
 def _axis(name, given):
-    """Values of an axis, and the function that puts one into a scenario."""
-    values = given[0] if _has_function(given) else given
+    """Values of an axis, the function that puts a value into a scenario, and attributes for plots."""
+    has_function = isinstance(given, tuple) and len(given) == 2 and callable(given[1])
+    values = given[0] if has_function else given
     if isinstance(values, str) or not np.iterable(values) or not len(list(values)):
         raise ValueError(f"the axis {name!r} needs a list of values, got {values!r}: write [value], even for one")
-    if _has_function(given):
-        return list(values), given[1]
-    return list(given), partial(changed, find_key(name))
+    if has_function:
+        return list(values), given[1], {}
+    key = find_key(name)
+    return list(values), partial(changed, key), key.attributes
 
 
 def _labels(values):
-    """Values as a coordinate: text where they are lists, which have no place along one dimension."""
+    """Values as a coordinate: text for lists."""
     if all(np.ndim(value) == 0 for value in values):
         return values
     return [in_text(np.atleast_1d(value)) for value in values]
-
-
-def _meaning(name, given):
-    """Attributes of an axis: what plots write beside it."""
-    if _has_function(given):
-        return {}
-    return find_key(name).attributes
-
-
-def _has_function(given):
-    return isinstance(given, tuple) and len(given) == 2 and callable(given[1])

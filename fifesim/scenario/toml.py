@@ -1,45 +1,26 @@
-"""Scenarios as TOML text: spelled as keys may be, with one line a mistake, and written with every unit."""
+"""Scenarios as TOML text: a check of the spelling of keys, one line for each mistake, and writing with every unit."""
 
 import inspect
-import json
 import os
-import re
 from copy import deepcopy
 from functools import reduce
 from pathlib import Path
 
+import tomlkit
 from pydantic import ValidationError
 
-from fifesim.base.foreign import in_a_line, read_toml, shown
-from fifesim.base.refusals import in_own_words
-from fifesim.base.spelling import closest, nearest
+from fifesim.base.files import in_a_line, read_toml, shown
+from fifesim.base.messages import closest, in_own_words, nearest
 from fifesim.scenario.keys import Keys
 
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-# The longest that is said of the mistakes of a scenario; a line of one is shorter.
+# Length of the text on all mistakes of a scenario. [character]
 _LONGEST = 500
-# A value of another kind than its key takes is told what the key says.
+# Types of errors whose message is followed by the meaning of the key.
 _OTHER_KINDS = ("dict_type", "list_type", "string_type")
 
 
 def load_values(path):
-    """
-    Values of a TOML file.
-
-    Parameters
-    ----------
-    path : str or path
-
-    Returns
-    -------
-    values : dict
-        Files that it names lie relative to it, and have their full paths here.
-
-    Raises
-    ------
-    ValueError
-        If it is missing, no regular file, too large, or not TOML.
-    """
+    """Values of a TOML file, with full paths for the files that it names relative to it."""
     path = Path(path)
     try:
         values = read_toml(path)
@@ -49,67 +30,19 @@ def load_values(path):
 
 
 def with_folder(values, folder):
-    """
-    Values of a scenario with the full paths of the files that they name.
-
-    Parameters
-    ----------
-    values : dict
-        As TOML gives it.
-    folder : str or path
-        That they lie relative to.
-
-    Returns
-    -------
-    values : dict
-        The same, changed.
-    """
+    """Values of a scenario with full paths of its files, changed in place."""
     for _, table, key in list(named_files(values)):
         table[key] = full_path(table[key], folder)
     return values
 
 
 def full_path(path, folder="."):
-    """
-    Full path of a file that a scenario names.
-
-    Parameters
-    ----------
-    path : str
-    folder : str or path, optional
-        Folder that the path is relative to.
-
-    Returns
-    -------
-    path : str
-        Links are not resolved: the file that one leads to may have another suffix. Paths of GDAL's virtual file
-        systems do not change, since they are no paths of this machine.
-
-    Examples
-    --------
-    >>> full_path("../lai.tif", "/data/runs"), full_path("/vsizip//data/maps.zip/lai.tif", "/data/runs")
-    ('/data/lai.tif', '/vsizip//data/maps.zip/lai.tif')
-    """
+    """Full path of a file in a scenario, without resolving links; GDAL's virtual paths stay."""
     return path if path.startswith("/vsi") else os.path.abspath(os.path.join(folder, path))
 
 
 def named_files(values):
-    """
-    Keys of a scenario that name files.
-
-    Parameters
-    ----------
-    values : dict
-        As TOML gives it.
-
-    Yields
-    ------
-    place : tuple of str
-        Of the table.
-    table : dict
-    key : str
-        Of the path in the table.
-    """
+    """Iterate over the keys of a scenario that name files: place, table and key."""
     for place, table in _tables(values):
         section = Keys.section(place)
         for key, value in table.items() if section else ():
@@ -125,54 +58,12 @@ def _tables(values):
         yield from ((place, each) for place, each in found if isinstance(each, dict))
 
 
-def validated(model, values):
-    """
-    A model of nested mappings, whose mistakes are one line each.
-
-    Parameters
-    ----------
-    model : type
-        `Keys`, which knows spelling, types and ranges, or a Scenario, which knows what values mean.
-    values : mapping
-        As TOML gives it.
-
-    Returns
-    -------
-    found : model
-
-    Raises
-    ------
-    ValueError
-        One line a mistake, with the key, the value and what is allowed.
-    """
-    try:
-        return model.model_validate(values)
-    except ValidationError as error:
-        raise ValueError(mistakes(error, values, model)) from None
-
-
 def mistakes(error, values, model):
-    """
-    Mistakes of a scenario, a line each.
-
-    A section with an unknown key is not checked as a whole, so the values are checked again with these keys corrected
-    where their spelling is close to a key, and without the others.
-
-    Parameters
-    ----------
-    error : pydantic.ValidationError
-    values : mapping
-        From which the model was made.
-    model : type
-        As in `validated`.
-
-    Returns
-    -------
-    lines : str
-        As many as can be read at once.
-    """
+    """Mistakes of a scenario, one line each."""
+    # A section with an unknown key is not checked as a whole, so the values are checked again with near misses
+    # corrected, and without other unknown keys.
     found = error.errors()
-    lines, unknown = [_explain(item) for item in found], [each for each in found if each["type"] == "extra_forbidden"]
+    lines, unknown = [_explain(item) for item in found], [item for item in found if item["type"] == "extra_forbidden"]
     if unknown:
         rest = deepcopy(dict(values))
         for item in unknown:
@@ -190,7 +81,7 @@ def mistakes(error, values, model):
 
 
 def _shortened(lines):
-    """As many of some lines as can be read at once, and how many more there are."""
+    """As many lines as are readable, and the number of the others."""
     kept = lines[:1]
     for line in lines[1:]:
         if len("\n".join((*kept, line))) > _LONGEST - len("\nand 1000000 more"):
@@ -200,104 +91,52 @@ def _shortened(lines):
 
 
 def check_spelling(path):
-    """
-    Refuse a scenario whose keys, types or ranges are wrong; this asks no physics, and is quick.
-
-    Parameters
-    ----------
-    path : str or path
-        TOML file.
-
-    Raises
-    ------
-    ValueError
-        As in `load_values` and `validated`.
-    """
-    validated(Keys, load_values(path))
+    """Raise ValueError for a scenario with wrong keys, types or ranges, without the slower physical checks."""
+    values = load_values(path)
+    try:
+        Keys.model_validate(values)
+    except ValidationError as error:
+        raise ValueError(mistakes(error, values, Keys)) from None
 
 
 def write_scenario(scenario):
-    """
-    TOML text of a scenario, every key with its unit and meaning.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    text : str
-        Reading it gives the same scenario. The first line states the synthetic parts.
-    """
-    lines = [f"# {scenario.provenance()}"]
-    lines += ["# Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
-    for place, section in scenario.sections().items():
-        lines += ["", *_table(".".join(map(_toml_key, place)), section)]
-    return "\n".join(lines) + "\n"
+    """TOML text of a scenario, with the unit and meaning of every key; reading it gives the same scenario."""
+    heading = [scenario.provenance(), "Scenario of a fifesim run. Run it with: fifesim simulate THIS_FILE -o FOLDER"]
+    return _document(heading, {place: _described(section) for place, section in scenario.sections().items()})
 
 
-def plain_table(place, values):
-    """
-    Lines of a TOML table.
-
-    Parameters
-    ----------
-    place : sequence of str
-        Its name.
-    values : mapping
-        Numbers, texts, lists and tables of them, by key; what is None is left out.
-
-    Returns
-    -------
-    lines : list of str
-
-    Examples
-    --------
-    >>> plain_table(["draw"], {"brown": {"uniform": [0.0, 0.5]}})
-    ['[draw]', 'brown = { uniform = [0.0, 0.5] }']
-    """
-    keys = (f"{_toml_key(key)} = {_toml(value)}" for key, value in values.items() if value is not None)
-    return [f"[{'.'.join(map(_toml_key, place))}]", *keys]
+def write_tables(heading, tables):
+    """TOML text of tables without descriptions of their keys."""
+    given = {place: {key: each for key, each in table.items() if each is not None} for place, table in tables.items()}
+    return _document([heading], {place: tomlkit.item(table) for place, table in given.items() if table})
 
 
-def _table(name, section):
-    """Lines of a table and of those in it."""
-    lines, tables = [f"[{name}]  # {inspect.getdoc(type(section)).splitlines()[0]}"], []
-    for key, known in section.said.items():
+def _document(heading, tables):
+    """TOML text of comment lines and of tables by their names, which have one or two parts."""
+    document = tomlkit.document()
+    for line in heading:
+        document.add(tomlkit.comment(line))
+    for (name, *inside), table in tables.items():
+        if inside:
+            above = document.setdefault(name, tomlkit.table(is_super_table=True))
+            above.add(inside[0], table)
+        else:
+            document.add(name, table)
+    return document.as_string()
+
+
+def _described(section):
+    """Table of a section, with the meaning of each key in a comment."""
+    table = tomlkit.table().comment(inspect.getdoc(type(section)).splitlines()[0])
+    # A key below a table inside this one would be part of that table.
+    for key, known in sorted(section.written.items(), key=lambda item: isinstance(getattr(section, item[0]), dict)):
         value, unit = getattr(section, key), section.unit(key)
         meaning = f"{unit}; {known.description}" if unit else known.description
-        if isinstance(value, dict):
-            parts = (f"{_toml_key(part)} = {_toml(number)}" for part, number in value.items())
-            tables += ["", f"[{name}.{key}]  # {meaning}", *parts]
-        elif value is None:
-            lines.append(f"# {key} =   # {meaning}")
+        if value is None:
+            table.add(tomlkit.comment(f"{key} =   # {meaning}"))
         else:
-            lines.append(f"{key} = {_toml(value)}  # {meaning}")
-    return lines + tables
-
-
-def _toml(value):
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        # JSON escapes as TOML does, all but one character.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_toml_key(key)} = {_toml(each)}" for key, each in value.items()) + " }"
-    return repr(value)
-
-
-def _toml_key(name):
-    return name if _BARE_KEY.fullmatch(name) else _toml(name)
-
-
-def _meaning(place):
-    """What a key says, in brackets; nothing of one that is not known."""
-    section = Keys.section(place[:-1])
-    known = section.model_fields.get(place[-1]) if section else None
-    return f" ({known.description})" if known else ""
+            table.add(key, tomlkit.item(value).comment(meaning))
+    return table
 
 
 def _known(place):
@@ -306,7 +145,7 @@ def _known(place):
 
 
 def _explain(error):
-    """One line that names the key, the value and what is allowed."""
+    """One line that names the key, the value and the allowed values."""
     place, value = [str(part) for part in error["loc"]], error["input"]
     key = in_a_line(".".join(place), 100)
     if error["type"] == "extra_forbidden":
@@ -315,9 +154,11 @@ def _explain(error):
         return in_a_line(f"unknown key {key} = {shown(value)}: {hint}allowed are {', '.join(known)}")
     message = str(error["ctx"]["error"]) if error["type"] == "value_error" else in_own_words(error)
     if error["type"] in _OTHER_KINDS and len(place) > 1:
-        message += _meaning(place)
+        section = Keys.section(place[:-1])
+        known = section.model_fields.get(place[-1]) if section else None
+        message += f" ({known.description})" if known else ""
     if isinstance(value, str):
-        # What others say of a value repeats it whole.
+        # Messages of libraries repeat the value in full.
         message = message.replace(repr(value), shown(value))
     if isinstance(value, dict):
         return in_a_line(": ".join(filter(None, (key, message))))

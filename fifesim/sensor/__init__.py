@@ -1,1 +1,1 @@
-"""The sensor: what an instrument makes of the light at the top of the atmosphere."""
+"""The sensor: images of an instrument from radiance at the top of the atmosphere."""

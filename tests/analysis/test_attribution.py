@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from fifesim.analysis.attribution import by_itself, shapley, taken_away
+from fifesim.analysis.scaling import by_itself, shapley, taken_away
 
 
 def test_glove_game():

@@ -5,7 +5,7 @@ from math import asin, pi, sqrt
 import numpy as np
 import pytest
 
-from fifesim.analysis.compositing import date_of_maximum, values_of_date
+from fifesim.analysis.indices import date_of_maximum, values_of_date
 
 # Expected largest of n standard normal numbers, in closed form.
 LARGEST = {

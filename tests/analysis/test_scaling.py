@@ -44,10 +44,13 @@ def test_linearity_is_zero_where_the_sum_is_constant():
     """Then the denominator does not vary, and NDVI is linear; with a little noise in it the correlation is small."""
     rng = np.random.default_rng(3)
     red = rng.uniform(0.05, 0.15, 4000)
-    assert np.isnan(scaling.ndvi_linearity(red, 0.4 - red)) or abs(scaling.ndvi_linearity(red, 0.4 - red)) < 1e-6
+    assert (
+        np.isnan(scaling.linearity_correlation(red, 0.4 - red))
+        or abs(scaling.linearity_correlation(red, 0.4 - red)) < 1e-6
+    )
     noise = rng.normal(0, 0.01, red.size)
     # Half of the noise to each band: the difference does not know it. Four standard errors of 1/sqrt(n).
-    assert abs(scaling.ndvi_linearity(red + noise / 2, 0.4 - red + noise / 2)) < 4 / np.sqrt(red.size)
+    assert abs(scaling.linearity_correlation(red + noise / 2, 0.4 - red + noise / 2)) < 4 / np.sqrt(red.size)
 
 
 def test_linearity_agrees_with_numpy():
@@ -55,7 +58,7 @@ def test_linearity_agrees_with_numpy():
     red[3], nir[5] = np.nan, np.inf
     kept = np.isfinite(red) & np.isfinite(nir)
     expected = np.corrcoef((nir - red)[kept], (1 / (nir + red))[kept])[0, 1]
-    assert scaling.ndvi_linearity(red, nir) == pytest.approx(expected, rel=1e-12)
+    assert scaling.linearity_correlation(red, nir) == pytest.approx(expected, rel=1e-12)
 
 
 def test_mean_ndvi_is_that_of_the_mean_where_ndvi_and_brightness_are_uncorrelated():
@@ -69,4 +72,4 @@ def test_mean_ndvi_is_that_of_the_mean_where_ndvi_and_brightness_are_uncorrelate
 
 def test_share_kept_leaves_out_what_is_missing():
     cells = np.array([[0.0, 4.0], [np.nan, 2.0]])
-    assert scaling.share_kept(np.array([1.0, np.nan, 2.0]), cells) == pytest.approx((0.25, 0.25 / (8 / 3)), rel=1e-12)
+    assert scaling.pixel_shares(np.array([1.0, np.nan, 2.0]), cells) == pytest.approx((0.25, 0.25 / (8 / 3)), rel=1e-12)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.analysis import variogram as kernels
+from fifesim.analysis import scaling as kernels
 from fifesim.base import footprints
 from fifesim.base import line_spread as spreads
 from fifesim.ground.landscape import autoregression

@@ -5,10 +5,10 @@ import pytest
 from lazy import check_raster_function
 
 import fifesim
-from fifesim.atmosphere.raster import to_surface, to_toa
-from fifesim.atmosphere.schemes import coupling, engines
+from fifesim.atmosphere import coupling, engines
+from fifesim.atmosphere.labels import surface_from_toa, toa_from_surface
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import directions
+from fifesim.grids import directions
 from fifesim.sensor.description.instruments import instrument
 
 AIR = fifesim.Atmosphere(visibility=23.0)
@@ -27,11 +27,11 @@ def ground(lai_with_hole):
 
 
 def upward(array):
-    return to_toa(array, AIR, BANDS, SUN)
+    return toa_from_surface(array, AIR, BANDS, SUN)
 
 
 def downward(array):
-    return to_surface(array, AIR, BANDS, SUN)
+    return surface_from_toa(array, AIR, BANDS, SUN)
 
 
 def test_to_toa_keeps_its_word_and_equals_the_kernel(ground):

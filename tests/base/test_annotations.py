@@ -8,9 +8,9 @@ import xarray as xr
 from scipy import stats
 
 import fifesim
-from fifesim.base.annotations import Array, Distribution
+from fifesim.base.annotations import Array, FrozenDistribution
 
-MEMBERS = {Array: ["__array__"], Distribution: ["ppf", "cdf", "pdf", "mean", "std", "support"]}
+MEMBERS = {Array: ["__array__"], FrozenDistribution: ["ppf", "cdf", "pdf", "mean", "std", "support"]}
 
 
 @pytest.mark.parametrize("protocol", MEMBERS)
@@ -28,4 +28,4 @@ def test_array_is_what_numpy_reads(array):
 @pytest.mark.parametrize("source", [stats.gamma(4, scale=0.4), "burned-grazed"], ids=["frozen", "name"])
 def test_distribution_is_a_frozen_one_of_scipy(source):
     found = fifesim.lai_distribution(source)
-    assert all(callable(getattr(found, name)) for name in MEMBERS[Distribution])
+    assert all(callable(getattr(found, name)) for name in MEMBERS[FrozenDistribution])

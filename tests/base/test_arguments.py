@@ -19,10 +19,9 @@ from odc.geo.geobox import GeoBox
 import fifesim
 from fifesim.accessor import PUBLIC
 from fifesim.base.annotations import FilePath, Metres, Names
-from fifesim.base.arguments import check_fields, checked, kind_of
-from fifesim.base.kinds import NUMBER, Kind
+from fifesim.base.arguments import NUMBER, Kind, check_fields, checked, kind_of
+from fifesim.grids import grid as grids
 from fifesim.ground.canopy.properties import PROPERTIES
-from fifesim.rasters import grid as grids
 
 PACKAGE = str(Path(fifesim.__file__).parent)
 

@@ -9,7 +9,7 @@ from fifesim.base.bands import (
     NEAR_INFRARED,
     RED,
     Band,
-    nearest,
+    nearest_band,
     solar_irradiance,
     solar_irradiance_steps,
     solar_spectrum,
@@ -90,12 +90,12 @@ def test_thematic_mapper_irradiance_agrees_with_landsat_handbook():
 )
 def test_the_band_nearest_to_the_best_place_of_a_window_is_taken(window, wavelengths, number):
     """Limits belong to a window; what lies outside is not taken, however near to the best place."""
-    assert nearest(wavelengths, window) == number
+    assert nearest_band(wavelengths, window) == number
 
 
 def test_thematic_mapper_shows_red_in_its_third_and_near_infrared_in_its_fourth_band():
     centers = [Band(f"TM{key}", *response.T).center for key, response in RSR_reader("Landsat-5", "TM").items()]
-    assert [nearest(centers, window) for window in (GREEN, RED, NEAR_INFRARED)] == [1, 2, 3]
+    assert [nearest_band(centers, window) for window in (GREEN, RED, NEAR_INFRARED)] == [1, 2, 3]
 
 
 def test_a_quadrature_is_the_mean_of_any_spectrum_on_its_wavelengths():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.base.digital_numbers import check_counts, counts
+from fifesim.base.bands import check_counts, counts
 
 
 @pytest.mark.parametrize(("dn", "said"), [(-1.0, "-1"), (256, "256"), (1.5, "1.5"), (-1, "-1"), (np.inf, "inf")])

@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from fifesim.base.foreign import check_regular, in_a_line, read_toml, shown
+from fifesim.base.files import check_regular, in_a_line, read_toml, shown
 
 
 def test_only_regular_files_are_opened(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import fifesim
-from fifesim.base.geometry import Geometry, angle_between, relative_azimuth, scattering_angle_cosine, sun_position
+from fifesim.base.geometry import Geometry, angle_between, relative_azimuth, scattering_angle_cosine, sun_geometry
 
 
 def almanac_sun(time, latitude, longitude):
@@ -35,7 +35,7 @@ def almanac_sun(time, latitude, longitude):
     ],
 )
 def test_sun_agrees_with_the_almanac(time, latitude, longitude):
-    sun = sun_position(time, latitude, longitude)
+    sun = sun_geometry(time, latitude, longitude)
     zenith, azimuth = almanac_sun(time, latitude, longitude)
     assert sun.sza == pytest.approx(zenith, abs=0.02)
     assert sun.saa == pytest.approx(azimuth, abs=0.03)
@@ -50,7 +50,7 @@ def test_paper_case():
 
 def test_sun_below_the_horizon_is_refused():
     with pytest.raises(ValueError, match=r"sza must be in \[0, 90\).*the sun is below the horizon"):
-        sun_position("1987-06-06T06:00:00Z", 39.06, -96.54)
+        sun_geometry("1987-06-06T06:00:00Z", 39.06, -96.54)
 
 
 @pytest.mark.parametrize("values", [{"sza": -1}, {"vza": 90}, {"sza": np.nan}, {"earth_sun_distance": 149.6e6}])

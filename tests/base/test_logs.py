@@ -2,7 +2,7 @@
 
 import logging
 
-from fifesim.base.logs import LOG, is_quiet, quiet
+from fifesim.base.messages import LOG, is_quiet, quiet
 
 
 def test_the_logger_is_called_fifesim_and_has_no_handlers():

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from fifesim.base import metadata
+from fifesim.sensor.products import metadata
 
 SECRET = "not for anybody"
 

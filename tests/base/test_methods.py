@@ -2,7 +2,7 @@
 
 import fifesim
 from fifesim.analysis.regression import Regression
-from fifesim.base.methods import Method
+from fifesim.base.arguments import Method
 
 
 def test_a_method_is_the_public_function_and_its_object_comes_first():

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import pytest
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
-from fifesim.base.refusals import in_own_words
+from fifesim.base.messages import in_own_words
 
 
 class Table(BaseModel):

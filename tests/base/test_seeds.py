@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.base.seeds import generator
-from fifesim.ground.landscape.field import periodic_field, streaming_field
+from fifesim.base.lattice import generator
+from fifesim.ground.landscape.autoregression import periodic_field, streaming_field
 
 GRID = fifesim.fife_site(30 / 9, window=((90, 108), (180, 198)))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pytest
 
 import fifesim
-from fifesim.base.spelling import nearest, spelled, unknown_argument
+from fifesim.base.messages import nearest, spelled, unknown_argument
 
 
 def test_the_nearest_is_named_and_none_where_none_is_near():

@@ -2,7 +2,7 @@
 
 import warnings
 
-from fifesim.base.warned import warn
+from fifesim.base.messages import warn
 
 
 def test_a_warning_points_outside_of_the_package():

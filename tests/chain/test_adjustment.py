@@ -7,7 +7,7 @@ import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
-from fifesim.base import datasets
+from fifesim.base import files
 
 # Bands of the MSI nearest to those of the TM.
 NEAREST = {"TM1": "MSI2", "TM2": "MSI3", "TM3": "MSI4", "TM4": "MSI8", "TM5": "MSI11", "TM7": "MSI12"}
@@ -74,7 +74,7 @@ def test_bands_of_the_tm_are_found_from_those_of_the_msi(lai):
 
 def test_measured_spectra_of_the_ground_are_found(lai):
     """Litter and soil as they were measured, without a canopy's model between."""
-    table = datasets.table("ground_spectra.csv").set_index("wavelength")
+    table = files.table("ground_spectra.csv").set_index("wavelength")
     spectra = xr.DataArray(table.to_numpy().T, dims=("sample", "wavelength"), coords={"wavelength": table.index})
     # The table has holes where the air is opaque.
     spectra = spectra.interp(wavelength=np.linspace(0.4, 2.45, 206))
@@ -183,10 +183,10 @@ def test_lines_are_near_those_of_nasa():
 
 
 def test_published_lines_are_of_bands_that_there_are():
-    table = datasets.table("spectral_adjustment.csv")
+    table = files.table("spectral_adjustment.csv")
     for row in table.itertuples():
-        fifesim.instrument(row.source).select(row.source_band)
-        fifesim.instrument(row.target).select(row.target_band)
+        for name, band in ((row.source, row.source_band), (row.target, row.target_band)):
+            assert [each.name for each in fifesim.instrument(name).select(band)] == [band]
 
 
 def test_pairs_that_nobody_published_have_no_line_of_others():

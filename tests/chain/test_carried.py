@@ -9,10 +9,10 @@ import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
-from fifesim.atmosphere.schemes import coupling, engines
+from fifesim.atmosphere import coupling, engines
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import directions
-from fifesim.rasters import grid as grids
+from fifesim.grids import directions
+from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
 
 

@@ -9,7 +9,7 @@ import xarray as xr
 from lazy import in_chunks, no_compute
 
 import fifesim
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 from fifesim.sensor.description.spectral_response import ResponseList
 
 NAMES = ["TM", "OLI", "MSI"]

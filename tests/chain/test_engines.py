@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.atmosphere.schemes.engines import band_terms
-from fifesim.chain.engines import compare_engines, engine_error
+from fifesim.atmosphere.engines import band_terms
+from fifesim.chain.comparison import compare_engines, engine_error
 
 HAZE = fifesim.Atmosphere(aerosol="urban", visibility=6)
 LOW = fifesim.Geometry(70, 120, 0, 0)

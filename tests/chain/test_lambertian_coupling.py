@@ -9,20 +9,17 @@ import pandas as pd
 import pytest
 from numpy.polynomial.legendre import leggauss
 from odc.geo.xr import wrap_xr
-from oracles_atmosphere import Air, Ground, coupled_reflectance
+from oracles_atmosphere import Air, Ground, coupled_reflectance, mixed_stokes
 
 import fifesim
-from fifesim.atmosphere.schemes.coupling import apparent_reflectance
-from fifesim.atmosphere.schemes.engines import band_terms
-from fifesim.atmosphere.schemes.mixed_air import mixed_stokes, whole_scattering
-from fifesim.atmosphere.schemes.phase_expansion import matrix_moments
-from fifesim.atmosphere.schemes.stokes import stokes_reflectance
-from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
-from fifesim.base import datasets
+from fifesim.atmosphere.column import matrix_moments
+from fifesim.atmosphere.coupling import apparent_reflectance
+from fifesim.atmosphere.engines import band_terms, whole_scattering
+from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance, stokes_reflectance
+from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.experiments.verification import benchmarks
-from fifesim.ground.canopy.background import with_background
-from fifesim.ground.canopy.sail_model import sail
+from fifesim.ground.canopy.sail_model import sail, with_background
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
@@ -107,7 +104,7 @@ def rpv_ground():
 
 def rami_air(vza, raa):
     """Molecules and aerosol of the reference, the latter evenly below 2 km."""
-    table = datasets.table("verification/rami4atm_phase.csv")
+    table = files.table("verification/rami4atm_phase.csv")
     knots, phase = table[["scattering_cosine", "phase"]].to_numpy().T
     nodes, weights = benchmarks._between(knots, 4)
     moments = matrix_moments(np.interp(nodes, knots, phase), np.zeros(nodes.size), nodes, weights, 48)

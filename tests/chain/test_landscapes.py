@@ -8,8 +8,8 @@ from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 from oracles_canopy import four_streams
 
 import fifesim
-from fifesim.atmosphere.schemes import engines
-from fifesim.rasters import grid as grids
+from fifesim.atmosphere import engines
+from fifesim.grids import grid as grids
 
 TM34 = ["TM3", "TM4"]
 GRASS = fifesim.Canopy(leaf_angles="erectophile", background={"dead_grass": 1.0}, hotspot=0.1)

@@ -7,8 +7,8 @@ import xarray as xr
 from lazy import no_compute
 
 import fifesim
-from fifesim.chain.seen_canopy import seen_reflectance, seen_through_air
-from fifesim.rasters.origins import origin_of
+from fifesim.chain.landscapes import seen_reflectance, seen_through_air
+from fifesim.grids.windows import origin_of
 
 GRID = fifesim.fife_site(30 / 9, window=((0, 90), (0, 72)))
 BANDS = ["TM2", "TM3", "TM4"]

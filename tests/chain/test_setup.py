@@ -7,7 +7,7 @@ import xarray as xr
 
 import fifesim
 from fifesim.chain.setup import Setup, image_of, reflectance_of
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 
 # Every field of the ground, the air and the sampling away from its default, as the public functions take them.
 GROUND = {

@@ -4,8 +4,8 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.chain.slopes import kt_and_reflectance
-from fifesim.rasters import grid as grids
+from fifesim.chain.steps import kt_and_reflectance
+from fifesim.grids import grid as grids
 
 
 def test_sky_above_slopes_is_in_a_graph_once(lai):

@@ -6,13 +6,13 @@ import xarray as xr
 from lazy import ODD_CHUNKS, in_chunks, no_compute
 
 import fifesim
-from fifesim.atmosphere.schemes import engines
+from fifesim.atmosphere import engines
 from fifesim.base.geometry import Geometry
 from fifesim.chain import landscapes
+from fifesim.grids import directions
+from fifesim.grids import grid as grids
 from fifesim.ground.canopy import optics
-from fifesim.ground.canopy.rasters.evaluation import BandCanopy, Light
-from fifesim.rasters import directions
-from fifesim.rasters import grid as grids
+from fifesim.ground.canopy.labels import BandCanopy, Light
 from fifesim.sensor.description.instruments import instrument
 
 TM34 = ["TM3", "TM4"]
@@ -39,7 +39,7 @@ def test_chunks_may_begin_anywhere_in_the_chain(whole):
 def test_every_step_lies_where_it_should(site, whole):
     for name in ("lai", "rho", "toa"):
         assert grids.same_grid(grids.geobox(whole[name]), site)
-    pixels = grids.aligned(site, 30.0)
+    pixels = grids.aligned_grid(site, 30.0)
     for name in ("image", "ndvi", "truth"):
         assert grids.same_grid(grids.geobox(whole[name]), pixels)
         np.testing.assert_array_equal(whole[name]["x"], grids.coordinates(pixels)["x"])
@@ -75,7 +75,7 @@ def test_skylight_of_the_atmosphere_reaches_the_ground(lai):
     bands = instrument("TM").select(TM34)
     sun = fifesim.fife_geometry()
     terms = engines.band_terms(haze, tuple(band.response for band in bands), sun.sza, sun.vza, sun.raa)
-    stand = BandCanopy(fifesim.Canopy(), optics.leaf_optics(TM34), None, optics.background(TM34))
+    stand = BandCanopy(fifesim.Canopy(), optics.band_leaf_optics(TM34), None, optics.band_background(TM34))
     expected = landscapes.ground.level_reflectance(lai, bands, stand, Light(sun, terms.diffuse_fraction))
     np.testing.assert_array_equal(rho, expected)
     assert not np.array_equal(rho, lai.fifesim.surface_reflectance("TM", bands=TM34))
@@ -84,7 +84,7 @@ def test_skylight_of_the_atmosphere_reaches_the_ground(lai):
 
 def test_bare_ground_is_the_background(lai):
     bare = xr.zeros_like(lai)
-    expected = np.array(optics.background(TM34))[:, None, None]
+    expected = np.array(optics.band_background(TM34))[:, None, None]
     np.testing.assert_allclose(
         bare.fifesim.surface_reflectance("TM", bands=TM34), expected + 0 * bare.values, rtol=1e-12
     )

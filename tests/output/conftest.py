@@ -2,7 +2,7 @@
 
 import pytest
 
-from fifesim.output import pages
+from fifesim.output import report
 from fifesim.output.run.folder import simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
 
@@ -20,6 +20,6 @@ def travelled(tmp_path_factory):
     """Its folder; nobody looks at its pictures."""
     folder = tmp_path_factory.mktemp("travelled") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pages, "png", lambda figure, dpi: b"")
+        patch.setattr(report, "png", lambda figure, dpi: b"")
         simulate_to_folder(parse_scenario(TRAVELLED), folder, scene=True, threads=1)
     return folder

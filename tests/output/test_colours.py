@@ -11,18 +11,25 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 import fifesim
-from fifesim.base.bands import composite
-from fifesim.experiments.explorer.words import layer_words
-from fifesim.output.chips.pictures import contact_sheet
-from fifesim.output.colours import LAND, colours_of, dark_and_bright, percentile_limits, stops_of
-from fifesim.output.composites import composite_bands, false_colour_names
-from fifesim.output.figures import fit_figure
-from fifesim.output.maps import relief_map, value_map
-from fifesim.output.report import finding
-from fifesim.output.words import axis_label, long_name, short_name, unit
-from fifesim.rasters import cf
-from fifesim.scenario.ground_keys import GroundKeys
-from fifesim.sensor.description.choices import false_colour_bands
+from fifesim.base.bands import colour_composite
+from fifesim.experiments.explorer.page import layer_words
+from fifesim.grids import cf
+from fifesim.output.chips.datasheet import contact_sheet
+from fifesim.output.colours import (
+    LAND,
+    axis_label,
+    colours_of,
+    dark_and_bright,
+    long_name,
+    percentile_limits,
+    short_name,
+    stops_of,
+    unit,
+)
+from fifesim.output.maps import composite_bands, false_colour_names, relief_map, value_map
+from fifesim.output.report import finding, fit_figure
+from fifesim.scenario.keys import GroundKeys
+from fifesim.sensor.description.fields import false_colour_bands
 from fifesim.sensor.description.instruments import instrument, instrument_names
 
 CLUMPING = cf.Quantity(
@@ -160,7 +167,7 @@ def test_bands_of_a_composite_are_the_same_for_instruments_images_and_styles(nam
     style = fifesim.write_style(image.fifesim.to_geotiff(tmp_path / "image.tif"))
     renderer = ElementTree.parse(style).getroot().find("pipe/rasterrenderer")
     numbers = [int(renderer.get(f"{colour}Band")) - 1 for colour in ("red", "green", "blue")]
-    assert numbers == composite(wavelengths)
+    assert numbers == colour_composite(wavelengths)
 
 
 def test_a_composite_is_stretched_alike_in_qgis_and_in_a_picture(whole, tmp_path):

@@ -7,8 +7,8 @@ import xarray as xr
 from lazy import CHUNKS, in_chunks
 
 import fifesim
-from fifesim.output.composites import composite_bands, rgb, thinned, valid
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
+from fifesim.output.maps import composite_bands, rgb, thinned, valid
 
 GRID = fifesim.grid_at("EPSG:26914", 705000.0, 4334000.0, 1200.0, 900.0, 30.0)
 WAVELENGTHS = {"B2": 0.48, "B3": 0.56, "B4": 0.66, "B8": 0.84}

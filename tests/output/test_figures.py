@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.analysis.rasters.regression import regress
-from fifesim.output.figures import fit_figure, histogram_figures, reflectance_change
+from fifesim.analysis.regression_labels import regress
+from fifesim.output.report import fit_figure, histogram_figures, reflectance_change
 from fifesim.scenario.scenario import parse_scenario
 
 

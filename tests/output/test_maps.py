@@ -8,8 +8,7 @@ from matplotlib import colormaps
 from PIL import Image
 
 import fifesim
-from fifesim.output.composites import false_colour_names
-from fifesim.output.maps import encoded, image_map, relief_map, stretch_of, value_map
+from fifesim.output.maps import encoded, false_colour_names, image_map, relief_map, stretch_of, value_map
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +62,7 @@ def test_colours_diverge_from_their_middle(lai):
 
 def test_a_frame_lies_where_its_ground_is(lai):
     """The ground is 600 m wide and 300 m high; the right half of its lowest 90 m is marked."""
-    part = fifesim.rasters.grid.geobox(lai[21:, 30:]).boundingbox
+    part = fifesim.grids.grid.geobox(lai[21:, 30:]).boundingbox
     assert value_map(lai, "", frame=part).frame == pytest.approx((50.0, 70.0, 50.0, 30.0))
     assert value_map(lai, "").scale == (pytest.approx(100 / 6), "100 m")
 

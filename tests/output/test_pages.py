@@ -8,7 +8,7 @@ import matplotlib
 import pytest
 from matplotlib.figure import Figure
 
-from fifesim.output import pages
+from fifesim.output import report
 
 
 @pytest.fixture
@@ -24,11 +24,11 @@ def template(tmp_path):
 def drawn():
     figure = Figure(figsize=(2, 1))
     figure.subplots().plot([0, 1])
-    return pages.png(figure, 50)
+    return report.png(figure, 50)
 
 
 def test_a_picture_is_in_the_page_as_it_is(template):
-    page = pages.html(template('<img src="{{ picture | embedded }}">'), picture=drawn())
+    page = report.page_html(template('<img src="{{ picture | embedded }}">'), picture=drawn())
     (content,) = re.findall(r'src="data:image/png;base64,([^"]*)"', page)
     assert base64.b64decode(content) == drawn()
 
@@ -39,20 +39,20 @@ def test_a_picture_has_so_many_pixels(template):
 
 
 def test_text_is_not_markup(template):
-    assert "a &lt; b" in pages.html(template("{{ text }}"), text="a < b")
+    assert "a &lt; b" in report.page_html(template("{{ text }}"), text="a < b")
 
 
 def test_a_name_without_a_value_is_an_error(template):
     with pytest.raises(jinja2.UndefinedError, match="forgotten"):
-        pages.html(template("{{ forgotten }}"))
+        report.page_html(template("{{ forgotten }}"))
 
 
 def test_versions_are_on_every_page(template):
-    assert f"matplotlib {matplotlib.__version__}" in pages.html(template(""))
+    assert f"matplotlib {matplotlib.__version__}" in report.page_html(template(""))
 
 
 def test_zero_has_no_sign():
-    assert [pages.fixed(value, 3, sign=True) for value in (-4e-4, 4e-4, -6e-4, 6e-4)] == [
+    assert [report.fixed(value, 3, sign=True) for value in (-4e-4, 4e-4, -6e-4, 6e-4)] == [
         "0.000", "0.000", "−0.001", "+0.001",
     ]  # fmt: skip
-    assert pages.fixed(-0.0, 3) == "0.000"
+    assert report.fixed(-0.0, 3) == "0.000"

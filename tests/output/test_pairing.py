@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from fifesim.output.pairing import pairing_rows
+from fifesim.output.report import pairing_rows
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 

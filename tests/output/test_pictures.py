@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 
 
 @pytest.fixture(autouse=True)

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from fifesim.base.logs import quiet
+from fifesim.base.messages import quiet
 from fifesim.output import progress
 from fifesim.output.progress import CellProgress, ChipProgress, doing, memory, since_start, steps
 

@@ -5,7 +5,7 @@ import platform
 import numpy as np
 
 import fifesim
-from fifesim.output.provenance import versions
+from fifesim.output.folders import versions
 
 
 def test_versions_are_those_of_the_packages_that_run():

@@ -4,7 +4,7 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.analysis.rasters.regression import regress
+from fifesim.analysis.regression_labels import regress
 from fifesim.output.report import engine_rows, finding, pairing, title
 from fifesim.scenario.scenario import parse_scenario
 
@@ -40,7 +40,7 @@ def test_report_says_where_5s_is_beyond_two_percent():
     assert 'beyond 2 % in TM3, TM4: engine = "successive-orders"' in haze and "TM4 +" in haze
     clear = engine_row(25.0, aerosol="none", visibility=None)
     assert clear.endswith("within 2 %")
-    other = parse_scenario({"atmosphere": {"engine": "successive-orders-scalar"}})
+    other = parse_scenario({"atmosphere": {"engine": "successive-orders"}})
     assert engine_rows(other) == []
 
 

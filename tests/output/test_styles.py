@@ -7,7 +7,7 @@ import pytest
 
 import fifesim
 from fifesim.output.colours import dark_and_bright
-from fifesim.output.styles import write_style
+from fifesim.output.maps import write_style
 
 
 def style(raster, path):

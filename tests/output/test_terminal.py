@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from fifesim.base.logs import LOG, quiet
+from fifesim.base.messages import LOG, quiet
 from fifesim.output.terminal import Exit, importing, in_time, listening, report, say, stop, tell
 
 

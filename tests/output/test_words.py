@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.output.words import long_name, short_name, subject, unit
+from fifesim.output.colours import long_name, short_name, subject, unit
 
 
 @pytest.mark.parametrize(

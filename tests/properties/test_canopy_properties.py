@@ -4,10 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fifesim.ground.canopy.background import with_background
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
-from fifesim.ground.canopy.sail_model import sail
+from fifesim.ground.canopy.sail_model import sail, with_background
 
 modest = settings(max_examples=80)
 zenith = st.floats(0, 89.9)

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from rasterio.control import GroundControlPoint
 
 import fifesim
-from fifesim.rasters.opening import ErrorsOfGdal
+from fifesim.grids.opening import ErrorsOfGdal
 
 COUNT = int(os.environ.get("FIFESIM_DRAWS", "150"))
 WEST, NORTH = 708000.0, 4332000.0

@@ -22,8 +22,8 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
 import fifesim
-from fifesim.atmosphere.air import models
-from fifesim.base import datasets
+from fifesim.atmosphere import models
+from fifesim.base import files
 from fifesim.scenario.keys import Keys
 from fifesim.scenario.scenario import parse_scenario, read_scenario
 from fifesim.scenario.simulation import simulate
@@ -166,7 +166,7 @@ def toml(value):
 def folder(tmp_path_factory):
     """Files beside the scenario, good and bad; what is slow the first time is done."""
     folder = tmp_path_factory.mktemp("drawn")
-    tm = datasets.path("instruments/tm.toml").read_text(encoding="utf-8")
+    tm = files.path("instruments/tm.toml").read_text(encoding="utf-8")
     (folder / "mine.toml").write_text(tm, encoding="utf-8")
     (folder / "samples.csv").write_text("lai\n1\n1.5\n2\n2.5\n3\n")
     with rasterio.open(

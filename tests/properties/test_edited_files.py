@@ -21,7 +21,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fifesim
-from fifesim.rasters.grid import place
+from fifesim.grids.grid import place
 
 COUNT = int(os.environ.get("FIFESIM_EDITS", "250"))
 GRID = fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 900.0, 720.0, 30.0)

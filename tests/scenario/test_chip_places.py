@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from fifesim.scenario.chip_places import place_of, ring_place
+from fifesim.scenario.chips import first_cell_of_chip, ring_place
 
 
 def test_the_spiral_goes_step_by_step_through_all_places():
@@ -19,7 +19,7 @@ def test_the_spiral_goes_step_by_step_through_all_places():
 def test_no_two_chips_share_a_cell(size, corner):
     cells = set()
     for number in range(60):
-        row, column = place_of(number, size, corner, 10)
+        row, column = first_cell_of_chip(number, size, corner, 10)
         own = set(itertools.product(range(row, row + size[0]), range(column, column + size[1])))
         assert not own & cells
         cells |= own
@@ -27,17 +27,19 @@ def test_no_two_chips_share_a_cell(size, corner):
 
 def test_chips_fill_a_tile_before_the_next():
     """333 cells fit thrice along a tile of 1008."""
-    tiles = [tuple(at // 1008 for at in place_of(number, (333, 333), (211491, 5000), 1008)) for number in range(27)]
+    tiles = [
+        tuple(at // 1008 for at in first_cell_of_chip(number, (333, 333), (211491, 5000), 1008)) for number in range(27)
+    ]
     assert [len(set(tiles[first : first + 9])) for first in (0, 9, 18)] == [1, 1, 1]
     assert len(set(tiles)) == 3 and tiles[0] == (209, 4)
     for number in range(9):
-        row, column = place_of(number, (333, 333), (211491, 5000), 1008)
+        row, column = first_cell_of_chip(number, (333, 333), (211491, 5000), 1008)
         assert (row + 332) // 1008 == row // 1008 and (column + 332) // 1008 == column // 1008
 
 
 def test_a_tile_holds_the_margins_of_its_chips():
     """With 24 cells around them only four chips of 333 fit into a tile of 1008."""
-    places = [place_of(number, (333, 333), (211491, 5000), 1008, (24, 24)) for number in range(8)]
+    places = [first_cell_of_chip(number, (333, 333), (211491, 5000), 1008, (24, 24)) for number in range(8)]
     for row, column in places:
         assert (row - 24) // 1008 == (row + 356) // 1008 and (column - 24) // 1008 == (column + 356) // 1008
     assert len({(row // 1008, column // 1008) for row, column in places}) == 2

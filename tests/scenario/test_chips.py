@@ -30,12 +30,6 @@ def test_chips_are_the_same_however_many_there_are(sequence):
     assert few.equals(many.isel(chip=slice(13)))
 
 
-def test_a_latin_hypercube_has_a_chip_in_every_slice():
-    table = chips_of(study_of(sequence="latin-hypercube"), 50).table()
-    slices = np.sort(np.floor(table["atmosphere.visibility"].values - 10))
-    np.testing.assert_array_equal(slices, np.arange(50))
-
-
 def test_no_landscape_is_in_two_parts(chips):
     parts = {name: set(chips.landscape[chips.split == name].tolist()) for name in ("train", "validation", "test")}
     assert [len(each) for each in parts.values()] == [6, 1, 1]

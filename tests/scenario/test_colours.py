@@ -2,8 +2,7 @@
 
 import pytest
 
-from fifesim.scenario.colours import with_false_colour
-from fifesim.scenario.scenario import Scenario, read_scenario
+from fifesim.scenario.scenario import Scenario, read_scenario, with_false_colour
 
 
 @pytest.mark.parametrize(

@@ -58,8 +58,3 @@ def test_a_realisation_has_the_bits_and_the_coordinates_of_the_same_scene_simula
     for name, values in (image | truth).items():
         node = found["image"] if name in image else found["truth"]
         np.testing.assert_array_equal(values, node[name])
-
-
-def test_a_node_that_a_run_lacks_is_named():
-    with pytest.raises(ValueError, match="keep names terrain, and this run has scene, truth, image"):
-        realise(scenario(), keep=["terrain"])

@@ -10,7 +10,7 @@ from elevations import write
 from lazy import no_compute
 
 import fifesim
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 from fifesim.scenario.ground import canopy_of, drawn_properties, ground_scene, truth_of, warn_of_canopy
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import setup_of
@@ -99,7 +99,7 @@ def test_light_and_truth_of_a_scenario_are_those_written_out(scenario, by_hand):
     with no_compute():
         tree = fifesim.simulate(scenario)
     np.testing.assert_array_equal(tree["scene"]["surface_reflectance"], rho)
-    onto = grids.aligned(scenario.geobox(), 30.0)
+    onto = grids.aligned_grid(scenario.geobox(), 30.0)
     image = fifesim.sense(fifesim.to_toa(rho), onto=onto)
     np.testing.assert_array_equal(tree["image"]["dn"], image)
     truth = {

@@ -5,8 +5,7 @@ import os
 import pytest
 from pydantic import ValidationError
 
-from fifesim.scenario.ground_keys import COVARIATES, VARYING, ClassKeys, GroundKeys, LandscapeKeys, StandKeys
-from fifesim.scenario.section import Section
+from fifesim.scenario.keys import COVARIATES, VARYING, ClassKeys, GroundKeys, LandscapeKeys, Section, StandKeys
 
 
 @pytest.mark.parametrize(
@@ -40,17 +39,17 @@ def test_one_stand_is_not_where_something_does(values):
 
 def test_a_class_says_what_it_was_given_and_no_default():
     stand = ClassKeys(hotspot=0.0, distribution="burned-grazed", code=None)
-    assert list(stand.said) == ["distribution", "hotspot", "code"]
-    assert list(ClassKeys().said) == []
-    assert stand.said["hotspot"] is ClassKeys.model_fields["hotspot"]
+    assert list(stand.written) == ["distribution", "hotspot", "code"]
+    assert list(ClassKeys().written) == []
+    assert stand.written["hotspot"] is ClassKeys.model_fields["hotspot"]
     ground = GroundKeys(hotspot=0.2)
-    assert list(ground.said) == list(GroundKeys.model_fields)
+    assert list(ground.written) == list(GroundKeys.model_fields)
 
 
 def test_a_class_keeps_what_it_says_in_another_place():
     """As a complete scenario has it: with the full path of its file."""
     whole = ClassKeys(distribution="samples.csv", brown=0.0).with_paths(os.path.abspath)
-    assert list(whole.said) == ["distribution", "brown"]
+    assert list(whole.written) == ["distribution", "brown"]
     assert whole.distribution.endswith("samples.csv") and len(whole.distribution) > len("samples.csv")
 
 

@@ -8,10 +8,19 @@ from datetime import date, datetime, timedelta, timezone
 import pytest
 from pydantic import ValidationError
 
-from fifesim.atmosphere.air import ENGINES
-from fifesim.atmosphere.schemes import engines
-from fifesim.scenario.ground_keys import ClassKeys, GroundKeys, LandscapeKeys, StandKeys
-from fifesim.scenario.keys import AirKeys, GridKeys, Keys, SensorKeys, SunAndViewKeys, TerrainKeys
+from fifesim.atmosphere import ENGINES, engines
+from fifesim.scenario.keys import (
+    AirKeys,
+    ClassKeys,
+    GridKeys,
+    GroundKeys,
+    Keys,
+    LandscapeKeys,
+    SensorKeys,
+    StandKeys,
+    SunAndViewKeys,
+    TerrainKeys,
+)
 from fifesim.scenario.scenario import Scenario
 
 

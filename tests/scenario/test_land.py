@@ -5,9 +5,9 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.ground.terrain.rasters import light as slopes_light
-from fifesim.rasters import grid as grids
-from fifesim.scenario.land import elevation, in_memory, light_on_hills
+from fifesim.grids import grid as grids
+from fifesim.ground.terrain import labels as slopes_light
+from fifesim.scenario.ground import elevation, in_memory, scenario_light_on_hills
 from fifesim.scenario.scenario import Scenario, parse_scenario
 
 GRID = {"west": 707970.0, "north": 4331220.0, "width": 300.0, "height": 240.0}
@@ -54,10 +54,10 @@ def test_in_memory_is_the_horizon_that_lies_above_the_elevation():
 def test_where_slopes_may_hide_the_sun_all_of_the_land_is_asked(sza, alone):
     """The steepest of these hills has 18.8 degrees."""
     hills = parse_scenario({"grid": GRID, "terrain": {"seed": 7}, "geometry": {"sza": sza, "saa": 95.0}})
-    light = light_on_hills(hills, hills.geobox(), hills.sun_and_view())
+    light = scenario_light_on_hills(hills, hills.geobox(), hills.sun_and_view())
     assert (light is not None) is alone
 
 
 def test_only_synthetic_hills_are_lit_without_labels():
     flat = parse_scenario({"grid": GRID, "terrain": {"dem": "flat"}})
-    assert light_on_hills(flat, flat.geobox(), flat.sun_and_view()) is None
+    assert scenario_light_on_hills(flat, flat.geobox(), flat.sun_and_view()) is None

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.scenario.named_keys import changed, find_key, in_text, put, values_of
-from fifesim.scenario.scenario import Scenario, parse_scenario
+from fifesim.scenario.scenario import Scenario, changed, find_key, in_text, parse_scenario, put, values_of
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,10 @@ import rasterio
 from affine import Affine
 
 import fifesim
-from fifesim.atmosphere.schemes import six_s
-from fifesim.base import fife
-from fifesim.base.geometry import earth_sun_distance, sun_position
-from fifesim.rasters import grid as grids
+from fifesim.atmosphere import six_s
+from fifesim.base import times
+from fifesim.base.geometry import earth_sun_distance, sun_geometry
+from fifesim.grids import grid as grids
 from fifesim.scenario.scenario import Scenario, parse_scenario
 from fifesim.scenario.sections import Ground
 from fifesim.scenario.toml import write_scenario
@@ -214,7 +214,7 @@ def test_files_lie_beside_the_scenario(tmp_path):
 
 def test_sun_may_be_given_instead_of_time_and_place():
     sun = parse_scenario({"geometry": {"sza": "40 degree", "saa": 100}}).sun_and_view()
-    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, earth_sun_distance(fife.TIME))
+    assert (sun.sza, sun.saa, sun.earth_sun_distance) == (40.0, 100.0, earth_sun_distance(times.TIME))
     night = parse_scenario({"geometry": {"time": "1987-06-06T06:00:00Z"}})
     with pytest.raises(ValueError, match="the sun is below the horizon"):
         night.sun_and_view()
@@ -259,7 +259,7 @@ def test_place_of_a_grid_is_its_own_and_what_holds_for_fife_is_asked_for():
     air = {"atmosphere": {"altitude": 1.3}, "terrain": {"dem": "flat"}}
     overpass = parse_scenario({"grid": SOUTH, "geometry": {"time": "2022-06-01T08:05Z"}} | air).complete()
     longitude, latitude = pyproj.Transformer.from_crs(32735, 4326, always_xy=True).transform(620150, 7219850)
-    sun = sun_position("2022-06-01T08:05Z", latitude, longitude, 1300)
+    sun = sun_geometry("2022-06-01T08:05Z", latitude, longitude, 1300)
     assert (overpass.sun_and_view().sza, overpass.sun_and_view().saa) == pytest.approx((sun.sza, sun.saa), abs=1e-9)
     assert sun.saa < 90  # north of east, as below the equator in winter
     given = parse_scenario({"grid": SOUTH, "geometry": {"sza": 50, "saa": 40}} | air).complete()

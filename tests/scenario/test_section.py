@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pydantic import Field, ValidationError
 
-from fifesim.scenario.section import Section, file, number, seed, text
+from fifesim.scenario.keys import Section, file, number, seed, text
 
 
 class Shelf(Section):

@@ -19,7 +19,7 @@ def test_optics_by_band_need_both_of_a_leaf():
 def test_complete_optics_are_those_that_the_chain_takes():
     bands = [band.response for band in instrument("TM").select(["TM3", "TM4"])]
     keys = Ground().complete_optics(bands)
-    rho = fifesim.ground.canopy.optics.leaf_optics(bands)[0]
+    rho = fifesim.ground.canopy.optics.band_leaf_optics(bands)[0]
     np.testing.assert_array_equal(list(keys["leaf_reflectance"].values()), rho)
     assert Ground(**keys).complete_optics(bands) == keys
 

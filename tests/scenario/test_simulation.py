@@ -7,12 +7,12 @@ import xarray as xr
 from lazy import no_compute
 
 import fifesim
-from fifesim.base import datasets, fife
+from fifesim.base import files, times
 from fifesim.base.geometry import Geometry, earth_sun_distance
-from fifesim.rasters import directions
-from fifesim.rasters import grid as grids
+from fifesim.grids import directions
+from fifesim.grids import grid as grids
+from fifesim.scenario.ground import elevation
 from fifesim.scenario.scenario import parse_scenario
-from fifesim.scenario.simulation import elevation
 from fifesim.sensor.description.instruments import instrument
 
 GRID = {"west": 704970.0 + 600, "north": 4334220.0 - 300, "width": 600.0, "height": 450.0}
@@ -202,7 +202,7 @@ def test_scenario_options_reach_their_stages():
     assert "ndvi" not in tree["image"]
     assert image["band"].values.tolist() == ["TM5"]
     assert grids.cell_size(grids.geobox(image)) == (50.0, 50.0)
-    assert directions.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
+    assert directions.geometry_of(image) == Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(times.TIME))
     assert fifesim.Atmosphere.parse(image.attrs["atmosphere"]).visibility == 23
 
 
@@ -249,7 +249,7 @@ def test_every_key_of_a_scenario_reaches_its_stage():
         "sensor": {"bands": bands, "pixel": 50.0, "min_valid": 1.0},
     }
     tree = fifesim.simulate(fifesim.Scenario.model_validate(options))
-    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(fife.TIME))
+    sun = Geometry(40.0, 100.0, 5.0, 10.0, earth_sun_distance(times.TIME))
     grid = grids.grid_at("EPSG:26914", *LEVEL["grid"].values(), 30 / 9)
     lai = fifesim.lai_scene(grid, "burned-ungrazed", arp=0.2, seed=11, method="periodic")
     rho = fifesim.surface_reflectance(
@@ -259,7 +259,7 @@ def test_every_key_of_a_scenario_reaches_its_stage():
         geometry=sun,
         canopy=fifesim.Canopy(leaf_optics=leaf, background=back, leaf_angles="planophile", hotspot=0.2),
     )
-    image = fifesim.sense(fifesim.to_toa(rho), onto=grids.aligned(grid, 50.0), min_valid=1.0)
+    image = fifesim.sense(fifesim.to_toa(rho), onto=grids.aligned_grid(grid, 50.0), min_valid=1.0)
     fpar = fifesim.fpar(lai, geometry=sun, canopy=fifesim.Canopy(leaf_angles="planophile"), fpar_inf=0.9)
     np.testing.assert_array_equal(tree["image"]["dn"], image)
     np.testing.assert_array_equal(tree["truth"]["lai"], fifesim.aggregate(lai, 50.0, min_valid=1.0))
@@ -269,11 +269,11 @@ def test_every_key_of_a_scenario_reaches_its_stage():
 def test_instrument_and_its_tables_lie_beside_the_scenario(tmp_path, monkeypatch):
     """Wherever it is run from: the scenario's file, the instrument's beside it, and the table beside that."""
     (tmp_path / "sensors").mkdir()
-    description = datasets.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
+    description = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
     assert "avhrr_response.csv" in description
     mine = description.replace("avhrr_response.csv", "responses.csv")
     (tmp_path / "sensors" / "mine.toml").write_text(mine, encoding="utf-8")
-    table = datasets.path("avhrr_response.csv").read_text(encoding="utf-8")
+    table = files.path("avhrr_response.csv").read_text(encoding="utf-8")
     (tmp_path / "sensors" / "responses.csv").write_text(table, encoding="utf-8")
     bands = [band.name for band in instrument("AVHRR9").bands[:2]]
     text = f"""

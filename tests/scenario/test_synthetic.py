@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from fifesim.base import datasets
-from fifesim.scenario.scenario import Scenario, default_scenario, parse_scenario, read_scenario
-from fifesim.scenario.synthetic import statement, summary
+from fifesim.base import files
+from fifesim.scenario.scenario import Scenario, default_scenario, parse_scenario, read_scenario, statement, summary
 from fifesim.scenario.toml import write_scenario
 
 ROOT = Path(__file__).parents[2]
@@ -130,6 +129,6 @@ def test_scenario_file_states_it_in_its_first_line_and_is_read_back(tmp_path):
 
 
 def test_readme_and_the_default_scenario_begin_with_it():
-    assert datasets.path("fife.toml").read_text(encoding="utf-8").splitlines()[0] == f"# {DEFAULT}"
+    assert files.path("fife.toml").read_text(encoding="utf-8").splitlines()[0] == f"# {DEFAULT}"
     _, first, *_ = (ROOT / "README.md").read_text(encoding="utf-8").split("\n\n")
     assert re.sub(r"\s+", " ", first).endswith(f"shows no real scene. *{DEFAULT}*")

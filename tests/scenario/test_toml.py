@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fifesim.scenario.scenario import Scenario, parse_scenario, read_scenario
-from fifesim.scenario.toml import _toml, _toml_key, check_spelling, load_values, write_scenario
+from fifesim.scenario.toml import check_spelling, load_values, write_scenario, write_tables
 
 
 def written(tmp_path, text):
@@ -95,10 +95,18 @@ def test_any_name_of_a_band_is_read_back(tmp_path, name):
 @given(st.text(st.characters(exclude_categories=["Cs"]), max_size=30), st.floats())
 def test_text_and_numbers_are_written_as_toml(text, number):
     """tomllib reads what was meant."""
-    line = f"{_toml_key(text)} = {{ text = {_toml(text)}, list = {_toml([text, number])}, flag = {_toml(True)} }}"
-    found = tomllib.loads(line)[text]
+    values = {text: {"text": text, "list": [text, number], "flag": True}, "none": None}
+    found = tomllib.loads(write_tables("", {("draw",): values, ("empty",): {}}))
+    assert list(found) == ["draw"] and list(found["draw"]) == [text]
+    found = found["draw"][text]
     assert (found["text"], found["list"][0], found["flag"]) == (text, text, True)
     assert found["list"][1] == number or number != number
+
+
+def test_a_key_that_is_left_out_can_be_filled_in_where_it_stands(tmp_path):
+    """Each one is a comment of its own section, above the tables inside it."""
+    text = write_scenario(Scenario()).replace("# lai_file = ", "lai_file = 'lai.tif'")
+    assert load_values(written(tmp_path, text))["ground"]["lai_file"] == str(tmp_path.resolve() / "lai.tif")
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_c
 import fifesim
 from fifesim.base.footprints import axis_operator, regularize
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import cf, directions
-from fifesim.rasters import grid as grids
+from fifesim.grids import cf, directions
+from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.spatial_response import GaussianResponse
 from fifesim.sensor.response import calibration
@@ -62,7 +62,7 @@ ONTO = {
 @pytest.mark.parametrize("onto", ONTO.values(), ids=ONTO.keys())
 def test_sense_keeps_its_word_and_equals_the_kernels(toa, site, onto):
     image = check_raster_function(lambda toa: fifesim.sense(toa, "TM", onto=onto), toa, quantity="dn")
-    pixels = grids.aligned(site, 30.0) if onto is None else onto
+    pixels = grids.aligned_grid(site, 30.0) if onto is None else onto
     assert grids.same_grid(grids.geobox(image), pixels)
     gain, offset = calibration.gain_offset(
         [band.full_scale_radiance for band in RED_NIR], [band.min_radiance for band in RED_NIR], 8
@@ -115,7 +115,7 @@ def test_radiance_and_reflectance_keep_their_word(toa):
 def test_reflectance_is_within_half_a_count(toa, site):
     image = fifesim.sense(toa, "TM")
     exact = calibration.radiance_to_reflectance(
-        radiance_by_kernels(toa, grids.aligned(site, 30.0)),
+        radiance_by_kernels(toa, grids.aligned_grid(site, 30.0)),
         image["solar_irradiance"].values[:, None, None],
         SUN.mu_s,
         SUN.earth_sun_distance,
@@ -234,7 +234,7 @@ class TestSeveralResolutions:
 
     def test_one_resolution_and_one_grid_for_all_stay_arrays(self, toa, site):
         assert isinstance(fifesim.sense(toa.sel(band=["MSI4", "MSI8"]), "MSI"), xr.DataArray)
-        for where in ({"interval": 20.0}, {"onto": grids.aligned(site, 30.0)}):
+        for where in ({"interval": 20.0}, {"onto": grids.aligned_grid(site, 30.0)}):
             assert fifesim.sense(toa, "MSI", **where)["band"].values.tolist() == ["MSI11", "MSI4", "MSI8"]
 
     def test_native_intervals_and_radiance(self, toa):

@@ -7,15 +7,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fifesim.base import datasets
-from fifesim.sensor.description.band_names import band_called
+from fifesim.base import files
+from fifesim.sensor.description.fields import band_called
 from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
 from fifesim.sensor.description.listing import instrument_in_words
-from fifesim.sensor.description.plausibility import check_units
+from fifesim.sensor.description.plausibility import check_instrument_units
 from fifesim.sensor.response.calibration import gain_offset, radiance_to_reflectance, reflectance_to_radiance
-from fifesim.sensor.scan.track import swath_width
+from fifesim.sensor.response.scan import swath_width
 
-FILES = sorted(datasets.path("instruments").glob("*.toml"))
+FILES = sorted(files.path("instruments").glob("*.toml"))
 LANDSAT = ("TM", "L4TM", "ETM+", "OLI", "OLI2")
 
 
@@ -214,7 +214,7 @@ def test_area_below_the_response_of_avhrr_is_the_equivalent_width(key):
 
 
 def test_responses_of_avhrr_rise_from_nothing_and_fall_to_it():
-    table = pd.read_csv(datasets.path("avhrr_response.csv"), comment="#")
+    table = pd.read_csv(files.path("avhrr_response.csv"), comment="#")
     for (satellite, channel), rows in table.groupby(["satellite", "band"]):
         ends = rows["response"].iloc[[0, -1]]
         assert ends.max() <= 0.002, (satellite, channel)
@@ -556,5 +556,5 @@ def test_a_number_alone_means_no_band_of_viirs():
 
 
 def test_check_of_units_passes_every_gain_state():
-    check_units(instrument("ETM+").with_gain("low"))
-    check_units(instrument("HRV").with_gain("m3"))
+    check_instrument_units(instrument("ETM+").with_gain("low"))
+    check_instrument_units(instrument("HRV").with_gain("m3"))

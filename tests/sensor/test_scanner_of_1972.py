@@ -7,8 +7,8 @@ from lazy import check_raster_function
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import directions
-from fifesim.rasters import grid as grids
+from fifesim.grids import directions
+from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response.calibration import radiance_to_dn
 from fifesim.sensor.response.noise import NoiseModel

@@ -1,39 +1,27 @@
-"""What comes of every setting of a page: digital numbers, truth, lines and budgets."""
+"""Results of every setting of a page: digital numbers, truth, lines and budgets."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fifesim.analysis import regression
-from fifesim.analysis.attribution import shapley
-from fifesim.base.bands import NEAR_INFRARED, RED, nearest
+from fifesim.analysis.scaling import shapley
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band
 from fifesim.chain.landscapes import aggregate
 from fifesim.chain.setup import image_of, reflectance_of
 from fifesim.experiments.scatter.shares import unexplained
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, displaced_pixels
-from fifesim.scenario.ground import ground_scene, truth_of
-from fifesim.scenario.land import elevation
+from fifesim.scenario.ground import elevation, ground_scene, truth_of
 from fifesim.scenario.simulation import setup_of
 from fifesim.sensor.response import calibration
 
 # Of each line, in this order.
-NUMBERS = ("slope", "intercept", "r2", "n")
+LINE_NUMBERS = ("slope", "intercept", "r2", "n")
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """
-    An instrument of a page.
-
-    Attributes
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-        One that it takes part in, complete.
-    bands : list of str
-        Names of red and near infrared.
-    reflectance : array, shape (2, count)
-        Planetary reflectance of every digital number below a sun overhead; NaN for no data. [1]
-    """
+    """Instrument of a page: scenario, red and near infrared band, and reflectance of every digital number."""
 
     scenario: object
     bands: list
@@ -43,7 +31,7 @@ class Camera:
 @dataclass(frozen=True, eq=False)
 class Outcomes:
     """
-    What a page shows.
+    Results that a page shows.
 
     Attributes
     ----------
@@ -56,11 +44,11 @@ class Outcomes:
     truths : list of array, shape (arp, sza, 2, rows, columns)
         LAI and FPAR of the ground of the pixels, by instrument.
     lines : array, shape (arp, haze, sza, instrument, offset, 2, 4)
-        Of LAI and of FPAR on NDVI: `NUMBERS`. Slope and intercept are NaN where all pixels have one NDVI.
+        Of LAI and of FPAR on NDVI: `LINE_NUMBERS`. Slope and intercept are NaN where all pixels have one NDVI.
     shares : array, shape (arp, haze, sza, instrument, offset, 2, stages)
-        Of the variance that the lines do not explain. [1]
+        Shares of the variance that the lines do not explain. [1]
     curvature : array, shape (arp, haze, sza, instrument, offset, 2)
-        What is left with all stages at their ideal. [1]
+        Share that remains with all stages ideal. [1]
     """
 
     scenes: np.ndarray
@@ -73,71 +61,44 @@ class Outcomes:
 
 
 def outcomes_of(sweep, each=iter):
-    """
-    Simulate every setting of a page.
-
-    Parameters
-    ----------
-    sweep : fifesim.experiments.explorer.settings.Sweep
-    each : callable, optional
-        Wraps the sequence of settings, to show how far it is.
-
-    Returns
-    -------
-    outcomes : Outcomes
-
-    Raises
-    ------
-    ValueError
-        If fewer than three pixels of an image have data.
-    """
+    """Simulate every setting of a page."""
     found = [_one(sweep, setting) for setting in each(sweep.settings)]
+    cameras, cells, truths, images, lines, shares, curvature = zip(*found, strict=True)
     shape = sweep.shape
-    by_setting = np.reshape(np.arange(len(found)), shape[:-1])
-    of_each = [[found[k] for k in by_setting[..., i].ravel()] for i in range(shape[3])]
-    images = [np.reshape([one.images for one in own], (*shape[:3], *np.shape(own[0].images))) for own in of_each]
-    truths = [np.reshape([one.truth for one in own], (*shape[:3], *own[0].truth.shape))[:, 0] for own in of_each]
+    numbers = np.reshape(np.arange(len(found)), shape[:-1])
+
+    def by_instrument(values):
+        """Values of the settings as one array for each instrument, shape (arp, haze, sza, ...)."""
+        of_each = [[values[number] for number in numbers[..., k].ravel()] for k in range(shape[3])]
+        return [np.reshape(own, (*shape[:3], *np.shape(own[0]))) for own in of_each]
+
     return Outcomes(
-        scenes=np.stack([found[k].cells for k in by_setting[:, 0, 0, 0]]),
-        cameras=[own[0].camera for own in of_each],
-        images=images,
-        truths=truths,
-        lines=np.reshape([one.lines for one in found], (*shape, len(VARIABLES), len(NUMBERS))),
-        shares=np.reshape([one.shares for one in found], (*shape, len(VARIABLES), len(STAGES))),
-        curvature=np.reshape([one.curvature for one in found], (*shape, len(VARIABLES))),
+        scenes=np.stack([cells[number] for number in numbers[:, 0, 0, 0]]),
+        cameras=[cameras[number] for number in numbers[0, 0, 0]],
+        images=by_instrument(images),
+        truths=[truth[:, 0] for truth in by_instrument(truths)],
+        lines=np.reshape(lines, (*shape, len(VARIABLES), len(LINE_NUMBERS))),
+        shares=np.reshape(shares, (*shape, len(VARIABLES), len(STAGES))),
+        curvature=np.reshape(curvature, (*shape, len(VARIABLES))),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _One:
-    """A setting with all its offsets first."""
-
-    camera: Camera
-    cells: np.ndarray
-    images: list
-    truth: np.ndarray
-    lines: list
-    shares: list
-    curvature: list
-
-
 def _one(sweep, setting):
+    """Camera, cells, truth, and by offset images, lines, shares and curvature of a setting."""
     scenario = sweep.at(setting)
-    camera, cells, truth, images = _images(scenario, sweep.offsets)
     budgets = [_budget(seen) for seen in displaced_pixels(scenario, sweep.offsets)]
-    lines, shares, curvature = (list(each) for each in zip(*budgets, strict=True))
-    return _One(camera, cells, images, truth, lines, shares, curvature)
+    return *_images(scenario, sweep.offsets), *zip(*budgets, strict=True)
 
 
 def _images(scenario, offsets):
-    """The camera, leaf area of the cells, LAI and FPAR of the pixels, and the numbers of both bands at each offset."""
+    """Camera, leaf area of the cells, LAI and FPAR of the pixels, and digital numbers of both bands at each offset."""
     grid, setup = scenario.geobox(), setup_of(scenario)
     dem, horizon, _ = elevation(scenario, grid)
     land = ground_scene(scenario, grid, dem=dem)
     truth = aggregate(truth_of(scenario, setup, land)[list(VARIABLES)], scenario.sensor.size, min_valid=setup.min_valid)
     reflectance = reflectance_of(replace(setup, dem=dem, horizon=horizon), land).compute()
     seen = [image_of(replace(setup, offset=offset), reflectance) for offset in offsets]
-    pair = [nearest(seen[0]["wavelength"].values, window) for window in (RED, NEAR_INFRARED)]
+    pair = [nearest_band(seen[0]["wavelength"].values, window) for window in (RED, NEAR_INFRARED)]
     # The image and the blocks of the truth are paired by row and column.
     rows, columns = (min(seen[0].sizes[axis], truth.sizes[axis]) for axis in ("y", "x"))
     means = np.stack([truth[name].values[:rows, :columns] for name in VARIABLES])
@@ -146,7 +107,7 @@ def _images(scenario, offsets):
 
 
 def _budget(seen):
-    """Lines, shares of the stages and curvature, each by variable."""
+    """Regression lines, shares of the stages and curvature, each by variable."""
     count = len(seen.stages)
     lines, shares, curvature = [], np.zeros((len(VARIABLES), len(STAGES))), []
     ndvi = seen.ndvi[(-1,) * count]
@@ -160,16 +121,16 @@ def _budget(seen):
 
 
 def _line(truth, ndvi):
-    """Numbers of the least-squares line of a truth on NDVI; of NDVI that is one number, as counts may be, none."""
+    """Statistics of the least-squares line of a truth on NDVI; slope and intercept are NaN where NDVI is constant."""
     if np.ptp(ndvi) == 0:
         return [np.nan, np.nan, 0.0, ndvi.size]
     origins = truth.mean(), ndvi.mean()
     line = regression.fit(regression.row_sums(truth[None], ndvi[None], *origins), *origins)
-    return [getattr(line, number) for number in NUMBERS]
+    return [getattr(line, number) for number in LINE_NUMBERS]
 
 
 def _camera(scenario, image):
-    """An instrument by an image of its two bands."""
+    """Camera of a page from an image of its two bands."""
     scales = {name: image[name].values[:, None] for name in ("gain", "offset", "solar_irradiance")}
     compression = image["compression"].values[:, None] if "compression" in image.coords else 0
     counts = np.arange(2**scenario.sensor.description.bits)

@@ -1,20 +1,151 @@
-"""The page: what it shows as one HTML text."""
+"""Page with sliders: its words, its packed arrays, and the file that it is written to."""
 
+from __future__ import annotations
+
+import base64
+import math
+import os
+import tempfile
+import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from markupsafe import Markup
 
-from fifesim.experiments.explorer.outcomes import NUMBERS
-from fifesim.experiments.explorer.packing import packed, stepped
-from fifesim.experiments.explorer.words import STAGES as MEANINGS
-from fifesim.experiments.explorer.words import VIEWS, layer_words, slider_words
+from fifesim.base.annotations import FilePath
+from fifesim.experiments.explorer.outcomes import LINE_NUMBERS, outcomes_of
+from fifesim.experiments.explorer.settings import sweep_of
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES
-from fifesim.output import pages
-from fifesim.output.colours import percentile_limits
-from fifesim.output.report import title
-from fifesim.rasters import grid as grids
+from fifesim.grids import cf
+from fifesim.grids import grid as grids
+from fifesim.ground.landscape.autoregression import correlation_length
+from fifesim.output import report
+from fifesim.output.colours import axis_label, colours_of, percentile_limits, stops_of
+from fifesim.output.progress import steps
+from fifesim.output.report import fixed, title
+from fifesim.scenario.scenario import Scenario
+from fifesim.sensor.description.instruments import instrument
+
+# As a page reads them: bytes, pairs of bytes with all low ones first, and numbers of four or eight bytes.
+_KINDS = {np.dtype("u1"): "u1", np.dtype("u2"): "u2", np.dtype("f4"): "f4", np.dtype("f8"): "f8"}
+_ALIGNED = 8
+# Of steps: 0 is kept for what has no data.
+_LEVELS = {"u1": 254, "u2": 65534}
+
+
+def packed(arrays):
+    """Pack arrays into a text: Base64 of a zlib stream, with kind, shape and start [byte] of each array."""
+    # Every array begins at a multiple of eight bytes.
+    whole, places = bytearray(), {}
+    for name, array in arrays.items():
+        if array.dtype not in _KINDS:
+            raise ValueError(f"{name} is of type {array.dtype}: packed takes uint8, uint16, float32 or float64")
+        kind = _KINDS[array.dtype]
+        places[name] = {"kind": kind, "shape": list(array.shape), "start": len(whole)}
+        little = np.ascontiguousarray(array).astype(f"<{kind}").tobytes()
+        # High bytes beside each other are nearly all alike.
+        whole += little[::2] + little[1::2] if kind == "u2" else little
+        whole += bytes(-len(whole) % _ALIGNED)
+    return base64.b64encode(zlib.compress(bytes(whole), 9)).decode("ascii"), places
+
+
+def stepped(values, kind):
+    """Codes 1 + (v - low) / step of values in equal steps, 0 for NaN, with low and step."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    step = (high - low) / _LEVELS[kind] or 1.0
+    codes = np.where(np.isfinite(values), 1 + np.rint((values - low) / step), 0)
+    return codes.astype(kind), low, step
+
+
+# Beside the name of a stage: what it does.
+STAGE_WORDS = {
+    CURVATURE: "LAI and FPAR go with NDVI along a curve, which no line follows",
+    "non-linearity": "bare and dense cells within a pixel do not average along that curve",
+    "NDVI scaling": "the NDVI of mean light is not the mean of NDVI",
+    "point spread": "a pixel sees its neighbours too",
+    "registration": "pixels lie beside the ground that they are compared with",
+    "quantisation": "light becomes whole numbers",
+    "noise": "the detectors' own",
+    "topography": "slopes face the sun, or turn away",
+    "atmosphere": "air veils the ground",
+    "soil": "soil is brighter here and darker there",
+    "dead leaves": "there are more of them here than there",
+    "cover": "plants and what lies below them differ from field to field",
+    "clumping": "leaves stand in crowns, with gaps between",
+    "covariance": "leaf area goes with the lie of the land and with the soil",
+}
+
+# What an image is shown in: a quantity, and one of its bands.
+VIEWS = {"ndvi": ("ndvi", ""), "red": ("toa_reflectance", "red"), "nir": ("toa_reflectance", "near infrared")}
+
+
+def layer_words(variables):
+    """Names, labels, units and colours of the truths and views of a page."""
+    layers = {name: (name, "") for name in variables} | VIEWS
+    return {key: _layer(quantity, band) for key, (quantity, band) in layers.items()}
+
+
+def _layer(quantity, band):
+    label, axis = (f"{band} {text}".strip() for text in (cf.QUANTITIES[quantity].label, axis_label(quantity)))
+    return {"name": band or label, "label": label, "axis": axis, "stops": stops_of(colours_of(quantity)[0])}
+
+
+def slider_words(sweep):
+    """Names, hints, marks and start positions of the sliders of a page."""
+    own = sweep.scenario
+    haze = {"visibility": "Visibility", "aot": "Haze"}[sweep.haze]
+    return [
+        _slider("arp", "Ground patches", "how far leaf area resembles that beside it", sweep.arps,
+                own.ground.arp, lambda arp: _patches(arp, own.grid.cell)),
+        _slider("haze", haze, "how far one can see, or how thick the haze is", sweep.hazes,
+                getattr(own.atmosphere, sweep.haze), lambda amount: _air(sweep.haze, amount)),
+        _slider("sza", "Solar zenith", "of the sun, from overhead", sweep.szas, own.sun_and_view().sza, _sun),
+        _slider("instrument", "Instrument", "from small pixels to large", sweep.instruments, own.sensor.instrument,
+                lambda name: _instrument_title(sweep, name)),
+        _slider("registration", "Registration error", "how far pixels lie beside the ground they are compared with",
+                sweep.offsets, tuple(own.sensor.offset), _displacement),
+    ]  # fmt: skip
+
+
+def _slider(key, name, hint, values, own, mark_and_text):
+    marks, texts = map(list, zip(*map(mark_and_text, values), strict=True))
+    start = values.index(own) if own in values else 0
+    return {"key": key, "name": name, "hint": hint, "marks": marks, "texts": texts, "start": start}
+
+
+def _patches(arp, cell):
+    if arp is None:
+        return "map", "as the map has them"
+    length = correlation_length(arp, cell)
+    return f"{length:.0f} m", f"leaves are alike up to {length:.0f} m, arp {arp:g}"
+
+
+def _air(key, amount):
+    if amount is None:
+        return "none", "without haze"
+    if key == "aot":
+        return f"{amount:g}", f"aerosol optical thickness {amount:g}"
+    return f"{amount:g} km", f"one sees {amount:g} km far"
+
+
+def _sun(sza):
+    return f"{sza:.3g}°", f"{sza:.1f}° from overhead"
+
+
+def _instrument_title(sweep, name):
+    found, size = instrument(name), sweep.at(replace(sweep.settings[0], instrument=name)).sensor.size
+    return found.name, f"{found.title}, {size:g} m"
+
+
+def _displacement(offset):
+    size = math.hypot(*offset)
+    mark = {0.25: "¼", 0.5: "½", 0.75: "¾"}.get(size, f"{size:.2g}")
+    if not size:
+        return mark, "none"
+    return mark, f"{fixed(size, 2)} pixel" + ("" if offset[0] == 0 else ", as in the scenario")
+
 
 _TEMPLATE = Path(__file__).with_name("explore.html.j2")
 _SCRIPTS = ("explore_data.js", "explore_drawing.js", "explore.js")
@@ -23,56 +154,19 @@ _SAMPLE = 50
 
 
 def explorer_page(sweep, outcomes):
-    """
-    One self-contained HTML page.
-
-    Parameters
-    ----------
-    sweep : fifesim.experiments.explorer.settings.Sweep
-    outcomes : fifesim.experiments.explorer.outcomes.Outcomes
-
-    Returns
-    -------
-    html : str
-    """
+    """One self-contained HTML page with sliders."""
     text, data = page_data(sweep, outcomes)
-    scenario, shape = sweep.scenario, sweep.scenario.geobox().shape
-    run = {
-        "count": int(np.prod(sweep.shape)),
-        "rows": shape.y,
-        "columns": shape.x,
-        "cell": scenario.grid.cell,
-        "height": shape.y * scenario.grid.cell,
-        "width": shape.x * scenario.grid.cell,
-        "seed": None if scenario.ground.lai_file else scenario.ground.seed,
-        "level": scenario.terrain.dem == "flat",
-    }
     own = Path(__file__).parent
-    return pages.html(
-        _TEMPLATE, title=title(scenario), sliders=data["sliders"], story=_story(data["sliders"], outcomes), run=run,
-        data=data, bytes=text,
+    return report.page_html(
+        _TEMPLATE, title=title(sweep.scenario), sliders=data["sliders"], story=_story(data["sliders"], outcomes),
+        scenario=sweep.scenario, count=math.prod(sweep.shape), data=data, bytes=text,
         style=Markup((own / "explore.css").read_text(encoding="utf-8")),
         script=Markup("\n".join((own / name).read_text(encoding="utf-8") for name in _SCRIPTS)),
     )  # fmt: skip
 
 
 def page_data(sweep, outcomes):
-    """
-    What the script of a page reads.
-
-    Parameters
-    ----------
-    sweep, outcomes
-        As in `explorer_page`.
-
-    Returns
-    -------
-    text : str
-        Arrays, from `packing.packed`: ``scenes``; by number of the instrument ``image``, ``lai``, ``fpar`` and
-        ``reflectance``; ``lines`` and ``shares``, of the curvature first.
-    data : dict
-        What JSON can hold: their places, sliders, stages, instruments, ranges of colours, and keys of the scenario.
-    """
+    """Data that the script of a page reads: the packed arrays as text, and their description."""
     shares = np.concatenate([outcomes.curvature[..., None], outcomes.shares], axis=-1)
     shown = [k for k, _ in enumerate((CURVATURE, *STAGES)) if shares[..., k].any()]
     names = [(CURVATURE, *STAGES)[k] for k in shown]
@@ -87,8 +181,8 @@ def page_data(sweep, outcomes):
         "variables": list(VARIABLES),
         "views": list(VIEWS),
         "layers": layer_words(VARIABLES),
-        "numbers": list(NUMBERS),
-        "stages": [{"name": name, "meaning": MEANINGS[name]} for name in names],
+        "numbers": list(LINE_NUMBERS),
+        "stages": [{"name": name, "meaning": STAGE_WORDS[name]} for name in names],
         "instruments": [_instrument(sweep, k, camera) for k, camera in enumerate(outcomes.cameras)],
         "offsets": [list(offset) for offset in sweep.offsets],
         "szas": list(sweep.szas),
@@ -100,8 +194,8 @@ def page_data(sweep, outcomes):
 
 
 def _story(sliders, outcomes):
-    """What becomes of R2 of LAI as a reader does what the page proposes first."""
-    r2 = outcomes.lines[..., VARIABLES.index("lai"), NUMBERS.index("r2")]
+    """R2 of LAI in the order of the settings that the page proposes first."""
+    r2 = outcomes.lines[..., VARIABLES.index("lai"), LINE_NUMBERS.index("r2")]
     place = [slider["start"] for slider in sliders]
     found = {"start": float(r2[tuple(place)]), "patches": None}
     place[-1] = -1
@@ -112,7 +206,7 @@ def _story(sliders, outcomes):
 
 
 def _arrays(outcomes):
-    """Images and truths in the steps that a page holds them in, and these steps."""
+    """Images and truths quantized for a page, and the quantization steps."""
     arrays, steps = {}, {}
     arrays["scenes"], *steps["scenes"] = stepped(outcomes.scenes, "u1")
     for k, (image, truth, camera) in enumerate(zip(outcomes.images, outcomes.truths, outcomes.cameras, strict=True)):
@@ -139,7 +233,7 @@ def _instrument(sweep, number, camera):
 
 
 def _ranges(sweep, outcomes):
-    """Ends of colours and of axes, the same for all settings: what is drawn can be compared."""
+    """Limits of colours and axes, common to all settings so that they can be compared."""
     ndvi, bands = [], []
     mu_s = np.cos(np.radians(sweep.szas))[None, None, :, None, None, None]
     for image, camera in zip(outcomes.images, outcomes.cameras, strict=True):
@@ -159,7 +253,7 @@ def _ranges(sweep, outcomes):
 
 
 def _keys(sweep):
-    """Keys of the scenario that no slider moves; of files their names alone."""
+    """Keys of the scenario that no slider changes, with files by name."""
     scenario = sweep.scenario
     values = scenario.model_dump(exclude_unset=True) | {"grid": scenario.grid.model_dump()}
     for place, section in scenario.sections().items():
@@ -170,3 +264,63 @@ def _keys(sweep):
     sun = scenario.sun_and_view()
     values["geometry"] = values.get("geometry", {}) | {"saa": sun.saa}
     return {"haze": sweep.haze, "arps": list(sweep.arps), "hazes": list(sweep.hazes), "tables": values}
+
+
+def explore(scenario: Scenario | None = None, path: FilePath = "explore.html", *, overwrite: bool = False) -> Path:
+    """
+    A page to play with: sliders over simulations of a scenario; computes.
+
+    Scene, image, scatter plot and budget of the scatter, for every setting of leaf area's patches, haze, sun,
+    instrument and registration error. The page needs nothing but a browser.
+
+    Parameters
+    ----------
+    scenario : fifesim.scenario.scenario.Scenario, optional
+        Sliders begin at its values, on the ground in the middle of its grid. By default the paper's case with patches
+        of 32 m, on level ground.
+    path : str or path, optional
+        Of the HTML file.
+    overwrite : bool, optional
+        Replace a file of that name.
+
+    Returns
+    -------
+    path : pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        If the file exists, or the scenario cannot be shown; nothing is written then.
+
+    See Also
+    --------
+    fifesim.budget, fifesim.sweep
+
+    Examples
+    --------
+    Some minutes of simulations:
+
+    >>> import fifesim
+    >>> fifesim.explore(fifesim.Scenario(), "mine.html")  # doctest: +SKIP
+    """
+    if scenario is not None and not isinstance(scenario, Scenario):
+        raise TypeError(f"explore takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
+    path = Path(path)
+    check_file(path, overwrite)
+    sweep = sweep_of(scenario)
+    html = explorer_page(sweep, outcomes_of(sweep, lambda settings: steps(settings, "simulating")))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # The file appears under its name when it is whole.
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        whole = Path(folder) / path.name
+        whole.write_text(html, encoding="utf-8")
+        os.replace(whole, path)
+    return path
+
+
+def check_file(path, overwrite):
+    """Raise ValueError if the file of a page exists and may not be overwritten."""
+    if path.is_dir():
+        raise ValueError(f"{str(path)!r} is a folder, and explore writes one page: type -o {path}/explore.html")
+    if path.exists() and not overwrite:
+        raise ValueError(f"the page {str(path)!r} exists: name another with -o, or add --overwrite")

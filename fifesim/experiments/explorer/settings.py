@@ -1,4 +1,4 @@
-"""What the sliders of a page set, and the scenario that each setting is."""
+"""Values of the sliders of a page, and the scenario of each setting."""
 
 import math
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from itertools import product
 from odc.geo.geobox import GeoBox
 
 from fifesim.experiments.scatter.stages import working_stages
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 from fifesim.scenario.scenario import Scenario, grid_keys, parse_scenario
 from fifesim.sensor.description.instruments import instrument
 
@@ -86,73 +86,32 @@ class Sweep:
 
     @property
     def settings(self):
-        """Every `Setting`, the last of them changing fastest."""
+        """Every `Setting`, the last slider changing fastest."""
         return [Setting(*values) for values in product(self.arps, self.hazes, self.szas, self.instruments)]
 
     def at(self, setting, offset=(0.0, 0.0)):
-        """
-        The scenario of a setting.
-
-        Parameters
-        ----------
-        setting : Setting
-        offset : (float, float), optional
-            [pixel]
-
-        Returns
-        -------
-        scenario : fifesim.scenario.scenario.Scenario
-            Complete.
-        """
+        """Complete scenario of a setting."""
         return parse_scenario(self.values(setting, offset)).complete()
 
     def values(self, setting, offset=(0.0, 0.0)):
-        """
-        The keys of the scenario of a setting that are not left to defaults, a dict of tables.
-
-        Parameters
-        ----------
-        setting, offset
-            As in `at`.
-
-        Returns
-        -------
-        values : dict
-        """
+        """Keys of the scenario of a setting that differ from the defaults, as tables."""
         values = self.scenario.model_dump(exclude_unset=True)
         sun = self.scenario.sun_and_view()
-        said = {
+        changed = {
             "ground": {} if setting.arp is None else {"arp": setting.arp},
             "atmosphere": {} if setting.haze is None else {self.haze: setting.haze},
             "geometry": {"sza": setting.sza, "saa": sun.saa},
         }
-        values |= {name: values.get(name, {}) | keys for name, keys in said.items() if keys}
+        values |= {name: values.get(name, {}) | keys for name, keys in changed.items() if keys}
         values["sensor"] = _sensor_keys(self.scenario, setting.instrument) | {"offset": list(offset)}
         return values
 
 
 def sweep_of(scenario=None):
-    """
-    Sliders of a scenario: its own values, and others around them.
-
-    Where more than eight stages share the scatter, as in a landscape of classes, sliders of haze, sun and instrument
-    have two values.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario, optional
-        By default the paper's case with its largest patches, on level ground.
-
-    Returns
-    -------
-    sweep : Sweep
-
-    Raises
-    ------
-    ValueError
-        If the scenario asks for what cannot be, or its grid holds fewer than 12 pixels along an edge.
-    """
-    scenario = default_scenario() if scenario is None else scenario
+    """Sliders of a scenario, with its values and others around them."""
+    # Where more than eight stages share the scatter, as in a landscape of classes, haze, sun and instrument have two
+    # values.
+    scenario = explorer_scenario() if scenario is None else scenario
     scenario.complete()
     scenario = scenario.model_copy(update={"grid": _window(scenario)})
     scenario = parse_scenario(scenario.model_dump(exclude_unset=True))
@@ -173,14 +132,14 @@ def sweep_of(scenario=None):
 
 
 def _stages(sweep):
-    """Stages that any setting has at work."""
+    """Stages that are active in any setting."""
     own = sweep.scenario
     displaced = own.sensor.model_copy(update={"offset": list(sweep.offsets[-1])})
     return working_stages(own.model_copy(update={"sensor": displaced}))
 
 
 def _with_fewer_values(sweep):
-    """Sliders of haze, sun and instrument with the own value and that farthest from it."""
+    """Sliders of haze, sun and instrument with the value of the scenario and the value farthest from it."""
     own, first = sweep.scenario, sweep.settings[0]
     sizes = {name: math.log(sweep.at(replace(first, instrument=name)).sensor.size) for name in sweep.instruments}
     name = own.sensor.instrument
@@ -196,26 +155,20 @@ def _farthest(values, own):
     return tuple(value for value in values if value in (own, far))
 
 
-def default_scenario():
-    """
-    The paper's case with its largest patches, on level ground.
-
-    Returns
-    -------
-    scenario : fifesim.scenario.scenario.Scenario
-    """
+def explorer_scenario():
+    """Scenario of the paper with its largest patches, on level ground."""
     return Scenario(ground={"arp": 0.24}, terrain={"dem": "flat"})
 
 
 def _with_own(name, own):
-    """Values of a slider, in their order, with the own one in the place of the nearest."""
+    """Values of a slider in order, with the value of the scenario in place of the nearest one."""
     values = _VALUES[name]
     nearest = min(values, key=lambda value: abs(value - own))
     return tuple(sorted(own if value == nearest else value for value in values))
 
 
 def _offsets(own):
-    """Displacements, one of which is the own."""
+    """Registration errors of the slider, one of which is the offset of the scenario. [pixel]"""
     size = math.hypot(*own)
     nearest = min(_DISPLACEMENTS[1:], key=lambda value: abs(value - size)) if size else None
     found = [tuple(own) if value == nearest else (0.0, value) for value in _DISPLACEMENTS]
@@ -223,28 +176,26 @@ def _offsets(own):
 
 
 def _instruments(sweep):
-    """Names of the instruments whose pixels fit the ground and its cells, from small pixels to large."""
-    own = sweep.instruments[0]
-    first = sweep.settings[0]
-    height, width = sweep.scenario.geobox().shape
-    cell = sweep.scenario.grid.cell
-    same = instrument(own).name
+    """Names of the instruments whose pixels fit the grid and its cells, from small to large pixels."""
+    own, first = sweep.instruments[0], sweep.settings[0]
+    edge = min(sweep.scenario.geobox().shape) * sweep.scenario.grid.cell
+    others = [name for name in _INSTRUMENTS if instrument(name).name != instrument(own).name]
     found = {}
-    for name in (own, *(name for name in _INSTRUMENTS if instrument(name).name != same)):
+    for name in (own, *others):
         try:
-            size = sweep.at(Setting(first.arp, first.haze, first.sza, name)).sensor.size
+            size = sweep.at(replace(first, instrument=name)).sensor.size
         except ValueError:
             # Leaves that are known in the bands of another, or pixels below a cell.
             if name == own:
                 raise
             continue
-        if name == own or _FEWEST <= round(min(height, width) * cell / size, 6) <= _MOST:
+        if name == own or _FEWEST <= round(edge / size, 6) <= _MOST:
             found[name] = size
     return tuple(sorted(found, key=found.get))
 
 
 def _sensor_keys(scenario, name):
-    """Keys of the sensor: all of its own, or of another what does not depend on its bands."""
+    """Keys of the sensor section: all for the instrument of the scenario, else only those independent of bands."""
     own = scenario.sensor.model_dump(exclude_unset=True)
     if name == scenario.sensor.instrument:
         return own
@@ -255,7 +206,7 @@ def _sensor_keys(scenario, name):
 
 
 def _window(scenario):
-    """Keys of the ground in the middle of a scenario's grid that a page shows."""
+    """Keys of the grid that a page shows, in the middle of the grid of a scenario."""
     box, size, cell = scenario.geobox(), scenario.sensor.size, max(grids.cell_size(scenario.geobox()))
     side = max(_FEWEST * size, min(max(_SIDE, _WANTED * size), _MOST_CELLS * cell))
     if min(box.shape) * cell < _FEWEST * size * (1 - 1e-9):

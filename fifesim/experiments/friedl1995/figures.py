@@ -1,4 +1,4 @@
-"""Figures 3 to 9 of Friedl et al. (1995), from what `fifesim.reproduce` gives."""
+"""Figures 3 to 9 of Friedl et al. (1995) and the numbers in their captions, from what `fifesim.reproduce` returns."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from fifesim.analysis import density, regression, scaling
-from fifesim.base.kinds import Kind
+from fifesim.analysis import regression, scaling
+from fifesim.base.arguments import Kind
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import VARIABLES
+from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, VARIABLES
 
 # Okabe and Ito's colours, which the colour-blind tell apart; dashes and markers tell them apart in grey.
 _COLORS = ("#0072B2", "#D55E00", "#009E73")
@@ -32,7 +32,7 @@ Reproduced: TypeAlias = Annotated[
     ),
 ]
 
-NUMBERS = range(3, 10)
+FIGURE_NUMBERS = range(3, 10)
 """Of the figures that are drawn."""
 
 BY_READING = (5, 6, 7, 9)
@@ -74,8 +74,10 @@ def plot_reproduction(number: int, found: Reproduced, *, reading: str | None = N
     >>> len(figure.axes)
     6
     """
-    if number not in NUMBERS:
-        raise ValueError(f"number must be one of {', '.join(map(str, NUMBERS))}, the paper's figures, got {number}")
+    if number not in FIGURE_NUMBERS:
+        raise ValueError(
+            f"number must be one of {', '.join(map(str, FIGURE_NUMBERS))}, the paper's figures, got {number}"
+        )
     names = [str(name) for name in found["reading"].values]
     reading = names[0] if reading is None else reading
     if reading not in names:
@@ -84,22 +86,7 @@ def plot_reproduction(number: int, found: Reproduced, *, reading: str | None = N
 
 
 def sample(found, reading, arp):
-    """
-    The sample of 200 pixels of one of the scenes that are shown.
-
-    Parameters
-    ----------
-    found : xarray.Dataset
-        From `reproduce`.
-    reading : str
-    arp : float
-        [1]
-
-    Returns
-    -------
-    values : dict of str to array, shape (n,)
-        By the names of its pixels, without ``pixel_``.
-    """
+    """Sample of 200 pixels of one of the scenes shown, by name, shape (n,)."""
     scene = found.sel(reading=reading, arp=arp)
     chosen = scene["sampled"].values.astype(bool)
     return {name[6:]: scene[name].values[chosen] for name in scene.data_vars if str(name).startswith("pixel_")}
@@ -115,8 +102,7 @@ def _figure3(found, reading):
         # Down to zero where the density is cut off.
         axis.plot([at[0], *at, at[-1]], [0 if at[0] > 0 or low else low, *known.values, 0], dash, color=color,
                   label=str(name).replace("-", ", "))  # fmt: skip
-    axis.set(xlabel=_LABELS["lai"], ylabel="density [m² m⁻²]⁻¹", xlim=(0, None), ylim=(0, None))
-    _finish(axis)
+    _finish(axis, xlabel=_LABELS["lai"], ylabel="density [m² m⁻²]⁻¹", xlim=(0, None), ylim=(0, None))
     axis.legend(frameon=False, fontsize=8)
     return figure
 
@@ -158,9 +144,8 @@ def _figure5(found, reading):
                 axis.plot(at, limit, color=_BLACK, linewidth=0.9, label=name)
             low, high = fit.prediction_interval(at)
             axis.fill_between(at, low, high, color=_GREY, alpha=0.2, linewidth=0, label="95 % prediction")
-            axis.set(xlabel=_LABELS["ndvi"], ylabel=_LABELS[variable])
-            axis.set_title(f"arp {arp:g}: R² = {fit.r2:.2f} (TOA), {np.corrcoef(boa, truth)[0, 1] ** 2:.3f} (BOA)")
-            _finish(axis)
+            title = f"arp {arp:g}: R² = {fit.r2:.2f} (TOA), {np.corrcoef(boa, truth)[0, 1] ** 2:.3f} (BOA)"
+            _finish(axis, xlabel=_LABELS["ndvi"], ylabel=_LABELS[variable], title=title)
     _legend_below(figure, axes[0, 0])
     return figure
 
@@ -175,19 +160,18 @@ def _figure6(found, reading):
         options = {"reflect": variable != "ndvi"}
         at = np.linspace(cells.min(), cells.max(), 500)
         counts, edges = np.histogram(cells, bins=400)
-        bandwidth = density.silverman_bandwidth(cells.std(), np.subtract(*np.percentile(cells, (75, 25))), cells.size)
-        of_cells = density.gaussian_density((edges[1:] + edges[:-1]) / 2, at, bandwidth, counts, **options)
+        bandwidth = scaling.silverman_bandwidth(cells.std(), np.subtract(*np.percentile(cells, (75, 25))), cells.size)
+        of_cells = scaling.gaussian_density((edges[1:] + edges[:-1]) / 2, at, bandwidth, counts, **options)
         axis.plot(at, of_cells, color=_BLACK, linewidth=1, label="cells")
         for arp, color, dash in zip(found["arp"].values, _COLORS, _DASHES, strict=True):
             values = sample(found, reading, arp)
-            of_pixels = density.sample_density(values[variable], at, **options)
+            of_pixels = scaling.sample_density(values[variable], at, **options)
             axis.plot(at, of_pixels, dash, color=color, label=f"pixels, arp {arp:g}")
             if variable == "ndvi":
-                smooth = density.sample_density(values["analogue_ndvi"], at)
+                smooth = scaling.sample_density(values["analogue_ndvi"], at)
                 axis.plot(at, smooth, color=_GREY, linewidth=0.9, label="before digitising" if arp == first else None)
         unit = " [m² m⁻²]⁻¹" if variable == "lai" else ""
-        axis.set(xlabel=_LABELS[variable], ylabel=f"density {unit}", ylim=(0, None))
-        _finish(axis)
+        _finish(axis, xlabel=_LABELS[variable], ylabel=f"density {unit}", ylim=(0, None))
     _legend_below(figure, figure.axes[-1])
     return figure
 
@@ -201,8 +185,7 @@ def _figure7(found, reading):
             at, noise = friedl1995_table.mean_noise(values[variable], values["ndvi"], increment)
             axis.plot(at, noise, dash, color=color, marker=marker, markersize=4, linewidth=1.2,
                       label=f"arp {arp:g}, mean {noise.mean():.2f}")  # fmt: skip
-        axis.set(xlabel=_LABELS[variable], ylabel=f"REN of {variable.upper()}", ylim=(0, None))
-        _finish(axis)
+        _finish(axis, xlabel=_LABELS[variable], ylabel=f"REN of {variable.upper()}", ylim=(0, None))
         axis.legend(frameon=False, fontsize=8)
     return figure
 
@@ -236,7 +219,7 @@ def _figure8(found, reading):
 
 
 def _figure9(found, reading):
-    """Reflectance at the top of the atmosphere against the mean of that of the ground."""
+    """Reflectance at the top of the atmosphere against mean surface reflectance."""
     figure = Figure(figsize=(_FIGURE_WIDTH, 5.0), layout="constrained")
     axes = figure.subplots(2, found.sizes["arp"])
     for row, name, words in zip(axes, ("red", "nir"), ("red", "near infrared"), strict=True):
@@ -248,27 +231,63 @@ def _figure9(found, reading):
             at, order = np.array([boa.min(), boa.max()]), np.argsort(boa)
             axis.plot(boa[order], clear[order], color=_BLACK, linewidth=1.1, label="atmosphere alone")
             axis.plot(at, at, ":", color=_GREY, linewidth=1, label="1 : 1")
-            axis.set(xlabel=f"{words}, ground")
-            axis.set_title(f"arp {arp:g}: R² = {np.corrcoef(boa, toa)[0, 1] ** 2:.2f}")
-            _finish(axis)
+            title = f"arp {arp:g}: R² = {np.corrcoef(boa, toa)[0, 1] ** 2:.2f}"
+            _finish(axis, xlabel=f"{words}, ground", title=title)
         row[0].set_ylabel(f"{words}, TOA")
     _legend_below(figure, figure.axes[0])
     return figure
 
 
-_DRAWN = dict(zip(NUMBERS, (_figure3, _figure4, _figure5, _figure6, _figure7, _figure8, _figure9), strict=True))
+_DRAWN = dict(zip(FIGURE_NUMBERS, (_figure3, _figure4, _figure5, _figure6, _figure7, _figure8, _figure9), strict=True))
 
 
 def _legend_below(figure, axis):
-    """One legend for all panels, where it hides no data."""
+    """One legend for all panels, below the figure."""
     names = axis.get_legend_handles_labels()
     figure.legend(*names, loc="outside lower center", ncols=len(names[0]), frameon=False, fontsize=8)
 
 
-def _finish(axis):
+def _finish(axis, **properties):
+    """Set properties of an axis, and its fonts, ticks and frame."""
+    axis.set(**properties)
     axis.title.set_fontsize(9)
     axis.tick_params(labelsize=8)
     for each in (axis.xaxis, axis.yaxis):
         each.label.set_fontsize(9)
         each.set_major_locator(MaxNLocator(5))
     axis.spines[["top", "right"]].set_visible(False)
+
+
+# A rise of a density is a peak where it reaches this share of the highest.
+_PEAK = 0.05
+
+
+def peaks(values):
+    """Number of peaks of the density of a sample."""
+    found = scaling.sample_density(values, np.linspace(values.min(), values.max(), 500))
+    rises = (found[1:-1] > found[:-2]) & (found[1:-1] >= found[2:]) & (found[1:-1] > _PEAK * found.max())
+    return int(rises.sum())
+
+
+def scatter(found, reading, band):
+    """Scatter, 1 - R2, of the reflectance of all pixels about its line on the surface reflectance, shape (arp,). [1]"""
+    scenes = found.sel(reading=reading)
+    pairs = zip(scenes[f"pixel_boa_{band}"].values, scenes[f"pixel_toa_{band}"].values, strict=True)
+    return np.array([1 - np.corrcoef(boa[np.isfinite(toa)], toa[np.isfinite(toa)])[0, 1] ** 2 for boa, toa in pairs])
+
+
+def drift_share(found):
+    """Share of the scatter of reflectance removed by co-registration of pixels and blocks, shape (band, arp). [1]"""
+    return np.array(
+        [1 - scatter(found, ALIGNED.name, band) / scatter(found, NATIVE.name, band) for band in ("red", "nir")]
+    )
+
+
+def caption_numbers(found, reading):
+    """Numbers in the captions: peaks of the densities at the smallest arp, and the share of drift in the scatter."""
+    arp = float(found["arp"].values[0])
+    values = sample(found, reading, arp)
+    numbers = {"arp": arp, "values": np.unique(values["ndvi"]).size, "drift": found.attrs["drift"]}
+    numbers |= {f"{name}_peaks": peaks(values[name]) for name in ("lai", "ndvi", "analogue_ndvi")}
+    both = {NATIVE.name, ALIGNED.name} <= set(found["reading"].values.tolist())
+    return numbers | {"share": drift_share(found) if both else None}

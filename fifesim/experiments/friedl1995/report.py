@@ -1,14 +1,22 @@
-"""The HTML page of the repeated experiment."""
+"""Folder and HTML page of the reproduction of Friedl et al. (1995)."""
 
+import os
+import shlex
 from pathlib import Path
 
-from fifesim.experiments.friedl1995 import fitted
+from fifesim.base.arguments import is_path
+from fifesim.experiments.friedl1995 import case as friedl1995
+from fifesim.experiments.friedl1995 import effects as table_effects
+from fifesim.experiments.friedl1995 import figures, reproduction
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.captions import figure_captions
-from fifesim.experiments.friedl1995.case import ARPS
-from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE, PASSAGES, READINGS, TABLE_1
+from fifesim.experiments.friedl1995.case import ALIGNED, ARPS, NATIVE, PASSAGES, READINGS, TABLE_1, beside
+from fifesim.experiments.friedl1995.figures import caption_numbers
+from fifesim.experiments.friedl1995.reproduction import REALISATIONS, SEED, reproduce_case
 from fifesim.ground.landscape.distribution import treatments
-from fifesim.output import pages
+from fifesim.output import report
+from fifesim.output.folders import check_folder, results
+from fifesim.output.progress import steps
+from fifesim.output.run.workers import check_memory_of_cells
 
 # Root mean squares of R2 that differ by less are alike: two realisations leave about so much. [1]
 _ALIKE = 0.02
@@ -18,170 +26,139 @@ _FEWEST = 10
 
 _GROUND = {"flat": "level", "flint-hills": "the synthetic Flint Hills"}
 
-_RELIEF_COUNTS = (
-    "If the pixels drifted as they do here, relief of this kind was not in Table 2; if relief of this kind was, its "
-    "scatter is not to be had from this drift with these densities and optics. The paper does not say which, nor do "
-    "these simulations."
-)
-_RELIEF_HELPS = (
-    "Relief of this kind brings R² nearer to the paper's; how near is in the table. So a part of the paper's scatter "
-    "may be relief."
-)
-_RELIEF_PASSES = "Relief of this kind changes too little to be told from level ground by Table 2."
-
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
 
 
 def reproduction_page(case, found, effects, figures, run):
-    """
-    One self-contained HTML page.
-
-    Parameters
-    ----------
-    case : fifesim.experiments.friedl1995.case.Case
-    found : xarray.Dataset
-        From `fifesim.experiments.friedl1995.reproduction.reproduce_case`.
-    effects : mapping of str to pandas.DataFrame
-        ``readings``, ``sizes`` and ``sensitivity`` of `fifesim.experiments.friedl1995.effects`.
-    figures : mapping of (int, str) to bytes
-        PNG by number and reading.
-    run : mapping of str
-        ``realisations``, ``effect_realisations``, ``seed``, and the ``command`` that makes the page again.
-
-    Returns
-    -------
-    html : str
-    """
+    """One self-contained HTML page of the experiment."""
     shown, beside = (str(name) for name in found["reading"].values)
     tables = {name: friedl1995_table.table2(found.sel(reading=name)) for name in (shown, beside)}
     texts = [friedl1995_table.text_table(found.sel(reading=name)).to_dict("records") for name in (shown, beside)]
-    own = dict(case.densities) == {name: name for name in treatments()}
-    return pages.html(
-        _TEMPLATE, case=case, run=run, shown=shown, beside=beside, **_constants(case),
+    return report.page_html(
+        _TEMPLATE, case=case, run=run, shown=shown, beside=beside,
+        arps=ARPS, treatments=treatments(), sample=friedl1995_table.SAMPLE, fewest=_FEWEST,
+        increments=friedl1995_table.INCREMENTS, tm=case.sensor == TABLE_1, drift=case.drift,
+        interval=case.interval, pixel=case.pixel, passages=PASSAGES,
+        readings={name: reading.in_words(case.interval, case.pixel) for name, reading in READINGS.items()},
         rows=list(zip(*(table.to_dict("records") for table in tables.values()), strict=True)),
         texts=list(zip(*texts, strict=True)),
-        limits=fitted.limits(*tables.values()), origins=fitted.origins(case), fitted=fitted.fitted_count(case),
+        limits=table_effects.limits(*tables.values()), origins=table_effects.number_sources(case),
+        fitted=table_effects.fitted_count(case),
         agreements={name: friedl1995_table.agreement(table) for name, table in tables.items()},
-        figures=figures, captions={name: figure_captions(found, name, own) for name in (shown, beside)},
-        **_conclusions(effects),
+        figures=figures, own_densities=case.own_densities, cell=found.attrs["cell"],
+        captions={name: caption_numbers(found, name) for name in (shown, beside)},
+        **conclusions(effects),
     )  # fmt: skip
 
 
-def _constants(case):
-    """What a page says of its case, whatever was found."""
-    return {
-        "arps": ARPS, "treatments": treatments(), "sample": friedl1995_table.SAMPLE, "fewest": _FEWEST,
-        "increments": friedl1995_table.INCREMENTS, "tm": case.sensor == TABLE_1, "drift": case.drift,
-        "interval": case.interval, "pixel": case.pixel, "passages": PASSAGES,
-        "readings": {name: each.in_words(case.interval, case.pixel) for name, each in READINGS.items()},
-    }  # fmt: skip
-
-
-def _conclusions(effects):
-    """The tables of effects, and what follows from them."""
+def conclusions(effects):
+    """Tables of effects, and the rows that the conclusions of the page compare."""
     readings, sensitivity = effects["readings"], effects["sensitivity"]
-    return {
-        "effects": {name: each.to_dict("records") for name, each in effects.items()},
-        "known": list(dict.fromkeys(readings["name"])),
-        "lands": {name: _GROUND.get(name, Path(name).name) for name in readings["dem"].unique()},
-        "blur": on_blur(readings, sensitivity), "relief": on_relief(readings),
-        "displacement": on_displacement(readings), "moved": sensitivity["r2_largest"].max(),
-    }  # fmt: skip
-
-
-def on_blur(readings, sensitivity):
-    """
-    What the figures say of blur in the place of drift.
-
-    Parameters
-    ----------
-    readings, sensitivity : pandas.DataFrame
-        From `fifesim.experiments.friedl1995.effects`.
-
-    Returns
-    -------
-    text : str
-        Empty where blur is not among the readings.
-    """
     rows = _of_case(readings)
     blurred = [row for name, row in rows.items() if READINGS[name].eifov is not None]
-    if not blurred:
-        return ""
-    drift, blur = rows[NATIVE.name], min(blurred, key=lambda row: row["lai_r2_rms"])
-    said = (
-        f"R² of {blur['name']} is off by {blur['lai_r2_rms']:.2f} in the root mean square of nine rows, that of the "
-        f"drift by {drift['lai_r2_rms']:.2f}. Slopes of {blur['name']} are off by {100 * blur['lai_slope_rms']:.0f} %, "
-        f"those of the drift by {100 * drift['lai_slope_rms']:.0f} %"
-    )
-    if blur["lai_slope_rms"] < 2 * drift["lai_slope_rms"]:
-        return said + ": these figures do not tell blur from drift."
-    step = 100 * sensitivity["lai_slope"].abs().max() if len(sensitivity) else 0.0
-    said += (
-        f": blur narrows NDVI, drift does not, and slopes rise {blur['lai_slope_factor']:.2f} times. Other optics "
-        f"could lower all of them together, though no change in the last table moves them by more than {step:.0f} %; "
-        f"{100 * blur['lai_slope_rest']:.0f} % would be left, of the drift {100 * drift['lai_slope_rest']:.0f} %. "
-    )
-    paper, drifting, blurring = drift["paper_growth"], drift["growth"], blur["growth"]
-    growths = f"{paper:.2f} times in the paper, {drifting:.2f} with drift, {blurring:.2f} with blur"
-    decided = abs(blurring - paper) > 2 * abs(drifting - paper)
-    end = "So slopes decide, not R²." if decided else "So it is their height that speaks against blur, and no more."
-    return said + f"What a common factor leaves is how slopes grow with arp: {growths}. {end}"
+    return {
+        "effects": {name: table.to_dict("records") for name, table in effects.items()},
+        "known": list(dict.fromkeys(readings["name"])),
+        "lands": {name: _GROUND.get(name, Path(name).name) for name in readings["dem"].unique()},
+        "drifting": rows[NATIVE.name], "displaced": rows["offset"], "relief": on_relief(readings), "alike": _ALIKE,
+        "blurred": min(blurred, key=lambda row: row["lai_r2_rms"], default=None),
+        "slope_step": sensitivity["lai_slope"].abs().max() if len(sensitivity) else 0.0,
+        "moved": sensitivity["r2_largest"].max(),
+    }  # fmt: skip
 
 
 def on_relief(readings):
-    """
-    What relief does, beside the same without, or the reverse.
-
-    Parameters
-    ----------
-    readings : pandas.DataFrame
-
-    Returns
-    -------
-    relief : dict
-        Rows of the readings table by reading, ``level`` and ``hills``; the ``treatment`` and ``arp`` whose R2 falls
-        most, and its column; and what ``follows``.
-    """
+    """Rows of readings on level ground and on hills, and the row of Table 2 that hills lower most."""
     rows = readings.to_dict("records")
     first = rows[0]["dem"]
     sets = {dem: {row["name"]: row for row in rows if row["dem"] == dem} for dem in readings["dem"].unique()}
     other = next(dem for dem in sets if dem != first)
     level, hills = (first, other) if first == "flat" else (other, first)
-    keys = [f"r2 {treatment} {arp:g}" for treatment in treatments() for arp in ARPS]
-    changed = {key: sets[hills][NATIVE.name][key] - sets[level][NATIVE.name][key] for key in keys}
-    most = min(changed, key=changed.get)
-    _, treatment, arp = most.split()
-    worse = sets[hills][NATIVE.name]["lai_r2_rms"] - sets[level][NATIVE.name]["lai_r2_rms"]
+    native = {dem: sets[dem][NATIVE.name] for dem in (level, hills)}
+    changed = {f"r2 {treatment} {arp:g}": (treatment, f"{arp:g}") for treatment, arp in friedl1995.scenes()}
+    most = min(changed, key=lambda key: native[hills][key] - native[level][key])
+    treatment, arp = changed[most]
     return {
         "level": sets[level], "hills": sets[hills], "dem": hills, "most": most, "treatment": treatment, "arp": arp,
-        "follows": _RELIEF_COUNTS if worse > _ALIKE else _RELIEF_HELPS if worse < -_ALIKE else _RELIEF_PASSES,
+        "worse": native[hills]["lai_r2_rms"] - native[level]["lai_r2_rms"],
         "native": NATIVE.name, "aligned": ALIGNED.name,
     }  # fmt: skip
 
 
-def on_displacement(readings):
-    """
-    Whether a constant displacement does as well as the interval.
-
-    Parameters
-    ----------
-    readings : pandas.DataFrame
-
-    Returns
-    -------
-    sentence : str
-    """
-    rows = _of_case(readings)
-    offset, native = rows["offset"], rows[NATIVE.name]
-    said = (
-        f"A constant offset has R² of LAI off by {offset['lai_r2_rms']:.3f} and slopes by "
-        f"{100 * offset['lai_slope_rms']:.0f} % in the root mean square, the interval by {native['lai_r2_rms']:.3f} "
-        f"and {100 * native['lai_slope_rms']:.0f} %"
-    )
-    alike = abs(offset["lai_r2_rms"] - native["lai_r2_rms"]) < _ALIKE
-    return said + (": Table 2 does not tell them apart." if alike else ".")
-
-
 def _of_case(readings):
-    """Rows on the elevation of the case, by name."""
+    """Rows for the elevation of the case, by name."""
     return {row["name"]: row for row in readings.to_dict("records") if row["dem"] == readings["dem"].iloc[0]}
+
+
+# Tables of effects, and the label of the progress of each.
+_TABLES = {"readings": "readings of Table 1", "sizes": "sizes of the scene", "sensitivity": "numbers chosen"}
+
+# Differences between cases share their random numbers, and need few realisations.
+_EFFECT_REALISATIONS = 2
+_DPI = 200
+
+
+def reproduce_to_folder(
+    folder, *, realisations=REALISATIONS, cells=None, seed=SEED, scenes=False, overwrite=False, **inputs
+):
+    """Write the experiment of [Friedl1995]_ to a folder: tables, figures, nine scenarios and report.html."""
+    folder = Path(folder)
+    check_folder(folder, overwrite)
+    if realisations < 1:
+        raise ValueError(f"realisations must be at least 1, got {realisations}")
+    case = friedl1995.case_of(cells=cells, **inputs)
+    reproduction.check_named(case)
+    check_memory_of_cells(case.cells)
+    pictures = pictures_of(case)
+    names = ["table2.csv", *(f"{name}.csv" for name in _TABLES), *pictures.values(), "scenarios", "report.html"]
+    with results(folder, names, overwrite=overwrite) as partial:
+        found = reproduce_case(case, realisations, seed, each=_shown)
+        seeds = range(seed, seed + _EFFECT_REALISATIONS)
+        tables = {
+            name: getattr(table_effects, name)(case, seeds, each=_shown(label)) for name, label in _TABLES.items()
+        }
+        tables["table2"] = _both(found)
+        for name, table in tables.items():
+            table.to_csv(partial / f"{name}.csv", index=False, float_format="%.6g")
+        drawn = {key: report.png(figures.plot_reproduction(key[0], found, reading=key[1]), _DPI) for key in pictures}
+        for key, picture in drawn.items():
+            (partial / pictures[key]).write_bytes(picture)
+        reproduction.write_scenarios(case, partial / "scenarios", seed, scenes, each=_shown("scenarios"))
+        run = {"realisations": realisations, "effect_realisations": _EFFECT_REALISATIONS, "seed": seed}
+        run["command"] = command({"realisations": realisations, "cells": case.cells, "seed": seed} | inputs)
+        page = reproduction_page(case, found, tables, drawn, run)
+        (partial / "report.html").write_text(page, encoding="utf-8")
+    return [folder / name for name in names]
+
+
+def pictures_of(case):
+    """File names of the figures by number and reading; figures that depend on the reading have two."""
+    shown, other = (reading.name for reading in beside(case.reading))
+    names = {}
+    for number in figures.FIGURE_NUMBERS:
+        names[number, shown] = f"figure{number}.png"
+        if number in figures.BY_READING:
+            names[number, other] = f"figure{number}_{other}.png"
+    return names
+
+
+def command(options):
+    """Command line that reproduces the folder."""
+    words = ["fifesim", "reproduce"]
+    defaults = {"reading": "native", "dem": "flat", "sensor": TABLE_1}
+    for name in (*defaults, "densities", "optics", "background", "west", "north", "realisations", "cells", "seed"):
+        value = options.get(name)
+        if value is not None and value != defaults.get(name):
+            words += [f"--{name}", os.fspath(value) if is_path(value) else str(value)]
+    return shlex.join(words)
+
+
+def _both(found):
+    """Table 2 of the reading, with the coefficients of the second reading."""
+    shown, other = (str(name) for name in found["reading"].values)
+    table, second = (friedl1995_table.table2(found.sel(reading=name)) for name in (shown, other))
+    return table.assign(**{f"{other}_{name}": second[name] for name in friedl1995_table.COEFFICIENTS})
+
+
+def _shown(label):
+    return lambda sequence: steps(sequence, label)

@@ -1,29 +1,107 @@
-"""The experiment of Friedl et al. (1995) as one call: its 54 numbers by realisation, and what its figures show."""
+"""Reproduction of Friedl et al. (1995) as one call: its numbers, its scenes, and its scenarios as files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 import xarray as xr
 
-from fifesim.base.annotations import Distribution, FilePath, WholeNumber
-from fifesim.base.kinds import Kind
-from fifesim.base.seeds import check_seed
+from fifesim.base.annotations import FilePath, FrozenDistribution, WholeNumber
+from fifesim.base.arguments import Kind, is_path
+from fifesim.base.lattice import check_seed
+from fifesim.chain.driver import Driver, cell_block_means
 from fifesim.experiments.friedl1995 import case as friedl1995
-from fifesim.experiments.friedl1995 import shown
-from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
-from fifesim.experiments.friedl1995.readings import TABLE_1, beside
-from fifesim.experiments.friedl1995.table import COEFFICIENTS, realise
-from fifesim.ground.landscape.distribution import treatments
+from fifesim.experiments.friedl1995 import table as friedl1995_table
+from fifesim.experiments.friedl1995.case import ARPS, TABLE_1, VARIABLES, beside
+from fifesim.experiments.friedl1995.table import COEFFICIENTS, ground_of, realise_scenes, scene_image, truth_means
+from fifesim.grids.files import to_geotiff
+from fifesim.ground.landscape.distribution import lai_distribution, treatments
+from fifesim.output import stac
+from fifesim.output.maps import write_style
 from fifesim.output.progress import steps
+from fifesim.scenario.scenario import read_scenario
+from fifesim.scenario.toml import write_scenario
+
+# Values of leaf area at which densities are given.
+_POINTS = 1201
+
+
+def shown_scenes(case, readings, seed, each=iter):
+    """Cells and pixels of the three scenes of the first treatment."""
+    # Variables `cell_*` have dims (arp, y, x), variables `pixel_*` (reading, arp, pixel), with NaN where a reading has
+    # fewer pixels.
+    cases, land = [replace(case, reading=reading) for reading in readings], case.land()
+    scenes = [_scene(cases, land, arp, seed) for arp in each(ARPS)]
+    longest = max(one["pixel_lai"].size for _, pixels in scenes for one in pixels)
+    names = list(scenes[0][1][0])
+    variables = {}
+    for name in names:
+        values = np.full((len(cases), len(ARPS), longest), False if name == "sampled" else np.nan)
+        for row, (_, pixels) in enumerate(scenes):
+            for number, one in enumerate(pixels):
+                values[number, row, : one[name].size] = one[name]
+        variables[name] = (("reading", "arp", "pixel"), values, {"units": "1"})
+    for name in scenes[0][0]:
+        variables[name] = (("arp", "y", "x"), np.stack([cells[name] for cells, _ in scenes]), {"units": "1"})
+    coords = {"reading": [one.reading.name for one in cases], "arp": list(ARPS)}
+    return xr.Dataset(variables, coords=coords)
+
+
+def densities(case):
+    """Densities of leaf area of the three treatments, dims (distribution, leaf_area), NaN outside of the support."""
+    known = {name: lai_distribution(case.densities[name]) for name in treatments()}
+    # What lies beyond has a ten-thousandth of the cells.
+    high = max(float(each.ppf(1 - 1e-4)) for each in known.values())
+    at = np.linspace(0.0, high * 1.02, _POINTS)
+    values = [np.where((at >= each.support()[0]) & (at <= each.support()[1]), each.pdf(at), np.nan)
+              for each in known.values()]  # fmt: skip
+    coords = {"distribution": list(known), "leaf_area": at}
+    attrs = {"long_name": "density of leaf area index", "units": "1"}
+    return xr.DataArray(values, dims=("distribution", "leaf_area"), coords=coords, attrs=attrs)
+
+
+def _scene(cases, land, arp, seed):
+    """Cells of a scene, and its pixels in each reading."""
+    treatment = treatments()[0]
+    driver = Driver(cases[0].setup)
+    cells = friedl1995_table.cells_of(cases[0], treatment, arp, seed, land, driver)
+    toa, truth = driver.toa(cells.reflectance), _truth(cases[0], driver, cells)
+    key = [seed, friedl1995.scenes().index((treatment, arp))]
+    pixels = []
+    for case in cases:
+        digital, analogue = (Driver(replace(case.setup, quantise=quantise)) for quantise in (True, False))
+        image = digital.planetary(digital.image(toa, case.grid))
+        smooth = analogue.ndvi(analogue.planetary(analogue.image(toa, case.grid)))
+        seen = {"ndvi": digital.ndvi(image), "analogue_ndvi": smooth, "toa_red": image[0], "toa_nir": image[1]}
+        values = friedl1995_table.paired(*truth.values(), *seen.values())
+        numbers = np.arange(values.shape[1])
+        chosen = friedl1995_table.draw(numbers[None], friedl1995_table.SAMPLE, key, 1)[0, 0]
+        one = {f"pixel_{name}": value for name, value in zip((*truth, *seen), values, strict=True)}
+        pixels.append(one | {"sampled": np.isin(numbers, chosen)})
+    return {"cell_lai": cells.lai, "cell_fpar": cells.fpar, "cell_ndvi": driver.ndvi(toa)}, pixels
+
+
+def _truth(case, driver, cells):
+    """Variables on the blocks of the truth, independent of the sensor."""
+    red, nir = cells.reflectance
+    arrays = {"lai": cells.lai, "fpar": cells.fpar, "boa_ndvi": driver.ndvi(cells.reflectance)}
+    arrays |= {"red_red": red**2, "red_nir": red * nir, "nir_nir": nir**2, "boa_red": red, "boa_nir": nir}
+    found = {
+        name: cell_block_means(array, case.grid, case.pixel, case.setup.min_valid) for name, array in arrays.items()
+    }
+    means = np.stack([found["boa_red"], found["boa_nir"]])
+    clear = driver.toa(means)
+    return found | {"ndvi_of_mean": driver.ndvi(means), "clear_red": clear[0], "clear_nir": clear[1]}
+
 
 FILE_BY_BAND = Kind("the path of a CSV file, or a mapping by band")
-Land: TypeAlias = Annotated[FilePath, Kind("'flat', 'flint-hills' or the path of a raster file")]
+LandPath: TypeAlias = Annotated[FilePath, Kind("'flat', 'flint-hills' or the path of a raster file")]
 Densities: TypeAlias = Annotated[
-    FilePath | Mapping[str, FilePath | Distribution], Kind("a folder, or a mapping by treatment")
+    FilePath | Mapping[str, FilePath | FrozenDistribution], Kind("a folder, or a mapping by treatment")
 ]
 
 SEED = 1995
@@ -33,7 +111,7 @@ REALISATIONS = 20
 def reproduce(
     *,
     reading: Literal["native", "aligned", "narrow", "offset", "blur-40.8", "blur-48.6"] = "native",
-    dem: Land = "flat",
+    dem: LandPath = "flat",
     densities: Densities | None = None,
     optics: Annotated[FilePath | Mapping[str, tuple[float, float]], FILE_BY_BAND] | None = None,
     background: Annotated[FilePath | Mapping[str, float], FILE_BY_BAND] | None = None,
@@ -112,33 +190,14 @@ def reproduce(
 
 
 def reproduce_case(case, realisations, seed, each=lambda label: iter):
-    """
-    The same of a case.
-
-    Parameters
-    ----------
-    case : fifesim.experiments.friedl1995.case.Case
-    realisations, seed : int
-        As in `reproduce`.
-    each : callable, optional
-        Gives, for a label, what wraps a sequence of scenes, to show how far it is.
-
-    Returns
-    -------
-    found : xarray.Dataset
-
-    Raises
-    ------
-    ValueError
-        If there is no realisation, or no such seed.
-    """
+    """Repeat the experiment for a case."""
     if realisations < 1:
         raise ValueError(f"realisations must be at least 1, got {realisations}")
     check_seed(seed)
     pair = beside(case.reading)
-    found = realise(case, range(seed, seed + realisations), readings=pair, each=each("nine scenes"))
-    scenes = shown.shown_scenes(case, pair, seed, each=each("scenes of the figures"))
-    out = found.merge(scenes).merge(_paper()).assign(density=shown.densities(case))
+    found = realise_scenes(case, range(seed, seed + realisations), readings=pair, each=each("nine scenes"))
+    scenes = shown_scenes(case, pair, seed, each=each("scenes of the figures"))
+    out = found.merge(scenes).merge(_paper()).assign(density=densities(case))
     out = out.assign_coords(text=("reading", [reading.in_words(case.interval, case.pixel) for reading in pair]))
     return out.assign_attrs(
         title="Friedl et al. (1995), repeated", sensor=case.instrument.name, dem=case.dem, cells=case.cells,
@@ -148,7 +207,7 @@ def reproduce_case(case, realisations, seed, each=lambda label: iter):
 
 
 def _paper():
-    """The paper's own numbers."""
+    """Numbers published in the paper."""
     dims, shape = ("variable", "distribution", "arp"), (len(VARIABLES), len(treatments()), len(ARPS))
     coords = {"variable": list(VARIABLES), "distribution": treatments(), "arp": list(ARPS)}
     table = friedl1995.paper_table()
@@ -158,3 +217,56 @@ def _paper():
         values = [[text.get((quantity, name, arp), np.nan) for arp in ARPS] for name in names]
         found[f"paper_{quantity}"] = ((along, "arp"), values, {"units": "1"})
     return xr.Dataset(found, coords=coords | {"quantity": [*VARIABLES, "ndvi"]})
+
+
+def write_scenarios(case, folder, seed, scenes=False, each=iter):
+    """Write the nine scenarios of a realisation, each into a folder such as ``burned-grazed-0.05``."""
+    check_named(case)
+    land, items = case.land() if scenes else None, {}
+    for treatment, arp in each(friedl1995.scenes()):
+        own = folder / f"{treatment}-{arp:g}"
+        own.mkdir(parents=True)
+        (own / "scenario.toml").write_text(scenario_text(case, own, treatment, arp, seed), encoding="utf-8")
+        if scenes:
+            _write_rasters(case, own, land, treatment, arp, seed)
+            found = read_scenario(own / "scenario.toml")
+            items[f"{own.name}/item.json"] = stac.item(
+                found, own, f"{treatment}, arp {arp:g}, seen by {case.instrument.name}"
+            )
+    if items:
+        stac.write_collection(folder, "friedl1995", "The nine scenes of Friedl et al. (1995), repeated.", items)
+
+
+def scenario_text(case, own, treatment, arp, seed):
+    """TOML text of one of the nine scenarios; any instrument file of its reading is written to the same folder."""
+    scenario = case.scenario(treatment, arp, seed)
+    if not case.reading.other_response:
+        return write_scenario(scenario.complete())
+    name = f"{case.reading.name}.toml"
+    (own / name).write_text(case.reading.instrument_file(case.instrument.altitude), encoding="utf-8")
+    sensor = scenario.sensor.model_copy(update={"instrument": str(own / name)})
+    complete = scenario.model_copy(update={"sensor": sensor}).complete()
+    # Beside the scenario, wherever both are moved.
+    beside = complete.sensor.model_copy(update={"instrument": name})
+    return write_scenario(complete.model_copy(update={"sensor": beside}))
+
+
+def check_named(case):
+    """Raise ValueError for densities that are not files, which a scenario cannot name."""
+    for treatment, source in case.densities.items():
+        if not is_path(source):
+            raise ValueError(
+                f"densities: that of {treatment} is no file, and a scenario names one: write samples of it as a CSV "
+                "file, or call fifesim.reproduce"
+            )
+
+
+def _write_rasters(case, own, land, treatment, arp, seed):
+    ground = ground_of(case, treatment, arp, seed, land)
+    truth = {name: truth_means(case, ground, getattr(ground, name)) for name in ("lai", "fpar")}
+    cells = {"lai": ground.lai, "fpar": ground.fpar}
+    for band in ground.reflectance["band"].values:
+        cells[str(band)] = ground.reflectance.sel(band=band).drop_vars(["band", "wavelength"], errors="ignore")
+    rasters = {"image": scene_image(case, ground), "truth": xr.Dataset(truth), "scene": xr.Dataset(cells)}
+    for name, raster in rasters.items():
+        write_style(to_geotiff(raster if name == "image" else raster.astype(np.float32), own / f"{name}.tif"))

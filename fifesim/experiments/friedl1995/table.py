@@ -1,19 +1,109 @@
-"""Table 2 of Friedl et al. (1995) over realisations, and how far it agrees with the paper's."""
+"""Table 2 of Friedl et al. (1995) over realisations, and its agreement with the published values."""
 
-from dataclasses import replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from fifesim.analysis import uncertainty
-from fifesim.chain.arrays import ArrayChain
+from fifesim.analysis import regression
+from fifesim.analysis.scaling_labels import aggregate_blocks
+from fifesim.base.caches import cached
+from fifesim.chain.driver import Driver, cell_block_means
+from fifesim.chain.setup import Setup, image_of, reflectance_of
 from fifesim.experiments.friedl1995 import case as friedl1995
 from fifesim.experiments.friedl1995.case import ARPS, VARIABLES
-from fifesim.experiments.friedl1995.cells import cells_of
-from fifesim.experiments.friedl1995.pixels import paired
-from fifesim.ground.landscape.distribution import treatments
+from fifesim.ground.canopy import labels as canopy
+from fifesim.ground.landscape.autoregression import periodic_field
+from fifesim.ground.landscape.distribution import lai_distribution, rank_quantiles, treatments
+from fifesim.ground.landscape.lai_labels import lai_scene
+
+
+@dataclass(frozen=True, eq=False)
+class SceneGround:
+    """
+    Ground of a scene.
+
+    Parameters
+    ----------
+    setup : fifesim.chain.setup.Setup
+        With the elevation.
+    lai, fpar : xarray.DataArray, dims (y, x)
+    reflectance : xarray.DataArray, dims (band, y, x)
+        At the ground. [1]
+    """
+
+    setup: Setup
+    lai: xr.DataArray
+    fpar: xr.DataArray
+    reflectance: xr.DataArray
+
+
+def ground_of(case, treatment, arp, seed, land=(None, None)):
+    """Ground of a scene by the method of the paper: one Fourier transform of the scene, and exact ranks."""
+    keys, (dem, horizon) = case.common.ground, land
+    setup = replace(case.setup, dem=dem, horizon=horizon)
+    lai = lai_scene(case.grid, case.densities[treatment], arp=arp, seed=seed, method=keys.method)
+    fpar = canopy.canopy_fpar(lai, setup.canopy, geometry=setup.geometry, fpar_inf=keys.fpar_inf)
+    return SceneGround(setup, lai, fpar, reflectance_of(setup, lai).compute())
+
+
+def scene_image(case, ground):
+    """Image that the instrument of a case records of a scene, dims (band, y, x)."""
+    return image_of(case.setup, ground.reflectance)
+
+
+def truth_means(case, ground, array):
+    """Means over the blocks of the truth, dims (..., y, x)."""
+    return aggregate_blocks(array, case.pixel, min_valid=ground.setup.min_valid)
+
+
+def paired(*arrays):
+    """Valid pixels of several arrays paired by row and column, shape (arrays, pixels); larger arrays are cut."""
+    rows, columns = (min(sizes) for sizes in zip(*(each.shape for each in arrays), strict=True))
+    values = np.stack([each[:rows, :columns].ravel() for each in arrays])
+    return values[:, np.isfinite(values).all(axis=0)]
+
+
+# Larger fields are not kept. [cell]
+_FEW = 2**18
+
+
+class Cells(NamedTuple):
+    """Cells of a scene: LAI and FPAR, shape (y, x), and reflectance, shape (band, y, x)."""
+
+    lai: np.ndarray
+    fpar: np.ndarray
+    reflectance: np.ndarray
+
+
+def cells_of(case, treatment, arp, seed, land=(None, None), driver=None):
+    """Cells of a scene, with the bits of `ground_of`."""
+    if land[0] is not None:
+        ground = ground_of(case, treatment, arp, seed, land)
+        return Cells(ground.lai.values, ground.fpar.values, ground.reflectance.values)
+    driver = driver or Driver(case.setup)
+    lai = periodic_scene(case.densities[treatment], arp, seed, tuple(case.grid.shape))
+    return Cells(lai, driver.fpar(lai, case.common.ground.fpar_inf), driver.reflectance(lai))
+
+
+def periodic_scene(density, arp, seed, shape):
+    """Leaf area with exactly the density, by the periodic method of `fifesim.lai_scene`, shape (y, x). [m2 m-2]"""
+    lai = np.empty(shape)
+    order = (_kept_order if lai.size <= _FEW else _order)(seed, arp, shape)
+    lai.ravel()[order] = rank_quantiles(lai_distribution(density), lai.size)
+    return lai
+
+
+def _order(seed, arp, shape):
+    """Order of the cells of a field, from the smallest to the largest."""
+    return np.argsort(periodic_field(seed, arp, shape), axis=None, kind="stable")
+
+
+# The three treatments of a seed lie on one field, and so do the cases that change one number.
+_kept_order = cached(8, "order of cells")(_order)
+
 
 SAMPLE = 200
 COEFFICIENTS = ("intercept", "slope", "r2")
@@ -34,38 +124,14 @@ _DIMS = {
 }
 
 
-def realise(case, seeds, readings=None, distributions=None, arps=ARPS, each=iter):
-    """
-    Run scenes with several seeds.
-
-    Parameters
-    ----------
-    case : fifesim.experiments.friedl1995.case.Case
-    seeds : sequence of int
-        One for each realisation; the scenes of one share their noise.
-    readings : sequence of Reading, optional
-        Of the same ground; by default the case's alone.
-    distributions : sequence of str, optional
-        Treatments; all by default.
-    arps : sequence of float, optional
-        [1]
-    each : callable, optional
-        Wraps the sequence of scenes, to show how far it is.
-
-    Returns
-    -------
-    found : xarray.Dataset
-        Over (reading, realisation, distribution, arp): ``intercept``, ``slope`` and ``r2`` of all pixels along
-        ``variable``, and those of samples of 200 pixels, ``intercept_200`` and so on, along ``draw``; ``ren``, the mean
-        relative equivalent noise of a sample over its increments, and ``range_kept``, the share of the range of the
-        cells that a sample has, along ``quantity``, both in the mean over samples. [1]
-    """
+def realise_scenes(case, seeds, readings=None, distributions=None, arps=ARPS, each=iter):
+    """Lines, noise and ranges of scenes with several seeds, dims (reading, realisation, distribution, arp)."""
     cases = [case] if readings is None else [replace(case, reading=reading) for reading in readings]
     distributions = treatments() if distributions is None else list(distributions)
     land = case.land()
     scenes = [(seed, treatment, arp) for seed in seeds for treatment in distributions for arp in arps]
-    chains = [ArrayChain(one.setup, one.grid) for one in cases]
-    found = [_scene(cases, chains, land, *scene) for scene in each(scenes)]
+    drivers = [Driver(one.setup) for one in cases]
+    found = [_scene(cases, drivers, land, *scene) for scene in each(scenes)]
     shape = (len(seeds), len(distributions), len(arps), len(cases))
     outer = ("realisation", "distribution", "arp", "reading")
     variables = {}
@@ -78,21 +144,7 @@ def realise(case, seeds, readings=None, distributions=None, arps=ARPS, each=iter
 
 
 def table2(found):
-    """
-    Table 2 beside the paper's.
-
-    Parameters
-    ----------
-    found : xarray.Dataset
-        From `realise`, of one reading and the nine scenes.
-
-    Returns
-    -------
-    table : pandas.DataFrame
-        Columns variable, distribution, arp; intercept, slope and r2, the means over realisations; these with
-        ``_deviation``, their standard deviations over realisations, and with ``_deviation_200``, of a sample of 200
-        pixels; and with ``paper_`` before them.
-    """
+    """Table 2 compared with the published values, with standard deviations over realisations and samples."""
     paper = friedl1995.paper_table()
     columns = {name: paper[name] for name in ("variable", "distribution", "arp")}
     for name in COEFFICIENTS:
@@ -109,23 +161,7 @@ def table2(found):
 
 
 def agreement(table):
-    """
-    How far a table is from the paper's.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `table2`.
-
-    Returns
-    -------
-    agreement : dict of str to float
-        By variable, ``lai`` or ``fpar``: root mean square and largest difference of R2, the same of the three rows at
-        arp 0.24, root mean square, mean and largest relative difference of slopes, what is left of its root mean square
-        after one common ``factor``, largest difference of intercepts; and the root mean square over all coefficients of
-        the difference in standard deviations, ``if_sampled`` of a sample of 200 pixels, and ``if_all`` of one
-        realisation of all pixels.
-    """
+    """Measures of the difference between a table and the published one, by variable and statistic."""
     found = {}
     for variable, rows in table.groupby("variable"):
         r2 = rows["r2"] - rows["paper_r2"]
@@ -149,19 +185,7 @@ def agreement(table):
 
 
 def text_table(found):
-    """
-    Mean noise and range kept of the burned, grazed scenes, beside the paper's.
-
-    Parameters
-    ----------
-    found : xarray.Dataset
-        From `realise`, of one reading.
-
-    Returns
-    -------
-    table : pandas.DataFrame
-        Columns quantity, variable, arp, value, deviation over realisations, and paper, NaN where it states none.
-    """
+    """Mean noise and range kept of the burned, grazed scenes, compared with the published values."""
     paper = friedl1995.paper_text().set_index(["quantity", "variable", "arp"])["value"]
     shown = found.sel(distribution=treatments()[0])
     rows = []
@@ -175,23 +199,7 @@ def text_table(found):
 
 
 def line(x, y):
-    """
-    Least-squares lines of samples.
-
-    Parameters
-    ----------
-    x, y : array, shape (..., n)
-
-    Returns
-    -------
-    coefficients : array, shape (..., 3)
-        Intercept, slope and R2.
-
-    Examples
-    --------
-    >>> line(np.array([0.0, 1.0, 2.0]), np.array([1.0, 3.0, 5.0])).tolist()
-    [1.0, 2.0, 1.0]
-    """
+    """Intercept, slope and R2 of least-squares lines of samples, shape (..., 3)."""
     x_mean, y_mean = x.mean(axis=-1), y.mean(axis=-1)
     x_about, y_about = x - x_mean[..., None], y - y_mean[..., None]
     xx, xy, yy = (x_about * x_about).sum(axis=-1), (x_about * y_about).sum(axis=-1), (y_about * y_about).sum(axis=-1)
@@ -200,69 +208,39 @@ def line(x, y):
 
 
 def mean_noise(variable, ndvi, increment, slope=None):
-    """
-    Relative equivalent noise of a sample by increments.
-
-    Parameters
-    ----------
-    variable, ndvi : array, shape (n,)
-    increment : float
-        Width, in units of the variable.
-    slope : float, optional
-        Of the sample's line, where it is known.
-
-    Returns
-    -------
-    values, noise : array, shape (increments,)
-        Mean of the variable and its relative equivalent noise in increments of at least three pixels. [1]
-    """
+    """Mean and relative equivalent noise [1] in increments of at least three pixels, shape (increments,)."""
     first, last = int(np.floor(variable.min() / increment)), int(np.floor(variable.max() / increment))
     increments, origin = last - first + 1, float(ndvi.mean())
-    sums = uncertainty.increment_sums(variable[None], ndvi[None], first, increment, increments, origin)
-    count, mean, deviation = uncertainty.increment_moments(sums)
+    sums = regression.increment_sums(variable[None], ndvi[None], first, increment, increments, origin)
+    count, mean, deviation = regression.increment_moments(sums)
     enough = count >= _FEWEST
     slope = line(variable, ndvi)[1] if slope is None else slope
-    return mean[enough], uncertainty.equivalent_noise(deviation[enough], slope, mean[enough])
+    return mean[enough], regression.equivalent_noise(deviation[enough], slope, mean[enough])
 
 
 def draw(pixels, count, seed, draws):
-    """
-    Samples of pixels without repetition.
-
-    Parameters
-    ----------
-    pixels : array, shape (k, n)
-    count : int
-        At most n are drawn.
-    seed : sequence of int
-    draws : int
-
-    Returns
-    -------
-    samples : array, shape (k, draws, count)
-    """
+    """Samples of pixels without repetition, shape (k, draws, count)."""
     return pixels[:, _drawn(tuple(seed), pixels.shape[1], count, draws)]
 
 
 # Readings of a scene, and scenes that differ in one number, have samples of the same places.
-@lru_cache(maxsize=256)
+@cached(256, "drawn pixels")
 def _drawn(seed, pixels, count, draws):
     order = np.random.default_rng(seed).random((draws, pixels)).argsort(axis=1)
     return order[:, :count].copy()
 
 
-def _scene(cases, chains, land, seed, treatment, arp):
-    """What each reading gives of a scene, a list of dicts."""
-    first, kernels = chains[0], chains[0].kernels
-    cells = cells_of(cases[0], treatment, arp, seed, land, kernels)
-    truth = [first.means(array, cases[0].pixel) for array in (cells.lai, cells.fpar)]
-    toa = kernels.toa(cells.reflectance)
-    limits = np.array([(each.min(), each.max()) for each in (cells.lai, cells.fpar, kernels.ndvi(toa))])
+def _scene(cases, drivers, land, seed, treatment, arp):
+    """Statistics of a scene under each reading, a list of dicts."""
+    case, driver = cases[0], drivers[0]
+    cells = cells_of(case, treatment, arp, seed, land, driver)
+    truth = [cell_block_means(array, case.grid, case.pixel, case.setup.min_valid) for array in (cells.lai, cells.fpar)]
+    of_cells = driver.ndvi(driver.toa(cells.reflectance))
+    limits = np.array([(each.min(), each.max()) for each in (cells.lai, cells.fpar, of_cells)])
     key = (seed, friedl1995.scenes().index((treatment, arp)))
     found = []
-    for chain in chains:
-        image = chain.image(chain.kernels.toa(cells.reflectance))
-        ndvi = chain.kernels.ndvi(chain.kernels.planetary(image))
+    for one, each in zip(cases, drivers, strict=True):
+        ndvi = each.ndvi(each.planetary(each.image(each.toa(cells.reflectance), one.grid)))
         found.append(_statistics(paired(*truth, ndvi), limits, key))
     return found
 
@@ -279,7 +257,7 @@ def _statistics(pixels, limits, key):
 
 
 def _noise_of_samples(variable, ndvi, increment):
-    """Mean relative equivalent noise of samples, each in the mean over its increments."""
+    """Mean relative equivalent noise of samples, averaged over the increments of each."""
     slopes = line(variable, ndvi)[:, 1]
     samples = zip(variable, ndvi, slopes, strict=True)
     return np.mean([mean_noise(one, seen, increment, slope)[1].mean() for one, seen, slope in samples])

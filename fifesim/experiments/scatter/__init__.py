@@ -1,1 +1,1 @@
-"""Where the scatter between NDVI and LAI or FPAR comes from."""
+"""Budget of the scatter between NDVI and LAI or FPAR."""

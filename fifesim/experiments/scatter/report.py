@@ -1,17 +1,19 @@
-"""The bar chart and the HTML page of a budget."""
+"""Bar chart, HTML page and folder of a scatter budget."""
 
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from fifesim.experiments.scatter.grounds import PROPERTIES
+from fifesim.experiments.scatter import shares as scatter
 from fifesim.experiments.scatter.shares import CURVATURE, TOTAL, VARIATION, standard_error
-from fifesim.experiments.scatter.stages import STAGES, VARIABLES
-from fifesim.output import pages
-from fifesim.output.pages import fixed, plus_minus
-from fifesim.output.report import title
-from fifesim.rasters import grid as grids
+from fifesim.experiments.scatter.stages import IDEAL_PROPERTIES, STAGES, VARIABLES
+from fifesim.grids import grid as grids
+from fifesim.output import report
+from fifesim.output.folders import check_folder, results
+from fifesim.output.report import fixed, plus_minus, title
+from fifesim.output.run.workers import check_memory_of_cells
+from fifesim.scenario.toml import write_scenario
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.listing import blur_in_words, noise_in_words
 
@@ -28,23 +30,12 @@ MECHANISMS = {
     "Place of the pixels, which the paper does not name": ("registration",),
     "Digital numbers and noise": ("quantisation", "noise"),
     "Terrain and atmosphere": ("topography", "atmosphere"),
-    "Ground that varies beside its leaf area": tuple(PROPERTIES),
+    "Ground that varies beside its leaf area": tuple(IDEAL_PROPERTIES),
 }
 
 
-def chart(table):
-    """
-    Bars of the shares with their standard errors.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `scatter.table`.
-
-    Returns
-    -------
-    figure : matplotlib.figure.Figure
-    """
+def bar_chart(table):
+    """Bar chart of the shares with their standard errors."""
     names = (*_shown(table), CURVATURE)
     figure = Figure(figsize=(7.2, 1.1 + 0.4 * len(names)), layout="constrained")
     axis = figure.subplots()
@@ -77,26 +68,13 @@ def chart(table):
 
 
 def _shown(table):
-    """Stages and their ideals: those of the ground where it has them."""
+    """Stages with their ideals; stages of the ground only where it has them."""
     shares = table.groupby("stage")["share"].apply(lambda values: values.any())
-    return {stage: ideal for stage, ideal in STAGES.items() if stage not in PROPERTIES or shares[stage]}
+    return {stage: ideal for stage, ideal in STAGES.items() if stage not in IDEAL_PROPERTIES or shares[stage]}
 
 
 def mechanisms(budget):
-    """
-    Shares of the mechanisms of the paper's discussion.
-
-    Parameters
-    ----------
-    budget : xarray.Dataset
-        From `scatter.budget`.
-
-    Returns
-    -------
-    rows : list of dict
-        ``name``, ``parts``, the names of their stages, and by variable a dict of ``share``, its ``error`` over
-        realisations, and its part ``of_total``. [1]
-    """
+    """Shares of the mechanisms of the discussion of the paper. [1]"""
     rows = []
     for name, parts in MECHANISMS.items():
         row = {"name": name, "parts": " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))}
@@ -110,62 +88,51 @@ def mechanisms(budget):
 
 
 def budget_page(scenario, budget, table, picture, run):
-    """
-    One self-contained HTML page.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-        Complete.
-    budget : xarray.Dataset
-        From `scatter.budget`.
-    table : pandas.DataFrame
-        From `scatter.table`.
-    picture : bytes
-        The chart as PNG.
-    run : mapping of str to int
-        ``realisations``, ``rows`` and ``columns`` of cells, and ``seed``.
-
-    Returns
-    -------
-    html : str
-    """
+    """One self-contained HTML page of a budget."""
     by_variable = {name: table[table["variable"] == name].set_index("stage").to_dict("index") for name in VARIABLES}
-    found = mechanisms(budget)
-    return pages.html(
-        _TEMPLATE, title=title(scenario), setting=_setting(scenario, run), stages=_shown(table), variables=VARIABLES,
+    found, own = mechanisms(budget), scenario.sensor
+    return report.page_html(
+        _TEMPLATE, title=title(scenario), scenario=scenario, stages=_shown(table), variables=VARIABLES,
+        native_interval=instrument(own.instrument).ground_interval, drift=_drift(scenario, run),
+        blur=blur_in_words(own.description, own.bands), noise=noise_in_words(own.description, own.bands, own.noise),
+        ground="level" if scenario.terrain.dem == "flat" else Path(scenario.terrain.dem).name,
         rows=by_variable, mechanisms=found, largest=max(found, key=lambda row: row["lai"]["share"]),
         curvature=CURVATURE, total=TOTAL, variation=VARIATION, run=run, chart=picture,
     )  # fmt: skip
 
 
-def _setting(scenario, run):
-    """Rows of a small table: what the budget is of."""
-    own, air = scenario.sensor, scenario.atmosphere
-    height, width = (run[name] * scenario.grid.cell for name in ("rows", "columns"))
-    description = instrument(own.instrument)
-    interval = {"product": "that of their size", "native": f"{description.ground_interval:.3f} m, its own"}.get(
-        own.interval, f"{own.interval} m"
-    )
-    beyond = _drift(scenario, run)
-    amount = f"visibility {air.visibility:g} km" if air.aot is None else f"optical thickness {air.aot:g}"
-    return [
-        ("Scenes", f"{run['realisations']} of {run['rows']} x {run['columns']} cells, {height:.0f} m x {width:.0f} m"),
-        ("Truth", f"means over blocks of {own.pixel:g} m, paired with pixels by row and column"),
-        ("Distance between pixels", interval + (f"; the last lie {beyond:.1f} m from their blocks" if beyond else "")),
-        ("Registration error", f"{own.offset[0]:g} and {own.offset[1]:g} pixels southward and eastward"),
-        ("Blur", blur_in_words(own.description, own.bands)),
-        ("Noise", noise_in_words(own.description, own.bands, own.noise)),
-        ("Ground", "level" if scenario.terrain.dem == "flat" else Path(scenario.terrain.dem).name),
-        ("Air", f"{air.profile}, {air.aerosol} aerosol, {amount}, {air.engine}"),
-    ]
-
-
 def _drift(scenario, run):
-    """How far along an axis the last pixel lies from its block, in a row of pixels with an interval of its own. [m]"""
+    """Distance along an axis between the last pixel and its block, for pixels at a native interval. [m]"""
     own, size = scenario.sensor, scenario.sensor.pixel
     if own.interval == "product":
         return 0.0
     interval = instrument(own.instrument).ground_interval if own.interval == "native" else own.interval
     length = run["columns"] * grids.cell_size(scenario.geobox())[1]
     return (min(int(length / interval), int(length / size)) - 0.5) * abs(interval - size)
+
+
+BUDGET_FILES = ("budget.csv", "budget.png", "report.html", "scenario.toml")
+
+_DPI = 200
+
+
+def budget_to_folder(scenario, folder, *, realisations=20, cells=333, seed=None, overwrite=False):
+    """Write the scatter budget of a scenario: budget.csv, budget.png, report.html and scenario.toml."""
+    folder = Path(folder)
+    check_folder(folder, overwrite)
+    complete = (scatter.budget_scenario() if scenario is None else scenario).complete()
+    check_memory_of_cells(min(cells, *complete.geobox().shape))
+    options = {"realisations": realisations, "cells": cells, "seed": seed}
+    with results(folder, BUDGET_FILES, overwrite=overwrite) as partial:
+        found = scatter.budget(complete, **options)
+        table = scatter.budget_table(found)
+        rows, columns = (min(cells, size) for size in complete.geobox().shape)
+        run = {"realisations": found.sizes["realisation"], "rows": rows, "columns": columns}
+        run["seed"] = complete.ground.seed if seed is None else seed
+        table.to_csv(partial / "budget.csv", index=False, float_format="%.6g")
+        chart = report.png(bar_chart(table), _DPI)
+        (partial / "budget.png").write_bytes(chart)
+        page = budget_page(complete, found, table, chart, run)
+        (partial / "report.html").write_text(page, encoding="utf-8")
+        (partial / "scenario.toml").write_text(write_scenario(complete), encoding="utf-8")
+    return [folder / name for name in BUDGET_FILES]

@@ -1,7 +1,8 @@
-"""Where the scatter between NDVI and LAI or FPAR comes from: the share of each stage of a scenario."""
+"""Shares of each stage and instrument in the scatter between NDVI and LAI or FPAR."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,16 +12,17 @@ import pandas as pd
 import xarray as xr
 from odc.geo.geobox import GeoBox
 
-from fifesim.analysis.attribution import by_itself, shapley, taken_away
+from fifesim.analysis.scaling import by_itself, shapley, taken_away
 from fifesim.base.annotations import WholeNumber
-from fifesim.base.seeds import check_seed
-from fifesim.base.warned import warn
+from fifesim.base.lattice import check_seed
+from fifesim.base.messages import warn
 from fifesim.experiments.scatter.stages import STAGES, VARIABLES, pixels
+from fifesim.grids import grid as grids
+from fifesim.grids.opening import raster_file
 from fifesim.output.progress import steps
-from fifesim.rasters import grid as grids
-from fifesim.rasters.opening import raster_file
 from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import Scenario, grid_keys
+from fifesim.sensor.description.instruments import instrument
 
 # Rows of the table beside the stages: what is left when all of them are ideal, and all together.
 CURVATURE, TOTAL = "curvature", "total"
@@ -84,7 +86,7 @@ def budget(
 
     See Also
     --------
-    fifesim.analysis.attribution.shapley
+    fifesim.analysis.scaling.shapley
 
     Examples
     --------
@@ -94,11 +96,11 @@ def budget(
     >>> round(float(shares["total"].sel(variable="lai").mean()), 2)
     0.05
     """
-    scenario = default_scenario() if scenario is None else scenario
+    scenario = budget_scenario() if scenario is None else scenario
     if not isinstance(scenario, Scenario):
         raise TypeError(f"budget takes a Scenario, got {type(scenario).__name__}: see fifesim.read_scenario")
     _check_map(scenario)
-    cases = realise(scenario, realisations=realisations, cells=cells, seed=seed)
+    cases = budget_cases(scenario, realisations=realisations, cells=cells, seed=seed)
     found = [_one(case) for case in (_shown if each is None else each)(cases)]
     names = {"stage": list(STAGES), "variable": list(VARIABLES)}
     stacked = {name: np.stack([one[name] for one in found]) for name in found[0]}
@@ -108,7 +110,7 @@ def budget(
 
 
 def _check_map(scenario):
-    """A map of coarser pixels is smooth below them, where the budget looks for what varies."""
+    """Raise ValueError for a map of coarse pixels, which is smooth below the scale of the budget."""
     if not scenario.ground.lai_file:
         return
     cell = scenario.grid.cell
@@ -122,36 +124,13 @@ def _check_map(scenario):
         )
 
 
-def default_scenario():
-    """
-    The paper's case, with pixels at the interval of Table 1.
-
-    Returns
-    -------
-    scenario : fifesim.scenario.scenario.Scenario
-    """
+def budget_scenario():
+    """Scenario of the paper, with pixels at the interval of Table 1."""
     return Scenario(sensor={"interval": "native"})
 
 
-def realise(scenario, *, realisations, cells, seed=None):
-    """
-    Scenarios of the realisations of a budget.
-
-    Parameters
-    ----------
-    scenario, realisations, cells, seed
-        As in `budget`.
-
-    Returns
-    -------
-    scenarios : list of fifesim.scenario.scenario.Scenario
-        Complete.
-
-    Raises
-    ------
-    ValueError
-        As in `budget`.
-    """
+def budget_cases(scenario, *, realisations, cells, seed=None):
+    """Complete scenarios of the realisations of a budget."""
     if realisations < 1:
         raise ValueError(f"realisations must be at least 1, got {realisations}")
     scenario = scenario.complete()
@@ -172,22 +151,8 @@ def realise(scenario, *, realisations, cells, seed=None):
     return found
 
 
-def table(budget):
-    """
-    Means and standard errors of a budget over its realisations.
-
-    Parameters
-    ----------
-    budget : xarray.Dataset
-        From `budget`.
-
-    Returns
-    -------
-    table : pandas.DataFrame
-        Columns stage, variable, alone, alone_error, first, first_error, share and share_error. Rows of stages and
-        curvature have shares that add up to that of the row total; the row of sub-pixel variation has alone only.
-        Errors are NaN with one realisation. [1]
-    """
+def budget_table(budget):
+    """Means and standard errors of a budget over its realisations, as a table."""
     rows = []
     for variable in VARIABLES:
         one = budget.sel(variable=variable)
@@ -205,18 +170,7 @@ def table(budget):
 
 
 def standard_error(values):
-    """
-    Standard error of the mean over realisations.
-
-    Parameters
-    ----------
-    values : xarray.DataArray, dims (realisation, ...)
-
-    Returns
-    -------
-    error : xarray.DataArray
-        NaN with one realisation.
-    """
+    """Standard error of the mean over realisations, NaN with one realisation."""
     count = values.sizes["realisation"]
     if count < 2:
         return values.mean("realisation") * np.nan
@@ -224,28 +178,7 @@ def standard_error(values):
 
 
 def unexplained(truth, ndvi):
-    """
-    Share of the variance of a truth that its line on NDVI leaves.
-
-    Parameters
-    ----------
-    truth, ndvi : array, shape (..., n)
-
-    Returns
-    -------
-    unexplained : array, shape (...)
-        1 - R2. [1]
-
-    Raises
-    ------
-    ValueError
-        If one of them does not vary.
-
-    Examples
-    --------
-    >>> float(unexplained(np.array([0.0, 1.0, 2.0]), np.array([0.2, 0.4, 0.6])).round(12))
-    0.0
-    """
+    """Unexplained share of the variance of a truth on its line on NDVI, 1 - R2, shape (...). [1]"""
     truth = truth - truth.mean(axis=-1, keepdims=True)
     ndvi = ndvi - ndvi.mean(axis=-1, keepdims=True)
     of_truth, of_ndvi = (truth**2).sum(axis=-1), (ndvi**2).sum(axis=-1)
@@ -261,7 +194,7 @@ def _shown(cases):
 
 
 def _one(scenario):
-    """Results of one realisation, by name: arrays of shape (variable, stage) or (variable,)."""
+    """Results of one realisation by name, shape (variable, stage) or (variable,)."""
     seen, found = pixels(scenario), {}
     place = [list(STAGES).index(stage) for stage in seen.stages]
     count = len(place)
@@ -280,7 +213,7 @@ def _one(scenario):
 
 
 def _windows(scenario, cells):
-    """Windows of a scenario's grid side by side, whole ones only."""
+    """Adjacent whole windows of the grid of a scenario."""
     box = scenario.geobox()
     size = tuple(min(cells, count) for count in box.shape)
     pixel = scenario.sensor.size
@@ -303,3 +236,24 @@ def _windows(scenario, cells):
     if not filled:
         raise ValueError(f"no scene of {size[0]} x {size[1]} cells of the LAI map holds enough data: take fewer cells")
     return filled
+
+
+_PIXELS = 12  # along a window of a coarse instrument, at least
+_CELLS = 333  # along a window of any
+
+
+def instrument_scenario(name, *, arp=0.15):
+    """Scenario of the paper on level ground as seen by an instrument."""
+    # Red and near infrared on the grid of its product, with its noise, displaced along both axes by the root mean
+    # square error of its geolocation.
+    description = instrument(name)
+    bands = description.red_and_near_infrared()
+    shift = (description.geolocation or 0.0) / description.pixel(bands[0])
+    noise = ["all"] if all(band.noise for band in bands) else []
+    sensor = {"instrument": name, "bands": [band.name for band in bands], "noise": noise, "offset": [shift, shift]}
+    return Scenario(sensor=sensor, ground={"arp": arp}, terrain={"dem": "flat"})
+
+
+def window_cells(scenario):
+    """Number of cells along the edge of a window that holds enough pixels of an instrument: 333, or 12 pixels."""
+    return max(_CELLS, math.ceil(_PIXELS * scenario.sensor.size / scenario.grid.cell))

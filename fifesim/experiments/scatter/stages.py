@@ -1,4 +1,4 @@
-"""Images of a scene with any of its stages at their ideal."""
+"""Images of a scene with any of its stages at their ideal, from the ground to the sensor."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,21 +9,139 @@ import xarray as xr
 from odc.geo.geobox import GeoBox
 
 from fifesim.analysis import indices
-from fifesim.analysis.rasters.indices import red_and_nir
-from fifesim.analysis.rasters.means import aggregate
+from fifesim.analysis.index_labels import red_and_nir
+from fifesim.analysis.scaling_labels import aggregate_blocks
+from fifesim.base.footprints import regularize
 from fifesim.base.line_spread import Boxcar
-from fifesim.chain import steps as chain
+from fifesim.chain.driver import Driver, cell_block_means, shared_operators, varying_parts
 from fifesim.chain.setup import Setup, reflectance_of
-from fifesim.experiments.scatter.blocks import middle_cells, spread_out
-from fifesim.experiments.scatter.cells import Stand, arrays_of, tangent
-from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
-from fifesim.experiments.scatter.sensed import images_of
-from fifesim.rasters import grid as grids
-from fifesim.scenario.ground import absorbed_light
-from fifesim.scenario.land import elevation, in_memory
+from fifesim.chain.steps import to_toa
+from fifesim.grids import grid as grids
+from fifesim.grids.grid import as_carried
+from fifesim.grids.reductions import areas
+from fifesim.ground.canopy.properties import DRAWN
+from fifesim.ground.terrain.labels import light_on_slopes
+from fifesim.ground.terrain.source_labels import beside_altitude
+from fifesim.scenario.ground import (
+    absorbed_light,
+    drawn_properties,
+    elevation,
+    ground_scene,
+    in_memory,
+    numbers_of_stands,
+)
 from fifesim.scenario.scenario import Scenario
 from fifesim.scenario.simulation import setup_of
-from fifesim.sensor.response.rasters.pixels import pixel_grid
+from fifesim.sensor.pixel_labels import pixel_grid
+
+
+def spread_out(cells, blocks, min_valid):
+    """Means of blocks spread over their cells; a cell outside of all blocks keeps its value."""
+    (rows, columns), inside = _places(cells, blocks)
+    spread = aggregate_blocks(cells, grids.cell_size(blocks)[0], min_valid=min_valid).values[rows][:, columns]
+    return cells.copy(data=np.where(inside & np.isfinite(spread) & np.isfinite(cells.values), spread, cells.values))
+
+
+def middle_cells(cells, blocks):
+    """Code of the central cell of each block spread over its cells; a cell outside of all blocks keeps its code."""
+    (rows, columns), inside = _places(cells, blocks)
+    sizes = zip(grids.cell_size(blocks), grids.cell_size(grids.geobox(cells)), strict=True)
+    down, across = (block / cell for block, cell in sizes)
+    middle = cells.values[((rows + 0.5) * down).astype(int)][:, ((columns + 0.5) * across).astype(int)]
+    return cells.copy(data=np.where(inside & (cells.values >= 0), middle, cells.values))
+
+
+def _places(cells, blocks):
+    """Row and column of the block of each cell, limited to the last block, and whether the cell is inside a block."""
+    sizes = zip(grids.cell_size(grids.geobox(cells)), grids.cell_size(blocks), cells.shape, strict=True)
+    places = [np.floor((np.arange(count) + 0.5) * cell / block + 1e-9).astype(int) for cell, block, count in sizes]
+    inside = [place < count for place, count in zip(places, blocks.shape, strict=True)]
+    last = [np.minimum(place, count - 1) for place, count in zip(places, blocks.shape, strict=True)]
+    return last, inside[0][:, None] & inside[1]
+
+
+# In this order along the axes of what `stages.pixels` gives.
+IDEAL_PROPERTIES = {
+    "soil": "as bright and as moist everywhere",
+    "dead leaves": "the same share of dead leaves everywhere",
+    "cover": "leaves and what lies below them are those of the first class",
+    "clumping": "leaves stand evenly, without gaps between crowns",
+    "covariance": "leaf area goes with nothing else",
+}
+
+
+def varying_ground(scenario):
+    """Properties that vary over the ground of a scenario apart from leaf area, in the order of `IDEAL_PROPERTIES`."""
+    own, classes = scenario.landscape, scenario.class_table() if scenario.landscape.cover != "none" else {}
+    found = {DRAWN[name].effect for name in drawn_properties(scenario)}
+    if len(classes) > 1 and any(each.canopy.given for each in classes.values()):
+        found.add("cover")
+    clumped = {name: known.default for name, known in DRAWN.items() if known.effect == "clumping"}
+    if any(set(numbers_of_stands(scenario, name)) != {default} for name, default in clumped.items()):
+        found.add("clumping")
+    if any(own.covary.values()):
+        found.add("covariance")
+    return tuple(name for name in IDEAL_PROPERTIES if name in found)
+
+
+def ground_with(scenario, grid, at_work, dem=None):
+    """Ground of a scenario with some varying properties ideal, from the same random numbers."""
+    own, ideal = scenario.landscape, {}
+    if "covariance" not in at_work:
+        ideal["covary"] = {}
+    land = ground_scene(scenario.model_copy(update={"landscape": own.model_copy(update=ideal)}), grid, dem=dem)
+    for name, known in DRAWN.items():
+        # Without clumping there are no gaps between crowns; what else is not at work has its mean.
+        if known.effect == "clumping" and known.effect in varying_ground(scenario) and known.effect not in at_work:
+            land = land.assign({name: known.default})
+        elif known.effect not in at_work and name in land:
+            land = land.assign({name: getattr(scenario.ground, name)})
+    if "cover" not in at_work and "cover" in land:
+        first = land["cover"].attrs["flag_values"][0]
+        land["cover"] = land["cover"].where(land["cover"] < 0, first).astype(land["cover"].dtype)
+    return land.compute()
+
+
+def images_of(scene, cells, switches):
+    """NDVI with the stages of the sensor active or ideal, with one axis for each stage, shape (..., y, x). [1]"""
+    scaling, spread, registration, quantisation, noise = switches
+    found = np.empty((*map(len, switches), *scene.shape))
+    for (i, blurred), (j, displaced) in product(enumerate(spread), enumerate(registration)):
+        means = _means(scene, cells, blurred, displaced)
+        red, nir, of_cells = means
+        of_means = indices.normalized_difference(nir, red)
+        for (k, counts), (m, grains) in product(enumerate(quantisation), enumerate(noise)):
+            recorded = _recorded(scene, means[:2], counts, grains)
+            for n, of_reflectance in enumerate(scaling):
+                # What the detector did stays as it is.
+                found[n, i, j, k, m] = recorded if of_reflectance else of_cells + (recorded - of_means)
+    return found
+
+
+def _means(scene, cells, blurred, displaced):
+    """Means over footprints of red, near infrared and NDVI, shape (3, y, x)."""
+    red, nir = scene.driver.bands
+    setup, grid = scene.setup, scene.grid
+    box = scene.image if displaced else scene.blocks
+    sizes = grids.cell_size(box)
+    shifts = [offset * size for offset, size in zip(setup.offset, sizes, strict=True)] if displaced else (0.0, 0.0)
+    rows, columns = scene.shape
+    means = np.empty((len(cells), rows, columns))
+    for layer, band in enumerate((red, nir, red)):
+        spreads = setup.instrument.line_spreads(band) if blurred else areas(scene.blocks)
+        along = shared_operators(spreads, grid, box[:rows, :columns], tuple(map(float, shifts)))
+        means[layer] = regularize(cells[layer], *along, min_valid=setup.min_valid)
+    return means
+
+
+def _recorded(scene, means, counts, grains):
+    """NDVI of the recorded mean reflectances."""
+    driver = scene.driver
+    radiance = driver.radiance(means)
+    if grains:
+        radiance = driver.with_noise(radiance, scene.image, scene.setup)
+    return driver.ndvi(driver.planetary(driver.recorded(radiance) if counts else radiance))
+
 
 # In this order along the axes of what `pixels` gives.
 STAGES = {
@@ -35,17 +153,19 @@ STAGES = {
     "noise": "none",
     "topography": "level ground",
     "atmosphere": "reflectance at the ground",
-} | PROPERTIES
+} | IDEAL_PROPERTIES
 # What of the ground changes its leaf area, or the light that that absorbs, in their order.
 _TRUE = ("cover", "clumping", "covariance")
 _SENSED = ("NDVI scaling", "point spread", "registration", "quantisation", "noise")
 VARIABLES = ("lai", "fpar")
+# Half of the step of LAI over which tangents are taken: wide compared with the error of the reflectance table, 1e-6.
+STEP = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Pixels:
     """
-    Pixels of a scene under every set of its stages.
+    Pixels of a scene under every combination of its stages.
 
     Parameters
     ----------
@@ -68,18 +188,7 @@ class Pixels:
 
 
 def working_stages(scenario):
-    """
-    Stages of a scenario that are not ideal already.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    stages : tuple of str
-        In the order of `STAGES`.
-    """
+    """Stages of a scenario that are not ideal, in the order of `STAGES`."""
     own, size = scenario.sensor, scenario.sensor.size
     bands = own.description.select(own.bands)
     spreads = [spread for band in bands for spread in own.description.line_spreads(band)]
@@ -89,45 +198,17 @@ def working_stages(scenario):
         "noise": not own.noise,
         "topography": scenario.terrain.dem == "flat",
     }
-    ideal |= {name: name not in varying(scenario) for name in PROPERTIES}
+    ideal |= {name: name not in varying_ground(scenario) for name in IDEAL_PROPERTIES}
     return tuple(stage for stage in STAGES if not ideal.get(stage, False))
 
 
 def pixels(scenario):
-    """
-    Pixels of a scene with each set of its stages at work and the others ideal, from the same random numbers.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    pixels : Pixels
-        Those with data in every image, paired by row and column.
-
-    Raises
-    ------
-    ValueError
-        If the bands have no red or no near infrared, or fewer than three pixels have data.
-    """
+    """Pixels of a scene for each set of active stages, from the same random numbers, paired by row and column."""
     return displaced_pixels(scenario, [scenario.sensor.offset])[0]
 
 
 def displaced_pixels(scenario, offsets):
-    """
-    `pixels` at several registration errors: the light that leaves the ground and the air is computed once.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    offsets : sequence of (float, float)
-        In the place of the scenario's, southward and eastward. [pixel]
-
-    Returns
-    -------
-    pixels : list of Pixels
-    """
+    """`pixels` for several registration errors, with the light at the top of the atmosphere computed once."""
     sensors = [scenario.sensor.model_copy(update={"offset": list(offset)}) for offset in offsets]
     stages = [working_stages(scenario.model_copy(update={"sensor": sensor})) for sensor in sensors]
     scene = _scene(scenario)
@@ -135,7 +216,7 @@ def displaced_pixels(scenario, offsets):
     # False is ideal, True at work.
     switches = [{name: (False, True) if name in each else (False,) for name in STAGES} for each in stages]
     lit, images = [name for name in STAGES if name not in _SENSED], [[] for _ in scenes]
-    for states in _states(switches[0], lit):
+    for states in product(*(switches[0][name] for name in lit)):
         at_work = {name for name, state in zip(lit, states, strict=True) if state}
         cells = _cells(scene, scene.ground(at_work), at_work)
         for found, one, each in zip(images, scenes, switches, strict=True):
@@ -150,7 +231,7 @@ def displaced_pixels(scenario, offsets):
 
 
 def _in_order(images, switches, lit):
-    """Images of all states with the axes of `STAGES` first."""
+    """Images of all states, with the axes of `STAGES` first."""
     order = [*lit, *_SENSED]
     images = np.reshape(images, (*(len(switches[name]) for name in order), *np.shape(images)[-2:]))
     return np.moveaxis(images, [order.index(name) for name in STAGES], range(len(STAGES)))
@@ -158,20 +239,22 @@ def _in_order(images, switches, lit):
 
 @dataclass(frozen=True, eq=False)
 class _Ground:
-    """What varies over the cells, and the mean leaf area of the pixel that each lies in."""
+    """Properties of the cells, and the mean leaf area [m2 m-2] of the pixel that each cell lies in."""
 
     land: xr.Dataset
-    middle: xr.DataArray
-    stand: Stand | None = None
+    middle: np.ndarray
+    known: dict = field(default_factory=dict)
+    """Reflectance by the stages of the ground that are at work."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """A scenario, and the instrument over it."""
+    """Scenario with its instrument, grid and blocks."""
 
     scenario: Scenario
     setup: Setup
-    bands: tuple
+    driver: Driver
+    """Of the red and the near infrared band, on level ground."""
     grid: GeoBox
     blocks: GeoBox
     image: GeoBox
@@ -183,117 +266,132 @@ class _Scene:
         return tuple(min(pair) for pair in zip(self.blocks.shape, self.image.shape, strict=True))
 
     def ground(self, at_work):
-        """The ground with some stages at work, made once."""
-        kind = frozenset(at_work) & set(PROPERTIES)
+        """Ground with some stages active, computed once."""
+        kind = frozenset(at_work) & set(IDEAL_PROPERTIES)
         if kind not in self.grounds:
             land = ground_with(self.scenario, self.grid, kind, self.setup.dem)
-            self.grounds[kind] = self.made(land, self.spread_out(land["lai"]))
+            self.grounds[kind] = _Ground(land, self.spread_out(land["lai"]).values)
         return self.grounds[kind]
 
     @cached_property
-    def arrays(self):
-        """The chain and the slopes of one stand, where plain arrays do."""
-        return arrays_of(self.setup, self.bands, self.grid)
+    def slopes(self):
+        """Light on the slopes of the scene, None on level ground."""
+        if self.setup.dem is None:
+            return None
+        dem = beside_altitude(self.setup.dem, self.driver.air.altitude)
+        return light_on_slopes(dem, as_carried(self.grid), self.setup.geometry, self.setup.horizon)
 
-    def made(self, land, middle):
-        """A ground, as arrays too where they do."""
-        chain, slopes = self.arrays
-        if chain is None or set(land.data_vars) != {"lai"}:
-            return _Ground(land, middle)
-        fpar_inf = self.scenario.ground.fpar_inf
-        return _Ground(land, middle, Stand(chain, slopes, land["lai"].values, middle.values, fpar_inf))
+    def is_stand(self, ground):
+        """Whether only leaf area varies, so that plain arrays do."""
+        return set(ground.land.data_vars) == {"lai"} and not varying_parts(self.driver.setup)
 
     def spread_out(self, cells):
-        """Means over the pixels of the truth, on the cells."""
+        """Means over the pixels of the truth, spread over the cells."""
         return spread_out(cells, self.blocks, self.setup.min_valid)
 
 
 def _scene(scenario):
     setup, grid = setup_of(scenario), scenario.geobox()
     bands = _red_and_nir(setup.instrument.select(setup.bands))
-    blocks = grids.aligned(grid, scenario.sensor.size)
+    blocks = grids.aligned_grid(grid, scenario.sensor.size)
     image = pixel_grid(grid, setup.instrument, bands, setup.onto, setup.interval)
     # In memory: every set of stages with topography asks for them.
     dem, horizon = in_memory(*elevation(scenario, grid)[:2])
-    return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), bands, grid, blocks, image)
+    driver = Driver(replace(setup, bands=tuple(band.name for band in bands)))
+    return _Scene(scenario, replace(setup, dem=dem, horizon=horizon), driver, grid, blocks, image)
 
 
 def _even(scene):
-    """The ground with all stages at work, but uniform within each pixel: means, and the class in the middle."""
-    whole = scene.ground(PROPERTIES)
+    """Ground with all stages active but uniform within each pixel: means, and the class in the middle."""
+    whole = scene.ground(IDEAL_PROPERTIES)
     land = {name: scene.spread_out(each) for name, each in whole.land.items() if name != "cover" and each.ndim == 2}
     if "cover" in whole.land:
         land["cover"] = middle_cells(whole.land["cover"], scene.blocks)
-    return scene.made(whole.land.assign(land), whole.middle)
+    return _Ground(whole.land.assign(land), whole.middle)
 
 
 def _red_and_nir(bands):
-    """The two bands of NDVI."""
+    """Red and near infrared band."""
     coords = {"wavelength": ("band", [band.wavelength for band in bands])}
     numbers = xr.DataArray(np.arange(len(bands))[:, None, None], dims=("band", "y", "x"), coords=coords)
     return tuple(bands[number.item()] for number in red_and_nir(numbers))
 
 
 def _truths(scene, switches):
-    """LAI and FPAR by blocks, shape (one axis for each stage, variable, y, x)."""
-    kinds = [
-        [name for name, at_work in zip(_TRUE, states, strict=True) if at_work] for states in _states(switches, _TRUE)
-    ]
+    """LAI and FPAR of the blocks, with one axis for each stage, shape (..., variable, y, x)."""
+    states = product(*(switches[name] for name in _TRUE))
+    kinds = [[name for name, at_work in zip(_TRUE, state, strict=True) if at_work] for state in states]
     found = [[_truth(scene, scene.ground(kind), curve) for kind in kinds] for curve in (0, 1)]
     shape = [len(switches[name]) if name in ("non-linearity", *_TRUE) else 1 for name in STAGES]
     return np.reshape(found, (*shape, len(VARIABLES), *scene.shape))
 
 
-def _states(switches, names):
-    """All states of some stages."""
-    return product(*(switches[name] for name in names))
-
-
 def _truth(scene, ground, curve):
-    """LAI and FPAR by blocks."""
-    setup, stand = _setup_over(scene, ground), ground.stand
-    if stand is not None:
-        size, (rows, columns) = grids.cell_size(scene.blocks)[0], scene.shape
-        return [stand.chain.means(each, size)[:rows, :columns] for each in (stand.lai, stand.fpar(bool(curve)))]
+    """LAI and FPAR of the blocks."""
+    own, lai = scene.scenario, ground.land["lai"].values
 
     def fpar(area):
-        return absorbed_light(scene.scenario, setup, ground.land.assign(lai=area))
+        if scene.is_stand(ground):
+            return scene.driver.fpar(area, own.ground.fpar_inf)
+        return absorbed_light(own, _setup_over(scene, ground), _with_lai(ground, area)).values
 
-    lai, size, (rows, columns) = ground.land["lai"], grids.cell_size(scene.blocks)[0], scene.shape
-    return [
-        aggregate(array, size, min_valid=scene.setup.min_valid).values[:rows, :columns]
-        for array in (lai, fpar(lai) if curve else tangent(fpar, lai, ground.middle))
-    ]
+    absorbed = fpar(lai) if curve else along_tangent(fpar, lai, ground.middle)
+    size, (rows, columns) = grids.cell_size(scene.blocks)[0], scene.shape
+    means = [cell_block_means(each, scene.grid, size, scene.setup.min_valid) for each in (lai, absorbed)]
+    return [each[:rows, :columns] for each in means]
 
 
 def _setup_over(scene, ground):
-    """The setup without the properties of the canopy that its cells have."""
+    """Setup without the canopy properties that vary by cell."""
     given = scene.setup.canopy.given & set(ground.land.data_vars)
     return replace(scene.setup, canopy=scene.setup.canopy.replace(**dict.fromkeys(given)))
 
 
+def _with_lai(ground, area):
+    """The land of a ground with another leaf area, an array [m2 m-2]."""
+    return ground.land.assign(lai=ground.land["lai"].copy(data=area))
+
+
 def _cells(scene, ground, at_work):
-    """Red, near infrared and NDVI of the cells, as light leaves the ground or the air, shape (3, y, x)."""
-    if ground.stand is not None:
-        light = [name in at_work for name in ("non-linearity", "topography", "atmosphere")]
-        red, nir = ground.stand.light(*light)
-        return np.stack([red, nir, indices.normalized_difference(nir, red)])
+    """Red, near infrared and NDVI of the cells, at the ground or at the top of the atmosphere, shape (3, y, x)."""
+    driver, bands = scene.driver, list(scene.driver.setup.bands)
     setup = _setup_over(scene, ground)
     setup = setup if "topography" in at_work else replace(setup, dem=None, horizon=None)
 
     def reflectance(area):
-        return reflectance_of(setup, ground.land.assign(lai=area))
+        if not scene.is_stand(ground):
+            return reflectance_of(setup, _with_lai(ground, area)).sel(band=bands).values
+        level = driver.reflectance(area)
+        return level if setup.dem is None else driver.on_slopes(level, scene.slopes)
 
-    lai = ground.land["lai"]
-    seen = reflectance(lai) if "non-linearity" in at_work else tangent(reflectance, lai, ground.middle)
+    # The atmosphere affects only the steps above.
+    key, lai = ("non-linearity" in at_work, setup.dem is None), ground.land["lai"].values
+    if key not in ground.known:
+        ground.known[key] = reflectance(lai) if key[0] else along_tangent(reflectance, lai, ground.middle)
+    seen = ground.known[key]
     if "atmosphere" in at_work:
-        seen = chain.to_toa(seen, adjacency=setup.adjacency)
-    red, nir = red_and_nir(seen)
-    return np.stack([red.values, nir.values, indices.normalized_difference(nir.values, red.values)])
+        seen = _with_adjacency(scene, seen) if setup.adjacency else driver.toa(seen)
+    red, nir = seen
+    return np.stack([red, nir, driver.ndvi(seen)])
+
+
+def _with_adjacency(scene, reflectance):
+    """Apparent reflectance where light from the surroundings is scattered into the view, shape (band, y, x)."""
+    own = scene.driver.setup
+    array = grids.place(
+        xr.DataArray(reflectance, dims=("band", "y", "x"), coords={"band": list(own.bands)}), scene.grid
+    )
+    return to_toa(array, scene.driver.air, geometry=own.geometry, instrument=own.instrument, adjacency=True).values
+
+
+def along_tangent(function, lai, middle):
+    """A function of leaf area along its tangent at the middle, arrays over (y, x)."""
+    low, high = np.maximum(middle - STEP, 0.0), middle + STEP
+    return function(middle) + (function(high) - function(low)) / (high - low) * (lai - middle)
 
 
 def _with_data(stages, images, truth, even, even_truth):
-    """The pixels that have data in every image and truth, on one axis."""
+    """Pixels with data in every image and truth, on one axis."""
     rasters = (images, truth, even, np.array(even_truth))
     found = np.logical_and.reduce([np.isfinite(each).reshape(-1, *even.shape).all(axis=0) for each in rasters])
     if found.sum() < 3:

@@ -1,1 +1,1 @@
-"""Checks of an installation against results that others found, or that follow from theory."""
+"""Checks of an installation against published results and theory."""

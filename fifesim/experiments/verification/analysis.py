@@ -1,4 +1,4 @@
-"""Checks of the analysis beside numpy, scipy and pandas, brute force and closed forms."""
+"""Checks of the analysis against numpy, scipy and pandas, brute force and closed forms."""
 
 from functools import partial
 from itertools import permutations
@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from fifesim.analysis import attribution, density, scaling, uncertainty, variogram
+from fifesim.analysis import regression, scaling
 from fifesim.analysis.indices import normalized_difference
 from fifesim.analysis.regression import fit, row_sums
 from fifesim.base.footprints import axis_operator
@@ -18,7 +18,7 @@ _deviation = partial(Deviation, "analysis")
 
 
 def _pairs():
-    """Values of y and x of one shape, some of them missing, and those that pair."""
+    """Values of y and x of one shape, some of them missing, and the valid pairs."""
     rng = np.random.default_rng(8)
     x = rng.uniform(0.3, 0.8, (20, 30))
     y = -1.2 + 3.4 * x + rng.normal(0, 0.2, x.shape)
@@ -28,21 +28,13 @@ def _pairs():
 
 
 def _regression():
-    """Origins near the means; the interval of a line by the inverse of its normal equations."""
+    """Check the regression and its interval by the inverse of the normal equations."""
     y, x, paired_y, paired_x = _pairs()
     line = fit(row_sums(y, x, 0.5, 0.6), 0.5, 0.6)
     (slope, intercept), covariance = np.polyfit(paired_x, paired_y, 1, cov=True)
-    found = [
-        line.slope,
-        line.intercept,
-        line.slope_error**2,
-        line.intercept_error**2,
-        line.r2,
-        line.n,
-        line.predict(0.4),
-    ]
+    found = [line.slope, line.intercept, line.slope_error**2, line.intercept_error**2, line.r2, line.n]
     expected = [slope, intercept, *np.diag(covariance), np.corrcoef(paired_x, paired_y)[0, 1] ** 2, paired_x.size]
-    worst = largest(found, [*expected, intercept + 0.4 * slope], relative=True)
+    worst = largest([*found, line.predict(0.4)], [*expected, intercept + 0.4 * slope], relative=True)
     yield _deviation("least-squares line and its errors", worst, 1e-10, "1", "numpy.polyfit")
     at = np.array([0.1, 0.9])
     own = np.sum((paired_y - intercept - slope * paired_x) ** 2) / (paired_x.size - 2)
@@ -61,14 +53,14 @@ def _indices():
 
 
 def _increments():
-    """Relative noise by increments of the true variable; error, its square and coverage of a map."""
+    """Check the relative noise by increments of the true variable, and error, squared error and coverage of a map."""
     y, x, _, _ = _pairs()
-    sums = uncertainty.increment_sums(x, y, 6, 0.05, 11, 0.5)
-    count, mean, deviation = uncertainty.increment_moments(sums)
+    sums = regression.increment_sums(x, y, 6, 0.05, 11, 0.5)
+    count, mean, deviation = regression.increment_moments(sums)
     table = pd.DataFrame({"x": x.ravel(), "y": y.ravel()})
     groups = table[np.isfinite(table).all(axis=1)].groupby(lambda k: np.floor(table["x"][k] / 0.05))
     numbers = np.array([*groups.groups]).astype(int) - 6
-    found = np.stack([count, mean, deviation, uncertainty.equivalent_noise(deviation, 3.4, mean)])[:, numbers]
+    found = np.stack([count, mean, deviation, regression.equivalent_noise(deviation, 3.4, mean)])[:, numbers]
     of_x, of_y = groups["x"].mean(), groups["y"].std()
     worst = largest(found, [groups.size(), of_x, of_y, of_y / of_x / 3.4])
     of_index = sums.sum(axis=0).reshape(-1, 4)[numbers, 2]
@@ -79,17 +71,17 @@ def _increments():
     inside = np.sum((x >= low) & (x <= high) & np.isfinite(y) & (np.abs(x - 0.5) < 0.2))
     low[np.abs(x - 0.5) >= 0.2] = 9.0
     estimate = np.where(np.isfinite(y), y, np.nan)
-    totals = uncertainty.error_sums(x, estimate, low, high).sum(axis=0)
+    totals = regression.error_sums(x, estimate, low, high).sum(axis=0)
     worst = largest(totals, [error.size, error.sum(), np.sum(error**2), inside])
     yield _deviation("errors of a map", worst, 1e-10, "1", "numpy, all at once")
 
 
 def _lags():
-    """Pair by pair, in two blocks that have a margin between them."""
+    """Check the lag sums pair by pair, in two blocks with a margin between them."""
     cells = np.random.default_rng(11).normal(5, 1, (17, 13))
     cells[4:7, 3:5] = np.nan
-    upper = variogram.lag_sums(cells[:12], ((0, 3), (0, 0)), (3, 3), 5.0)
-    sums = upper + variogram.lag_sums(cells[9:], ((0, 0), (0, 0)), (3, 3), 5.0)
+    upper = scaling.lag_sums(cells[:12], ((0, 3), (0, 0)), (3, 3), 5.0)
+    sums = upper + scaling.lag_sums(cells[9:], ((0, 0), (0, 0)), (3, 3), 5.0)
     found, expected = [], []
     for down, across in ((0, 0), (0, 1), (0, -3), (2, -1), (3, 3)):
         columns = slice(max(-across, 0), 13 - max(across, 0)), slice(max(across, 0), 13 + min(across, 0))
@@ -97,33 +89,33 @@ def _lags():
         there = np.isfinite(one + two)
         about = (one[there] - np.nanmean(cells)) * (two[there] - np.nanmean(cells))
         expected.append([there.sum(), about.mean(), np.mean((one[there] - two[there]) ** 2) / 2])
-        maps = sums[0], variogram.covariance(sums), variogram.semivariance(sums)
+        maps = sums[0], scaling.covariance(sums), scaling.semivariance(sums)
         found.append([each[down, across + 3] for each in maps])
     yield _deviation("covariance and semivariance by lag", largest(found, expected), 1e-10, "1", "pairs, one by one")
     lag = 2 * np.arange(10.0)
-    found = [variogram.crossing(lag, np.exp(-lag / 4)), variogram.crossing(lag, 1 - lag / 7)]
+    found = [scaling.crossing(lag, np.exp(-lag / 4)), scaling.crossing(lag, 1 - lag / 7)]
     worst = largest(found, [4 * np.log(20), 7 * 0.95])
-    worst = worst if np.isnan(variogram.crossing(lag, 1 + 0 * lag)) else np.inf
+    worst = worst if np.isnan(scaling.crossing(lag, 1 + 0 * lag)) else np.inf
     yield _deviation("practical range", worst, 1e-12, "cell", "exponential, line and constant")
 
 
 def _footprint_variance():
-    """All pairs of cells of one pixel, of a process whose covariance falls off with both distances."""
+    """Check the variance of a footprint by all pairs of its cells, for a covariance that decays in both directions."""
     axis = axis_operator(
         Boxcar(7.3), cell_origin=0, cell_size=1, n_cells=30, pixel_origin=2.2, pixel_size=7, n_pixels=1
     )
     weights = axis.weights[0, : axis.count[0]]
-    products = variogram.weight_correlation(axis, 9)
+    products = scaling.weight_correlation(axis, 9)
     by_lag = np.exp(-np.abs(np.arange(-9, 10)) / 3) * np.exp(-np.arange(10)[:, None] / 2)
     place = np.arange(weights.size)
     apart = np.abs(place[:, None] - place)
     expected = (weights @ np.exp(-apart / 2) @ weights) * (weights @ np.exp(-apart / 3) @ weights)
-    found = variogram.footprint_variance(by_lag, products, products)
+    found = scaling.footprint_variance(by_lag, products, products)
     yield _deviation("variance that a footprint leaves", largest(found, expected), 1e-12, "1", "all pairs of its cells")
 
 
 def _scales():
-    """Derivatives by differences; means of exp(-K LAI) and of a square of a normal variable, which are known."""
+    """Check derivatives by differences, and the second-order bias for normal variables whose means are known."""
     red, nir, h = 0.08, 0.3, 1e-4
     steps = [(a, b) for a in ((h, 0.0), (0.0, h)) for b in ((h, 0.0), (0.0, h))]
     signs = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
@@ -142,27 +134,29 @@ def _scales():
     yield _deviation("bias of a form of second degree", worst, 1e-12, "1", "its mean, exactly")
     of_red, of_nir = np.random.default_rng(1).uniform(0.05, 0.5, (2, 500))
     expected = np.corrcoef(of_nir - of_red, 1 / (of_nir + of_red))[0, 1]
-    worst = largest(scaling.ndvi_linearity(np.append(of_red, np.nan), np.append(of_nir, 0.3)), expected)
+    worst = largest(scaling.linearity_correlation(np.append(of_red, np.nan), np.append(of_nir, 0.3)), expected)
     yield _deviation("linearity of NDVI", worst, 1e-12, "1", "numpy.corrcoef")
-    kept = scaling.share_kept(of_red[:50], np.append(of_nir, np.nan))
+    kept = scaling.pixel_shares(of_red[:50], np.append(of_nir, np.nan))
     expected = np.ptp(of_red[:50]) / np.ptp(of_nir), np.var(of_red[:50]) / np.var(of_nir)
     yield _deviation("range and variance kept", largest(kept, expected), 1e-12, "1", "numpy")
 
 
 def _densities():
-    """The narrower of two spreads decides: of skewed values that of the quartiles, of even ones the deviation."""
+    """
+    Check kernel densities, whose bandwidth is from quartiles for skewed values and from the deviation for even ones.
+    """
     at, rng, found, expected = np.linspace(0, 3, 20), np.random.default_rng(4), [], []
     for kept in (np.exp(rng.normal(size=300)), rng.uniform(0, 3, 200)):
         spread = min(kept.std(ddof=1), stats.iqr(kept) / 1.34)
         factor = 0.9 * spread * kept.size**-0.2 / kept.std(ddof=1)
         expected.append(stats.gaussian_kde(kept, bw_method=factor)(at))
-        found.append(density.sample_density(np.append(kept, np.nan), at))
+        found.append(scaling.sample_density(np.append(kept, np.nan), at))
     worst = largest(found, expected)
     yield _deviation("kernel density", worst, 1e-12, "1", "scipy.stats, bandwidth by the rule of thumb")
 
 
 def _causes():
-    """Mean over all orders in which three causes can come; with and without each."""
+    """Check the shares of three causes by all orders, and the effects with and without each."""
     values = np.random.default_rng(3).normal(size=(2, 2, 2))
     expected = np.zeros(3)
     for order in permutations(range(3)):
@@ -171,12 +165,10 @@ def _causes():
             before = values[tuple(state)]
             state[cause] = 1
             expected[cause] += (values[tuple(state)] - before) / 6
-    yield _deviation(
-        "shares of three causes", largest(attribution.shapley(values, 3), expected), 1e-12, "1", "all orders"
-    )
+    yield _deviation("shares of three causes", largest(scaling.shapley(values, 3), expected), 1e-12, "1", "all orders")
     alone = [values[1, 0, 0], values[0, 1, 0], values[0, 0, 1]] - values[0, 0, 0]
     gone = values[1, 1, 1] - [values[0, 1, 1], values[1, 0, 1], values[1, 1, 0]]
-    worst = largest([attribution.by_itself(values, 3), attribution.taken_away(values, 3)], [alone, gone])
+    worst = largest([scaling.by_itself(values, 3), scaling.taken_away(values, 3)], [alone, gone])
     yield _deviation("a cause by itself, and taken away", worst, 1e-12, "1", "two of eight sets")
 
 

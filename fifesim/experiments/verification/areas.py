@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from fifesim.experiments.verification import (
-    adjacency,
     analysis,
     atmosphere,
     benchmarks,
     canopy,
-    foliage,
     landscape,
-    line_spread,
     scan,
     scattering,
     sensor,
@@ -21,10 +18,10 @@ from fifesim.output.progress import steps
 
 AREAS = {
     "random field": landscape.CHECKS,
-    "canopy": (*canopy.CHECKS, *foliage.CHECKS, *benchmarks.CANOPY),
+    "canopy": (*canopy.CHECKS, *canopy.FOLIAGE_CHECKS, *benchmarks.CANOPY),
     "terrain": terrain.CHECKS,
-    "atmosphere": (*scattering.CHECKS, *benchmarks.CHECKS, *adjacency.CHECKS, *atmosphere.CHECKS),
-    "sensor": (*sensor.CHECKS, *line_spread.CHECKS, *scan.CHECKS),
+    "atmosphere": (*scattering.CHECKS, *benchmarks.CHECKS, *scattering.ADJACENCY_CHECKS, *atmosphere.CHECKS),
+    "sensor": (*sensor.CHECKS, *sensor.LINE_SPREAD_CHECKS, *scan.CHECKS),
     "analysis": analysis.CHECKS,
 }
 
@@ -58,16 +55,5 @@ def verify() -> list[Deviation]:
 
 
 def deviations():
-    """
-    Deviations of one check after the other, as they are found.
-
-    Returns
-    -------
-    deviations : iterator of Deviation
-
-    Examples
-    --------
-    >>> next(deviations()).within
-    True
-    """
+    """Iterate over the deviations of all checks."""
     return (deviation for checks in AREAS.values() for check in checks for deviation in check())

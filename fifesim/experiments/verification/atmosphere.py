@@ -1,24 +1,25 @@
-"""Checks of the atmosphere beside tables of 6SV1.1, band by band of Landsat TM, and of its forms beside each other."""
+"""
+Checks of the atmosphere against tables of 6SV1.1 for the bands of Landsat TM, and of its engines against each other.
+"""
 
 from functools import partial
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.coupling import (
+from fifesim.atmosphere.coupling import (
+    BandTerms,
     TargetTerms,
     apparent_reflectance,
     corrected_reflectance,
     inhomogeneous_reflectance,
     target_reflectance,
 )
-from fifesim.atmosphere.schemes.engines import band_terms, scattering
-from fifesim.atmosphere.schemes.lookup import varying_diffuse_fraction, varying_reflectance
-from fifesim.atmosphere.schemes.terms import BandTerms
-from fifesim.base import datasets
+from fifesim.atmosphere.engines import band_terms, scattering
+from fifesim.atmosphere.lookup import varying_diffuse_fraction, varying_reflectance
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.base import files
 from fifesim.base.bands import Band
 from fifesim.base.geometry import relative_azimuth
 from fifesim.experiments.verification.deviations import Deviation, largest, rms_percent
@@ -37,7 +38,7 @@ _ALL_BOUND = 3.2
 
 
 def _terms(table, engine):
-    """Terms of the band of each row."""
+    """Terms of the coupling equation for the band of each row."""
     responses = {band.name: band.response for band in instrument("TM").bands}
     parts = []
     for (profile, aerosol, visibility, altitude, *angles), rows in table.groupby(_CASE):
@@ -52,13 +53,8 @@ def _terms(table, engine):
     return BandTerms(*(found[name].to_numpy() for name in BandTerms._fields))
 
 
-def _clear(table):
-    """Where the closed forms are meant to hold best."""
-    return ((table["visibility"] >= 23) & (table["sza"] <= 45) & (table["vza"] <= 20)).to_numpy()
-
-
 def _columns():
-    table = datasets.table("verification/sixs_columns.csv")
+    table = files.table("verification/sixs_columns.csv")
     atmospheres = [Atmosphere(profile=row.profile, altitude=row.altitude) for row in table.itertuples()]
     for name in ("pressure", "water_vapour", "ozone"):
         found = [getattr(atmosphere, name) for atmosphere in atmospheres]
@@ -67,24 +63,24 @@ def _columns():
 
 
 def _optical_depths():
-    table = datasets.table("verification/sixs_molecules.csv")
+    table = files.table("verification/sixs_molecules.csv")
     found = [
         float(Atmosphere(profile=row.profile, altitude=row.altitude).rayleigh_optical_depth(row.wavelength))
         for row in table.itertuples()
     ]
     worst = 100 * largest(found, table["optical_depth"], relative=True)
     yield _deviation("optical depth of the molecules", worst, 1.0, "%")
-    for aerosol, rows in datasets.table("verification/sixs_aerosol.csv").groupby("aerosol"):
+    for aerosol, rows in files.table("verification/sixs_aerosol.csv").groupby("aerosol"):
         found = Atmosphere(aerosol=aerosol, aot=1.0).aerosol_optical_depth(rows["wavelength"].to_numpy())
         worst = 100 * largest(found, rows["relative_optical_depth"], relative=True)
         yield _deviation(f"optical depth of {aerosol} aerosol", worst, 1.0, "%")
-    table = datasets.table("verification/sixs_visibility.csv")
+    table = files.table("verification/sixs_visibility.csv")
     found = [Atmosphere(visibility=visibility).aot for visibility in table["visibility"]]
     yield _deviation("optical thickness by visibility", 100 * largest(found, table["aot"], relative=True), 1.0, "%")
 
 
 def _five_s_at_fife():
-    table = datasets.table("verification/sixs_fife.csv")
+    table = files.table("verification/sixs_fife.csv")
     found = apparent_reflectance(table["surface_reflectance"].to_numpy(), **_terms(table, "5S").uniform)
     for band, bound in zip(_BANDS, _FIFE_BOUNDS, strict=True):
         rows = (table["band"] == band).to_numpy()
@@ -93,10 +89,11 @@ def _five_s_at_fife():
 
 
 def _five_s():
-    table = datasets.table("verification/sixs_grid.csv")
+    table = files.table("verification/sixs_grid.csv")
     terms = _terms(table, "5S")
     found, expected = apparent_reflectance(0.3, **terms.uniform), table["toa_reflectance"].to_numpy()
-    clear = _clear(table)
+    # The closed forms are best in clear air, below a high sun and near nadir.
+    clear = ((table["visibility"] >= 23) & (table["sza"] <= 45) & (table["vza"] <= 20)).to_numpy()
     for band, bound in zip(_BANDS, _CLEAR_BOUNDS, strict=True):
         rows = (table["band"] == band).to_numpy() & clear
         yield _deviation(f"5S, clear and high sun, {band}, rms", rms_percent(found[rows], expected[rows]), bound, "%")
@@ -111,27 +108,22 @@ def _five_s():
 
 
 def _successive_orders():
-    """Without polarization 6S is not always consistent in itself, and the table has less cases."""
-    for engine, name, said in (
-        ("successive-orders-scalar", "sixs_scalar", "scalar"),
-        ("successive-orders", "sixs_grid", "polarized"),
-    ):
-        table = datasets.table(f"verification/{name}.csv")
-        rows = table[table["band"].isin(_VISIBLE)]
-        terms = _terms(rows, engine)
-        found = {
-            "path": (terms.path_reflectance * terms.gas_transmittance, 1.0),
-            "toa": (apparent_reflectance(0.3, **terms.uniform), 0.3),
-        }
-        for (name, (values, bound)), band in product(found.items(), _VISIBLE):
-            of_band = (rows["band"] == band).to_numpy()
-            percent = rms_percent(values[of_band], rows[f"{name}_reflectance"][of_band])
-            yield _deviation(f"successive orders, {said}, {band}, {name}, rms", percent, bound, "%")
+    table = files.table("verification/sixs_grid.csv")
+    rows = table[table["band"].isin(_VISIBLE)]
+    terms = _terms(rows, "successive-orders")
+    found = {
+        "path": (terms.path_reflectance * terms.gas_transmittance, 1.0),
+        "toa": (apparent_reflectance(0.3, **terms.uniform), 0.3),
+    }
+    for (name, (values, bound)), band in product(found.items(), _VISIBLE):
+        of_band = (rows["band"] == band).to_numpy()
+        percent = rms_percent(values[of_band], rows[f"{name}_reflectance"][of_band])
+        yield _deviation(f"successive orders, {band}, {name}, rms", percent, bound, "%")
 
 
 def _light():
-    """Parts of the light down and up; 5S adds the albedos of molecules and aerosol, which is .05 too much in haze."""
-    table = datasets.table("verification/sixs_adjacency.csv")
+    """Check the parts of the transmittances; 5S adds the albedos of molecules and aerosol, an error of 0.05 in haze."""
+    table = files.table("verification/sixs_adjacency.csv")
     hazy = table[table["visibility"] == 10]
     names = ("transmittance_down", "direct_transmittance_up", "diffuse_up_molecules", "diffuse_up_aerosol")
     for engine, albedo, bound in (("5S", 0.05, 0.004), ("successive-orders", 0.002, 0.0015)):
@@ -143,7 +135,7 @@ def _light():
 
 
 def _sunbeam():
-    """What is not scattered falls off with the depth of molecules and aerosol together; the rest is skylight."""
+    """Check that direct light falls off with the total optical depth, and that the rest is skylight."""
     wavelength, sza, vza = np.array([0.47, 0.86]), 50.0, np.array([0.0, 30.0])
     mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))[:, None]
     for engine in ("5S", "successive-orders"):
@@ -155,21 +147,15 @@ def _sunbeam():
         yield _deviation(f"{engine}, sunbeam", worst, 1e-12, "1", source="Bouguer's law")
     terms = band_terms(Atmosphere(visibility=10.0), [Band("green", (0.55, 0.56), (1, 1))], sza, 0.0, 0.0)
     beam = terms.transmittance_down * (1 - terms.diffuse_fraction)
-    yield _deviation(
-        "sunbeam and skylight", largest(beam, terms.direct_transmittance_down), 1e-12, "1", source="theory"
-    )
+    worst = largest(beam, terms.direct_transmittance_down)
+    yield _deviation("sunbeam and skylight", worst, 1e-12, "1", source="theory")
 
 
 def _there_and_back():
     reflectance = np.linspace(-0.02, 1.0, 52)
-    terms = {
-        "path_reflectance": 0.11,
-        "transmittance_down": 0.8,
-        "transmittance_up": 0.87,
-        "spherical_albedo": 0.19,
-        "gas_transmittance": 0.93,
-    }
-    back = corrected_reflectance(apparent_reflectance(reflectance, **terms), **terms)
+    # Path reflectance, transmittance down and up, spherical albedo, and transmittance of the gases.
+    terms = 0.11, 0.8, 0.87, 0.19, 0.93
+    back = corrected_reflectance(apparent_reflectance(reflectance, *terms), *terms)
     yield _deviation("reflectance there and back", largest(back, reflectance), 1e-12, "1", source="theory")
     around, terms = reflectance[:, None], TargetTerms(0.11, 0.8, 0.6, 0.27, 0.19, 0.93)
     back = target_reflectance(inhomogeneous_reflectance(reflectance, around, terms), around, terms)
@@ -178,29 +164,20 @@ def _there_and_back():
 
 
 def _varying():
-    """Cubics in the angles: 3e-5, and nothing at their nodes; the sun by a spline: 4e-5 where it is low."""
+    """Check interpolation in varying geometry."""
+    # Cubics in the angles: 3e-5, and 0 at their nodes; the sun by a spline: 4e-5 where it is low.
     bands = tuple(band.response for band in instrument("TM").select(["TM1", "TM3"]))
     air = Atmosphere(visibility=23.0)
     ground = np.array([[0.05, 0.4], [0.3, 0.1], [0.2, 0.6], [0.5, 0.02]])
-    between = _Places(
-        altitude=np.array([3.05, 3.6, 3.7, 3.9]),
-        sza=np.array([72.6, 73.9, 74.6, 73.1]),
-        saa=np.array([10.0, 80.0, 300.0, 120.0]),
-        vza=np.array([3.0, 20.0, 44.0, 61.0]),
-        vaa=np.full(4, 70.0),
-    )
-    ends = _Places(
-        altitude=np.array([4.0, 3.5]),
-        sza=np.array([75.0, 72.5]),
-        saa=np.array([180.0, 40.0]),
-        vza=np.array([75.0, 0.0]),
-        vaa=np.array([0.0, 40.0]),
-    )
-    for places, what, bound in (
-        (between, "geometry by cell", 5e-5),
-        (ends, "geometry at the ends of tables", 1e-12),
+    # Altitude [km], and zenith and azimuth of the sun and of the view [degree] of the cells.
+    suns, views = ([72.6, 73.9, 74.6, 73.1], [10.0, 80.0, 300.0, 120.0]), ([3.0, 20.0, 44.0, 61.0], [70.0] * 4)
+    between = [3.05, 3.6, 3.7, 3.9], *suns, *views
+    ends = [4.0, 3.5], [75.0, 72.5], [180.0, 40.0], [75.0, 0.0], [0.0, 40.0]
+    for what, bound, places in (
+        ("geometry by cell", 5e-5, np.array(between)),
+        ("geometry at the ends of tables", 1e-12, np.array(ends)),
     ):
-        cells = ground[: places.sza.size]
+        cells = ground[: places.shape[1]]
         found = varying_reflectance(cells, *places, atmosphere=air, bands=bands).T
         back = varying_reflectance(found, *places, atmosphere=air, bands=bands, to_surface=True).T
         worst = largest(found, [_one_cell(air, bands, *cell) for cell in zip(cells, *places, strict=True)])
@@ -210,14 +187,6 @@ def _varying():
     expected = [band_terms(air, bands, sun, 0.0, 0.0).diffuse_fraction for sun in suns]
     worst = largest(varying_diffuse_fraction(suns, atmosphere=air, bands=bands).T, expected)
     yield _deviation("share of skylight by cell", worst, 1e-4, "1", source="each cell's own terms")
-
-
-class _Places(NamedTuple):
-    altitude: np.ndarray
-    sza: np.ndarray
-    saa: np.ndarray
-    vza: np.ndarray
-    vaa: np.ndarray
 
 
 def _one_cell(air, bands, reflectance, altitude, sza, saa, vza, vaa):

@@ -1,18 +1,16 @@
-"""Checks beside benchmarks that others published: polarized light of the sky, and a canopy below an atmosphere."""
+"""Checks against published benchmarks: polarized light of the sky, and a canopy below an atmosphere."""
 
 from functools import partial
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
-from fifesim.atmosphere.schemes.phase_expansion import matrix_moments
-from fifesim.atmosphere.schemes.stokes import stokes_reflectance
-from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
-from fifesim.base import datasets
+from fifesim.atmosphere.column import matrix_moments
+from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance, stokes_reflectance
+from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.experiments.verification.deviations import Deviation, largest
-from fifesim.ground.canopy.background import with_background
-from fifesim.ground.canopy.sail_model import sail
+from fifesim.ground.canopy.sail_model import sail, with_background
 
 _deviation = partial(Deviation, "atmosphere")
 
@@ -25,23 +23,9 @@ HOTSPOT = 0.03  # of HOM45: see `flat_discs`
 
 
 def iprt(case):
-    """
-    Polarized light of one of the IPRT cases, and what MYSTIC finds.
-
-    Parameters
-    ----------
-    case : str
-        "A1a", "A1b", "A1c", "A2", "A3" or "B1".
-
-    Returns
-    -------
-    table : DataFrame
-        The views, with columns I, Q, U, and sd_ of each. [1]
-    found : array, shape (3, views)
-        fifesim's I, Q and U. [1]
-    """
-    table = datasets.table("verification/iprt.csv").query("case == @case")
-    setup = datasets.table("verification/iprt_cases.csv").set_index("case").loc[case]
+    """Polarized light of an IPRT case, A1a to B1: table of MYSTIC, and I, Q and U of fifesim, shape (3, views). [1]"""
+    table = files.table("verification/iprt.csv").query("case == @case")
+    setup = files.table("verification/iprt_cases.csv").set_index("case").loc[case]
     particles = _spheres() if case == "A3" else None
     options = {"ground": setup["ground"], "depolarization": setup["depolarization"]}
     found = np.empty((3, len(table)))
@@ -53,17 +37,8 @@ def iprt(case):
 
 
 def molecules():
-    """
-    Polarized light of molecules, and what Natraj et al. (2009) tabulate.
-
-    Returns
-    -------
-    table : DataFrame
-        The views, with columns I, Q and U. [1]
-    found, converged : array, shape (3, views)
-        fifesim's as it comes, and with many directions and layers, extrapolated to layers without end. [1]
-    """
-    table = datasets.table("verification/molecules_stokes.csv")
+    """Table of Natraj et al. (2009) for molecules, and default and converged results, shape (3, views). [1]"""
+    table = files.table("verification/molecules_stokes.csv")
     found, coarse, fine = np.empty((3, 3, len(table)))
     many = {"streams": 48, "tolerance": 1e-10}
     for (level, tau, albedo, mu_s), rows in table.groupby(["level", "tau", "albedo", "mu_s"]):
@@ -76,22 +51,8 @@ def molecules():
 
 
 def rami(case):
-    """
-    Reflectance at the top over Lambertian ground, scalar, and what Eradiate finds.
-
-    Parameters
-    ----------
-    case : str
-        "white" or "lambert".
-
-    Returns
-    -------
-    table : DataFrame
-        The views, with columns reflectance and sd. [1]
-    found : array, shape (views,)
-        [1]
-    """
-    table = datasets.table("verification/rami4atm.csv").query("case == @case")
+    """Scalar reflectance over Lambertian ground, "white" or "lambert": table of Eradiate, and fifesim. [1]"""
+    table = files.table("verification/rami4atm.csv").query("case == @case")
     path, down, up, albedo = _rami_air(table, RAMI_AEROSOL if case == "lambert" else 0.0)
     ground = RAMI_GROUND[case]
     gases = np.exp(-RAMI_GASES * _air_mass(table)) if case == "lambert" else 1.0
@@ -99,22 +60,8 @@ def rami(case):
 
 
 def hom45(hotspot=HOTSPOT):
-    """
-    Reflectance of the canopy HOM45 below its sky by SAIL, and what Eradiate finds for its discs.
-
-    Parameters
-    ----------
-    hotspot : float, optional
-        Leaf size over canopy height. [1]
-
-    Returns
-    -------
-    table : DataFrame
-        The views, with a column reflectance. [1]
-    found : array, shape (views,)
-        [1]
-    """
-    table = datasets.table("verification/rami4atm.csv").query("case == 'HOM45'")
+    """Reflectance of the canopy HOM45 below its sky: table of Eradiate for discs, and SAIL. [1]"""
+    table = files.table("verification/rami4atm.csv").query("case == 'HOM45'")
     _, down, _, _ = _rami_air(table, RAMI_AEROSOL)
     sunlight = np.exp(-(RAMI_MOLECULES + RAMI_AEROSOL) / np.cos(np.radians(RAMI_SZA))) / down
     angles = {"sza": RAMI_SZA, "vza": table["vza"].abs().to_numpy(), "raa": table["raa"].to_numpy()}
@@ -125,7 +72,7 @@ def hom45(hotspot=HOTSPOT):
 
 def flat_discs(radius, lai, vza, *, sza=30.0, depths=4001):
     r"""
-    Light that flat discs in a layer of height 1 scatter once, with the shadow of each disc on itself.
+    Single scattering by flat discs in a layer of height 1, with the shadow of each disc on itself.
 
     .. math::
 
@@ -148,13 +95,13 @@ def flat_discs(radius, lai, vza, *, sza=30.0, depths=4001):
     Returns
     -------
     share : array, shape (views,)
-        Of what a leaf reflects. [1]
+        Share of the light that a leaf reflects. [1]
 
     Notes
     -----
     :math:`O` is the overlap of two circles. `sail` has :math:`e^{-d / l}` for it, where :math:`l` is `hotspot` times
     the height times the mean extinction toward sun and view, which is 1 for flat leaves. Over distance the overlap of
-    circles sums up to .85 radii; the reflectance is met best with :math:`l` of one radius.
+    circles sums up to 0.85 radii; the reflectance is met best with :math:`l` of one radius.
 
     References
     ----------
@@ -183,8 +130,8 @@ def _stokes(rows, tau, albedo, particles, sza, level, **options):
 
 
 def _spheres():
-    """Moments of the scattering matrix of case A3; its phase function and polarization, linear in the cosine."""
-    matrix = datasets.table("verification/iprt_matrix.csv").iloc[::-1]
+    """Moments of the scattering matrix of case A3, and its phase function and polarization, linear in the cosine."""
+    matrix = files.table("verification/iprt_matrix.csv").iloc[::-1]
     knots = np.cos(np.radians(matrix["scattering_angle"].to_numpy()))
     nodes, weights = _between(knots, 12)
     f11, f12, f33 = (np.interp(nodes, knots, matrix[name]) for name in ("F11", "F12", "F33"))
@@ -198,8 +145,8 @@ def _spheres():
 
 
 def _rami_air(table, tau_aerosol):
-    """Path reflectance, transmittances down and up, and spherical albedo at the views of a table."""
-    knots, phase = datasets.table("verification/rami4atm_phase.csv")[["scattering_cosine", "phase"]].to_numpy().T
+    """Path reflectance, transmittances down and up, and spherical albedo at the views of a table. [1]"""
+    knots, phase = files.table("verification/rami4atm_phase.csv")[["scattering_cosine", "phase"]].to_numpy().T
     nodes, weights = _between(knots, 4)
     moments = matrix_moments(np.interp(nodes, knots, phase), np.zeros(nodes.size), nodes, weights, 48)[:, 0]
     (vza, views), (raa, azimuths) = (np.unique(a, return_inverse=True) for a in (table["vza"].abs(), table["raa"]))
@@ -226,12 +173,10 @@ def _zenith(cosine):
 
 
 def _iprt():
-    """
-    Three times the noise of the intensity; four of Q and U.
-
-    Of 590 numbers chance takes one or two beyond three times their noise, and none beyond four, 27 times of 28.
-    """
-    for case in datasets.table("verification/iprt_cases.csv")["case"]:
+    """Check the IPRT cases, within 3 times the noise of the intensity and 4 times the noise of Q and U."""
+    # Of 590 numbers one or two exceed 3 times their noise by chance; with a probability of 27 in 28 none exceeds 4
+    # times.
+    for case in files.table("verification/iprt_cases.csv")["case"]:
         table, found = iprt(case)
         noise = table[["sd_I", "sd_Q", "sd_U"]].to_numpy().T
         away = np.abs(found - table[STOKES].to_numpy().T) / noise
@@ -240,7 +185,7 @@ def _iprt():
 
 
 def _molecules():
-    """The last digit of the table; the solver as it comes is stated to be good to 1e-4 of the intensity."""
+    """Check molecules to the last digit of the table, and the default solver within its stated 1e-4."""
     table, found, converged = molecules()
     expected = table[STOKES].to_numpy().T
     what, source = "I, Q and U of molecules", "Natraj et al. (2009)"
@@ -250,7 +195,7 @@ def _molecules():
 
 
 def _rami():
-    """Neighbouring views show 1.2 times the noise that the table states: three times that, and that of the mean."""
+    """Check the RAMI scenes, within 3 times the noise, which neighbouring views show to be 1.2 times the stated one."""
     for case, what in (("white", "white ground below molecules"), ("lambert", "ground below aerosol and gases")):
         table, found = rami(case)
         expected = table["reflectance"].to_numpy()
@@ -262,7 +207,9 @@ def _rami():
 
 
 def _canopy():
-    """What SAIL can: its hot spot is a cusp where discs make a cap, and low views away from the sun are too bright."""
+    """Check the canopy of RAMI."""
+    # SAIL limits the agreement: its hot spot is a cusp where discs make a cap, and low views away from the sun are too
+    # bright.
     table, found = hom45()
     percent, vza = 100 * (found / table["reflectance"].to_numpy() - 1), table["vza"].to_numpy()
     beside = _beside_the_hot_spot(vza)
@@ -277,7 +224,7 @@ def _canopy():
 
 
 def _flat_discs():
-    """Their radius over the height is the size of the hot spot; a cusp of one radius for a cap."""
+    """Check the hot spot of flat discs, of size radius over height; SAIL has a cusp where discs have a cap."""
     vza = np.concatenate([np.arange(-70, 71, 5), [27, 28, 29, 31, 32, 33]])
     angles = {"sza": RAMI_SZA, "vza": np.abs(vza), "raa": np.where(vza < 0, 180.0, 0.0)}
     percent = []

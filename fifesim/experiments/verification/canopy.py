@@ -1,4 +1,4 @@
-"""Checks of the canopy: limits that any canopy keeps, theory, and other codes."""
+"""Checks of canopies: limits, energy, theory and other codes, also for crowns and two kinds of leaf."""
 
 from functools import partial
 from itertools import pairwise
@@ -8,14 +8,20 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.experiments.verification.deviations import Deviation, largest
-from fifesim.ground.canopy import absorption
-from fifesim.ground.canopy.background import over_background, with_background
-from fifesim.ground.canopy.divided_differences import exponential_chain
+from fifesim.ground.canopy import layers
+from fifesim.ground.canopy.crowns import SHAPE, clumped, crown_shares, crown_terms, crowns_over_background
+from fifesim.ground.canopy.layers import light_budget, two_layers
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes, leaf_projection
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance, directional_reflectance
-from fifesim.ground.canopy.sail_model import sail, volume_scattering
+from fifesim.ground.canopy.sail_model import (
+    exponential_chain,
+    over_background,
+    sail,
+    volume_scattering,
+    with_background,
+)
 
 _deviation = partial(Deviation, "canopy")
 
@@ -28,7 +34,7 @@ _SHAPES = ("spherical", "planophile", "erectophile")
 
 
 def _limits():
-    """Rounding, of up to 20 optical thicknesses of leaves."""
+    """Check physical limits of the canopy, within rounding for up to 20 optical thicknesses."""
     bare = with_background(sail(0.0, _RHO, 1 - _RHO, sza=_SZA, vza=_VZA, hotspot=0.05), 0.15)
     yield _deviation("no leaves show the background", np.max([largest(r, 0.15) for r in bare]), 0.0, "1", "theory")
     white = [sail(_LAI, _RHO, 1 - _RHO, sza=_SZA, vza=_VZA, raa=50, leaf_angles=shape) for shape in _SHAPES]
@@ -51,7 +57,7 @@ def _reciprocity():
 
 
 def _half_space():
-    """Light by light through leaves of one inclination, whose mean squared cosine is that of their inclination."""
+    """Check the half-space by tracing light through leaves of one inclination, with their mean squared cosine."""
     rho, tau = np.array([[0.07, 0.45, 0.6], [0.04, 0.42, 0.1]])
     worst = 0.0
     for inclination in (0.0, 35.0, 57.0, 90.0):
@@ -64,7 +70,7 @@ def _half_space():
 
 
 def _spherical_leaves():
-    """The closed form holds for leaves of all inclinations; 900 classes of them are good to 1e-5."""
+    """Check spherical leaves against the closed form, which 900 classes reproduce to 1e-5."""
     leaves = leaf_angle_classes("spherical", classes=900)
     inclination, fraction = np.array(leaves.inclination), np.array(leaves.fraction)
     worst = 0.0
@@ -79,10 +85,10 @@ def _spherical_leaves():
 
 
 def _ellipsoidal_leaves():
-    """Normals of a spheroid, whose axes go by their mean."""
+    """Check the ellipsoidal distribution by the normals of a spheroid, whose axes follow from their mean."""
 
     def share(log_ratio, low, high, power=0):
-        """Of normals between two inclinations, times a power of these, but for a factor. [radian]"""
+        """Unnormalized integral over normals between two inclinations, times a power of the inclination [rad]."""
         ratio = np.exp(2 * log_ratio)
         return quad(lambda t: t**power * np.sin(t) / (np.cos(t) ** 2 + ratio * np.sin(t) ** 2) ** 2, low, high)[0]
 
@@ -96,7 +102,7 @@ def _ellipsoidal_leaves():
 
 
 def _hot_spot():
-    """What a hot spot adds to single scattering, by adaptive quadrature over the depth."""
+    """Check the contribution of the hot spot to single scattering, by adaptive quadrature over the depth."""
     leaves = leaf_angle_classes("spherical")
     inclination, fraction = np.array(leaves.inclination), np.array(leaves.fraction)
     worst = 0.0
@@ -114,14 +120,14 @@ def _hot_spot():
 
 
 def _gap(depth, ks, ko, lai, apart):
-    """Chance that sun and observer both reach a relative depth."""
+    """Probability that sun and observer both see a relative depth."""
     overlap = depth if apart < 1e-9 else -np.expm1(-apart * depth) / apart
     return np.exp(-(ks + ko) * lai * depth + np.sqrt(ks * ko) * lai * overlap)
 
 
 def _other_sail():
-    """Leaf angle classes of the other code come from an iteration that stops at 1e-8."""
-    table = datasets.table("verification/sail.csv")
+    """Check SAIL against another code, whose leaf angle classes come from an iteration that stops at 1e-8."""
+    table = files.table("verification/sail.csv")
     worst = 0.0
     for row in table.itertuples():
         leaves = leaf_angle_classes(("verhoef", row.a, row.b), classes=18)
@@ -134,8 +140,8 @@ def _other_sail():
 
 
 def _exact_transfer():
-    """Four streams for a continuum of directions: what the model itself leaves, as the documentation says."""
-    table = datasets.table("verification/canopy_transfer.csv")
+    """Check the four-stream model against exact transfer, within the model error that the documentation states."""
+    table = files.table("verification/canopy_transfer.csv")
     angles = {name: table[name].to_numpy() for name in ("sza", "vza", "raa")}
     canopy = sail(table["lai"], table["leaf_reflectance"], table["leaf_transmittance"], **angles)
     found = 100 * (with_background(canopy, table["background"].to_numpy()).rso / table["reflectance"] - 1)
@@ -152,17 +158,18 @@ def _exact_transfer():
 def _absorption():
     sza = np.array([0, 25, 28.5, 45, 60, 80])
     cosine, tangent = np.cos(np.radians(sza)), np.tan(np.radians(sza))
-    spherical = largest(absorption.extinction_coefficient(sza), 0.5 / cosine)
+    spherical = largest(layers.extinction_coefficient(sza), 0.5 / cosine)
     yield _deviation("extinction by spherical leaves", spherical, 0.0, "1", "theory, 0.5 / cos(sza)")
-    vertical = largest(absorption.extinction_coefficient(sza, "90: 1"), 2 / np.pi * tangent)
+    vertical = largest(layers.extinction_coefficient(sza, "90: 1"), 2 / np.pi * tangent)
     yield _deviation("extinction by vertical leaves", vertical, 1e-12, "1", "theory, 2 tan(sza) / pi")
     taken = [0.94 * quad(lambda depth: 0.569 * np.exp(-0.569 * depth), 0, lai)[0] for lai in (0.5, 2.5, 8)]
-    fpar = largest(absorption.fpar([0.5, 2.5, 8], 0.569), taken)
+    fpar = largest(layers.beer_fpar([0.5, 2.5, 8], 0.569), taken)
     yield _deviation("light that leaves take, layer by layer", fpar, 1e-12, "1", "quadrature of Beer's law")
 
 
 def _chains():
-    """The corner of the exponential of a bidiagonal matrix is a divided difference; rates alike and far apart."""
+    """Check exponential chains, with equal and distant rates."""
+    # The corner of the exponential of a bidiagonal matrix is a divided difference.
     worst = 0.0
     for gap in (0.0, 1e-9, 0.01, 0.6, 0.7, 3.0, 100.0):
         for rates in ((0.3, gap), (0.3, 0.3 + gap, 0.1, 0.3, 0.2 + 2 * gap)):
@@ -172,7 +179,7 @@ def _chains():
 
 
 def _tables():
-    """Over one background, over one for each cell, and exactly; and with directions of each cell's own."""
+    """Check the reflectance tables: one background, one for each cell, exact evaluation, and directions by cell."""
     rng, sky, leaf = np.random.default_rng(6), np.array([0.2, 0.1]), (np.array([0.07, 0.45]), np.array([0.04, 0.42]))
     lai = np.concatenate([[0.0, 1e-6, 100.0], rng.gamma(1.5, 1.5, 197)])
     ground, one = rng.uniform(0, 1, (2, 200)), np.array([0.15, 0.6])
@@ -186,8 +193,8 @@ def _tables():
         exact = [
             canopy_reflectance(lai, *leaf, each, diffuse_fraction=sky, exact=True, **given) for each in (one, ground)
         ]
-        given |= {name: np.full(200, float(given[name])) for name in ("sza", "vza", "raa")}
-        cells = directional_reflectance(lai, *leaf, ground.T, diffuse_fraction=sky, **given)
+        towards = [np.full(200, float(angle)) for angle in (sza, vza, raa)]
+        cells = directional_reflectance(lai, leaf, ground.T, sky, towards, shape, hotspot)
         worst = np.maximum(worst, [largest(tables, expected), largest(exact, expected), largest(cells, expected[1])])
     table, exact, cells = worst
     yield _deviation("table of canopies over leaf area", table, 1e-6, "1", "SAIL at every cell")
@@ -195,7 +202,7 @@ def _tables():
 
 
 def _orders():
-    """What goes back and forth between leaves and ground, order by order, in both ways of writing it."""
+    """Check multiple reflections between canopy and ground order by order, in both formulations."""
     canopy = sail(_LAI, 0.9 * _RHO, 0.9 - 0.9 * _RHO, sza=_SZA, vza=_VZA, raa=50, hotspot=0.05)
     through = (canopy.tss + canopy.tsd) * (canopy.too + canopy.tdo)
     hot = canopy.tsstoo - canopy.tss * canopy.too
@@ -219,3 +226,111 @@ CHECKS = (
     _orders,
     _tables,
 )
+
+
+_GREEN, _DEAD = ([0.07, 0.45], [0.04, 0.42]), ([0.28, 0.42], [0.12, 0.3])
+_FOLIAGE_LAI = np.array([0, 0.01, 0.5, 2, 8, 20])[:, None]
+_BROWN = np.linspace(0, 1, 5)
+# Scenes of RAMI-3: leaf area index [m2 m-2], crown cover seen from above, leaf reflectance and transmittance, and
+# background [1]. Leaves of HET04 are the mean of its spheres and cylinders, by leaf area.
+CROWNS = {"HET01": (2.356, 0.4712, 0.4957, 0.4409, 0.159), "HET04": (1.4999, 0.2989, 0.4688, 0.3518, 0.15)}
+_VIEW = {"sza": 35.0, "vza": 20.0, "raa": 30.0, "hotspot": 0.1}
+
+
+def _other_layers():
+    """Check two layers against another code, whose leaf angle classes come from an iteration that stops at 1e-8."""
+    table = files.table("verification/two_layers.csv")
+    worst = 0.0
+    for row in table.itertuples():
+        leaves = leaf_angle_classes(row.leaf_angles, classes=18)
+        optics = row.rho_green, row.tau_green, row.rho_brown, row.tau_brown
+        order = {"brown": row.brown, "dissociation": row.dissociation, "leaf_angles": leaves, "hotspot": row.hotspot}
+        canopy = two_layers(row.lai, *optics, sza=row.sza, vza=row.vza, raa=row.raa, **order)
+        found = with_background(canopy, row.soil)
+        worst = np.maximum(worst, largest(list(found), [row.rso, row.rdo, row.rsd, row.rdd]))
+    source = "Verhoef and Bach (2007), SAIL of prosail 2.0.5"
+    yield _deviation(f"{len(table)} canopies of green and dead leaves", worst, 1e-6, "1", source)
+
+
+def _foliage_limits():
+    """Check limits of all fields of the layers, for every leaf area and dead share."""
+    worst = np.zeros(3)
+    for rho, tau, rho_dead, tau_dead in zip(*_GREEN, *_DEAD, strict=True):
+        alike = two_layers(_FOLIAGE_LAI, rho, tau, rho, tau, brown=_BROWN, dissociation=0.6, **_VIEW)
+        plain = sail(_FOLIAGE_LAI, rho, tau, **_VIEW)
+        mean = [one + _BROWN * (other - one) for one, other in ((rho, rho_dead), (tau, tau_dead))]
+        mixture = two_layers(_FOLIAGE_LAI, rho, tau, rho_dead, tau_dead, brown=_BROWN, dissociation=0.0, **_VIEW)
+        covered = clumped(plain, crown_shares(1.0, 1.0, 35.0, 20.0, 30.0))
+        pairs = (alike, plain), (mixture, sail(_FOLIAGE_LAI, *mean, **_VIEW)), (covered, plain)
+        found = [max(largest(a, b) for a, b in zip(one, other, strict=True)) for one, other in pairs]
+        worst = np.maximum(worst, found)
+    names = "leaves alike in two layers", "leaves of two kinds, mixed", "crowns without gaps"
+    for name, deviation in zip(names, worst, strict=True):
+        yield _deviation(name, deviation, 1e-9, "1", "SAIL")
+
+
+def _energy():
+    """Check the energy budget at two wavelengths, through crowns with gaps."""
+    lai, brown, cover = _FOLIAGE_LAI[..., None, None], _BROWN[:, None, None], np.array([0.3, 1.0])[:, None]
+    optics = *_GREEN, *_DEAD, [0.15, 0.19]
+    budget = light_budget(
+        lai, *optics, brown=brown, dissociation=0.4, sza=35.0, diffuse_fraction=0.2, crown_cover=cover
+    )
+    yield _deviation("light absorbed and reflected", largest(sum(budget), 1), 1e-9, "1", "energy budget")
+
+
+def _foliage_tables():
+    """Check tables against single evaluations where dead share, crown cover and ground differ by cell."""
+    rng, worst = np.random.default_rng(7), 0.0
+    lai, brown, cover = rng.gamma(1.5, 1.5, 200), rng.uniform(0, 1, 200), rng.uniform(0.3, 1, 200)
+    dead = dict(zip(("brown_reflectance", "brown_transmittance"), _DEAD, strict=True))
+    given = {"background": rng.uniform(0, 1, (2, 200)), "diffuse_fraction": [0.2, 0.1], "dissociation": 0.5, **dead}
+    for shares in ({"brown": brown}, {"brown": 0.3, "crown_cover": cover}, {"brown": brown, "crown_cover": cover}):
+        table, exact = (
+            canopy_reflectance(lai, *_GREEN, exact=exact, **given, **shares, **_VIEW) for exact in (False, True)
+        )
+        worst = np.maximum(worst, largest(table, exact))
+    yield _deviation("table over leaf area and dead share", worst, 1e-6, "1", "SAIL in two layers at every cell")
+
+
+def _crowns():
+    canopy, sky = sail(_FOLIAGE_LAI, *_GREEN, **_VIEW), 0.2
+    shares = crown_shares(0.6, 1.0, 35.0, 20.0, 30.0)
+    over = with_background(clumped(canopy, shares), 0.15)
+    terms = crowns_over_background(
+        crown_terms(canopy, sky), (0.6, shares.sun, shares.view, shares.apart, shares.lit), 0.15
+    )
+    worst = largest(terms, (1 - sky) * over.rso + sky * over.rdo)
+    yield _deviation("crowns over ground, in both ways of writing it", worst, 1e-12, "1", "clumped SAIL")
+
+
+def known_crowns(scene):
+    """Reflectance of a RAMI-3 scene whose crowns are known leaf by leaf: columns vza, raa [degree] and brf [1]."""
+    # HET01, spheres, is from Eradiate; HET04, spheres and cylinders, from the Monte Carlo code of make_crown_scenes.py.
+    if scene == "HET01":
+        return files.table("verification/spheres_of_leaves.csv")
+    return files.table("verification/crown_scenes.csv").query("scene == @scene")
+
+
+def crown_errors(scene, crown_cover=None):
+    """View zenith, positive toward the sun [degree], and error of crowns by SAIL [%], shape (views,)."""
+    lai, seen, *leaf, background = CROWNS[scene]
+    cover = seen if crown_cover is None else crown_cover
+    table = known_crowns(scene)
+    angles = 20.0, table["vza"].to_numpy(), table["raa"].to_numpy()
+    # Discs of 0.2 m in crowns of 20 m; of 0.1 m in crowns of 8 to 12 m.
+    canopy = sail(lai / cover, *leaf, hotspot=0.01, **dict(zip(("sza", "vza", "raa"), angles, strict=True)))
+    found = with_background(clumped(canopy, crown_shares(cover, SHAPE, *angles)), background).rso
+    return np.where(angles[2] == 0, 1, -1) * angles[1], 100 * (found / table["brf"].to_numpy() - 1)
+
+
+def _known_crowns():
+    """Check crowns against scenes known leaf by leaf; the bounds state the error of the crown model."""
+    for scene, what, bound, source in (
+        ("HET01", "spheres full of leaves", 14.0, "Eradiate, RAMI-3 HET01"),
+        ("HET04", "spheres and cylinders full of leaves", 26.0, "Monte Carlo, RAMI-3 HET04"),
+    ):
+        yield _deviation(what, largest(crown_errors(scene)[1], 0), bound, "%", source)
+
+
+FOLIAGE_CHECKS = (_other_layers, _foliage_limits, _energy, _foliage_tables, _crowns, _known_crowns)

@@ -1,4 +1,4 @@
-"""How far a result lies from an independent one."""
+"""Deviations of results from independent ones, and their listing as text."""
 
 from itertools import pairwise
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 
 class Deviation(NamedTuple):
-    """The largest deviation that one check found, beside the bound that it must keep."""
+    """Largest deviation that one check found, and its bound."""
 
     area: str  # of the package, one of `areas.AREAS`
     what: str  # was compared
@@ -19,72 +19,53 @@ class Deviation(NamedTuple):
 
     @property
     def within(self):
-        """Whether the bound is kept; what is not a number does not."""
+        """Whether the bound holds; NaN does not."""
         return bool(self.deviation <= self.bound)
 
 
 def largest(found, expected, *, relative=False):
-    """
-    Largest absolute difference of two arrays.
-
-    Parameters
-    ----------
-    found, expected : array, broadcastable
-    relative : bool, optional
-        In units of `expected`.
-
-    Returns
-    -------
-    deviation : float
-        NaN where one of them holds NaN.
-
-    Examples
-    --------
-    >>> largest([1.0, 2.5], [1.0, 2.0]), largest([1.0, 2.5], [1.0, 2.0], relative=True)
-    (0.5, 0.25)
-    """
+    """Largest absolute difference of two arrays, or relative to `expected`; NaN if either holds NaN."""
     difference = np.abs(np.subtract(found, expected))
     return float(np.max(difference / np.abs(expected) if relative else difference))
 
 
 def rms_percent(found, expected):
-    """
-    Root mean square of the relative difference of two arrays.
-
-    Parameters
-    ----------
-    found, expected : array, broadcastable
-
-    Returns
-    -------
-    deviation : float
-        [%]
-
-    Examples
-    --------
-    >>> round(rms_percent([1.01, 0.99], 1.0), 12)
-    1.0
-    """
+    """Root mean square of the relative difference of two arrays. [%]"""
     return float(100 * np.sqrt(np.mean((np.divide(found, expected) - 1) ** 2)))
 
 
 def integral(function, kinks):
-    """
-    Integral of a function with kinks.
-
-    Parameters
-    ----------
-    function : callable
-    kinks : sequence of float
-        Increasing, from the lower end of the integral to the upper.
-
-    Returns
-    -------
-    integral : float
-
-    Examples
-    --------
-    >>> round(integral(abs, (-1.0, 0.0, 2.0)), 12)
-    2.5
-    """
+    """Integral of a function with kinks, which include both ends."""
     return sum(quad(function, low, high, epsabs=1e-10)[0] for low, high in pairwise(kinks))
+
+
+HEADING = f"{'':13}{'compared':<48}{'largest':>10}{'bound':>10} {'unit':<8}with"
+
+# The stages of Figure 1 that the areas are of, in the order of the way of a pixel.
+AREA_STAGES = dict.fromkeys(("random field", "canopy", "terrain"), "Ground")
+AREA_STAGES |= {"atmosphere": "Atmosphere", "sensor": "Sensor", "analysis": "Analysis"}
+
+
+def by_stage(deviations):
+    """Lines of deviations, below a heading for each stage."""
+    stage = None
+    for deviation in deviations:
+        if AREA_STAGES[deviation.area] != stage:
+            stage = AREA_STAGES[deviation.area]
+            yield f"\n{stage}"
+        yield deviation_line(deviation)
+
+
+def deviation_line(deviation):
+    """Line of text on a deviation."""
+    numbers = f"{deviation.deviation:>10.3g}{deviation.bound:>10.3g} {deviation.unit:<8}"
+    mark = "" if deviation.within else "  EXCEEDED"
+    return f"{deviation.area:<13}{deviation.what:<48}{numbers}{deviation.source}{mark}"
+
+
+def deviation_summary(deviations):
+    """Summary of all deviations, which names those beyond their bounds."""
+    exceeded = [f"{each.area}: {each.what}" for each in deviations if not each.within]
+    if not exceeded:
+        return f"{len(deviations)} checks, all within their bounds"
+    return f"{len(deviations)} checks, {len(exceeded)} beyond their bounds: {'; '.join(exceeded)}"

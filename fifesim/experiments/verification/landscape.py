@@ -1,4 +1,4 @@
-"""Checks of the random field against its equation and its analytic spectrum, and of the noise that it is made of."""
+"""Checks of the random field against its equation and its analytic spectrum, and of its white noise."""
 
 from functools import partial
 
@@ -6,11 +6,16 @@ import numpy as np
 from scipy.stats import norm
 
 from fifesim.experiments.verification.deviations import Deviation, largest
-from fifesim.ground.landscape.autoregression import autocorrelation, field_variance
-from fifesim.ground.landscape.distribution import lai_distribution, treatments
-from fifesim.ground.landscape.field import TILE, periodic_field, streaming_field
-from fifesim.ground.landscape.noise import philox, white_noise
-from fifesim.ground.landscape.quantiles import quantile_map, quantile_table, rank_map
+from fifesim.ground.landscape.autoregression import (
+    FIELD_TILE,
+    autocorrelation,
+    field_variance,
+    periodic_field,
+    philox,
+    streaming_field,
+    white_noise,
+)
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map, treatments
 
 _deviation = partial(Deviation, "random field")
 
@@ -19,7 +24,7 @@ _SIZE = 1024  # cells on a side: many correlation lengths
 
 
 def _covariances(arp):
-    """Covariances by lag on a torus, the transform of the spectrum of the process."""
+    """Covariances by lag on a torus, by the transform of the spectrum of the process."""
     wave = np.cos(2 * np.pi * np.fft.fftfreq(512))
     return np.fft.ifft2((1 - 2 * arp * (wave[:, None] + wave)) ** -2.0).real
 
@@ -36,7 +41,7 @@ def _moments():
 
 
 def _samples():
-    """Bartlett's standard error of a covariance that is estimated from so many correlated cells; 4 of them."""
+    """Check sample covariances within 4 standard errors, by Bartlett for correlated cells."""
     for arp in _ARPS:
         field = streaming_field(20, arp, -_SIZE // 2, 17, (_SIZE, _SIZE))
         correlations = _covariances(arp) / _covariances(arp)[0, 0]
@@ -59,16 +64,15 @@ def _equation():
 
 
 def _generator():
-    """Counters and keys of Random123's kat_vectors."""
+    """Check the generator with the counters and keys of kat_vectors of Random123."""
     known = {
         ("00000000 00000000 00000000 00000000", "00000000 00000000"): "6627e8d5 e169c58d bc57ac4c 9b00dbd8",
         ("ffffffff ffffffff ffffffff ffffffff", "ffffffff ffffffff"): "408f276d 41c83b0e a20bc7c6 6d5451fd",
         ("243f6a88 85a308d3 13198a2e 03707344", "a4093822 299f31d0"): "d16cfe09 94fdcceb 5001e420 24126ea1",
     }
     wrong = [philox(*_words(counter), *_words(key)) != _words(answer) for (counter, key), answer in known.items()]
-    yield _deviation(
-        "words of Philox-4x32-10", float(np.sum(wrong)), 0.0, "word", "Salmon et al. (2011), known answers"
-    )
+    source = "Salmon et al. (2011), known answers"
+    yield _deviation("words of Philox-4x32-10", float(np.sum(wrong)), 0.0, "word", source)
 
 
 def _words(text):
@@ -76,16 +80,14 @@ def _words(text):
 
 
 def _halves(*numbers):
-    """Low and high words of numbers of 64 bits."""
+    """Low and high 32-bit words of 64-bit numbers."""
     return np.array([number >> shift & 2**32 - 1 for number in numbers for shift in (0, 32)], np.uint64)
 
 
 def _white_noise():
-    """
-    In single precision, whose rounding leaves no mean: neither at a logarithm's mantissa nor at an angle.
-
-    Four cells of a row are made of the words of one place. One seed gives a word of 26, whose half counts.
-    """
+    """Check white noise against a scalar computation in double precision."""
+    # Single precision must not leave a mean, neither by mantissa nor by angle. Four cells of a row use the words of one
+    # place; one of the seeds gives a word of 26, for which the half counts.
     row, group = -2, -3
     worst = np.zeros(2)
     for seed in (2696, 2**40 + 7):
@@ -113,13 +115,13 @@ def _white_noise():
 
 
 def _means(values, place):
-    """Means of 32 classes of a place from 0 to 1."""
+    """Means in 32 classes of a place from 0 to 1."""
     classes = (32 * place).astype(int)
     return np.bincount(classes, values) / np.bincount(classes)
 
 
 def _quantiles():
-    """Linear interpolation of a table leaves an eighth of its squared step times the curvature of the quantiles."""
+    """Check the quantile table, whose linear interpolation errs by 1/8 of its squared step times the curvature."""
     deviates = np.append(np.random.default_rng(4).normal(0, 1.5, 20_000), [-9.0, 9.0])[None]
     worst = 0.0
     for name in treatments():
@@ -135,11 +137,11 @@ def _quantiles():
 
 
 def _tiles():
-    """Across the seams of four tiles, in the single precision of their filter."""
+    """Check the equation of the process across the seams of four tiles, within the single precision of the filter."""
     worst = 0.0
     for arp in _ARPS:
-        noise = white_noise(5, -20, TILE - 30, (40, 60)).astype(float)
-        field = streaming_field(5, arp, -21, TILE - 31, (42, 62)) * np.sqrt(field_variance(arp))
+        noise = white_noise(5, -20, FIELD_TILE - 30, (40, 60)).astype(float)
+        field = streaming_field(5, arp, -21, FIELD_TILE - 31, (42, 62)) * np.sqrt(field_variance(arp))
         neighbours = field[:-2, 1:-1] + field[2:, 1:-1] + field[1:-1, :-2] + field[1:-1, 2:]
         worst = np.maximum(worst, largest(field[1:-1, 1:-1] - arp * neighbours, noise))
     yield _deviation("tiles are their neighbours and noise", worst, 1e-5, "1", "its own equation, cell by cell")

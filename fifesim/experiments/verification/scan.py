@@ -9,12 +9,11 @@ from fifesim.base.footprints import axis_operator
 from fifesim.base.geometry import fife_geometry
 from fifesim.base.line_spread import Boxcar
 from fifesim.experiments.verification.deviations import Deviation, largest
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
+from fifesim.sensor.response import scan
+from fifesim.sensor.response.scan import Footprints, apply_operator, footprint_operator
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
-from fifesim.sensor.scan import track as scan
-from fifesim.sensor.scan.rasters.swath import sense_swath
-from fifesim.sensor.scan.rasters.view import scan_geometry
-from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_operator
+from fifesim.sensor.scan_labels import scan_geometry, sense_swath
 
 _deviation = partial(Deviation, "sensor")
 
@@ -24,7 +23,7 @@ _TRACK = scan.Track(39.0, -97.0, 193.0)
 
 
 def _triangle(aside, altitude=_ALTITUDE):
-    """Slant range [m], scan angle and view zenith [degree] by the sides of the triangle with the earth's centre."""
+    """Slant range [m], scan angle and view zenith [degree] by the triangle of ground, sensor and earth centre."""
     orbit = scan.EARTH_RADIUS + altitude
     slant = np.sqrt(scan.EARTH_RADIUS**2 + orbit**2 - 2 * scan.EARTH_RADIUS * orbit * np.cos(np.radians(aside)))
     scan_angle = np.degrees(np.arccos((slant**2 + orbit**2 - scan.EARTH_RADIUS**2) / (2 * slant * orbit)))
@@ -48,7 +47,7 @@ def _lines_of_sight():
 
 
 def _places():
-    """To either side and along the track, where the sensor stands abeam."""
+    """Check places on both sides and along the track against geodesics on the sphere."""
     distance, aside = np.array([-3e5, 4e5, 1e5, -2e5]), np.array([3.0, -8.0, 0.4, 12.0])
     lon, lat, back = _SPHERE.fwd([_TRACK.longitude] * 4, [_TRACK.latitude] * 4, [_TRACK.heading] * 4, distance)
     abeam = np.array(back) + 180 + 90 * np.sign(aside)
@@ -64,7 +63,7 @@ def _places():
 
 
 def _grid():
-    """Cells of 10 km on both sides of a track, whose directions are splines."""
+    """Check directions on cells of 10 km on both sides of a track, which are splines."""
     cells, track = grids.grid_at("EPSG:26914", 680e3, 4.35e6, 40e3, 30e3, 10e3), scan.Track(39.0, -96.7, 193.0)
     view = scan_geometry("TM", cells, track)
     lon, lat = pyproj.Transformer.from_crs(26914, 4269, always_xy=True).transform(*np.meshgrid(view["x"], view["y"]))
@@ -76,7 +75,7 @@ def _grid():
 
 
 def _orbits():
-    """Velocity in space less that of the turning ground, up and down, forward and backward of a polar orbit."""
+    """Check headings by velocities in space minus the rotation of the ground, on ascending and descending orbits."""
     worst = 0.0
     for latitude, inclination, ascending in ((0.0, 98.2, True), (39.0, 98.2, False), (-50.0, 65.0, True)):
         normal = np.array([0.0, -np.sin(np.radians(inclination)), np.cos(np.radians(inclination))])
@@ -97,7 +96,7 @@ def _footprint(frame, along, across, row=30.3, column=28.7):
 
 
 def _turned():
-    """Gaussians that are turned and grown, on cells of 3.33 m, which add a twelfth of their own size."""
+    """Check the moments of turned and grown Gaussians on cells of 3.33 m, which add a twelfth of their squared size."""
     place = np.arange(60) + 0.5
     down, right = np.meshgrid(place - 30.3, place - 28.7, indexing="ij")
     centre, shape = 0.0, 0.0
@@ -118,7 +117,7 @@ def _turned():
 
 
 def _rectangle():
-    """A detector of 30 by 40 m, turned over cells of 10 m; 64 by 64 points in each of these."""
+    """Check a turned detector of 30 by 40 m over cells of 10 m, by 64 by 64 points in each cell."""
     frame = 10 * np.array([[np.cos(0.5), np.sin(0.5)], [-np.sin(0.5), np.cos(0.5)]])
     footprint = _footprint(frame, Boxcar(30.0), Boxcar(40.0), 6.3, 5.7)
     found = footprint_operator(footprint, slice(0, 12), slice(0, 12)).toarray().reshape(12, 12)
@@ -131,7 +130,7 @@ def _rectangle():
 
 
 def _straight():
-    """A quarter turn changes rows for columns; tables of the responses have steps of 1/4096."""
+    """Check that a quarter turn exchanges rows and columns; response tables have steps of 1/4096."""
     along, across = CosineSpread(30.32), Boxcar(24.0)
     operators = [
         axis_operator(
@@ -160,7 +159,7 @@ def _straight():
 
 
 def _plane():
-    """Light that rises evenly over cells of 3.33 m, and samples that lie evenly in the angle of the scan."""
+    """Check a linear ramp of light over cells of 3.33 m, for samples at equal scan angles."""
     cells = grids.grid_at("EPSG:26914", 705600.0, 4334000.0, 600.0, 500.0, 10 / 3)
     place = grids.coordinates(cells)
     light = 40 + 0.02 * (place["x"] - 705900) - 0.03 * (place["y"] - 4333750)

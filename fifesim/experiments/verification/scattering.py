@@ -1,20 +1,25 @@
-"""Checks of what scatters light: closed forms, quadratures, and tables that others computed."""
+"""Checks of scattering and of the adjacency effect: closed forms, quadratures and published tables."""
 
 from functools import partial
 
 import numpy as np
+import xarray as xr
 from numpy.polynomial.legendre import leggauss, legval, legvander
 from scipy.integrate import quad
 
-from fifesim.atmosphere.air.aerosols import aerosol_optics, aerosol_phase
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.air.molecules import DEPOLARIZATION, rayleigh_phase
-from fifesim.atmosphere.schemes import phase_expansion
-from fifesim.atmosphere.schemes.single_scattering import once_on_nodes, scattered_once
-from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
-from fifesim.base import datasets
+from fifesim.atmosphere import adjacency, adjacency_labels
+from fifesim.atmosphere import column as phase_expansion
+from fifesim.atmosphere.aerosols import aerosol_optics, aerosol_phase
+from fifesim.atmosphere.coupling import BandTerms, TargetTerms, inhomogeneous_reflectance
+from fifesim.atmosphere.engines import band_terms
+from fifesim.atmosphere.gases import DEPOLARIZATION, rayleigh_phase
+from fifesim.atmosphere.lookup import once_on_nodes, scattered_once
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
+from fifesim.base import files
 from fifesim.base.geometry import scattering_angle_cosine
 from fifesim.experiments.verification.deviations import Deviation, largest
+from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
 
 _deviation = partial(Deviation, "atmosphere")
@@ -27,7 +32,7 @@ _PURE_RAYLEIGH = np.array([[1, 0, 0, 0], [0, 0, 0, 0], [0.1, 0.6, 0, np.sqrt(6) 
 
 
 def _wigner_functions():
-    """Of the lowest degree they are known, and the others of one order and spin are orthogonal to it and each other."""
+    """Check Wigner functions: known for the lowest degree, and orthogonal for one order and spin."""
     lowest = {
         (0, 0): np.ones_like(_COSINE),
         (1, 0): -_SINE / np.sqrt(2),
@@ -47,7 +52,7 @@ def _wigner_functions():
 
 
 def _expansions():
-    """The scattering matrix of molecules is a polynomial of the second degree in the cosine."""
+    """Check the expansion of the scattering matrix of molecules, a polynomial of the second degree in the cosine."""
     anisotropy = 2 * (1 - DEPOLARIZATION) / (2 + DEPOLARIZATION)
     phase, crossed = rayleigh_phase(_COSINE), -0.75 * anisotropy * _SINE**2
     expansion = phase_expansion.rayleigh_expansion(4)
@@ -72,8 +77,10 @@ def _expansions():
 
 
 def _polarized():
-    """60 layers of even source are good to 5e-4 at a grazing view, and 1e-3 in what bright ground adds there."""
-    table = datasets.table("verification/polarized_molecules.csv")
+    """Check polarized light of molecules."""
+    # 60 layers of constant source are good to 5e-4 at a grazing view, and to 1e-3 in the contribution of bright ground
+    # there.
+    table = files.table("verification/polarized_molecules.csv")
     mu_s = table["mu_s"][0]
     black, bright = table[table["ground"] == 0], table[table["ground"] > 0]
     found = mu_s * _reflectance(black, mu_s, 0.5, 1.0, _PURE_RAYLEIGH, lambda cosine: 0.75 * (1 + cosine**2))
@@ -87,28 +94,24 @@ def _polarized():
     added = bright["intensity"].to_numpy() - dark.to_numpy()
     worst = 100 * largest(found, added, relative=True)
     yield _deviation("and over bright ground", worst, 0.12, "%", "Natraj et al. (2009)")
-    series = datasets.table("verification/spheres_expansion.csv")
+    series = files.table("verification/spheres_expansion.csv")
     coefficients = series[["beta", "alpha", "zeta", "gamma"]].to_numpy()
     moments = coefficients / (2 * series["order"].to_numpy()[:, None] + 1)
-    table = datasets.table("verification/spheres_radiance.csv")
+    table = files.table("verification/spheres_radiance.csv")
     found = 0.6 * _reflectance(table, 0.6, 1.0, 0.973527, moments, lambda cosine: legval(cosine, coefficients[:, 0]))
     yield _deviation("polarized light of spheres", largest(found, table["intensity"]), 6e-5, "1", "Siewert (2000)")
 
 
 def _reflectance(table, mu_s, tau, albedo, moments, phase):
-    """Of one layer of particles, at the view of each row."""
-    sza, (mu_v, views), (raa, azimuths) = np.degrees(np.arccos(mu_s)), _numbered(table["mu_v"]), _numbered(table["raa"])
-    vza = np.degrees(np.arccos(mu_v))
+    """Reflectance of one layer of particles at the view of each row. [1]"""
+    (mu_v, views), (raa, azimuths) = (np.unique(table[name], return_inverse=True) for name in ("mu_v", "raa"))
+    sza, vza = np.degrees(np.arccos(mu_s)), np.degrees(np.arccos(mu_v))
     cosine = scattering_angle_cosine(sza, vza[:, None], raa)
     return path_reflectance(0.0, tau, albedo, moments, phase(cosine), sza, vza, raa)[views, azimuths]
 
 
-def _numbered(values):
-    return np.unique(values, return_inverse=True)
-
-
 def _once():
-    """Also straight back. The phase function is read at quarters of a degree."""
+    """Check single scattering, exact backscatter included; the phase function is tabulated at 0.25 degrees."""
     band, worst = instrument("TM").select(["TM3"])[0].response, 0.0
     at = np.array([band.center])
     cases = ("5S", (40.0, 25.0, 130.0)), ("successive-orders", (55.0, 40.0, 20.0)), ("5S", (35.0, 35.0, 0.0))
@@ -130,3 +133,128 @@ def _both_ways(depth, mu_s, mu_v):
 
 
 CHECKS = (_wigner_functions, _expansions, _polarized, _once)
+
+
+_PATH_WEIGHTS = 0.3, 0.6  # of molecules and aerosol; a tenth is the target's own
+
+
+def _functions():
+    """Check the environment function against the published one and against 6S, the latter by its transmittances."""
+    nadir = files.table("verification/sixs_environment.csv")
+    found = adjacency.environment_function(1000 * nadir["radius"].to_numpy())
+    worst = largest(found, nadir[["molecules", "aerosol"]].to_numpy().T)
+    yield _deviation("environment function, nadir", worst, 1e-6, "1", "6SV1.1")
+    table = {name: column.to_numpy() for name, column in files.table("verification/sixs_adjacency.csv").items()}
+    up = table["diffuse_up_molecules"], table["diffuse_up_aerosol"]
+    share = adjacency.mixed_environment_function(1000 * table["radius"], table["vza"], *up)
+    without_scattering = largest(adjacency.mixed_environment_function(60.0, 0.0, 0.0, 0.0), 1.0)
+    worst = np.maximum(largest(share, table["environment_function"]), without_scattering)
+    yield _deviation("environment function, mixed", worst, 0.002, "1", "6SV1.1")
+    around = share * table["target_reflectance"] + (1 - share) * table["environment_reflectance"]
+    table["path_reflectance"] = table["path_reflectance"] / table["gas_transmittance"]
+    terms = TargetTerms(*(table[name] for name in TargetTerms._fields))
+    found = inhomogeneous_reflectance(table["target_reflectance"], around, terms)
+    worst = largest(found, table["toa_reflectance"])
+    yield _deviation("round target, apparent reflectance", worst, 0.002, "1", "6SV1.1")
+
+
+def _density(radius):
+    """Density of the environment at nadir: derivative of the published function over the circumference. [m-2]"""
+    r = radius / 1000
+    molecules = 0.930 * 0.080 * np.exp(-0.080 * r) + 0.070 * 1.10 * np.exp(-1.10 * r)
+    aerosol = 0.448 * 0.27 * np.exp(-0.27 * r) + 0.552 * 2.83 * np.exp(-2.83 * r)
+    return (_PATH_WEIGHTS[0] * molecules + _PATH_WEIGHTS[1] * aerosol) / 1000 / (2 * np.pi * radius)
+
+
+def _point_spread():
+    """Check the point spread by quadrature; the cell of the target is integrated by angle."""
+    # Beyond the eighth cell, edges have fewer nodes.
+    (down, across), (nodes, weights) = (60.0, 75.0), leggauss(40)
+    found = adjacency.point_spread((13, 31), (down, across), 0.0, *_PATH_WEIGHTS)
+    worst = 0.0
+    for row, column in ((0, 1), (1, 0), (1, 1), (3, 2), (9, 0), (12, 30)):
+        radius = np.hypot(((row + nodes / 2) * down)[:, None], (column + nodes / 2) * across)
+        expected = weights @ _density(radius) @ weights * down * across / 4
+        worst = np.maximum(worst, largest(found[row, column], expected, relative=True))
+    own, corner = 1 - sum(_PATH_WEIGHTS), np.arctan2(down, across)
+    for low, high, edge in ((0, corner, lambda a: across / np.cos(a)), (corner, np.pi / 2, lambda a: down / np.sin(a))):
+        molecules, aerosol = adjacency.environment_function(edge(low + (high - low) * (nodes + 1) / 2) / 2)
+        own += weights @ (_PATH_WEIGHTS[0] * molecules + _PATH_WEIGHTS[1] * aerosol) * (high - low) / np.pi
+    worst = np.maximum(worst, largest(found[0, 0], own, relative=True))
+    yield _deviation("point spread of the environment", worst, 1e-7, "1", "Tanre et al. (1981), quadrature")
+
+
+def _raster(values, cell, west=700_020.0, north=4_330_020.0):
+    """Labelled raster in UTM; 60 m are a block, and 699 960 and 4 330 020 are whole multiples of it."""
+    grid = grids.grid_at("EPSG:26914", west, north, values.shape[-1] * cell, values.shape[-2] * cell, cell)
+    return grids.place(xr.DataArray(values, dims=("band", "y", "x"), name="surface_reflectance"), grid)
+
+
+def _scene():
+    """Raster of 19 x 23 cells of 20 m with a hole, which starts inside a block of 3 x 3 cells."""
+    values = np.random.default_rng(1).random((1, 19, 23)) * 0.6
+    values[0, 4:9, 10:14] = np.nan
+    return _raster(values, 20.0, west=700_000.0, north=4_330_000.0)
+
+
+def _direct_sums():
+    scene, far, vza = _scene(), 0.2, 40.0
+    found = adjacency_labels.environment(scene.chunk(y=8, x=10), *_PATH_WEIGHTS, vza, surroundings=far)[0]
+    first = grids.lattice_position(grids.geobox(scene))
+    places = [start + np.arange(size) for start, size in zip(first, scene.shape[1:], strict=True)]
+    rows, columns = (np.arange(place[0] // 3 - 1, place[-1] // 3 + 2) for place in places)
+    spread = adjacency.point_spread((30, 30), (60.0, 60.0), vza, *_PATH_WEIGHTS)
+    total, missing = np.zeros((rows.size, columns.size)), np.zeros((rows.size, columns.size))
+    for (i, j), value in np.ndenumerate(scene.values[0]):
+        seen = spread[np.abs(rows - places[0][i] // 3)[:, None], np.abs(columns - places[1][j] // 3)] / 9
+        total += 0.0 if np.isnan(value) else seen * (value - far)
+        missing += seen * np.isnan(value)
+    around = far + total / (1 - missing)
+    # Linear between the middles of blocks.
+    down = np.array([np.interp((places[0] - 1) / 3, rows, each) for each in around.T])
+    expected = np.array([np.interp((places[1] - 1) / 3, columns, each) for each in down.T])
+    yield _deviation("environment of cells", largest(found, expected), 1e-12, "1", "sum over cells one by one")
+
+
+def _part_of_a_scene():
+    """Check that a part of a scene, with the rest as surroundings, has the environment of the whole."""
+    whole = _raster(np.random.default_rng(2).random((1, 60, 72)) * 0.6, 20.0, west=699_960.0)
+    far, inside = float(whole.mean()), {"y": slice(21, 45), "x": slice(12, 54)}
+    expected = adjacency_labels.environment(whole, *_PATH_WEIGHTS, 0.0, surroundings=far).isel(inside)
+    found = adjacency_labels.environment(whole.isel(inside), *_PATH_WEIGHTS, 0.0, surroundings=whole)
+    yield _deviation("environment of a part of a scene", largest(found, expected), 1e-12, "1", "that of the whole")
+
+
+def _discs():
+    """Check discs against 6S by its transmittances; the middle of each disc is the centre of a block of 60 m."""
+    table = files.table("verification/sixs_adjacency.csv").query("0.3 <= radius <= 1.5").iloc[::5]
+    worst = 0.0
+    for row in table.itertuples():
+        half = int(row.radius * 1000 / 20) + 7
+        centre = np.arange(-half, half + 1) * 20.0
+        inside = np.hypot(centre[:, None], centre) < 1000 * row.radius
+        values = np.where(inside, row.target_reflectance, row.environment_reflectance)[None]
+        disc = _raster(values, 20.0, west=700_050.0 - 20.0 * half - 10.0, north=4_330_050.0 + 20.0 * half + 10.0)
+        terms = BandTerms(**{name: np.array([getattr(row, name, np.nan)]) for name in BandTerms._fields})
+        terms = terms._replace(
+            path_reflectance=terms.path_reflectance / terms.gas_transmittance,
+            transmittance_up=terms.direct_transmittance_up + row.diffuse_transmittance_up,
+        )
+        found = adjacency_labels.apparent_reflectance_of_scene(disc, terms, row.vza, row.environment_reflectance)
+        worst = np.maximum(worst, abs(float(found[0, half, half]) - row.toa_reflectance))
+    yield _deviation("middle of a disc of cells", worst, 0.001, "1", "6SV1.1")
+
+
+def _there_and_back():
+    """Check that simulation and correction are inverse; the environment is solved to 1e-12."""
+    scene, worst = _scene(), 0.0
+    bands = instrument("TM").select(["TM1"])
+    terms = band_terms(Atmosphere(visibility=10.0), [band.response for band in bands], 40.0, 30.0, 60.0)
+    for surroundings in (None, 0.3):
+        toa = adjacency_labels.apparent_reflectance_of_scene(scene, terms, 30.0, surroundings)
+        back = adjacency_labels.corrected_reflectance_of_scene(toa, terms, 30.0, surroundings)
+        worst = np.maximum(worst, largest(back.fillna(-1.0), scene.fillna(-1.0)))
+    yield _deviation("scene with adjacency, there and back", worst, 1e-10, "1", "theory")
+
+
+ADJACENCY_CHECKS = (_functions, _point_spread, _direct_sums, _part_of_a_scene, _discs, _there_and_back)

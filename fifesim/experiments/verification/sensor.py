@@ -1,4 +1,4 @@
-"""Checks of the sensor: images by the quadrature of a line spread, calibration, bands and noise."""
+"""Checks of the sensor: images by quadrature, line spreads, calibration, bands and noise."""
 
 from functools import partial
 from itertools import product
@@ -6,18 +6,106 @@ from itertools import product
 import numpy as np
 import xarray as xr
 from scipy.integrate import quad, trapezoid
+from scipy.signal import butter, freqs
+from scipy.stats import norm
 
-from fifesim.base.bands import NEAR_INFRARED, RED, Band, nearest, solar_irradiance_steps, solar_spectrum
+from fifesim.base.bands import NEAR_INFRARED, RED, Band, nearest_band, solar_irradiance_steps, solar_spectrum
 from fifesim.base.footprints import axis_operator, regularize
+from fifesim.base.line_spread import Boxcar
 from fifesim.experiments.verification.deviations import Deviation, integral, largest
-from fifesim.rasters import grid as grids
-from fifesim.rasters.regularization import areas, regularized
+from fifesim.grids import grid as grids
+from fifesim.grids.reductions import areas, regularized
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.response import calibration
 from fifesim.sensor.response.noise import NoiseModel, add_noise, fixed_pattern, line_noise
-from fifesim.sensor.response.spatial import CosineSpread
+from fifesim.sensor.response.spatial import (
+    CosineSpread,
+    Diffraction,
+    GaussianSpread,
+    LowPass,
+    SystemSpread,
+    TableSpread,
+)
 
 _deviation = partial(Deviation, "sensor")
+
+_TABLE = (-31.0, -12.5, 4.0, 38.0), (0.0, 0.4, 1.0, -0.1)
+_EVEN = (-21.0, -9.0, 9.0, 21.0)
+
+
+def _trapezoid(x):
+    return np.minimum((21.0 - np.abs(x)) / 12.0, 1.0)
+
+
+# Line spread, density by its definition, kinks of the density, and bound: a Gaussian is cut, and a product is a table
+# that rounds its kinks.
+_SHAPES = {
+    "cosine": (CosineSpread(30.0), lambda x: np.cos(2 * np.pi * x / 90.0), (-15.0, 15.0), 1e-9),
+    "boxcar": (Boxcar(30.0), lambda x: 1.0 + 0 * x, (-15.0, 15.0), 1e-9),
+    "Gaussian": (GaussianSpread(33.0), lambda x: 2.0 ** -((2 * x / 33.0) ** 2), (-85.0, 0.0, 85.0), 1e-8),
+    "uneven table": (TableSpread(*_TABLE), lambda x: np.interp(x, *_TABLE), _TABLE[0], 1e-9),
+    "even table": (TableSpread(_EVEN, (0.0, 1.0, 1.0, 0.0)), _trapezoid, _EVEN, 1e-9),
+    "two boxcars": (SystemSpread((Boxcar(30.0), Boxcar(12.0)), 1e-9), _trapezoid, _EVEN, 2e-5),
+}
+
+
+def _transform(density, kinks, frequency):
+    """Fourier transform of a density."""
+    turn = 2 * np.pi * frequency
+    even = integral(lambda x: density(x) * np.cos(turn * x), kinks)
+    return even - 1j * integral(lambda x: density(x) * np.sin(turn * x), kinks)
+
+
+def _shapes():
+    """Check shares and transfer functions of each shape, and that the support holds the whole response."""
+    ends = 0.0
+    for name, (spread, density, kinks, bound) in _SHAPES.items():
+        whole = integral(density, kinks)
+        shares = [integral(density, [*(k for k in kinks if k < x), x]) / whole for x in (-14.0, 3.0, 14.5)]
+        transfers = np.array([_transform(density, kinks, f) for f in (1 / 200, 1 / 60, 1 / 23)]) / whole
+        # The modulus, where the response is not even.
+        transfers = np.abs(transfers) if name == "uneven table" else transfers.real
+        found = [*spread.cumulative([-14.0, 3.0, 14.5]), *spread.mtf([1 / 200, 1 / 60, 1 / 23])]
+        worst = largest(found, [*shares, *transfers])
+        yield _deviation(f"line spread and transfer, {name}", worst, bound, "1", "its density, quadrature")
+        reach = spread.half_width
+        ends = np.maximum(ends, largest(spread.cumulative([-reach - 1, -reach, reach, reach + 1]), [0, 0, 1, 1]))
+    yield _deviation("line spreads between their ends", ends, 1e-12, "1", "theory")
+
+
+def _parts():
+    """Check the transfer of an aperture by its self-overlap, of a filter by its poles, and of two Gaussians by one."""
+    nu = np.array([0.0, 0.2, 0.55, 0.9, 1.3])
+    overlap = [4 / np.pi * quad(lambda t: np.sqrt(1 - t * t), min(each, 1), 1)[0] for each in nu]
+    worst = largest(Diffraction(0.4).mtf(-0.4 * nu), overlap)
+    yield _deviation("transfer of an aperture", worst, 1e-9, "1", "overlap of two disks, quadrature")
+    frequency = np.array([0.001, 0.01, 0.03])
+    poles = [abs(freqs(*butter(n, 0.01, analog=True), frequency)[1]) for n in (1, 3)]
+    worst = largest([LowPass(0.01, n).mtf(frequency) for n in (1, 3)], poles)
+    yield _deviation("transfer of electronics", worst, 1e-12, "1", "poles, scipy.signal")
+    system = SystemSpread((Diffraction(0.5), GaussianSpread(3.0)), 2e-3)
+    tail = 4 / (np.pi**3 * 0.5 * system.half_width)
+    worst = 100 * largest(system.truncated_share, tail, relative=True)
+    yield _deviation("share of an aperture's response cut off", worst, 2.0, "%", "Struve's asymptote")
+    both = SystemSpread((GaussianSpread(30.0), GaussianSpread(40.0)), 1e-6)
+    x = np.linspace(-60.0, 60.0, 13)
+    worst = largest(both.cumulative(x), norm.cdf(x, scale=50.0 / np.sqrt(8 * np.log(2))))
+    yield _deviation("line spread of two Gaussians", worst, 1e-5, "1", "their variances add")
+
+
+def _instruments():
+    """Check angles on the ground, and a measured transfer: 40.8 m is half of the period with a transfer of one half."""
+    tm, measured = instrument("TM"), instrument("L4TM").line_spread
+    angles = tm.line_spread.width / (9 * 4.778e-6 * 705e3), tm.ground_interval / (43e-6 * 705e3)
+    found = [*angles, measured.mtf(0.5 / 40.8) / 0.5]
+    yield _deviation("TM's line spread on the ground", largest(found, 1), 1e-4, "1", "Schowengerdt et al. (1985)")
+    at_nyquist = GaussianSpread.from_mtf(0.3, 30.0)
+    worst = largest(at_nyquist.mtf(1 / 60), 0.3)
+    yield _deviation("Gaussian of a given transfer", worst, 1e-12, "1", "its definition")
+
+
+LINE_SPREAD_CHECKS = (_shapes, _parts, _instruments)
+
 
 _WIDTH = 9 * 4.778e-6 * 705e3  # of TM's line spread [m]
 _PIXEL = 30.0
@@ -25,7 +113,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(40)
 
 
 def _integral(low, high, frequency=0.0):
-    """Integral of the normalized line spread times a cosine wave, from low to high [m] around the pixel's centre."""
+    """Integral of the normalized line spread function times a cosine, from low to high around the centre [m]."""
     low, high = np.clip([low, high], -_WIDTH / 2, _WIDTH / 2)
     middle, half = (low + high) / 2, (high - low) / 2
     x = middle[..., None] + half[..., None] * _NODES
@@ -47,7 +135,7 @@ def _axis(cell, cells, pixels, origin):
 
 
 def _impulse():
-    """One bright cell among those of 30/9 m, on pixels that are offset by 7 m."""
+    """Check the image of one bright cell of 30/9 m on pixels with an offset of 7 m."""
     cell, origin, bright = 30 / 9, 37.123, (31, 26)
     scene = np.zeros((70, 70))
     scene[bright] = 1.0
@@ -59,7 +147,7 @@ def _impulse():
 
 
 def _wave():
-    """Cells of 5 mm hold means; the two that the ends of the support cut lose 3e-8."""
+    """Check the image of a wave on cells of 5 mm; the two cells at the ends of the support cost 3e-8."""
     cell, cells = 5e-3, 30_000
     single = _axis(_WIDTH, 1, 1, (_WIDTH - _PIXEL) / 2)
     columns = _axis(cell, cells, 2, 37.3)
@@ -92,7 +180,7 @@ def _constant():
 
 
 def _holes():
-    """Pixels that reach beyond the cells on every side, moved by shifts down and to the right, over cells in chunks."""
+    """Check shifted pixels that reach beyond the cells on every side, over cells in chunks with holes."""
     cells = grids.grid_at("EPSG:26914", 705600.0, 4334000.0, 300.0, 250.0, 10 / 3)
     pixels = grids.grid_at("EPSG:26914", 705572.0, 4334019.0, 360.0, 300.0, _PIXEL)
     scene = np.random.default_rng(3).uniform(1, 2, tuple(cells.shape))
@@ -108,17 +196,17 @@ def _holes():
 
 
 def _blocks():
-    """Edges of pixels are edges of cells, but for rounding: thirds of 3.3 m leave dust in the cells before them."""
+    """Check block means where pixel edges equal cell edges except for rounding, as with thirds of 3.3 m."""
     cells = grids.grid_at("EPSG:26914", 705500.0, 4334000.0, 198.0, 148.5, 1.1)
     values = np.random.default_rng(1).uniform(1, 2, tuple(cells.shape))
-    pixels = grids.aligned(cells, 3.3)
+    pixels = grids.aligned_grid(cells, 3.3)
     image = regularized(grids.place(xr.DataArray(values, dims=("y", "x")), cells), areas(pixels), pixels, min_valid=1.0)
     worst = largest(image, values.reshape(45, 3, 60, 3).mean(axis=(1, 3)))
     yield _deviation("means over blocks of cells", worst, 1e-12, "1", "numpy")
 
 
 def _counts():
-    """Rounding to the nearest count, of 8 bits as TM's and of 12."""
+    """Check quantization with 8 and 12 bits, within half a count."""
     worst = 0.0
     for band, bits in product(instrument("TM").bands, (8, 12)):
         gain, offset = calibration.gain_offset(band.full_scale_radiance, band.min_radiance, bits)
@@ -130,7 +218,7 @@ def _counts():
 
 
 def _radiances():
-    """Counts by hand; and what a Lambertian surface sends into all directions is what it reflects."""
+    """Check the radiance of counts by hand, and that a Lambertian surface reflects as much as it radiates."""
     gain, offset = calibration.gain_offset(204.3, -1.2, 8)
     found = calibration.dn_to_radiance([1, 100, 255], gain, offset)
     worst = largest((found + 1.2) * 255 / 205.5, [1, 100, 255])
@@ -145,7 +233,7 @@ def _radiances():
 
 
 def _bands():
-    """A broken line over a rectangle, a curve over a triangle on nodes of 1 nm, and the sun in steps."""
+    """Check band means: a broken line over a rectangle, a curve over a triangle on nodes of 1 nm, and solar steps."""
     coarse, values = np.linspace(0.4, 0.9, 6), np.array([3.0, 1.0, 4.0, 1.5, 9.0, 2.6])
     found = Band("box", (0.55, 0.73), (2.0, 2.0)).mean(values, coarse)
     expected = integral(lambda x: np.interp(x, coarse, values), (0.55, 0.6, 0.7, 0.73)) / 0.18
@@ -169,23 +257,23 @@ def _bands():
 
 
 def _ndvi_bands():
-    """By the names that the agencies give."""
+    """Check that red and near infrared are the bands that the agencies name so."""
     expected = {"TM": ("TM3", "TM4"), "OLI": ("OLI4", "OLI5"), "MSI": ("MSI4", "MSI8"), "MODIS": ("MODIS1", "MODIS2")}
-    wrong = nearest([0.5, 0.72], RED) is not None
+    wrong = nearest_band([0.5, 0.72], RED) is not None
     for name, pair in expected.items():
         bands = instrument(name).bands
-        found = [nearest([band.wavelength for band in bands], window) for window in (RED, NEAR_INFRARED)]
+        found = [nearest_band([band.wavelength for band in bands], window) for window in (RED, NEAR_INFRARED)]
         wrong += tuple(bands[number].name for number in found) != pair
     yield _deviation("red and near infrared of four instruments", wrong, 0, "1", "their makers")
 
 
 def _grey(level, shape, model, kinds, **place):
-    """Image of a grey scene."""
+    """Noisy image of a uniform scene."""
     return add_noise(np.full(shape, level), model, kinds, **({"seed": 5, "band": 2, "row": -7, "column": 3000} | place))
 
 
 def _noise():
-    """Four standard errors of 120 000 pixels, whose variance is linear in the light between two published ratios."""
+    """Check noise on 120 000 pixels within four standard errors; its variance is linear between two ratios."""
     model = NoiseModel.from_snr([50.0, 200.0], [100.0, 250.0])
     kinds, shape = ("shot", "thermal"), (300, 400)
     noise, thermal = _grey(80.0, shape, model, kinds) - 80.0, _grey(80.0, shape, model, ("thermal",)) - 80.0
@@ -203,7 +291,7 @@ def _noise():
 
 
 def _detectors():
-    """The equation of a detector by its draws; and twenty thousand of them, within four standard errors."""
+    """Check the detector equation by its draws, and 20 000 detectors within four standard errors."""
     kinds, window = ("shot", "thermal", "fixed-pattern"), 0.0
     for along in ("rows", "columns"):
         model = NoiseModel(0.3, 0.01, 16, 0.01, 0.2, along)

@@ -1,19 +1,143 @@
-"""Checks of the terrain on surfaces whose slope, sky and light are known."""
+"""Checks of terrain and elevation on surfaces and equations with known solutions."""
 
 from functools import partial
 from itertools import product
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph, linalg
 
 from fifesim.base.geometry import Geometry
-from fifesim.experiments.verification import elevation
 from fifesim.experiments.verification.deviations import Deviation, largest
-from fifesim.ground.terrain import horizon
+from fifesim.ground.terrain import flint_hills, horizon, spline
 from fifesim.ground.terrain import lit_slopes as lights
-from fifesim.ground.terrain import sky as skies
 from fifesim.ground.terrain import slope as terrain
 
 _deviation = partial(Deviation, "terrain")
+
+_NEIGHBOURS = [(down, across) for down in (-1, 0, 1) for across in (-1, 0, 1) if down or across]
+
+
+def _upsampling():
+    """Check spline upsampling, which loses 2e-4 of waves of six cells, and less of longer ones."""
+    rows, columns = np.mgrid[:100, :90]
+    y, x = 40 + np.arange(90) / 9, 38 + np.arange(80) / 9
+    worst = 0.0
+    for turn in (0.0, 30.0, 45.0):
+        u, v = 2 * np.pi / 6 * np.cos(np.radians(turn)), 2 * np.pi / 6 * np.sin(np.radians(turn))
+        wave, coefficients = np.sin(u * x + v * y[:, None]), spline.spline_coefficients(np.sin(u * columns + v * rows))
+        found = [
+            spline.spline_grid(coefficients, y, x),
+            spline.spline_points(coefficients, *np.meshgrid(y, x, indexing="ij")),
+            spline.spline_of_tiles(lambda i, j, of=coefficients: of[10 * i :, 10 * j :][:10, :10], 10, y, x),
+        ]
+        worst = np.maximum(worst, largest(found, wave))
+    yield _deviation("wave of six cells, nine times finer", worst, 2e-4, "1", "the wave itself")
+
+
+def _unknown_cells():
+    """Check filled gaps up to the largest size; the second differences of a paraboloid balance everywhere."""
+    rows, columns = np.mgrid[:60, :70]
+    plane = 400.0 + 3.0 * columns - 2.0 * rows
+    bent = plane + 0.05 * columns**2 - 0.03 * rows**2 + 0.04 * rows * columns
+    holed = bent.copy()
+    holed[20:29, 30:39], holed[40, 50], holed[43:47, 47:53] = np.nan, np.nan, np.nan
+    yield _deviation("paraboloid in its holes", largest(spline.fill_gaps(holed, (4, 4)), bent), 1e-8, "m", "paraboloid")
+    cut = np.full(plane.shape, np.nan)
+    cut[15:45, 20:50] = plane[15:45, 20:50]
+    carried = spline.extend(cut, 12, rest=False)
+    reached = np.isfinite(carried)
+    worst = largest(carried[reached], plane[reached]) if reached[3:57, 8:62].all() else np.nan
+    yield _deviation("plane past its edge", worst, 1e-8, "m", "plane")
+
+
+def _drainage(ground, preference, node):
+    """Steepest descent: the nodes that drain, the nodes to which they drain, and the distances."""
+    index, middle = np.arange(ground.size).reshape(ground.shape), (slice(1, -1),) * 2
+    lengths = np.array([node * np.hypot(*step) for step in _NEIGHBOURS])
+    falls, others = [], []
+    for (down, across), length, liked in zip(_NEIGHBOURS, lengths, preference, strict=True):
+        there = np.roll(ground, (-down, -across), (0, 1))[middle], np.roll(index, (-down, -across), (0, 1))[middle]
+        falls.append((ground[middle] - there[0]) / length * liked.reshape(ground.shape)[middle])
+        others.append(there[1])
+    steepest = np.argmax(falls, axis=0)[None]
+    falls, others = (np.take_along_axis(np.array(each), steepest, 0)[0] for each in (falls, others))
+    drains = falls > 0
+    return index[middle][drains], others[drains], lengths[steepest[0]][drains]
+
+
+def _areas(ground, drained, node):
+    """Area that drains through each node, by a system of linear equations."""
+    here, there, _ = drained
+    given = sparse.csc_array((np.ones(there.size), (there, here)), shape=(ground.size, ground.size))
+    return linalg.spsolve((sparse.eye_array(ground.size) - given).tocsc(), np.full(ground.size, node**2))
+
+
+def _eroded(ground, erodibility, preference, law):
+    """One unit of time of erosion, with sparse systems for areas and for implicit stream power."""
+    ground, step = ground.copy(), 1 / law.steps
+    parts = int(law.creep * step / law.node**2 / 0.2) + 1
+    for _ in range(law.steps):
+        drained = here, there, way = _drainage(ground, preference, law.node)
+        rate = step * erodibility.ravel()[here] * _areas(ground, drained, law.node)[here] ** law.area_exponent / way
+        places = np.tile(here, 2), np.concatenate([here, there])
+        cut = sparse.csc_array((np.concatenate([rate, -rate]), places), shape=(ground.size, ground.size))
+        ground = linalg.spsolve((sparse.eye_array(ground.size) + cut).tocsc(), ground.ravel()).reshape(ground.shape)
+        for _ in range(parts):
+            bent = sum(np.roll(ground, shift, axis) for shift in (-1, 1) for axis in (0, 1)) - 4 * ground
+            risen = ground + law.creep * step / parts * bent / law.node**2 + law.uplift * step / parts
+            ground[1:-1, 1:-1] = risen[1:-1, 1:-1]
+    return ground
+
+
+def _ways():
+    rng, size = np.random.default_rng(2), 21
+    cost, index = rng.uniform(0.5, 3.0, (size, size)), np.arange(size**2).reshape(size, size)
+    links = []
+    for down, across in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        here = index[: size - down, max(-across, 0) : size - max(across, 0)].ravel()
+        there = here + down * size + across
+        links.append((here, there, np.hypot(down, across) * (cost.ravel()[here] + cost.ravel()[there]) / 2))
+    here, there, length = np.concatenate(links, axis=1)
+    graph = sparse.csr_array((length, (here.astype(int), there.astype(int))), shape=(size**2, size**2))
+    border = np.setdiff1d(index, index[1:-1, 1:-1])
+    least = csgraph.dijkstra(graph, directed=False, indices=border, min_only=True).reshape(size, size)
+    worst = largest(flint_hills.least_ways(cost), least)
+    yield _deviation("least ways to a river", worst, 1e-12, "1", "Dijkstra (1959)")
+
+
+def _erosion():
+    """Check erosion of a small upland step by step, and that everything above base level is cut in the long run."""
+    rng, size, node = np.random.default_rng(2), 21, 30.0
+    start = 300 + 20 * rng.uniform(0.5, 3.0, (size, size))
+    rock, liked = rng.uniform(0.02, 0.1, start.shape), rng.uniform(0.8, 1.2, (8, start.size))
+    law = flint_hills.StreamPower(steps=4, area_exponent=0.519, uplift=40.0, creep=900.0, node=node)
+    found = flint_hills.erode(start, rock, liked, law)
+    worst = largest(found, _eroded(start, rock, liked, law))
+    yield _deviation("hills step by step", worst, 1e-9, "m", "sparse systems")
+    start, rock = 300 + flint_hills.least_ways(np.ones(start.shape)), 1e4 * rock
+    steady = flint_hills.erode(start, rock, np.ones_like(liked), law._replace(steps=20, creep=0.0))
+    steady[1:-1, 1:-1] -= 40.0 / 20
+    drained = here, there, way = _drainage(steady, np.ones_like(liked), node)
+    fall = (steady.ravel()[here] - steady.ravel()[there]) / way
+    cut = rock.ravel()[here] * _areas(steady, drained, node)[here] ** 0.519 * fall
+    yield _deviation("steady valleys cut what rises", largest(cut / 40, 1), 1e-9, "1", "law of stream power")
+
+
+def _hills():
+    """Check elevations at quantiles against a survey, and the variance of noise within four standard errors."""
+    eroded = np.array([322.1, 398.9, 506.3, 751.0, 923.6, 1035.7, 1087.9, 1097.7, 1108.3])
+    surveyed = np.array([334.0, 341.0, 352.0, 379.0, 400.0, 412.0, 434.0, 440.0, 443.5])
+    beyond = flint_hills.hypsometry(np.array([312.1, 1118.3])) - [334.0, 443.5]
+    worst = np.maximum(largest(flint_hills.hypsometry(eroded), surveyed), largest(beyond, [-2.0, 2.0]))
+    yield _deviation("quantiles of elevation", worst, 1e-9, "m", "Kings Creek, USGS 3DEP; lines beyond")
+    at = np.arange(900) * 2.5
+    noise = spline.smooth_noise(1, 5, 5.0, at, at)
+    yield _deviation("variance of smooth noise", abs(np.mean(noise**2) - 1), 0.015, "1", "B-spline of degree 11")
+
+
+ELEVATION_CHECKS = (_upsampling, _unknown_cells, _ways, _erosion, _hills)
+
 
 _PLANES = tuple((slope, aspect) for slope in (0.5, 12.0, 45.0, 75.0) for aspect in (0.0, 37.0, 135.0, 201.5, 359.0))
 
@@ -26,10 +150,10 @@ def _plane(slope, aspect, shape=(7, 9)):
 
 
 def _sky_view(slope, aspect, zenith):
-    """Of a slope under a horizon that is known from north on."""
+    """Sky view of a slope below a horizon given from north on. [1]"""
     steep, azimuth = np.tan(np.radians(slope)), np.radians(aspect)
     tangents, directions = horizon.tangent(zenith), horizon.azimuths(len(zenith))
-    return skies.sky_view(tangents, directions, -steep * np.sin(azimuth), -steep * np.cos(azimuth))
+    return horizon.horizon_sky_view(tangents, directions, -steep * np.sin(azimuth), -steep * np.cos(azimuth))
 
 
 def _vector(zenith, azimuth):
@@ -38,7 +162,8 @@ def _vector(zenith, azimuth):
 
 
 def _slopes():
-    """Elevations of 1000 m leave 1e-13 m, and the gentlest slope makes that 1e-10 degree. An edge may be unknown."""
+    """Check slopes and aspects of planes; an edge may be unknown."""
+    # Elevations of 1000 m have errors of 1e-13 m, which are 1e-10 degrees on the gentlest slope.
     worst = np.zeros(2)
     for edge in (np.s_[9:], np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1]):
         for slope, aspect in _PLANES:
@@ -55,7 +180,8 @@ def _slopes():
 
 
 def _skies():
-    """A horizon is known in 32 directions, and is a great circle between them: half a percent in a valley."""
+    """Check sky views."""
+    # A horizon is known in 32 directions and is a great circle between them: half a percent in a valley.
     slopes = np.array([0.0, 5.0, 30.0, 60.0])
     wide = [_sky_view(slope, 100.0, np.full(32, 90.0)) for slope in slopes]
     analytic = (1 + np.cos(np.radians(slopes))) / 2
@@ -72,7 +198,7 @@ def _skies():
 
 
 def _valley_of_cells():
-    """Walls of 20 degrees and 300 m that end at a level upland: the floor, and half way up."""
+    """Check a valley with walls of 20 degrees and 300 m below a level upland, on the floor and half way up."""
     wall, half, cell, reach = np.radians(20.0), 30, 10.0, 1000.0
     x = (np.arange(6 * half + 1) - 3 * half) * cell
     ground = np.broadcast_to(np.minimum(np.abs(x), half * cell) * np.tan(wall), (5, x.size))
@@ -89,7 +215,7 @@ def _valley_of_cells():
 
 
 def _any_sky():
-    """Horizons of any shape, and slopes that rise above them; the midpoint rule meets kinks of the horizon."""
+    """Check sky views for horizons of any shape and slopes above them, by the midpoint rule, which meets kinks."""
     rng = np.random.default_rng(5)
     phi, step = (np.arange(40_000) + 0.5) * 2 * np.pi / 40_000, 2 * np.pi / 24
     first, part = (phi // step).astype(int), phi % step
@@ -106,7 +232,7 @@ def _any_sky():
 
 
 def _horizons():
-    """A plane rises alike in all samples of a ray, as far as they reach; a ridge is straight between two directions."""
+    """Check horizons on a plane, for any sample of a ray, and on a ridge, which is straight between directions."""
     worst = 0.0
     for slope, aspect in ((35.0, 210.0), (5.0, 17.0)):
         directions = 3.0 + horizon.azimuths(32)
@@ -115,15 +241,13 @@ def _horizons():
         found = horizon.horizon_tangent(_plane(slope, aspect, (2 * m + 2, 2 * n + 2)), 20.0, 30.0, directions, 1500.0)
         worst = np.maximum(worst, largest(found, np.maximum(rise, 0.0)[:, None, None]))
         for azimuth in (0.0, 33.3, 351.0):
-            toward = horizon.horizon_toward(rise, directions, azimuth)
-            worst = np.maximum(
-                worst, largest(toward, -np.tan(np.radians(slope)) * np.cos(np.radians(azimuth - aspect)))
-            )
+            expected = -np.tan(np.radians(slope)) * np.cos(np.radians(azimuth - aspect))
+            worst = np.maximum(worst, largest(horizon.horizon_toward(rise, directions, azimuth), expected))
     yield _deviation("horizon of planes in all directions", worst, 1e-8, "1", "plane")
 
 
 def _uneven_skies():
-    """Sky and horizon toward the sun of 22 x 26 cells, and at places: such that rise evenly, and those of one place."""
+    """Check sky and horizon toward the sun on 22 x 26 cells and at places, with linear and with uniform fields."""
     row, column = np.mgrid[:22, :26]
     at, along = row[:, 0], column[0]
     vector = np.array(
@@ -132,18 +256,15 @@ def _uneven_skies():
     tangent = 0.2 + 0.031 * row + 0.017 * column
     before, beside = np.clip((at - 3) // 6, 0, 2), np.clip((along - 4) // 7, 0, 2)
     layers = np.concatenate([vector, tangent[None]])
-    yield (
-        vector,
-        tangent,
-        lights.Sky(layers[:, 3::6, 4::7], before, (at - 3) / 6 - before, beside, (along - 4) / 7 - beside),
-    )
+    sky = lights.Sky(layers[:, 3::6, 4::7], before, (at - 3) / 6 - before, beside, (along - 4) / 7 - beside)
+    yield vector, tangent, sky
     vector, wall = np.full(vector.shape, 0.2), np.full(row.shape, np.inf)
     layers = np.concatenate([vector, wall[None]])
     yield vector, wall, lights.Sky(layers[:, :1, :1], 0 * at, np.zeros(22), 0 * along, np.zeros(26))
 
 
 def _light():
-    """Sun by the cosine of its angle, an uneven sky by its share, the land by what a slope sees; a cell is missing."""
+    """Check light on slopes: sun by its cosine, sky by its vector, land by the visible share; one cell is missing."""
     geometry, cell = Geometry(50.0, 110.0, 35.0, 300.0), (20.0, 30.0)
     sun, sensor = _vector(50.0, 110.0), _vector(35.0, 300.0)
     direct, total = np.array([0.55, 0.3])[:, None, None], np.array([0.8, 0.7])[:, None, None]
@@ -171,7 +292,7 @@ def _light():
 
 
 def _shadow():
-    """The edge of a shadow is known to a cell; the cliff is seen from as far as the reach."""
+    """Check the edge of a shadow to one cell, and that a cliff is seen up to the reach."""
     cliff = np.where(np.arange(120) < 60, 0.0, 20.0) * np.ones((3, 1))
     m, n = horizon.horizon_margin(2.0, 2.0, 120.0)
     padded = np.pad(cliff, ((m, m), (n, n)), mode="edge")
@@ -184,4 +305,4 @@ def _shadow():
     yield _deviation("length of its shadow", worst, 2.0, "m", "20 m / tan(elevation)")
 
 
-CHECKS = (_slopes, _skies, _any_sky, _valley_of_cells, _horizons, _light, _shadow, *elevation.CHECKS)
+CHECKS = (_slopes, _skies, _any_sky, _valley_of_cells, _horizons, _light, _shadow, *ELEVATION_CHECKS)

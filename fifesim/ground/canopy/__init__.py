@@ -1,1 +1,1 @@
-"""Light in leaves and on what lies below them."""
+"""Radiative transfer in leaves and canopies, and the background below them."""

@@ -1,22 +1,19 @@
-"""Leaves in crowns with gaps between: what sun and observer see of a clumped canopy."""
+"""Leaves in crowns with gaps between them: reflectance of a clumped canopy."""
 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
-from fifesim.ground.canopy.background import over_background
-from fifesim.ground.canopy.hot_spot import apart
-from fifesim.ground.canopy.leaf_area import LARGEST_LAI
-from fifesim.ground.canopy.ranges import check_share
+from fifesim.ground.canopy.leaf_area import LARGEST_LAI, check_share
+from fifesim.ground.canopy.sail_model import direction_distance, over_background
 
 SHAPE = 1.0
 """Crown diameter over height of round crowns [1]."""
 
 
 class CrownShares(NamedTuple):
-    """Shares of the ground, each 1 where crowns cover all of it. [1]"""
+    """Shares of the ground covered by crowns, each 1 for full cover. [1]"""
 
     cover: np.ndarray
     """Below crowns, by the vertical: Cv."""
@@ -34,7 +31,7 @@ class CrownShares(NamedTuple):
 
 def crown_shares(crown_cover, crown_shape, sza, vza, raa):
     r"""
-    Shares of the ground that crowns cover, as sun and observer see them.
+    Shares of the ground covered by crowns, as seen by sun and observer.
 
     .. math::
 
@@ -57,7 +54,7 @@ def crown_shares(crown_cover, crown_shape, sza, vza, raa):
     Notes
     -----
     :math:`\Delta` is the distance of the two directions on a plane one unit below. The chance of a gap between crowns
-    is that of crowns placed at random (Nilson 1971): :math:`1 - C_v = e^{-n A}` for n crowns of area A, and a slant
+    is for randomly placed crowns (Nilson 1971): :math:`1 - C_v = e^{-n A}` for n crowns of area A, and a slant
     beam meets the shadow of each, :math:`A / \mu` of a round crown. Crowns that are lit and seen weigh
     :math:`1 - (1 - C_{so})^{(1 / \mu_s + 1 / \mu_v) / 2}`, which goes to 1 toward the horizon.
 
@@ -74,7 +71,7 @@ def crown_shares(crown_cover, crown_shape, sza, vza, raa):
     sun_path, view_path = (1 / np.cos(np.radians(np.asarray(angle, float))) for angle in (sza, vza))
     sun, view = 1 - gap**sun_path, 1 - gap**view_path
     shape = np.asarray(crown_shape, float)
-    close = np.where(shape > 0, np.exp(-apart(sza, vza, raa) / np.where(shape > 0, shape, 1)), 0)
+    close = np.where(shape > 0, np.exp(-direction_distance(sza, vza, raa) / np.where(shape > 0, shape, 1)), 0)
     beyond = np.minimum(sun * (1 - view), view * (1 - sun)) * close
     both = sun * view + beyond
     lit = 1 - (1 - both) ** ((sun_path + view_path) / 2)
@@ -94,13 +91,13 @@ def clumped(canopy, shares):
     Parameters
     ----------
     canopy : Canopy
-        Of the crowns, whose leaf area index is that of the ground over the crown cover.
+        Canopy of the crowns, whose leaf area index is the one of the ground divided by the crown cover.
     shares : CrownShares
 
     Returns
     -------
     canopy : Canopy
-        Of crowns and gaps together. [1]
+        Reflectances and transmittances of crowns and gaps together. [1]
 
     References
     ----------
@@ -132,7 +129,7 @@ def clumped(canopy, shares):
 
 
 class CrownTerms(NamedTuple):
-    """Of leaves within crowns, what `crowns_over_background` needs of a band; 0 without leaves. [1]"""
+    """Terms of the leaves within crowns that `crowns_over_background` needs, 0 without leaves. [1]"""
 
     seen: np.ndarray
     """Sunlight's share times rso."""
@@ -152,20 +149,7 @@ class CrownTerms(NamedTuple):
 
 
 def crown_terms(canopy, sky):
-    """
-    Terms of `crowns_over_background`.
-
-    Parameters
-    ----------
-    canopy : Canopy
-        Of the crowns.
-    sky : array
-        Share of skylight. [1]
-
-    Returns
-    -------
-    terms : CrownTerms
-    """
+    """Terms of `crowns_over_background`, for reflectances of crowns and a share of skylight. [1]"""
     c, sun = canopy, 1 - sky
     return CrownTerms(
         seen=sun * c.rso,
@@ -189,7 +173,7 @@ def crowns_over_background(terms, shares, background):
     terms : sequence of 8 arrays
         Those of `CrownTerms`. [1]
     shares : sequence of 5 arrays
-        Fields ``cover``, ``sun``, ``view``, ``apart`` and ``lit`` of `CrownShares`. [1]
+        Fields ``cover``, ``sun``, ``view``, ``direction_distance`` and ``lit`` of `CrownShares`. [1]
     background : array
         [1]
 
@@ -215,66 +199,17 @@ def crowns_over_background(terms, shares, background):
 
 
 def lai_in_crowns(lai, crown_cover):
-    """
-    Leaf area index within crowns.
-
-    Parameters
-    ----------
-    lai : array
-        Of the ground. [m2 m-2]
-    crown_cover : array
-        [1]
-
-    Returns
-    -------
-    lai : array
-        0 where there are no crowns. [m2 m-2]
-
-    Examples
-    --------
-    >>> float(lai_in_crowns(1.5, 0.5))
-    3.0
-    """
+    """Leaf area index within crowns, 0 where there are none. [m2 m-2]"""
     lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
     # NaN of the leaf area stays.
     return np.where(cover > 0, lai / np.where(cover > 0, cover, 1), 0 * lai)
 
 
-@njit(nogil=True, cache=True)
-def _overfull(lai, cover):
-    """How many crowns hold too many leaves: a sum, so that several are looked at at once."""
-    count = 0
-    for i in range(lai.size):
-        count += (lai[i] > LARGEST_LAI * cover[i]) & (cover[i] > 0)
-    return count
-
-
 def check_crowns(lai, crown_cover):
-    """
-    Refuse crowns that hold more leaves than any canopy; NaN passes, and so does a cover of 0, bare ground.
-
-    Parameters
-    ----------
-    lai : array
-        Of the ground. [m2 m-2]
-    crown_cover : array
-        Broadcasts against it. [1]
-
-    Raises
-    ------
-    ValueError
-        If the cover is outside 0 to 1, or the leaf area index within the crowns above 100.
-
-    Examples
-    --------
-    >>> check_crowns(1.5, 0.5)
-    """
+    """Raise ValueError if crowns hold more leaves than any canopy; NaN and a cover of 0, bare ground, pass."""
     check_share("crown_cover", crown_cover)
     lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
-    shape = np.broadcast_shapes(lai.shape, cover.shape)
-    cells = (each if each.shape == shape else np.broadcast_to(each, shape) for each in (lai, cover))
-    # Ground without crowns holds no leaves, and is not meant.
-    if _overfull(*(np.ascontiguousarray(each).reshape(-1) for each in cells)):
+    if np.any((lai > LARGEST_LAI * cover) & (cover > 0)):
         with np.errstate(over="ignore"):
             inside = lai / np.where(cover > 0, cover, np.inf)
         raise ValueError(

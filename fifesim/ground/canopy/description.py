@@ -1,15 +1,54 @@
 """Description of a canopy: its leaves, their arrangement, and the ground below them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
-from fifesim.base.arguments import check_fields
-from fifesim.base.kinds import described, is_a
-from fifesim.base.spelling import PARTS
-from fifesim.ground.canopy.annotations import BelowLeaves, LeafAngles, LeafOptics, NumberByCell
+import numpy as np
+
+from fifesim.base import arguments
+from fifesim.base.annotations import Array, FilePath, NumberOrArray
+from fifesim.base.messages import PARTS
 from fifesim.ground.canopy.crowns import check_crowns
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.properties import PROPERTIES
+from fifesim.ground.canopy.prospect import Leaf
+from fifesim.ground.canopy.spectra import Background
+
+LEAF = arguments.Kind(
+    "a fifesim.Leaf, the path of a CSV file or a Dataset of spectra, {band: (reflectance, transmittance)}, or a pair",
+    lambda value: (
+        isinstance(value, Leaf)
+        or arguments.is_a(value, "Dataset")
+        or arguments.is_path(value)
+        or arguments.MAPPING.fits(value)
+        or arguments.TWO.fits(value)
+    ),
+)
+
+# A leaf by its contents, a file or Dataset of its spectra, or reflectance and transmittance, by band or for all bands.
+LeafOptics: TypeAlias = Annotated[Leaf | FilePath | Mapping | Sequence[NumberOrArray], LEAF]
+LeafAngleInput: TypeAlias = Annotated[
+    str | Sequence[float] | np.ndarray,
+    arguments.Kind(
+        "a name such as 'planophile', classes such as '30: 0.5, 60: 0.5', or a list of fractions",
+        lambda value: arguments.ROW.fits(value) and not isinstance(value, Mapping),
+    ),
+]
+# A number or raster, by band or spectrum, shares of spectra, or a file or Dataset of a spectrum.
+BelowLeaves: TypeAlias = Annotated[float | Array | Background | Mapping | FilePath, arguments.ANYTHING]
+# A number, or a raster over (y, x).
+NumberByCell: TypeAlias = Annotated[
+    float | Array,
+    arguments.Kind(
+        f"{arguments.NUMBER.words}, or {arguments.RASTER.words}",
+        lambda value: (
+            arguments.RASTER.fits(value) or (arguments.NUMBER.fits(value) and not isinstance(value, np.complexfloating))
+        ),
+        arguments.RASTER.dimensions,
+    ),
+]
+
 
 # Below it the hot spot is narrower than the sun. [1]
 LEAST_HOTSPOT = 1e-6
@@ -86,7 +125,7 @@ class Canopy:
     _in_words: ClassVar[str] = "a fifesim.Canopy, such as fifesim.Canopy(brown=0.2)"
 
     leaf_optics: LeafOptics | None = None
-    leaf_angles: LeafAngles | None = None
+    leaf_angles: LeafAngleInput | None = None
     hotspot: float | None = None
     brown: NumberByCell | None = None
     dissociation: NumberByCell | None = None
@@ -101,7 +140,7 @@ class Canopy:
     def __post_init__(self):
         object.__setattr__(self, "given", frozenset(name for name in PROPERTIES if getattr(self, name) is not None))
         if self.given:
-            check_fields(self, *self.given)
+            arguments.check_fields(self, *self.given)
         for name, known in PROPERTIES.items():
             if name in self.given:
                 _check(name, getattr(self, name), known)
@@ -109,8 +148,8 @@ class Canopy:
                 object.__setattr__(self, name, known.default)
 
     def __repr__(self):
-        said = (f"{name}={_brief(getattr(self, name))}" for name in PROPERTIES if name in self.given)
-        return f"Canopy({', '.join(said)})"
+        given = (f"{name}={_brief(getattr(self, name))}" for name in PROPERTIES if name in self.given)
+        return f"Canopy({', '.join(given)})"
 
     def replace(self, **changes: Any) -> Self:
         """
@@ -170,12 +209,12 @@ TALLGRASS = Canopy()
 
 
 def is_raster(value):
-    """Whether a value of a field is a raster."""
-    return is_a(value, "DataArray")
+    """Whether the value of a field is a raster."""
+    return arguments.is_a(value, "DataArray")
 
 
 def _check(name, value, known):
-    """Raise ValueError if a field cannot have a value of its kind."""
+    """Raise ValueError if a field cannot have a value."""
     if name == "leaf_angles":
         leaf_angle_classes(value)
     elif known.unit and not is_raster(value):
@@ -194,5 +233,5 @@ def _check(name, value, known):
 
 
 def _brief(value):
-    """A value of a field in a few words."""
-    return f"<{described(value)}>" if is_a(value, "DataArray", "Dataset") else repr(value)
+    """Short text of the value of a field."""
+    return f"<{arguments.described(value)}>" if arguments.is_a(value, "DataArray", "Dataset") else repr(value)

@@ -1,17 +1,24 @@
-"""Green and dead leaves in one canopy: two SAIL layers of which each is a mixture of both."""
+"""Canopies of green and dead leaves: two SAIL layers, and the light that leaves and ground absorb."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from fifesim.base.geometry import relative_azimuth
-from fifesim.ground.canopy.hot_spot import bidirectional_gap, hotspot_decay
-from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.sail_model import Canopy, scattered_again, scattering
+from fifesim.ground.canopy.crowns import SHAPE, clumped, crown_shares, lai_in_crowns
+from fifesim.ground.canopy.leaf_angles import leaf_angle_classes, leaf_projection
+from fifesim.ground.canopy.sail_model import (
+    CanopyLayer,
+    bidirectional_gap,
+    hotspot_decay,
+    leaf_scattering,
+    scattered_again,
+    with_background,
+)
 
 
 class Layers(NamedTuple):
-    """How leaves of two kinds lie above each other; fields broadcast against each other."""
+    """Leaf areas and dead shares of two layers; fields broadcast against each other."""
 
     lai: np.ndarray
     """Leaf area of the upper layer. [m2 m-2]"""
@@ -23,9 +30,9 @@ class Layers(NamedTuple):
     """And in the lower one. [1]"""
 
 
-def layers_of(lai, brown, dissociation):
+def leaf_layers(lai, brown, dissociation):
     r"""
-    Leaf areas of two layers, and their shares of dead leaves.
+    Leaf areas of two layers, and their dead shares.
 
     .. math::
 
@@ -35,7 +42,7 @@ def layers_of(lai, brown, dissociation):
     Parameters
     ----------
     lai : array
-        Of the canopy, :math:`L`. [m2 m-2]
+        Leaf area of the canopy, :math:`L`. [m2 m-2]
     brown : array
         Dead share of it, :math:`f_B`. [1]
     dissociation : array
@@ -51,9 +58,9 @@ def layers_of(lai, brown, dissociation):
 
     Examples
     --------
-    What is dead above and below is what is dead in all:
+    The dead leaf areas of both layers add up to the total:
 
-    >>> layers = layers_of(3.0, 0.4, 0.5)
+    >>> layers = leaf_layers(3.0, 0.4, 0.5)
     >>> round(float(layers.lai * layers.brown + layers.lai_below * layers.brown_below), 12)
     1.2
     """
@@ -76,7 +83,7 @@ def two_layers(
     leaf_angles="spherical",
     hotspot=0.0,
 ):
-    r"""
+    """
     Reflectances and transmittances of a canopy of green and dead leaves, after 4SAIL2.
 
     Parameters
@@ -84,9 +91,9 @@ def two_layers(
     lai : array
         Leaf area index of both kinds together. NaN gives NaN. [m2 m-2]
     leaf_reflectance, leaf_transmittance, brown_reflectance, brown_transmittance : array
-        Of green leaves, and of dead ones. [1]
+        Optics of green leaves, and of dead leaves. [1]
     brown, dissociation : array
-        As in `layers_of`. [1]
+        As in `leaf_layers`. [1]
     sza, vza, raa, leaf_angles, hotspot
         As in `sail`, the same in both layers; the hot spot is one over the depth of both.
 
@@ -97,7 +104,7 @@ def two_layers(
 
     Notes
     -----
-    Each layer has the mean optics of its leaves, and the two are added. What the observer gets by one scattering is
+    Each layer has the mean optics of its leaves, and the two are added. Single scattering to the observer is
     :math:`w_1 A_1 + w_2 A_2` with the leaf areas :math:`A` that sun and observer both reach in each, from Kuusk's
     gap over both; its integral is the series of `bidirectional_gap`, for which the authors' program takes 20 steps.
 
@@ -116,10 +123,10 @@ def two_layers(
     """
     raa = relative_azimuth(raa, 0.0)
     green, dead = (leaf_reflectance, leaf_transmittance), (brown_reflectance, brown_transmittance)
-    layers = layers_of(lai, brown, dissociation)
+    layers = leaf_layers(lai, brown, dissociation)
     angles = sza, vza, raa, leaf_angle_classes(leaf_angles)
-    upper = scattering(*mixed(green, dead, layers.brown), *angles)
-    lower = scattering(*mixed(green, dead, layers.brown_below), *angles)
+    upper = leaf_scattering(*mixed(green, dead, layers.brown), *angles)
+    lower = leaf_scattering(*mixed(green, dead, layers.brown_below), *angles)
     alpha = hotspot_decay(sza, vza, raa, upper.ks + upper.ko, np.asarray(hotspot, float))
     # Without a hot spot the decay is infinite, which no share of the depth makes less.
     none = np.isinf(alpha)
@@ -133,26 +140,7 @@ def two_layers(
 
 
 def mixed(green, dead, brown):
-    """
-    Mean optics of leaves of two kinds.
-
-    Parameters
-    ----------
-    green, dead : (array, array)
-        Reflectance and transmittance. [1]
-    brown : array
-        Share of the dead ones. [1]
-
-    Returns
-    -------
-    reflectance, transmittance : array
-        [1]
-
-    Examples
-    --------
-    >>> [float(each) for each in mixed((0.5, 0.25), (0.25, 0.25), 0.5)]
-    [0.375, 0.25]
-    """
+    """Mean optics of a mixture of green and dead leaves. [1]"""
     pairs = ((np.asarray(one, float), np.asarray(other, float)) for one, other in zip(green, dead, strict=True))
     return tuple(one + brown * (other - one) for one, other in pairs)
 
@@ -198,7 +186,7 @@ def added(top, bottom):
     seen_up = (top.tdo + top.rdd_below * bottom.rdo * top.too) * back_and_forth
     sky_up = top.tdd * bottom.rdd * back_and_forth
     sky_down = top.tdd * back_and_forth
-    return Canopy(
+    return CanopyLayer(
         rso=top.rso + (top.tss * bottom.rso + down * bottom.rdo) * top.too + up * top.tdo,
         rdo=top.rdo + sky_down * bottom.rdo * top.too + sky_up * top.tdo,
         rsd=top.rsd + up * top.tdd,
@@ -211,3 +199,237 @@ def added(top, bottom):
         tsstoo=top.tsstoo * bottom.tsstoo,
         rdd_below=bottom.rdd_below + bottom.tdd * top.rdd_below * bottom.tdd * back_and_forth,
     )
+
+
+FPAR_INF = 0.94
+"""FPAR of an infinitely thick canopy [1]; Friedl et al. (1995), below Eq. 6."""
+
+
+def extinction_coefficient(sza, leaf_angles="spherical"):
+    r"""
+    Extinction coefficient of the direct beam per leaf area.
+
+    .. math:: K = G(\theta_s) / \mu_s
+
+    Parameters
+    ----------
+    sza : array
+        Below 90. [degree]
+    leaf_angles : optional
+        As in `leaf_angle_classes`. Spherical leaves have exactly :math:`G = 1/2`; other distributions are summed over
+        their classes.
+
+    Returns
+    -------
+    extinction : array, shape of sza
+        :math:`K`. [1]
+
+    References
+    ----------
+    [Monteith1990]_
+
+    Examples
+    --------
+    The projection of horizontal leaves is their area for any position of the sun:
+
+    >>> float(round(extinction_coefficient(60.0, "0: 1"), 12))
+    1.0
+    """
+    leaf_angles = leaf_angle_classes(leaf_angles)
+    mu_s = np.cos(np.radians(np.asarray(sza, float)))
+    if leaf_angles == leaf_angle_classes("spherical"):
+        return 0.5 / mu_s
+    projection = leaf_projection(np.asarray(leaf_angles.inclination), np.asarray(sza, float)[..., None])
+    return projection @ np.asarray(leaf_angles.fraction) / mu_s
+
+
+def beer_fpar(lai, extinction, fpar_inf=FPAR_INF):
+    r"""
+    Fraction of photosynthetically active radiation absorbed by a canopy, by Beer's law.
+
+    .. math:: \mathrm{FPAR} = \mathrm{FPAR}_\infty \left[ 1 - e^{-K \, \mathrm{LAI}} \right]
+
+    Parameters
+    ----------
+    lai : array
+        Leaf area index. NaN gives NaN. [m2 m-2]
+    extinction : array
+        Extinction coefficient :math:`K`; `extinction_coefficient` gives it. [1]
+    fpar_inf : array, optional
+        FPAR of an infinitely thick canopy. [1]
+
+    Returns
+    -------
+    fpar : array, shape of the broadcast inputs
+        [1]
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 6
+
+    Examples
+    --------
+    Bare ground absorbs nothing:
+
+    >>> float(beer_fpar(0.0, 0.57))
+    0.0
+    """
+    return -fpar_inf * np.expm1(-np.asarray(extinction, float) * np.asarray(lai, float))
+
+
+def green_fpar(lai, extinction, brown, dissociation=0.0, fpar_inf=FPAR_INF):
+    r"""
+    Fraction of photosynthetically active radiation absorbed by the green leaves of a canopy.
+
+    .. math::
+
+        \mathrm{FPAR}_g = \mathrm{FPAR}_\infty \, \big[ &(1 - b_1) \left( 1 - e^{-K L_1} \right) \\
+            &+ (1 - b_2) \, e^{-K L_1} \left( 1 - e^{-K L_2} \right) \big]
+
+    Parameters
+    ----------
+    lai : array
+        Leaf area index of both kinds. NaN gives NaN. [m2 m-2]
+    extinction, fpar_inf : array
+        As in `beer_fpar`. [1]
+    brown, dissociation : array
+        Dead share :math:`f_B`, and :math:`D`, as in `leaf_layers`, which gives the layers and their shares. [1]
+
+    Returns
+    -------
+    fpar : array, shape of the broadcast inputs
+        [1]
+
+    Notes
+    -----
+    Where both kinds are mixed it is FPAR times the green share of the leaf area, as in Hall et al. (1992); green leaves
+    above dead ones get the light first.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 6; [Hall1992]_
+
+    Examples
+    --------
+    >>> bool(np.isclose(green_fpar(2.0, 0.57, 0.25), 0.75 * beer_fpar(2.0, 0.57)))
+    True
+    """
+    if not np.ndim(dissociation) and dissociation == 0:
+        return (1 - np.asarray(brown, float)) * beer_fpar(lai, extinction, fpar_inf)
+    layers, k = leaf_layers(lai, brown, dissociation), np.asarray(extinction, float)
+    above = beer_fpar(layers.lai, k, fpar_inf)
+    below = np.exp(-k * layers.lai) * beer_fpar(layers.lai_below, k, fpar_inf)
+    return (1 - layers.brown) * above + (1 - layers.brown_below) * below
+
+
+class LightBudget(NamedTuple):
+    """Shares of the irradiance, which sum to 1. [1]"""
+
+    green: np.ndarray
+    brown: np.ndarray
+    ground: np.ndarray
+    reflected: np.ndarray
+
+
+def light_budget(
+    lai,
+    leaf_reflectance,
+    leaf_transmittance,
+    brown_reflectance,
+    brown_transmittance,
+    background,
+    *,
+    brown,
+    dissociation=0.0,
+    sza,
+    leaf_angles="spherical",
+    diffuse_fraction=0.0,
+    crown_cover=1.0,
+):
+    r"""
+    Light budget of a canopy of green and dead leaves at one wavelength.
+
+    Parameters
+    ----------
+    lai : array
+        Leaf area of both kinds per ground area. NaN gives NaN. [m2 m-2]
+    leaf_reflectance, leaf_transmittance, brown_reflectance, brown_transmittance, background : array
+        [1]
+    brown, dissociation : array
+        As in `leaf_layers`. [1]
+    sza : array
+        [degree]
+    leaf_angles : optional
+        Whatever `leaf_angle_classes` accepts.
+    diffuse_fraction : array, optional
+        Share of skylight in the irradiance. [1]
+    crown_cover : array, optional
+        [1]
+
+    Returns
+    -------
+    budget : LightBudget
+        Fields of the broadcast shape of all arguments. [1]
+
+    Notes
+    -----
+    A layer absorbs what goes in less what comes out; of that its dead leaves have the share
+    :math:`b \, \alpha_B / [(1 - b) \, \alpha_G + b \, \alpha_B]`, with the absorptances :math:`\alpha` of both kinds
+    and the dead share :math:`b` of its leaf area, as they lie in the same light.
+
+    References
+    ----------
+    [VerhoefBach2007]_
+
+    Examples
+    --------
+    >>> budget = light_budget(3.0, 0.07, 0.04, 0.28, 0.12, 0.15, brown=0.3, dissociation=0.5, sza=30)
+    >>> round(float(sum(budget)), 12)
+    1.0
+    """
+    green, dead = (leaf_reflectance, leaf_transmittance), (brown_reflectance, brown_transmittance)
+    cover = np.asarray(crown_cover, float)
+    layers = leaf_layers(lai_in_crowns(lai, cover), brown, dissociation)
+    angles = sza, 0.0, 0.0, leaf_angle_classes(leaf_angles)
+    top, bottom = (
+        scattered_again(area, leaf_scattering(*mixed(green, dead, share), *angles))
+        for area, share in ((layers.lai, layers.brown), (layers.lai_below, layers.brown_below))
+    )
+    crowns = crown_shares(cover, SHAPE, sza, 0.0, 0.0)
+    canopy = clumped(added(top, bottom), crowns)
+    r, sky = np.asarray(background, float), np.asarray(diffuse_fraction, float)
+    down = ((1 - sky) * (canopy.tss + canopy.tsd) + sky * canopy.tdd) / (1 - r * canopy.rdd_below)
+    sunlit, skylit, lit_from_below = _absorbed(top, bottom)
+    absorbed = [
+        (1 - sky) * crowns.sun * of_sun + cover * (sky * of_sky + r * down * of_ground)
+        for of_sun, of_sky, of_ground in zip(sunlit, skylit, lit_from_below, strict=True)
+    ]
+    shares = [_dead_share(share, green, dead) for share in (layers.brown, layers.brown_below)]
+    by_dead = sum(taken * share for taken, share in zip(absorbed, shares, strict=True))
+    surface = with_background(canopy, r)
+    reflected = (1 - sky) * surface.rsd + sky * surface.rdd
+    return LightBudget(sum(absorbed) - by_dead, by_dead, (1 - r) * down, reflected)
+
+
+def _absorbed(top, bottom):
+    """Absorption by both layers over black ground, of direct light, skylight, and light from below."""
+    again = 1 / (1 - top.rdd_below * bottom.rdd)
+    up = (top.tss * bottom.rsd + top.tsd * bottom.rdd) * again
+    down = top.tsd + top.rdd_below * up
+    below = top.tss * (1 - bottom.tss - bottom.tsd) + down * (1 - bottom.tdd) - up
+    sun = 1 - top.rsd - top.tss - down + up * (1 - top.tdd), below
+    up = top.tdd * bottom.rdd * again
+    down = top.tdd + top.rdd_below * up
+    sky = 1 - top.rdd - down + up * (1 - top.tdd), down * (1 - bottom.tdd) - up
+    up = bottom.tdd * again
+    down = top.rdd_below * up
+    ground = up * (1 - top.tdd) - down, 1 - bottom.rdd_below + down * (1 - bottom.tdd) - up
+    return sun, sky, ground
+
+
+def _dead_share(brown, green, dead):
+    """Share of dead leaves in the absorption of a layer, 0 if it absorbs nothing."""
+    of_green, of_dead = (1 - np.add(*optics) for optics in (green, dead))
+    by_dead = brown * of_dead
+    total = (1 - brown) * of_green + by_dead
+    return np.where(total > 0, by_dead / np.where(total > 0, total, 1), 0.0)

@@ -4,20 +4,20 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from fifesim.base.kinds import described
-from fifesim.base.spelling import closest
+from fifesim.base.arguments import described
+from fifesim.base.caches import cached
+from fifesim.base.messages import closest
 
 
 @dataclass(frozen=True)
 class LeafAngles:
     """
-    A leaf angle distribution: the share of the leaf area in each class of inclination.
+    Leaf angle distribution: share of the leaf area in each class of inclination.
 
     ``str`` gives a text from which `leaf_angle_classes` makes the same distribution.
 
@@ -159,9 +159,9 @@ def _unknown(text):
     )
 
 
-@lru_cache
+@cached(128, "leaf angle distributions")
 def _named(name, parameters, classes):
-    """LeafAngles of a named distribution; named in turn only if it has the default number of classes."""
+    """LeafAngles of a named distribution, with this name only for the default number of classes."""
     edges = np.radians(np.linspace(0, 90, classes + 1))
     if name in _CUMULATIVE and not parameters:
         cumulative = _CUMULATIVE[name](edges)
@@ -193,12 +193,9 @@ def _verhoef(angle, a, b):
 
 
 def _ellipsoidal(angle, axis_ratio):
-    """
-    Cumulative ellipsoidal distribution (Campbell 1990): the area of a cap of a spheroid.
-
-    Where the normal of a spheroid of horizontal to vertical axis ratio chi is inclined by t, its relative
-    height is z = (1 + chi^2 tan^2 t)^-1/2; the area grows as sqrt(1 + (chi^2 - 1) z^2) dz.
-    """
+    """Cumulative ellipsoidal distribution (Campbell 1990): relative area of a cap of a spheroid."""
+    # Where the normal of a spheroid of horizontal to vertical axis ratio chi is inclined by t, its relative height is z
+    # = (1 + chi^2 tan^2 t)^-1/2; the area grows as sqrt(1 + (chi^2 - 1) z^2) dz.
     q = axis_ratio**2 - 1
     root = math.sqrt(abs(q))
 

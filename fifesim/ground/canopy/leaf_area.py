@@ -1,9 +1,55 @@
-"""Range of leaf area index: what no canopy has is refused, and what is implausible is a warning."""
+"""Checks of leaf area index and of the fractions of a canopy."""
 
 import numpy as np
+from numba import njit
 
-from fifesim.base.warned import warn
-from fifesim.ground.canopy.ranges import within
+from fifesim.base.messages import warn
+
+
+def within(values, lowest, highest):
+    """Whether all values are in a range; NaN is ignored."""
+    values = np.asarray(values, float)
+    if values.flags.c_contiguous or values.flags.f_contiguous:
+        return not outside(read_only(values.ravel(order="K")), float(lowest), float(highest))
+    # Two passes without a copy.
+    low, high = (np.fmin.reduce(values, axis=None, initial=lowest), np.fmax.reduce(values, axis=None, initial=highest))
+    return bool(low >= lowest and high <= highest)
+
+
+@njit(nogil=True, cache=True)
+def outside(values, lowest, highest):
+    """Number of values outside a range; NaN is ignored."""
+    # A sum without branches, so that several values are compared at once.
+    count = 0
+    for i in range(values.size):
+        count += (values[i] < lowest) | (values[i] > highest)
+    return count
+
+
+def read_only(values):
+    """Contiguous, read-only view of an array, so that a kernel is compiled once for arrays of either kind."""
+    view = np.ascontiguousarray(values).view()
+    view.flags.writeable = False
+    return view
+
+
+def check_fraction(name, values):
+    """Raise ValueError for values outside 0 to 1, and for NaN."""
+    values = np.asarray(values, float)
+    wrong = ~((values >= 0) & (values <= 1))
+    if wrong.any():
+        raise ValueError(
+            f"{name} must be in [0, 1], got {values[wrong].flat[0]:g}: give a fraction, not percent or digital numbers"
+        )
+
+
+def check_share(name, values):
+    """Raise ValueError for a share outside 0 to 1; NaN passes."""
+    cells = np.asarray(values, float)
+    if not within(cells, 0.0, 1.0):
+        check_fraction(name, cells[~np.isnan(cells)])
+    return values
+
 
 LARGEST_LAI = 100.0
 """Largest leaf area index that is taken for one [m2 m-2]; the densest canopies have about 20."""
@@ -19,29 +65,7 @@ _COMMON = 10.0
 
 
 def check_lai(lai):
-    """
-    Refuse a leaf area index that is negative or above 100; NaN passes.
-
-    Parameters
-    ----------
-    lai : array
-        [m2 m-2]
-
-    Returns
-    -------
-    lai : array
-        What was given.
-
-    Raises
-    ------
-    ValueError
-        If one is negative or above 100, which no canopy has: it is a fill value, or needs a scale.
-
-    Examples
-    --------
-    >>> check_lai(2.5)
-    2.5
-    """
+    """Raise ValueError if leaf area index is negative or above 100; NaN passes."""
     cells = np.asarray(lai, float)
     if not within(cells, 0.0, LARGEST_LAI):
         wrong = (cells < 0) | (cells > LARGEST_LAI)
@@ -55,38 +79,9 @@ def check_lai(lai):
 
 
 def check_map(lai):
-    """
-    Refuse a map of leaf area index whose numbers look like those of another scale; NaN passes.
-
-    Parameters
-    ----------
-    lai : array
-        [m2 m-2]
-
-    Returns
-    -------
-    lai : array
-        What was given.
-
-    Raises
-    ------
-    ValueError
-        As `check_lai`, or if one is above 20.
-
-    Notes
-    -----
-    The largest of some 1000 measured values is 18, once outliers are removed.
-
-    References
-    ----------
-    Asner, G.P., Scurlock, J.M.O., Hicke, J.A. (2003), Global synthesis of leaf area index observations. Global Ecology
-    and Biogeography 12, 191-205
-
-    Examples
-    --------
-    >>> check_map(2.5)
-    2.5
-    """
+    """Raise ValueError if a map of leaf area index looks scaled; NaN passes."""
+    # The largest of some 1000 measured values is 18, once outliers are removed: Asner, Scurlock and Hicke (2003),
+    # Global Ecology and Biogeography 12, 191-205.
     cells = np.asarray(lai, float)
     if not within(cells, 0.0, LARGEST_OF_MAPS):
         check_lai(lai)
@@ -98,21 +93,7 @@ def check_map(lai):
 
 
 def check_source(name, values):
-    """
-    Raise ValueError if the cells of a map cannot be leaf area index, before they are interpolated.
-
-    Parameters
-    ----------
-    name : str
-        Name of the map.
-    values : array
-        NaN passes. [m2 m-2]
-
-    Raises
-    ------
-    ValueError
-        As `check_map`. A mark of missing data next to the grid would enter cells at its edge as a plausible value.
-    """
+    """Raise ValueError if the cells of a map cannot be leaf area index, before they are interpolated."""
     try:
         check_map(values)
     except ValueError as error:
@@ -123,24 +104,7 @@ def check_source(name, values):
 
 
 def warn_of_large(lai):
-    """
-    Warn if leaf area index is implausibly large on average.
-
-    Parameters
-    ----------
-    lai : array
-        NaN is left out. [m2 m-2]
-
-    Returns
-    -------
-    lai : array
-        The same array.
-
-    Warns
-    -----
-    UserWarning
-        If the mean exceeds 8, more than dense forest has over a scene.
-    """
+    """Warn if the mean leaf area index is implausibly large."""
     total, count = np.nansum(lai), np.count_nonzero(~np.isnan(lai))
     if total > LARGEST_MEAN * count:
         warn(
@@ -151,7 +115,7 @@ def warn_of_large(lai):
 
 
 def _of_another_scale(cells):
-    """What to type where numbers are scaled: by the power of ten that brings nearly all of them below 10."""
+    """Advice for scaled numbers: the power of ten that brings nearly all of them below 10."""
     positive = cells[(cells > 0) & np.isfinite(cells)]
     most = np.quantile(positive, 0.98) if positive.size else 0.0
     if most <= _COMMON:

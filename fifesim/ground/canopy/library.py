@@ -1,14 +1,12 @@
-"""A library of land spectra: leaves, canopies and what lies below them, as the models of this package make them."""
-
-from functools import lru_cache
+"""Library of modelled land spectra: canopies of many leaves over many backgrounds."""
 
 import numpy as np
 
-from fifesim.base import datasets
-from fifesim.base.seeds import generator
-from fifesim.ground.canopy.background import reflectance_factor, with_background
+from fifesim.base import files
+from fifesim.base.caches import cached
+from fifesim.base.lattice import generator
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
-from fifesim.ground.canopy.sail_model import sail
+from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
 
 # How many leaves there are, and canopies of each.
 LEAVES = 60
@@ -38,32 +36,12 @@ _BRIGHTNESS = (0.3, 1.1)
 _STREAM = 2
 
 
-@lru_cache
+@cached(128, "library of canopy spectra")
 def library_spectra():
-    """
-    Reflectance spectra of canopies of many leaves over many soils, PROSPECT-D and SAIL.
-
-    Returns
-    -------
-    wavelength : array, shape (n,)
-        0.4 to 2.45, in steps of 0.005. [um]
-    reflectance : array, shape (spectrum, n)
-        Read only. [1]
-
-    Notes
-    -----
-    Leaf contents are uniform in wide ranges, brown pigments mostly few. Leaf area is exponential with mean 1.5: a
-    quarter of the spectra has an NDVI below 0.5. Ground is mixed of all spectra of ``data/ground_spectra.csv``, from
-    0.3 to 1.1 times as bright. The view is from nadir, the sun at 20 to 60 degrees, up to 0.3 of its light from the
-    sky. The spectra are the same in every session.
-
-    Examples
-    --------
-    >>> wavelength, reflectance = library_spectra()
-    >>> reflectance.shape == (480, wavelength.size), bool(reflectance.min() > 0), bool(reflectance.max() < 1)
-    (True, True, True)
-    """
-    ground = datasets.table("ground_spectra.csv")
+    """Wavelengths [um], shape (n,), and spectra of canopies by PROSPECT-D and SAIL, shape (spectrum, n)."""
+    # Leaf contents are uniform in wide ranges, brown pigments mostly few. Leaf area is exponential with mean 1.5: a
+    # quarter of the spectra has an NDVI below 0.5.
+    ground = files.table("ground_spectra.csv")
     found = []
     for number in range(LEAVES):
         random = generator(0, _STREAM, (0, number, 0, 0))
@@ -91,7 +69,7 @@ def _uniform(random, limits):
 
 
 def _leaf(random):
-    """A leaf drawn from the ranges."""
+    """Random leaf from the ranges of its contents."""
     chlorophyll = _uniform(random, _CHLOROPHYLL)
     return Leaf(
         structure=_uniform(random, _STRUCTURE),
@@ -105,7 +83,7 @@ def _leaf(random):
 
 
 def _ground(random, table, wavelength):
-    """Mixtures of the ground's spectra, one for each canopy."""
+    """Random mixtures of background spectra, one for each canopy."""
     names = table.columns.drop("wavelength")
     shares = random.dirichlet(np.full(len(names), 0.7), CANOPIES)
     bright = _BRIGHTNESS[0] + (_BRIGHTNESS[1] - _BRIGHTNESS[0]) * random.random((CANOPIES, 1))

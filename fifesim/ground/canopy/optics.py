@@ -1,59 +1,42 @@
-"""Leaf and background optics of bands, and the ranges that SAIL accepts."""
+"""Leaf and background optics in bands, with the ranges that SAIL accepts."""
 
 from collections.abc import Mapping
-from functools import lru_cache
+from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
-from fifesim.base import datasets
+from fifesim.base import files
+from fifesim.base.arguments import is_path
 from fifesim.base.bands import Band
-from fifesim.base.kinds import is_path
-from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
-from fifesim.ground.canopy.ranges import check_fraction, within
-from fifesim.ground.canopy.spectra import Background, background_means, band_means, did_you_mean, is_mixture
-from fifesim.ground.canopy.spectrum import LeafSpectrum, Spectrum, read_spectrum
+from fifesim.base.caches import cached
+from fifesim.ground.canopy.interpolation import refined
+from fifesim.ground.canopy.leaf_area import check_fraction, check_share
+from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf, leaf_spectrum
+from fifesim.ground.canopy.spectra import (
+    Background,
+    LeafSpectrum,
+    Spectrum,
+    background_means,
+    band_means,
+    did_you_mean,
+    is_mixture,
+    read_spectrum,
+)
 
 DEAD_LEAF = Leaf(chlorophyll=0.0, carotenoids=0.0, brown=1.0, water=0.001)
 """Dead tallgrass: the default leaf without green pigments and with little water; see ``data/README.md``."""
 
-# What the tables of the TM bands were modelled with; see data/README.md.
+# Mixture from which the tables of the TM bands were modelled; see data/README.md.
 _DEFAULT_BACKGROUND = {"soil_dry": 0.475, "shade": 0.525}
 
 
-def leaf_optics(bands, given=None):
-    """
-    Leaf reflectance and transmittance of bands.
-
-    Parameters
-    ----------
-    bands : sequence of str or fifesim.base.bands.Band
-        Names, such as ``["TM3", "TM4"]``, or responses, which spectra need.
-    given : Leaf, LeafSpectrum, str, path, mapping, or pair of arrays, optional
-        The contents of a leaf; its spectra, or the path of their CSV file; ``{band: (reflectance, transmittance)}``;
-        or both as arrays of shape (band,). The default is the green tallgrass of ``data/leaf_optics.csv``, and
-        ``Leaf()`` for bands that are not in it.
-
-    Returns
-    -------
-    leaf_reflectance, leaf_transmittance : array, shape (band,)
-        [1]
-
-    Raises
-    ------
-    ValueError
-        If a band has no optics, they are outside their range, or the file holds no leaf spectra.
-
-    Examples
-    --------
-    Leaves absorb red light and scatter near infrared:
-
-    >>> reflectance, transmittance = leaf_optics(["TM3", "TM4"])
-    >>> (reflectance + transmittance).round(2).tolist()
-    [0.11, 0.87]
-    """
+def band_leaf_optics(bands, given=None):
+    """Leaf reflectance and transmittance of bands, shape (band,). [1]"""
     if given is None:
         given = _default_leaves()
-        given = given | _leaf_means(_lacking(given, bands), Leaf())
+        if lacking := _lacking(given, bands):
+            given = given | _leaf_means(lacking, Leaf())
     elif is_path(given):
         given = read_spectrum(_csv(given), LeafSpectrum)
     if isinstance(given, LeafSpectrum):
@@ -67,41 +50,16 @@ def leaf_optics(bands, given=None):
     return reflectance, transmittance
 
 
-def background(bands, given=None):
-    """
-    Background reflectance of bands.
-
-    Parameters
-    ----------
-    bands : sequence of str or fifesim.base.bands.Band
-        As in `leaf_optics`.
-    given : Background, Spectrum, str, mapping, float or array, optional
-        Spectra that are mixed, also as ``{spectrum: fraction}``; one spectrum, or the path of its CSV file;
-        ``{band: reflectance}``; one number; or an array of shape (band,). The default is the soil and litter of
-        ``data/background.csv``, for bands that are not in it the dark soil that it was modelled with.
-
-    Returns
-    -------
-    background : array, shape (band,)
-        [1]
-
-    Raises
-    ------
-    ValueError
-        If a band has no reflectance, or it is outside its range.
-
-    Examples
-    --------
-    >>> background(["TM3", "TM4"], 0.2).tolist()
-    [0.2, 0.2]
-    """
+def band_background(bands, given=None):
+    """Background reflectance of bands, shape (band,). [1]"""
     if is_path(given):
         given = Background({str(given): 1.0})
     elif is_mixture(given) and not set(given) <= set(_names(bands)):
         given = Background(given)
     if given is None:
         given = _default_background()
-        given = given | _background_means(_lacking(given, bands), Background(_DEFAULT_BACKGROUND))
+        if lacking := _lacking(given, bands):
+            given = given | _background_means(lacking, Background(_DEFAULT_BACKGROUND))
     elif isinstance(given, Background | Spectrum):
         given = _background_means(_responses(bands, type(given).__name__), given)
     if isinstance(given, Mapping):
@@ -120,14 +78,14 @@ def _csv(path):
     return path
 
 
-@lru_cache(maxsize=1)
+@cached(1, "default leaf optics")
 def _default_leaves():
-    return datasets.table("leaf_optics.csv").set_index("band").T.to_dict("list")
+    return files.table("leaf_optics.csv").set_index("band").T.to_dict("list")
 
 
-@lru_cache(maxsize=1)
+@cached(1, "default background")
 def _default_background():
-    return datasets.table("background.csv").set_index("band")["background"].to_dict()
+    return files.table("background.csv").set_index("band")["background"].to_dict()
 
 
 def _names(bands):
@@ -135,12 +93,12 @@ def _names(bands):
 
 
 def _lacking(given, bands):
-    """Bands whose response is known, and which are not given."""
+    """Bands with a known response that are not given."""
     return [band for band in bands if isinstance(band, Band) and band.name not in given]
 
 
 def _responses(bands, needed_by):
-    """The bands, if the responses of all are known."""
+    """Check that the responses of all bands are known."""
     if not all(isinstance(band, Band) for band in bands):
         raise TypeError(f"a {needed_by} is a spectrum, it needs the bands' responses: give Band objects, not names")
     return bands
@@ -160,7 +118,7 @@ def _means_of(bands, leaf):
 
 
 # Dead leaves stay the same where green ones vary.
-_means_of_numbers = lru_cache(maxsize=64)(_means_of)
+_means_of_numbers = cached(64, "band means of leaf optics")(_means_of)
 
 
 def _background_means(bands, mixture):
@@ -178,25 +136,7 @@ def _for_bands(values, bands, what):
 
 
 def of_band(given, band, what):
-    """
-    What a mapping has for a band.
-
-    Parameters
-    ----------
-    given : mapping
-    band : str
-    what : str
-        "leaf optics" or "background".
-
-    Returns
-    -------
-    value : object
-
-    Raises
-    ------
-    ValueError
-        If it has nothing.
-    """
+    """Value of a mapping for a band."""
     if band in given:
         return given[band]
     typed = "(reflectance, transmittance)" if what == "leaf optics" else "reflectance"
@@ -207,23 +147,7 @@ def of_band(given, band, what):
 
 
 def check_leaf_optics(reflectance, transmittance):
-    """
-    Refuse leaf optics that no leaf can have; there may be none.
-
-    Parameters
-    ----------
-    reflectance, transmittance : array
-        [1]
-
-    Raises
-    ------
-    ValueError
-        If one is outside 0 to 1, or they add up to more than 1.
-
-    Examples
-    --------
-    >>> check_leaf_optics(0.45, 0.42)
-    """
+    """Raise ValueError for impossible leaf optics; the arrays may be empty."""
     for name, values in (("reflectance", reflectance), ("transmittance", transmittance)):
         check_fraction(f"leaf {name}", values)
     total = np.max(np.add(reflectance, transmittance), initial=0.0)
@@ -236,23 +160,71 @@ def check_leaf_optics(reflectance, transmittance):
 
 
 def check_background(reflectance):
-    """
-    Refuse a background reflectance outside 0 to 1; NaN passes.
+    """Raise ValueError if a background reflectance is outside 0 to 1; NaN passes."""
+    check_share("background reflectance", reflectance)
 
-    Parameters
-    ----------
-    reflectance : array
-        [1]
 
-    Raises
-    ------
-    ValueError
-        If one is outside 0 to 1.
+_BLOCK = 2**8  # leaves at a time, to bound memory: a spectrum has up to 2101 values
 
-    Examples
-    --------
-    >>> check_background(0.15)
-    """
-    values = np.asarray(reflectance, float)
-    if not within(values, 0.0, 1.0):
-        check_fraction("background reflectance", values[~np.isnan(values)])
+LEAF_TOLERANCE = 1e-8
+"""Of leaf reflectance and transmittance from a table [1]."""
+
+_COARSEST, _FINEST = 64, 2**12
+
+
+def leaf_means(bands, leaf, exact=False):
+    """Reflectance and transmittance in bands of leaves that differ, shape (2, band, ...). [1]"""
+    # Within TOLERANCE where a single content varies, else exact.
+    bands, varying = tuple(bands), leaf.varying()
+    names, arrays = list(varying), np.broadcast_arrays(*(np.asarray(v, float) for v in varying.values()))
+    cells = np.stack([each.reshape(-1) for each in arrays])
+    if len(names) == 1 and not exact:
+        low, high = _range(names[0])
+        table = _table(bands, names[0], replace(leaf, **{names[0]: low}))
+        means = table(np.cbrt((cells[0] - low) / (high - low))).T.reshape(2, len(bands), -1)
+        # By the error of the table leaves without absorption could give more than they get.
+        means[1] = np.minimum(means[1], 1 - means[0])
+    else:
+        means = _each_kind(bands, leaf, names, cells)
+    return means.reshape(2, len(bands), *arrays[0].shape)
+
+
+def _each_kind(bands, leaf, names, cells):
+    """Band means of leaves, shape (2, band, n), from the varying contents, shape (name, n), once per kind of leaf."""
+    means = np.full((2, len(bands), cells.shape[1]), np.nan)
+    known = ~np.isnan(cells).any(axis=0)
+    kinds, index = np.unique(cells[:, known], axis=1, return_inverse=True)
+    of_kinds = np.empty((2, len(bands), kinds.shape[1]))
+    for start in range(0, kinds.shape[1], _BLOCK):
+        block = slice(start, start + _BLOCK)
+        part = dict(zip(names, kinds[:, block], strict=True))
+        of_kinds[..., block] = np.moveaxis(_means(bands, replace(leaf, **part)), -1, 1)
+    means[..., known] = of_kinds[..., index.reshape(-1)]
+    return means
+
+
+def _means(bands, leaf):
+    """Reflectance and transmittance of each leaf in each band, shape (2, n, band)."""
+    limits = min(band.limits[0] for band in bands), max(band.limits[1] for band in bands)
+    wavelength, *spectra = leaf_spectrum(leaf, limits)
+    return band_means(bands, wavelength, np.stack(spectra))
+
+
+@cached(32, "splines of leaf optics")
+def _table(bands, name, leaf):
+    """Cubic spline of reflectance and transmittance in each band over the cube root of one content."""
+    # Transmittance falls steeply with the first pigment, and k^2 E1(k) has no third derivative at 0; both are smooth in
+    # the cube root.
+    low, high = _range(name)
+
+    def exact(position):
+        means = _means(bands, replace(leaf, **{name: np.minimum(low + (high - low) * position**3, high)}))
+        return np.moveaxis(means, 1, 0).reshape(len(position), -1)
+
+    values = refined(exact, _COARSEST, _FINEST, LEAF_TOLERANCE, 0, nodes="leaves")
+    return CubicSpline(np.linspace(0, 1, len(values)), values)
+
+
+def _range(name):
+    """Smallest and largest value of a content of a leaf."""
+    return (1.0, LARGEST_STRUCTURE) if name == "structure" else (0.0, CONTENTS[name][1])

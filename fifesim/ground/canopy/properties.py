@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 
 class Property(NamedTuple):
-    """A property of the canopy."""
+    """Property of the canopy."""
 
     default: Any
     meaning: str
@@ -33,7 +33,7 @@ PROPERTIES = {
 }
 """Properties by the names of the fields of `fifesim.Canopy`. The module imports no physics, for scenarios as text."""
 
-NUMBERS = {name: each for name, each in PROPERTIES.items() if each.unit}
+NUMERIC_PROPERTIES = {name: each for name, each in PROPERTIES.items() if each.unit}
 """Properties that are numbers."""
 
 DRAWN = {name: each for name, each in PROPERTIES.items() if each.effect}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy.special import exp1
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.base.annotations import Array, NumberOrArray
-from fifesim.base.kinds import described
+from fifesim.base.arguments import described
+from fifesim.base.caches import cached
 
 CONTENTS = {
     "chlorophyll": ("ug cm-2", 200.0),
@@ -110,9 +110,9 @@ def leaf_spectrum(leaf, limits=(0.4, 2.5)):
     Parameters
     ----------
     leaf : Leaf
-        Of numbers, or of arrays of shape (...) that broadcast; NaN gives NaN.
+        Leaf of numbers, or of arrays of shape (...) that broadcast; NaN gives NaN.
     limits : (float, float), optional
-        Wavelengths that are wanted. [um]
+        Range of wavelengths. [um]
 
     Returns
     -------
@@ -127,13 +127,13 @@ def leaf_spectrum(leaf, limits=(0.4, 2.5)):
 
     Examples
     --------
-    What is neither reflected nor transmitted is absorbed, in the red most of the light:
+    Light that is neither reflected nor transmitted is absorbed, which is most of it in the red:
 
     >>> wavelength, reflectance, transmittance = leaf_spectrum(Leaf(chlorophyll=40))
     >>> bool(1 - (reflectance + transmittance)[wavelength == 0.67][0] > 0.8)
     True
     """
-    table = datasets.table("prospect_d.csv")
+    table = files.table("prospect_d.csv")
     first, last = np.searchsorted(table["wavelength"].to_numpy(), limits)
     table = table.iloc[max(first - 1, 0) : last + 2]
     refractive_index = table["refractive_index"].to_numpy()
@@ -159,13 +159,13 @@ def _number(name, value):
 
 
 def _column(value):
-    """A number as it is, or one for each leaf beside the wavelengths."""
+    """A number unchanged, or an array of leaves with an axis for wavelengths."""
     return value if isinstance(value, float) else np.asarray(value, float)[..., None]
 
 
 def layer_transmissivity(absorption):
     r"""
-    Isotropic light that passes an absorbing layer, without its surfaces.
+    Isotropic transmittance of an absorbing layer, without its surfaces.
 
     .. math:: \tau = (1 - k) \, e^{-k} + k^2 E_1(k)
 
@@ -197,7 +197,7 @@ def layer_transmissivity(absorption):
 
 def interface_transmissivity(refractive_index, angle):
     """
-    Unpolarized light from air that passes a plane surface, averaged over a cone about its normal.
+    Transmittance of a plane surface for unpolarized light from air, averaged over a cone about its normal.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def plate(refractive_index, tau, angle):
 
     Examples
     --------
-    What does not absorb loses nothing:
+    A plate without absorption conserves energy:
 
     >>> bool(abs(sum(plate(1.4, 1.0, 40.0)) - 1) < 1e-14)
     True
@@ -273,9 +273,9 @@ def plate(refractive_index, tau, angle):
     return 1 - entering + inside * tau * transmittance, transmittance
 
 
-@lru_cache(maxsize=16)
+@cached(16, "transmissivity of leaf surfaces")
 def _passing(refractive_index, shape, angle):
-    """`interface_transmissivity` of the bytes of an array: leaves differ in all else."""
+    """`interface_transmissivity` of the bytes of an array, cached because leaves share it."""
     passing = np.asarray(interface_transmissivity(np.frombuffer(refractive_index).reshape(shape), angle))
     passing.flags.writeable = False
     return passing
@@ -288,14 +288,14 @@ def pile(reflectance, transmittance, layers):
     Parameters
     ----------
     reflectance, transmittance : array
-        Of one layer, r above 0. [1]
+        Reflectance r, above 0, and transmittance of one layer. [1]
     layers : float
         Number of layers, not negative; it need not be whole.
 
     Returns
     -------
     reflectance, transmittance : array
-        Of the pile. [1]
+        Reflectance and transmittance of the pile. [1]
 
     References
     ----------

@@ -1,12 +1,13 @@
-"""Reflectance of a canopy in many cells: by the models themselves, or interpolated in tables of what cells share."""
+"""
+Reflectance of a canopy in many cells: by the models, or interpolated in tables of the properties that cells share.
+"""
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from fifesim.ground.canopy.absorption import extinction_coefficient
-from fifesim.ground.canopy.background import over_background, reflectance_factor, with_background
+from fifesim.base.caches import cached
+from fifesim.ground.canopy import interpolation
 from fifesim.ground.canopy.crowns import (
     SHAPE,
     check_crowns,
@@ -16,15 +17,11 @@ from fifesim.ground.canopy.crowns import (
     crowns_over_background,
     lai_in_crowns,
 )
-from fifesim.ground.canopy.foliage_interpolation import interpolate_crowned, interpolate_foliage
-from fifesim.ground.canopy.foliage_table import crown_table, tabulate_foliage
-from fifesim.ground.canopy.lai_table import interpolate, interpolate_over, tabulate
-from fifesim.ground.canopy.layers import two_layers
+from fifesim.ground.canopy.layers import extinction_coefficient, two_layers
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes
-from fifesim.ground.canopy.leaf_area import check_lai
+from fifesim.ground.canopy.leaf_area import check_lai, check_share
 from fifesim.ground.canopy.optics import check_background, check_leaf_optics
-from fifesim.ground.canopy.ranges import check_share
-from fifesim.ground.canopy.sail_model import sail
+from fifesim.ground.canopy.sail_model import over_background, reflectance_factor, sail, with_background
 
 _BLOCK = 2**15  # cells evaluated at a time, to bound memory
 
@@ -76,7 +73,7 @@ def canopy_reflectance(
     brown, dissociation : float, or array broadcastable to lai.shape, optional
         Dead share of the leaf area, and how far it lies below the rest, as in `two_layers`; NaN gives NaN. [1]
     brown_reflectance, brown_transmittance : array, shape (band,), optional
-        Of dead leaves; those of the others by default. [1]
+        Optics of dead leaves, by default equal to green leaves. [1]
     crown_cover : float, or array broadcastable to lai.shape, optional
         Share of the ground below crowns, which hold all leaves; NaN gives NaN. [1]
     crown_shape : float, optional
@@ -97,7 +94,7 @@ def canopy_reflectance(
     Notes
     -----
     Where the background is a number, its reflectance with the canopy is tabulated; where it is a raster, the layer's
-    reflectances and transmittances are, and each cell combines its own.
+    reflectances and transmittances are tabulated, and combined with the background of each cell.
 
     References
     ----------
@@ -127,8 +124,8 @@ def scene_reflectance(lai, background, scene, exact=False):
     if not (exact or scene.varies()):
         check_cells(lai, background, scene)
         if uniform:
-            return interpolate(_surface_table(_per_band(background, (bands,)), scene), lai)
-        return interpolate_over(_layer_table(scene), lai, background)
+            return interpolation.interpolate(_surface_table(_per_band(background, (bands,)), scene), lai)
+        return interpolation.interpolate_over(_layer_table(scene), lai, background)
     ground = np.broadcast_to(background, (bands,) if uniform else (bands, *cells)).reshape(bands, -1)
     if exact:
         check_cells(lai.reshape(-1), ground, scene)
@@ -137,7 +134,7 @@ def scene_reflectance(lai, background, scene, exact=False):
 
 
 def uniform_scene(leaf, sky, directions, leaf_angles, hotspot, dead=None, crown_shape=SHAPE, bands=(1,)):
-    """Scene without gaps or dead leaves, whose optics (reflectance, transmittance) are the same in all cells."""
+    """Scene without gaps or dead leaves, with the same optics in all cells."""
     if not 0 <= crown_shape < np.inf:
         raise ValueError(f"crown_shape must be at least 0, got {crown_shape:g}: it is crown diameter over height")
     for optics in (leaf, dead or leaf):
@@ -151,58 +148,44 @@ def uniform_scene(leaf, sky, directions, leaf_angles, hotspot, dead=None, crown_
 
 
 def with_shares(scene, cells, brown=0.0, dissociation=0.0, crown_cover=1.0):
-    """Scene with dead leaves and crowns: numbers, or arrays that broadcast to the shape of the cells."""
+    """Scene with dead leaves and crowns, by numbers or arrays that broadcast to the cells."""
     if not np.ndim(brown) and brown == 0:
         brown, dissociation = 0.0, 0.0
     elif scene.brown_reflectance is None:
         raise ValueError("brown leaves need optics of their own: give brown_reflectance and brown_transmittance")
     check_share("dissociation", dissociation)
-    shares = (_of_cells(each, cells) for each in (brown, dissociation, crown_cover))
-    return scene._replace(**dict(zip(("brown", "dissociation", "crown_cover"), shares, strict=True)))
+    brown, dissociation, crown_cover = (_of_cells(share, cells) for share in (brown, dissociation, crown_cover))
+    return scene._replace(brown=brown, dissociation=dissociation, crown_cover=crown_cover)
 
 
 def surface_table(background, scene):
-    """Table of the reflectance of each band over leaf area, for a scene of numbers and a background of each band."""
+    """Table of the reflectance of each band over leaf area, for a scene of numbers and a background for each band."""
     check_background(background)
     return _surface_table(tuple(background), scene)
 
 
 def directional_reflectance(
-    lai,
-    leaf_reflectance,
-    leaf_transmittance,
-    background,
-    *,
-    sza,
-    vza,
-    raa,
-    leaf_angles,
-    hotspot,
-    diffuse_fraction,
-    brown=0.0,
-    dissociation=0.0,
-    brown_reflectance=None,
-    brown_transmittance=None,
-    crown_cover=1.0,
-    crown_shape=SHAPE,
+    lai, leaf, background, sky, directions, leaf_angles, hotspot, dead=None, crown_shape=SHAPE, shares=(0.0, 0.0, 1.0)
 ):
-    r"""
-    Reflectance factor of a canopy where the directions of sun and view, or the leaves, differ from cell to cell.
+    """
+    Reflectance factor of a canopy where the directions of sun and view, or the leaves, vary from cell to cell.
 
     Parameters
     ----------
     lai : array, shape (...)
         NaN gives NaN. [m2 m-2]
-    leaf_reflectance, leaf_transmittance : array, shape (band,) or (..., band)
-        NaN gives NaN. [1]
-    background, diffuse_fraction : array, broadcastable to (..., band)
-        [1]
-    sza, vza, raa : array, broadcastable to (...)
-        NaN gives NaN. [degree]
-    leaf_angles, hotspot, brown, dissociation, crown_cover, crown_shape
+    leaf : pair of arrays, shape (band,) or (..., band)
+        Reflectance and transmittance of leaves. NaN gives NaN. [1]
+    background, sky : array, broadcastable to (..., band)
+        Reflectance of the background, and share of skylight. [1]
+    directions : three arrays, broadcastable to (...)
+        Solar zenith, view zenith and relative azimuth. NaN gives NaN. [degree]
+    leaf_angles, hotspot, crown_shape
         As in `canopy_reflectance`.
-    brown_reflectance, brown_transmittance : array, shape (band,) or (..., band), optional
-        Of dead leaves. [1]
+    dead : pair of arrays, shape (band,) or (..., band), optional
+        Reflectance and transmittance of dead leaves. [1]
+    shares : three numbers or arrays, broadcastable to (...), optional
+        Brown share, dissociation and crown cover, as in `canopy_reflectance`. [1]
 
     Returns
     -------
@@ -218,26 +201,23 @@ def directional_reflectance(
     ----------
     [Verhoef2007]_
     """
-    leaf_reflectance, leaf_transmittance = _leaves_by_cell(leaf_reflectance, leaf_transmittance, np.shape(lai))
+    leaf, (sza, vza, raa) = _leaves_by_cell(*leaf, np.shape(lai)), directions
     for name, angle in (("sza", np.asarray(sza, float)), ("vza", np.asarray(vza, float))):
         wrong = angle[(angle < 0) | (angle >= 90)]
         if wrong.size:
             raise ValueError(f"{name} must be in [0, 90) degrees in every cell, got {wrong[0]:g}")
-    cells, bands = np.shape(lai), len(leaf_reflectance)
+    cells, bands = np.shape(lai), len(leaf[0])
     lai = np.asarray(lai, float).reshape(-1)
     if np.ndim(sza) or np.ndim(vza) or np.ndim(raa):
         sza, vza, raa = (np.broadcast_to(np.asarray(v, float), cells).reshape(-1) for v in (sza, vza, raa))
     ground, sky = (
-        np.broadcast_to(np.asarray(v, float), (*cells, bands)).reshape(-1, bands).T
-        for v in (background, diffuse_fraction)
+        np.broadcast_to(np.asarray(v, float), (*cells, bands)).reshape(-1, bands).T for v in (background, sky)
     )
     missing = np.isnan(sza + vza + raa)
     sza, vza, raa = (np.where(missing, 0.0, angle) for angle in (sza, vza, raa))
-    scene = Scene(leaf_reflectance, leaf_transmittance, sky, sza, vza, raa, leaf_angle_classes(leaf_angles), hotspot)
-    if brown_reflectance is not None and brown_transmittance is not None:
-        dead = _leaves_by_cell(brown_reflectance, brown_transmittance, cells)
-        scene = scene._replace(brown_reflectance=dead[0], brown_transmittance=dead[1])
-    scene = with_shares(scene, cells, brown, dissociation, crown_cover)._replace(crown_shape=float(crown_shape))
+    dead = (None, None) if dead is None else _leaves_by_cell(*dead, cells)
+    scene = Scene(*leaf, sky, sza, vza, raa, leaf_angle_classes(leaf_angles), hotspot, *dead)
+    scene = with_shares(scene, cells, *shares)._replace(crown_shape=float(crown_shape))
     check_cells(lai, ground, scene)
     out = cell_by_cell(lai, ground, scene)
     out[:, np.broadcast_to(missing, lai.shape)] = np.nan
@@ -245,7 +225,7 @@ def directional_reflectance(
 
 
 def _leaves_by_cell(reflectance, transmittance, cells):
-    """Leaf optics of cells, shape (band, n), or (band, 1) where they are the same."""
+    """Leaf optics of cells, shape (band, n), or (band, 1) where they are equal."""
     rho, tau = np.broadcast_arrays(np.asarray(reflectance, float), np.asarray(transmittance, float))
     known = ~np.isnan(rho + tau) if rho.ndim > 1 else ...
     check_leaf_optics(rho[known], tau[known])
@@ -261,27 +241,29 @@ def _of_cells(value, cells):
 
 
 def _per_band(values, bands):
-    """Values of each band as a tuple, which a cache can look up."""
+    """Values of each band as a tuple, for the key of a cache."""
     return tuple(np.broadcast_to(np.asarray(values, float), bands).tolist())
 
 
-@lru_cache(maxsize=32)
+@cached(32, "reflectance tables over one background")
 def _surface_table(background, scene):
     """Table of the reflectance of each band."""
     ground = np.array(background)[:, None]
-    return tabulate(lambda lai: reflectance_of(lai, ground, scene), decay(scene) / (scene.crown_cover or 1.0))
+    return interpolation.tabulate(
+        lambda lai: model_reflectance(lai, ground, scene), decay(scene) / (scene.crown_cover or 1.0)
+    )
 
 
-@lru_cache(maxsize=32)
+@cached(32, "reflectance tables over any background")
 def _layer_table(scene):
-    """Table of the terms of `interpolate_over`; the reflectance must hold for every background."""
+    """Table of the terms of `interpolate_over`, accurate for every background."""
     sky = sky_of(scene)
     rate = decay(scene) / (scene.crown_cover or 1.0)
-    return tabulate(lambda lai: _layer_terms(canopy_of(lai, scene), sky), rate, _over_grounds)
+    return interpolation.tabulate(lambda lai: _layer_terms(cell_canopy(lai, scene), sky), rate, _over_grounds)
 
 
 def _layer_terms(canopy, sky):
-    """Terms of `over_background` for each band: reflected above, seen beyond chance, let through, reflected below."""
+    """Terms of `over_background` for each band: reflected above, hot spot, transmitted, reflected below."""
     c = canopy
     alone = reflectance_factor(c.rso, c.rdo, sky)
     hot = (1 - sky) * (c.tsstoo - c.tss * c.too)
@@ -297,11 +279,7 @@ def _over_grounds(values):
 
 
 class Scene(NamedTuple):
-    """
-    Leaves, their order, and directions; numbers, or arrays whose last axis are cells.
-
-    Optics and the sky's share are tuples over bands, or arrays of shape (band, 1) or (band, n).
-    """
+    """Leaves, canopy structure and directions; optics and sky are tuples over bands, or of shape (band, 1 or n)."""
 
     leaf_reflectance: tuple | np.ndarray
     leaf_transmittance: tuple | np.ndarray
@@ -319,33 +297,17 @@ class Scene(NamedTuple):
     crown_shape: float = SHAPE
 
     def varies(self):
-        """
-        Whether leaves or crowns differ from cell to cell.
-
-        Returns
-        -------
-        answer : bool
-        """
+        """Whether leaves or crowns vary from cell to cell."""
         return any(isinstance(each, np.ndarray) for each in (self.brown, self.dissociation, self.crown_cover))
 
     def part(self, cells):
-        """
-        The same for some of the cells: of arrays that vary, whose last axis they are.
-
-        Parameters
-        ----------
-        cells : slice or array of int
-
-        Returns
-        -------
-        scene : Scene
-        """
+        """Scene of some cells, which are the last axis of its arrays."""
         by_cell = {name: v for name, v in self._asdict().items() if isinstance(v, np.ndarray) and v.shape[-1:] > (1,)}
         return self._replace(**{name: values[..., cells] for name, values in by_cell.items()})
 
 
-def canopy_of(lai, scene):
-    """Reflectances and transmittances of the canopy of cells, a Canopy of shape (band, n) [1]."""
+def cell_canopy(lai, scene):
+    """Reflectances and transmittances of the canopy in cells, shape (band, n). [1]"""
     if _is(scene.crown_cover, 1):
         return leaves_of(lai, scene)
     shares = crown_shares(scene.crown_cover, scene.crown_shape, scene.sza, scene.vza, scene.raa)
@@ -354,8 +316,7 @@ def canopy_of(lai, scene):
 
 def leaves_of(lai, scene):
     """Reflectances and transmittances of leaves without gaps between crowns, from leaf area within crowns."""
-    names = "sza", "vza", "raa", "leaf_angles", "hotspot"
-    given = {name: getattr(scene, name) for name in names}
+    given = {name: getattr(scene, name) for name in ("sza", "vza", "raa", "leaf_angles", "hotspot")}
     leaf = _by_band(scene.leaf_reflectance), _by_band(scene.leaf_transmittance)
     if _is(scene.brown, 0):
         return sail(lai, *leaf, **given)
@@ -364,23 +325,23 @@ def leaves_of(lai, scene):
 
 
 def sky_of(scene):
-    """Diffuse fraction, shape (band, 1) or (band, n) [1]."""
+    """Diffuse fraction, shape (band, 1) or (band, n). [1]"""
     return _by_band(scene.sky)
 
 
-def reflectance_of(lai, background, scene):
-    """Reflectance factor of cells by the models themselves, shape (band, n) [1]."""
-    surface = with_background(canopy_of(lai, scene), background)
+def model_reflectance(lai, background, scene):
+    """Reflectance factor of cells by the models, shape (band, n). [1]"""
+    surface = with_background(cell_canopy(lai, scene), background)
     return reflectance_factor(surface.rso, surface.rdo, sky_of(scene))
 
 
 def cell_by_cell(lai, background, scene):
-    """Reflectance factor of cells by the models themselves, a block of cells at a time."""
+    """Reflectance factor of cells by the models, one block of cells at a time."""
     background = np.broadcast_to(background, (len(background), lai.size))
     out = np.empty(background.shape)
     for start in range(0, lai.size, _BLOCK):
         block = slice(start, start + _BLOCK)
-        out[:, block] = reflectance_of(lai[block], background[:, block], scene.part(block))
+        out[:, block] = model_reflectance(lai[block], background[:, block], scene.part(block))
     return out
 
 
@@ -394,7 +355,7 @@ def check_cells(lai, background, scene):
 
 
 def decay(scene):
-    """Fastest decay with leaf area within crowns: sunbeam and view together, or diffuse light."""
+    """Fastest decay with leaf area within crowns: direct beam and view together, or diffuse light."""
     down, up = (extinction_coefficient(angle, scene.leaf_angles) for angle in (scene.sza, scene.vza))
     return max(1.0, down + up)
 
@@ -404,34 +365,13 @@ def _is(value, number):
 
 
 def _by_band(values):
-    """Shape (band, 1) or (band, n)."""
+    """Values as an array of shape (band, 1) or (band, n)."""
     return np.reshape(values, (len(values), -1))
 
 
 def varied_reflectance(lai, background, scene):
-    """
-    Reflectance factor of cells whose dead share, dissociation or crown cover are arrays.
-
-    Parameters
-    ----------
-    lai : array, shape (n,)
-        [m2 m-2]
-    background : array, shape (band, n) or (band, 1)
-        [1]
-    scene : Scene
-        All else in it are numbers.
-
-    Returns
-    -------
-    reflectance : array, shape (band, n)
-        Within 1e-6 of that of `cell_by_cell`; which it is where the dissociation is an array, and where the leaf area
-        index within crowns is above `foliage_table.LIMIT`. [1]
-
-    Raises
-    ------
-    ValueError
-        As `check_cells`.
-    """
+    """Reflectance factor for varying brown, dissociation or crown cover, shape (band, n), within 1e-6. [1]"""
+    # By the models where the dissociation is an array, and where leaf area within crowns is beyond the tables.
     if isinstance(scene.dissociation, np.ndarray):
         check_cells(lai, background, scene)
         return cell_by_cell(lai, background, scene)
@@ -441,10 +381,10 @@ def varied_reflectance(lai, background, scene):
     if isinstance(scene.crown_cover, np.ndarray):
         table = _crown_terms_table(alike._replace(crown_cover=1.0, crown_shape=SHAPE), by_brown)
         crowns = _crown_table(scene.crown_shape, scene.sza, scene.vza, scene.raa)
-        out, wrong = interpolate_crowned(table, crowns, lai, brown, scene.crown_cover, background)
+        out, wrong = interpolation.interpolate_crowned(table, crowns, lai, brown, scene.crown_cover, background)
     else:
         inside = lai if scene.crown_cover == 1 else lai_in_crowns(lai, scene.crown_cover)
-        out, wrong = interpolate_foliage(_joined_table(alike), inside, brown, background)
+        out, wrong = interpolation.interpolate_foliage(_joined_table(alike), inside, brown, background)
     if wrong:
         check_cells(lai, background, scene)
     if np.fmax.reduce(out[0], initial=0.0) == np.inf:
@@ -453,12 +393,12 @@ def varied_reflectance(lai, background, scene):
     return out
 
 
-_crown_table = lru_cache(maxsize=32)(crown_table)
+_crown_table = cached(32, "reflectance tables of crowns")(interpolation.crown_table)
 
 
-@lru_cache(maxsize=32)
+@cached(32, "reflectance tables by dead share")
 def _joined_table(scene):
-    """Table of the terms of `over_background`, over leaf area within crowns and its dead share."""
+    """Table of the terms of `over_background` over leaf area within crowns and dead share."""
     sky = sky_of(scene)
 
     def terms(lai, brown):
@@ -467,10 +407,10 @@ def _joined_table(scene):
             c = clumped(c, crown_shares(scene.crown_cover, scene.crown_shape, scene.sza, scene.vza, scene.raa))
         return _layer_terms(c, sky)
 
-    return tabulate_foliage(terms, decay(scene), combine=_over_grounds)
+    return interpolation.tabulate_foliage(terms, decay(scene), combine=_over_grounds)
 
 
-@lru_cache(maxsize=32)
+@cached(32, "reflectance tables of crowns over any background")
 def _crown_terms_table(scene, by_brown):
     """Table of the terms of `crowns_over_background`."""
     sky = sky_of(scene)
@@ -480,9 +420,9 @@ def _crown_terms_table(scene, by_brown):
         return np.stack(np.broadcast_arrays(*found), axis=1).reshape(-1, lai.size)
 
     def reflectances(values):
-        """Crowns without gaps have the largest errors, of all terms."""
+        """Reflectances for which a table of crown terms is tested; crowns without gaps have the largest errors."""
         by_band = tuple(values.reshape(len(sky), -1, values.shape[1]).swapaxes(0, 1))
         over = [crowns_over_background(by_band, (1.0, 1.0, 1.0, 0.0, 1.0), r) for r in _GROUNDS]
         return np.concatenate([values, *over])
 
-    return tabulate_foliage(terms, decay(scene), by_brown, reflectances)
+    return interpolation.tabulate_foliage(terms, decay(scene), by_brown, reflectances)

@@ -1,21 +1,344 @@
-"""SAIL: four-stream radiative transfer in a homogeneous leaf canopy over a background."""
+"""SAIL: four-stream radiative transfer in a homogeneous leaf canopy with hot spot over a background."""
 
+import math
 from typing import NamedTuple
 
+import numba
 import numpy as np
+from numba.extending import register_jitable
 
 from fifesim.base.geometry import relative_azimuth
-from fifesim.ground.canopy.divided_differences import exponential_chain
-from fifesim.ground.canopy.hot_spot import bidirectional_gap, hotspot_decay
 from fifesim.ground.canopy.leaf_angles import azimuth_limit, leaf_angle_classes, leaf_projection
 
 
-class Canopy(NamedTuple):
-    """
-    Reflectances and transmittances of a canopy layer alone; s is the sun, o the observer, d diffuse light [1].
+class Surface(NamedTuple):
+    """Reflectances of canopy and background together, with the names of `Canopy`. [1]"""
 
-    The first letter is the light that comes in, the second that which leaves. Fields broadcast against each other.
+    rso: np.ndarray
+    rdo: np.ndarray
+    rsd: np.ndarray
+    rdd: np.ndarray
+
+
+def with_background(canopy, background):
+    r"""
+    Reflectances of a canopy over a Lambertian background.
+
+    .. math::
+
+        r_{so}^* &= r_{so} + (\tau_{ssoo} - \tau_{ss} \tau_{oo}) \, r \\
+            &\quad + (\tau_{ss} + \tau_{sd}) \, \frac{r}{1 - r \, r_{dd}} \, (\tau_{oo} + \tau_{do})
+
+    and likewise, without the second term, for the other three; :math:`r_{dd}` is for light from below.
+
+    Parameters
+    ----------
+    canopy : Canopy
+    background : array
+        Reflectance :math:`r` of the background, a number or any shape that broadcasts. [1]
+
+    Returns
+    -------
+    surface : Surface
+        [1]
+
+    References
+    ----------
+    [Verhoef2007]_
+
+    Examples
+    --------
+    Without leaves the background is seen as it is:
+
+    >>> from fifesim.ground.canopy.sail_model import sail
+    >>> float(with_background(sail(0.0, 0.1, 0.1, sza=30), 0.15).rso)
+    0.15
     """
+    c, r = canopy, np.asarray(background, float)
+    returned = r / (1 - r * c.rdd_below)
+    sun_down, to_observer = c.tss + c.tsd, c.too + c.tdo
+    return Surface(
+        rso=c.rso + (c.tsstoo - c.tss * c.too) * r + sun_down * returned * to_observer,
+        rdo=c.rdo + c.tdd * returned * to_observer,
+        rsd=c.rsd + sun_down * returned * c.tdd,
+        rdd=c.rdd + c.tdd * returned * c.tdd,
+    )
+
+
+@register_jitable
+def over_background(alone, hot, through, rdd, background):
+    r"""
+    Reflectance factor of a canopy over a background, from terms of its layer.
+
+    .. math:: \rho = A + r \left( B + \frac{C}{1 - r \, r_{dd}} \right)
+
+    Parameters
+    ----------
+    alone : array
+        A, of the canopy over black ground. [1]
+    hot : array
+        B, of the ground in the gaps that sun and observer share beyond chance. [1]
+    through : array
+        C, by the transmittance down and up. [1]
+    rdd : array
+        Reflectance of the canopy from below. [1]
+    background : array
+        r. [1]
+
+    Returns
+    -------
+    reflectance : array
+        That of `with_background` to rounding, mixed by `reflectance_factor`. [1]
+
+    References
+    ----------
+    [Verhoef2007]_
+
+    Examples
+    --------
+    >>> over_background(0.0, 0.0, 1.0, 0.0, 0.15)
+    0.15
+    """
+    return alone + background * (hot + through / (1 - background * rdd))
+
+
+def reflectance_factor(rso, rdo, diffuse_fraction):
+    r"""
+    Reflectance factor under a mixture of sunlight and isotropic skylight.
+
+    .. math:: \rho = (1 - f) \, r_{so} + f \, r_{do}
+
+    Parameters
+    ----------
+    rso, rdo : array
+        Bidirectional and hemispherical-directional reflectance factors. [1]
+    diffuse_fraction : array
+        Share :math:`f` of skylight in the irradiance; 0 is sunlight alone. [1]
+
+    Returns
+    -------
+    reflectance : array, shape of the broadcast inputs
+        [1]
+
+    References
+    ----------
+    [SchaepmanStrub2006]_
+
+    Examples
+    --------
+    >>> reflectance_factor(0.5, 0.25, 0.5)
+    0.375
+    """
+    return (1 - diffuse_fraction) * rso + diffuse_fraction * rdo
+
+
+def direction_distance(sza, vza, raa):
+    """Distance between two directions on a horizontal plane one unit below, 0 in the hot spot. [1]"""
+    tan_s, tan_v = np.tan(np.radians(sza)), np.tan(np.radians(vza))
+    # Without cancellation near the hot spot.
+    chord = 4 * tan_s * tan_v * np.sin(np.radians(raa) / 2) ** 2
+    return np.sqrt((tan_s - tan_v) ** 2 + chord)
+
+
+def hotspot_decay(sza, vza, raa, extinction, hotspot):
+    """
+    Decay of the correlation between the gaps of sun and observer with the relative depth of the canopy.
+
+    Parameters
+    ----------
+    sza, vza, raa : array
+        [degree]
+    extinction : array
+        Extinction of direct beam and view together, ks + ko. [1]
+    hotspot : array
+        Ratio of leaf size to canopy height. [1]
+
+    Returns
+    -------
+    alpha : array
+        Infinite without a hot spot. The factor 2 / (ks + ko) is Breon's, as in Verhoef et al. (2007). [1]
+
+    References
+    ----------
+    [Kuusk1991]_; [Verhoef2007]_
+    """
+    distance = direction_distance(sza, vza, raa)
+    has = hotspot > 0
+    return np.where(has, 2 * distance / (extinction * np.where(has, hotspot, 1)), np.inf)
+
+
+def bidirectional_gap(lai, ks, ko, alpha):
+    r"""
+    Probability that both beams reach the background, and the leaf area that both reach.
+
+    Parameters
+    ----------
+    lai : array
+        Leaf area above. [m2 m-2]
+    ks, ko : array
+        Extinction of both beams. [1]
+    alpha : array
+        From `hotspot_decay`; of the upper share x of a canopy, x times that. [1]
+
+    Returns
+    -------
+    tsstoo, sunlit_and_seen : array
+        [1], [m2 m-2]
+
+    Notes
+    -----
+    The gap fraction to relative depth x is
+
+    .. math:: P(x) = \exp\left[-K L x + \kappa L \, (1 - e^{-\alpha x}) / \alpha \right]
+
+    with :math:`K = k_s + k_o` and :math:`\kappa = \sqrt{k_s k_o}`. Its integral to infinite depth is, by parts again
+    and again,
+
+    .. math:: \sum_n (\kappa L)^n \Big/ \prod_{j=0}^n (K L + j \alpha)
+
+    and the part below :math:`x = 1` is :math:`P(1)` times the same with :math:`\kappa e^{-\alpha}`. As
+    :math:`\kappa \le K / 2` each term is at most half of the one before: 56 terms reach rounding, for any hot spot.
+
+    References
+    ----------
+    [Kuusk1991]_
+    """
+    extinction, kappa = ks + ko, np.sqrt(ks * ko)
+    finite = np.where((alpha > 0) & (alpha < np.inf), alpha, 1)
+    overlap = np.where(alpha > 0, np.where(alpha < np.inf, -np.expm1(-finite) / finite, 0), 1)
+    tsstoo = np.exp(-(extinction - kappa * overlap) * lai)
+    shade = np.exp(-alpha)
+    term, below = np.broadcast_arrays(1.0, tsstoo)
+    total = term - below
+    for n in range(1, 57):
+        # At zero depth in the exact hot spot 0 / 0 stands for a term that does not count.
+        rate = extinction * lai + n * alpha
+        ratio = kappa * lai / np.where(rate > 0, rate, 1)
+        term, below = term * ratio, below * ratio * shade
+        total = total + (term - below)
+    return tsstoo, total / extinction
+
+
+# The Taylor series takes over below this spread of exponents; recursion loses no more than a digit above it.
+_SPREAD = 2.0
+_TERMS = 22
+
+
+def exponential_chain(lai, *rates):
+    r"""
+    Transmission through a layer whose light changes its attenuation rate at every possible depth.
+
+    .. math::
+
+        C(L; r_0 \dots r_n) &= L^n \exp[-r_0 L, \dots, -r_n L] \\
+            &= \int\limits_{0 < t_1 < \dots < t_n < L}
+            e^{-r_0 t_1 - r_1 (t_2 - t_1) - \dots - r_n (L - t_n)} \, dt_1 \dots dt_n
+
+    Parameters
+    ----------
+    lai : array
+        Depth of the layer, :math:`L`. [1]
+    *rates : array
+        Attenuation rates :math:`r_i` per leaf area, two to five. They may be equal, and in any order. [1]
+
+    Returns
+    -------
+    chain : array, shape of the broadcast inputs
+
+    Notes
+    -----
+    The brackets denote a divided difference. SAIL's functions J1 and J2 are chains of two rates, and where they
+    are singular the two are equal. Close exponents go through a Taylor series about their centre, distant
+    ones through the recursion for divided differences; so no rate is singular.
+
+    References
+    ----------
+    [McCurdy1984]_
+
+    Examples
+    --------
+    Equal rates are no singular case:
+
+    >>> float(exponential_chain(3.0, 0.0, 0.0, 0.0))
+    4.5
+    """
+    given = [np.asarray(each, float) for each in (lai, *rates)]
+    flat = np.empty((len(given), *np.broadcast_shapes(*(each.shape for each in given))))
+    for number, each in enumerate(given):
+        flat[number] = each
+    shape, flat = flat.shape[1:], flat.reshape(len(given), -1)
+    chains = np.empty(flat.shape[1])
+    _chains(flat[0], flat[1:], chains)
+    return chains.reshape(shape)[()]
+
+
+@numba.njit(nogil=True, cache=True)
+def _chains(lai, rates, chains):
+    """Divided differences of the exponential over all exponents of each cell, times a power of the depth."""
+    count = rates.shape[0]
+    x, difference, homogeneous = np.empty(count), np.empty(count), np.empty(count)
+    for cell in range(lai.size):
+        _sort_exponents(lai[cell], rates[:, cell], x)
+        if math.isnan(x[0]):
+            chains[cell] = math.nan
+            continue
+        if x[-1] - x[0] < _SPREAD:
+            difference[0] = _series(x, 0, count, homogeneous)
+        else:
+            _recursion(x, difference, homogeneous)
+        chains[cell] = lai[cell] ** (count - 1) * difference[0]
+
+
+@numba.njit(nogil=True, cache=True)
+def _sort_exponents(lai, rates, x):
+    """Sort the exponents by insertion, NaN first; the recursion divides by the widest difference."""
+    for i in range(x.size):
+        exponent = -rates[i] * lai
+        if math.isnan(exponent):
+            x[0] = math.nan
+            return
+        j = i
+        while j > 0 and x[j - 1] > exponent:
+            x[j] = x[j - 1]
+            j -= 1
+        x[j] = exponent
+
+
+@numba.njit(nogil=True, cache=True)
+def _recursion(x, difference, homogeneous):
+    """Divided differences over distant exponents, by recursion on their number."""
+    for i in range(x.size):
+        difference[i] = np.exp(x[i])
+    for order in range(1, x.size):
+        for i in range(x.size - order):
+            spread = x[i + order] - x[i]
+            if spread < _SPREAD:
+                difference[i] = _series(x, i, order + 1, homogeneous)
+            else:
+                difference[i] = (difference[i + 1] - difference[i]) / spread
+
+
+@numba.njit(nogil=True, cache=True)
+def _series(x, start, count, homogeneous):
+    """Divided difference over close exponents: e^c sum_n h_n(x - c) / (n + count - 1)!, h_n homogeneous."""
+    centre = (x[start] + x[start + count - 1]) / 2
+    # homogeneous[j] is the complete homogeneous polynomial of one degree in the first j + 1 offsets.
+    homogeneous[:count] = 1.0
+    factorial = 1.0
+    for n in range(2, count):
+        factorial *= n
+    total = 1 / factorial
+    for n in range(1, _TERMS):
+        factorial *= n + count - 1
+        homogeneous[0] *= x[start] - centre
+        for j in range(1, count):
+            homogeneous[j] = homogeneous[j - 1] + (x[start + j] - centre) * homogeneous[j]
+        total += homogeneous[count - 1] / factorial
+    return math.exp(centre) * total
+
+
+class CanopyLayer(NamedTuple):
+    """Reflectances and transmittances of a canopy layer: s sun, o observer, d diffuse light; in, then out. [1]"""
 
     rso: np.ndarray
     rdo: np.ndarray
@@ -32,8 +355,8 @@ class Canopy(NamedTuple):
     """As rdd, of light from below; the same where all leaves are alike."""
 
 
-class Scattering(NamedTuple):
-    """Coefficients of the four-stream equations per leaf area, Verhoef's notation. [1]"""
+class LeafScattering(NamedTuple):
+    """Coefficients of the four-stream equations per leaf area, in the notation of Verhoef. [1]"""
 
     ks: np.ndarray  # extinction of the sunbeam
     ko: np.ndarray  # and toward the observer
@@ -92,7 +415,7 @@ def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, le
 
     Examples
     --------
-    What leaves do not absorb is reflected or transmitted:
+    Leaves without absorption conserve energy:
 
     >>> canopy = sail(2.0, 0.5, 0.5, sza=30)
     >>> float(round(canopy.rsd + canopy.tsd + canopy.tss, 12))
@@ -101,7 +424,7 @@ def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, le
     lai = np.asarray(lai, float)
     rho, tau = np.asarray(leaf_reflectance, float), np.asarray(leaf_transmittance, float)
     raa = relative_azimuth(raa, 0.0)
-    c = scattering(rho, tau, sza, vza, raa, leaf_angle_classes(leaf_angles))
+    c = leaf_scattering(rho, tau, sza, vza, raa, leaf_angle_classes(leaf_angles))
     alpha = hotspot_decay(sza, vza, raa, c.ks + c.ko, np.asarray(hotspot, float))
     tsstoo, sunlit_and_seen = bidirectional_gap(lai, c.ks, c.ko, alpha)
     layer = scattered_again(lai, c)
@@ -110,7 +433,7 @@ def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, le
 
 def scattered_again(lai, c):
     """
-    Reflectances and transmittances of a layer, without the light that the observer gets by one scattering.
+    Reflectances and transmittances of a layer, without the single scattering toward the observer.
 
     Parameters
     ----------
@@ -131,7 +454,7 @@ def scattered_again(lai, c):
     sinh = exponential_chain(lai, 2 * c.m, 0.0)
     slab = np.exp(-2 * c.m * lai) + (c.a + c.m) * sinh
     tss, too, rdd = np.exp(-c.ks * lai), np.exp(-c.ko * lai), c.sigma * sinh / slab
-    return Canopy(
+    return CanopyLayer(
         rso=_multiple_scattering(lai, c) / slab,
         rdo=_turned_back(lai, c, c.ko, c.vf, c.vb) / slab,
         rsd=_turned_back(lai, c, c.ks, c.sf, c.sb) / slab,
@@ -146,7 +469,7 @@ def scattered_again(lai, c):
     )
 
 
-def scattering(rho, tau, sza, vza, raa, leaf_angles):
+def leaf_scattering(rho, tau, sza, vza, raa, leaf_angles):
     """
     Coefficients of the four-stream equations, summed over leaf angle classes.
 
@@ -177,7 +500,7 @@ def scattering(rho, tau, sza, vza, raa, leaf_angles):
     scattered = [_over_leaves(phase / (mu_s * mu_v), fraction) for phase in (reflected, transmitted)]
     sigma = ((1 + bf) * rho + (1 - bf) * tau) / 2
     absorbed = 1 - rho - tau
-    return Scattering(
+    return LeafScattering(
         ks=ks,
         ko=ko,
         a=absorbed + sigma,
@@ -193,7 +516,7 @@ def scattering(rho, tau, sza, vza, raa, leaf_angles):
 
 
 def _over_leaves(values, fraction):
-    """Sum over leaf angles; a matrix product's last bits would depend on how many cells there are."""
+    """Sum over leaf angles, whose last bits, unlike those in a matrix product, do not depend on the number of cells."""
     return np.sum(values * fraction, axis=-1)
 
 
@@ -245,32 +568,29 @@ def volume_scattering(inclination, sza, vza, raa):
 
 
 def _turned_back(lai, c, k, forward, backward):
-    """Beam of extinction k that leaves as diffuse light where it came in, times A(L) e^(-m L)."""
+    """Beam of extinction k converted to diffuse light that leaves on the side of entry, times A(L) e^(-m L)."""
     again = (c.a + c.m) * backward + c.sigma * forward
     beam = k + c.m
     return backward * exponential_chain(lai, beam, 2 * c.m) + again * exponential_chain(lai, beam, 2 * c.m, 0.0)
 
 
 def _passed_on(lai, c, k, forward, backward):
-    """Beam of extinction k that leaves as diffuse light on the far side, times A(L) e^(-m L)."""
+    """Beam of extinction k converted to diffuse light that leaves on the far side, times A(L) e^(-m L)."""
     again = (c.a + c.m) * forward + c.sigma * backward
     beam = k + 2 * c.m
     return forward * exponential_chain(lai, beam, c.m) + again * exponential_chain(lai, beam, k, c.m)
 
 
 def _multiple_scattering(lai, c):
-    """Sunlight that reaches the observer after two scatterings or more, times A(L) e^(-m L)."""
+    """Sunlight that reaches the observer after two or more scatterings, times A(L) e^(-m L)."""
     down = _between(lai, c, c.ko, (c.sf, c.sb), (c.vb, c.vf))
     return down + _between(lai, c, c.ks, (c.vf, c.vb), (c.sb, c.sf))
 
 
 def _between(lai, c, k, upper, lower):
-    """
-    Paths with the scatterings of one beam above those of the other, whose extinction is k.
-
-    Both beams cross the leaves above the upper scattering, the other beam alone those between. Above and below, the
-    diffuse light is as in `_passed_on` and `_turned_back`.
-    """
+    """Paths with the scatterings of one beam, of extinction k, above those by the other."""
+    # Both beams cross the leaves above the upper scattering, only the other beam those between. Above and below, the
+    # diffuse light is as in `_passed_on` and `_turned_back`.
     (forward, backward), (turned, kept) = upper, lower
     forward_again = (c.a + c.m) * forward + c.sigma * backward
     turned_again = (c.a + c.m) * turned + c.sigma * kept

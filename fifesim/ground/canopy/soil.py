@@ -1,14 +1,19 @@
-"""Soil below a canopy: its brightness along the soil line."""
+"""Soil below a canopy: its brightness along the soil line, and its darkening by water."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
-from fifesim.base import datasets
-from fifesim.ground.canopy.ranges import outside, within
+from fifesim.base import files
+from fifesim.base.caches import cached
+from fifesim.ground.canopy.leaf_area import outside, read_only, within
+from fifesim.ground.canopy.prospect import interface_transmissivity
 from fifesim.ground.canopy.spectra import band_means
 
 # Where the reflectance of a soil is its brightness: in the midst of visible light, as for aerosol and visibility. [um]
-GREEN = 0.55
+GREEN_WAVELENGTH = 0.55
 
 # Cells that are done together, so that they stay in the nearest cache.
 _RUN = 1024
@@ -48,64 +53,19 @@ def soil_line(bands):
     >>> soil_line([Band("green", (0.549, 0.55, 0.551), (0, 1, 0))]).round(3).tolist()
     [1.0]
     """
-    table = datasets.table("ground_spectra.csv")
+    table = files.table("ground_spectra.csv")
     wavelength, change = (each.to_numpy() for each in (table["wavelength"], table["soil_dry"] - table["soil_wet"]))
     check_range(bands, wavelength)
-    return band_means(bands, wavelength, change) / np.interp(GREEN, wavelength, change)
+    return band_means(bands, wavelength, change) / np.interp(GREEN_WAVELENGTH, wavelength, change)
 
 
 def brightened(reflectance, brightness, line):
-    """
-    Reflectance of a soil that is brighter, or darker, along the soil line.
-
-    Parameters
-    ----------
-    reflectance : array, shape (..., band)
-        NaN gives NaN. [1]
-    brightness : array, shape (...)
-        Change of the reflectance at 0.55 um; NaN gives NaN. [1]
-    line : array, shape (band,)
-        From `soil_line`.
-
-    Returns
-    -------
-    reflectance : array, shape (..., band)
-        Cut off at 0 and 1, where a soil cannot be darker or brighter. [1]
-
-    Raises
-    ------
-    ValueError
-        If a change is beyond -1 to 1.
-
-    Examples
-    --------
-    >>> brightened(np.array([0.15, 0.19]), -0.1, np.array([1.0, 2.0])).round(3).tolist()
-    [0.05, 0.0]
-    """
+    """Reflectance of a brighter or darker soil along the soil line, clipped to 0 to 1, shape (..., band). [1]"""
     return in_cells(_brighten, reflectance, brightness, np.asarray(line, float), check=check_brightness)
 
 
 def in_cells(kernel, reflectance, change, *parameters, check):
-    """
-    Reflectance of bands that a kernel makes of that before and of a number for each cell.
-
-    Parameters
-    ----------
-    kernel : callable
-        ``kernel(reflectance, change, *parameters, out)`` fills out, shape (band, n), from (band, n), or (band, 1) where
-        it is the same in all cells, and (n,). It gives how many of the numbers are out of their range.
-    reflectance : array, shape (band,) or (..., band)
-    change : array, shape (...)
-    *parameters
-        Passed to the kernel.
-    check : callable
-        Of the numbers, raises where one is out of its range.
-
-    Returns
-    -------
-    reflectance : array, shape (..., band)
-        In memory one band after the other, as it is used next.
-    """
+    """Apply a kernel to reflectance and one number for each cell, shape (..., band), with bands first in memory."""
     reflectance, change = np.atleast_1d(np.asarray(reflectance, float)), np.asarray(change, float)
     shape = np.broadcast_shapes(reflectance.shape[:-1], change.shape)
     cells = change if change.shape == shape else np.broadcast_to(change, shape)
@@ -115,7 +75,7 @@ def in_cells(kernel, reflectance, change, *parameters, check):
     else:
         below = reflectance[:, None]
     out = np.empty((bands, cells.size))
-    if kernel(np.ascontiguousarray(below), np.ascontiguousarray(cells).reshape(-1), *parameters, out):
+    if kernel(read_only(below), read_only(cells).reshape(-1), *parameters, out):
         check(change)
     return np.moveaxis(out.reshape(bands, *shape), 0, -1)
 
@@ -137,42 +97,13 @@ def _brighten(reflectance, brightness, line, out):
 
 
 def check_brightness(brightness):
-    """
-    Refuse a change of reflectance that none can have; NaN passes.
-
-    Parameters
-    ----------
-    brightness : array
-        [1]
-
-    Raises
-    ------
-    ValueError
-        If one is outside -1 to 1.
-
-    Examples
-    --------
-    >>> check_brightness(-0.04)
-    """
+    """Raise ValueError for an impossible change of reflectance, or return it; NaN passes."""
     check_span(brightness, -1.0, "soil is a change of reflectance along the soil line", "soil=0.04, not percent")
+    return brightness
 
 
 def check_span(values, lowest, meaning, such_as):
-    """
-    Refuse values below the lowest or above 1; NaN passes.
-
-    Parameters
-    ----------
-    values : array
-    lowest : float
-    meaning, such_as : str
-        What they are, by their name first, and what to type.
-
-    Raises
-    ------
-    ValueError
-        If one is.
-    """
+    """Raise ValueError for values below the lowest or above 1; NaN passes."""
     values = np.asarray(values, float)
     if not within(values, lowest, 1.0):
         name = meaning.partition(" ")[0]
@@ -181,23 +112,193 @@ def check_span(values, lowest, meaning, such_as):
 
 
 def check_range(bands, wavelength):
-    """
-    Refuse bands beyond the spectra that soils are known by.
-
-    Parameters
-    ----------
-    bands : sequence of fifesim.base.bands.Band
-    wavelength : array, shape (n,)
-        [um]
-
-    Raises
-    ------
-    ValueError
-        If one lies beyond.
-    """
+    """Raise ValueError for bands beyond the spectra of soils."""
     for band in bands:
         if band.limits[0] < wavelength[0] or band.limits[1] > wavelength[-1]:
             raise ValueError(
                 f"no soil line for band {band.name}, {band.limits[0]:g} to {band.limits[1]:g} um: its spectra have "
                 f"{wavelength[0]:g} to {wavelength[-1]:g} um; give bands= without it, or soil as background= by cell"
             )
+
+
+# Of the brightness-shape-moisture model, Yang et al. (2020): the water of the driest and of the wettest soil that it is
+# for, and what a soil holds in its first film, in percent of the volume; the thickness of a film [cm]; and the index of
+# refraction of what soils are made of.
+DRIEST, WETTEST = 5.0, 55.0
+CAPACITY = 25.0
+FILM = 0.015
+SOIL_INDEX = 2.0
+
+# Half opening of the cone from which light falls on a film, as on a leaf in PROSPECT. [degree]
+_CONE = 40.0
+
+# Films on average of a soil that is saturated.
+_PER_MOISTURE = (WETTEST - DRIEST) / CAPACITY
+
+# Deeper than so many films is less than 2 % of the wettest soil, which counts as so many.
+_FILMS = 6
+
+# Cells that are done together, so that they stay in the nearest cache, and in the next.
+_WATER_RUN, _AT_ONCE = 256, 2**14
+
+
+class WaterFilms(NamedTuple):
+    """Optics of water films on a soil in bands."""
+
+    surface: np.ndarray
+    """Reflectance of the upper side of the water for light from the air, shape (band,). [1]"""
+    inside: np.ndarray
+    """The same of its lower side, for diffuse light from below, shape (band,). [1]"""
+    entrance: np.ndarray
+    """Light that enters the soil's grains from water over that from air, shape (band,). [1]"""
+    passed: np.ndarray
+    """Light that one to six films let pass down and up, shape (band, 6). [1]"""
+
+
+@cached(64, "optics of water films")
+def water_films(bands):
+    """Optics of water films in bands."""
+    water, absorbing = files.table("water_index.csv"), files.table("prospect_d.csv")
+    wavelength, absorption = absorbing["wavelength"].to_numpy(), absorbing["water"].to_numpy()
+    check_range(bands, wavelength)
+    index = np.interp(wavelength, water["wavelength"], water["refractive_index"])
+    upward = interface_transmissivity(index, 90.0) / index**2
+    entrance = interface_transmissivity(SOIL_INDEX / index, 90.0) / interface_transmissivity(SOIL_INDEX, 90.0)
+    deep = np.arange(1, _FILMS + 1)[:, None]
+    spectra = [1 - interface_transmissivity(index, _CONE), 1 - upward, entrance, *np.exp(-2 * absorption * FILM * deep)]
+    surface, inside, entrance, *passed = band_means(bands, wavelength, np.array(spectra))
+    return WaterFilms(surface, inside, entrance, np.ascontiguousarray(np.transpose(passed)))
+
+
+@register_jitable
+def below_film(below, passed, inside):
+    """Light below a water film after one passage, and the share not reflected back; their quotient is the sum. [1]"""
+    up = passed * below
+    return up, 1 - inside * up
+
+
+@register_jitable
+def grains_in_water(dry, entrance):
+    r"""
+    Reflectance of a soil whose grains are in water, which refracts light into them less than air does.
+
+    .. math:: r_b = 1 - (1 - r) \, (r e + 1 - r)
+
+    Parameters
+    ----------
+    dry : array
+        Reflectance :math:`r` of the dry soil. [1]
+    entrance : array
+        Light that enters the grains from water over that from air, :math:`e`. [1]
+
+    Returns
+    -------
+    reflectance : array
+        [1]
+
+    References
+    ----------
+    [Lekner1988]_
+
+    Examples
+    --------
+    >>> round(grains_in_water(0.3, 1.0), 12)
+    0.3
+    """
+    return 1 - (1 - dry) * (dry * entrance + 1 - dry)
+
+
+def moistened(dry, moisture, films):
+    r"""
+    Reflectance of a moist soil, in parts dry and in parts below one, two and more water films.
+
+    .. math:: r = \sum_k \frac{\mu^k e^{-\mu}}{k!} \, r_k, \quad \mu = \frac{\theta - 5}{25}
+
+    where :math:`r_0` is dry, and :math:`\theta` from 5 to 55 percent of the volume is a moisture of 0 to 1.
+
+    Parameters
+    ----------
+    dry : array, shape (band,) or (..., band)
+        Reflectance of the dry soil; NaN gives NaN. [1]
+    moisture : array, shape (...)
+        0 is dry and 1 saturated; NaN gives NaN. [1]
+    films : WaterFilms
+
+    Returns
+    -------
+    reflectance : array, shape (..., band)
+        Equal to the dry soil to the bit at moisture 0. [1]
+
+    Raises
+    ------
+    ValueError
+        If a moisture is outside 0 to 1.
+
+    Notes
+    -----
+    Absorption uses the mean transmittance of films over a band, in which the dry soil is taken as flat. The surface of
+    the water reflects 2 %: a soil darker than 4 % becomes brighter. More than six films count as six.
+
+    References
+    ----------
+    [Yang2020]_, after [Verhoef2018]_; [HaleQuerry1973]_ and [Feret2017]_ for water
+
+    Examples
+    --------
+    >>> from fifesim.base.bands import Band
+    >>> films = water_films((Band("red", (0.63, 0.66, 0.69), (0, 1, 0)),))
+    >>> moistened(np.array([0.3]), np.array([0.0, 0.5, 1.0]), films).round(3).ravel().tolist()
+    [0.3, 0.23, 0.205]
+    """
+    return in_cells(_moisten, dry, moisture, *films, check=check_moisture)
+
+
+def _moisten(dry, moisture, surface, inside, entrance, passed, out):
+    wrong = 0
+    for start in range(0, moisture.size, _AT_ONCE):
+        bare = np.exp(moisture[start : start + _AT_ONCE] * -_PER_MOISTURE)
+        wrong += _films(dry, moisture, start, bare, surface, inside, entrance, passed, out)
+    return wrong
+
+
+# No divisor is 0: without that being asked, cells are done several at once.
+@njit(nogil=True, cache=True, error_model="numpy")
+def _films(dry, moisture, start, bare, surface, inside, entrance, passed, out):
+    covered, by_cell, wrong = np.empty((_FILMS, _WATER_RUN)), dry.shape[1] > 1, 0
+    for begin in range(0, bare.size, _WATER_RUN):
+        free = bare[begin : begin + _WATER_RUN]
+        run = slice(start + begin, start + begin + free.size)
+        wrong += outside(moisture[run], 0.0, 1.0)
+        _covered(moisture[run], free, covered)
+        for band in range(out.shape[0]):
+            soil, wet = dry[band, run] if by_cell else dry[band], out[band, run]
+            above_all, back, entering = surface[band], inside[band], entrance[band]
+            through = (1 - above_all) * (1 - back)
+            for i in range(free.size):
+                own = soil[i if by_cell else 0]
+                below, above, under = grains_in_water(own, entering), 0.0, 1.0
+                # The sum of the quotients of all films as one of two products: a division takes longer than the rest.
+                for k in range(_FILMS):
+                    up, kept = below_film(below, passed[band, k], back)
+                    above = above * kept + covered[k, i] * up * under
+                    under *= kept
+                wet[i] = free[i] * own + (1 - free[i]) * above_all + through * above / under
+    return wrong
+
+
+@register_jitable
+def _covered(moisture, bare, covered):
+    """Shares of a soil below one water film, two and more."""
+    for i in range(moisture.size):
+        mean = moisture[i] * _PER_MOISTURE
+        share, rest = bare[i], 1.0 - bare[i]
+        for k in range(1, _FILMS):
+            share *= mean * (1.0 / k)
+            covered[k - 1, i] = share
+            rest -= share
+        covered[_FILMS - 1, i] = rest
+
+
+def check_moisture(moisture):
+    """Raise ValueError if a moisture is outside 0 to 1; NaN passes."""
+    check_span(moisture, 0.0, "moisture is 0 where the soil is dry and 1 where it is saturated", "moisture=0.3")

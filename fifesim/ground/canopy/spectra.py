@@ -1,20 +1,120 @@
-"""Spectra of leaves and of what lies below them, mixed and averaged over bands."""
+"""Spectra of leaves and backgrounds: CSV files, mixtures and means over bands."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.base.annotations import NumberOrArray
+from fifesim.base.arguments import described
 from fifesim.base.bands import solar_spectrum
-from fifesim.base.kinds import described
-from fifesim.base.spelling import closest
-from fifesim.ground.canopy.spectrum import Spectrum, read_spectrum
+from fifesim.base.caches import cached
+from fifesim.base.files import read_csv
+from fifesim.base.messages import closest
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """
+    Reflectance spectrum.
+
+    Parameters
+    ----------
+    wavelength : sequence of float, shape (n,)
+        Increasing. [um]
+    reflectance : sequence of float, shape (n,)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If the wavelengths do not increase or are not in micrometres, or a reflectance is outside 0 to 1.
+    """
+
+    wavelength: tuple = field(repr=False)
+    reflectance: tuple = field(repr=False)
+
+    def __post_init__(self):
+        wavelength, shapes = np.asarray(self.wavelength, float), {np.shape(each) for each in self.values()}
+        if wavelength.ndim != 1 or wavelength.size < 2 or shapes != {wavelength.shape}:
+            raise ValueError("a spectrum needs two wavelengths or more, and one value for each")
+        if not np.all(np.diff(wavelength) > 0):
+            raise ValueError("the wavelengths of a spectrum must increase, and none be missing: sort them")
+        if wavelength[-1] > 100:
+            raise ValueError(f"wavelengths are in um, got {wavelength[-1]:g}: divide nanometres by 1000")
+        if wavelength[-1] < 0.1:
+            raise ValueError(f"wavelengths are in um, the largest is {wavelength[-1]:g}: convert them to micrometres")
+        object.__setattr__(self, "wavelength", tuple(wavelength.tolist()))
+        for name, values in zip(self.names(), self.values(), strict=True):
+            values = np.asarray(values, float)
+            wrong = ~((values >= 0) & (values <= 1))
+            if wrong.any():
+                raise ValueError(
+                    f"the {name} of a spectrum must be in [0, 1], got {values[wrong][0]:g} at "
+                    f"{wavelength[wrong][0]:g} um: give a fraction, not percent"
+                )
+            object.__setattr__(self, name, tuple(values.tolist()))
+
+    @classmethod
+    def names(cls):
+        """Names of the quantities by wavelength."""
+        return tuple(each.name for each in fields(cls) if each.name != "wavelength")
+
+    def values(self):
+        """Values of the quantities by wavelength, each of shape (n,). [1]"""
+        return tuple(getattr(self, name) for name in self.names())
+
+
+@dataclass(frozen=True)
+class LeafSpectrum(Spectrum):
+    """
+    Reflectance and transmittance spectra of a leaf.
+
+    Parameters
+    ----------
+    wavelength, reflectance
+        As in `Spectrum`.
+    transmittance : sequence of float, shape (n,)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        As in `Spectrum`, or if reflectance and transmittance add up to more than 1.
+    """
+
+    transmittance: tuple = field(repr=False)
+
+    def __post_init__(self):
+        super().__post_init__()
+        total = np.add(self.reflectance, self.transmittance)
+        if np.max(total) > 1 + 1e-12:
+            raise ValueError(
+                f"leaf reflectance and transmittance add up to {np.max(total):g} at "
+                f"{self.wavelength[np.argmax(total)]:g} um: the sum must not exceed 1, the rest is absorbed"
+            )
+
+
+def read_spectrum(path, kind=Spectrum):
+    """Read a spectrum from a CSV file with columns wavelength [um], reflectance and, for a leaf, transmittance."""
+    table = read_csv(path, "the spectrum")
+    columns = [str(column).strip().lower() for column in table.columns]
+    wanted = ("wavelength", *kind.names())
+    missing = [name for name in wanted if columns.count(name) != 1]
+    if missing:
+        raise ValueError(
+            f"{path} has no column {' nor '.join(missing)}, or several: its first line must name wavelength [um] and "
+            f"{' and '.join(kind.names())} [1], it has {', '.join(map(str, table.columns))}"
+        )
+    try:
+        return kind(*(table.iloc[:, columns.index(name)] for name in wanted))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
 
 SHADE = "shade"
 """Part of a mixture that reflects nothing."""
@@ -71,24 +171,7 @@ class Background:
 
 
 def check_shares(names, shares):
-    """
-    Refuse shares of a mixture that are no fractions, or do not add up to 1; NaN passes.
-
-    Parameters
-    ----------
-    names : sequence of str
-    shares : sequence of array, shape (...)
-        One for each name. [1]
-
-    Raises
-    ------
-    ValueError
-        If one is outside 0 to 1, or the sum is not 1.
-
-    Examples
-    --------
-    >>> check_shares(["soil_dry", "shade"], [0.25, 0.75])
-    """
+    """Raise ValueError if shares of a mixture are not fractions or do not add up to 1; NaN passes."""
     for name, share in zip(names, shares, strict=True):
         wrong = np.ravel(share)[np.ravel((np.asarray(share) < 0) | (np.asarray(share) > 1))]
         if wrong.size:
@@ -101,74 +184,20 @@ def check_shares(names, shares):
         )
 
 
+@cached(1, "names of ground spectra")
 def spectrum_names():
-    """
-    Names of the spectra that a background may be mixed from.
-
-    Returns
-    -------
-    names : tuple of str
-
-    Examples
-    --------
-    >>> "soil_dry" in spectrum_names()
-    True
-    """
-    return _spectrum_names()
-
-
-@lru_cache(maxsize=1)
-def _spectrum_names():
-    return (*datasets.table("ground_spectra.csv").columns.drop("wavelength"), SHADE)
+    """Names of the spectra from which a background can be mixed."""
+    return (*files.table("ground_spectra.csv").columns.drop("wavelength"), SHADE)
 
 
 def is_mixture(given):
-    """
-    Whether a mapping names spectra, and not bands.
-
-    Parameters
-    ----------
-    given : object
-
-    Returns
-    -------
-    answer : bool
-
-    Examples
-    --------
-    >>> is_mixture({"soil_dry": 1.0}), is_mixture({"TM3": 0.2})
-    (True, False)
-    """
+    """Whether the keys of a mapping are spectra rather than bands."""
     names = spectrum_names()
     return isinstance(given, Mapping) and bool(given) and all(str(name) in names or _is_file(name) for name in given)
 
 
 def band_means(bands, wavelength, values):
-    """
-    Means of spectra over the response of bands, weighted by the extraterrestrial sun.
-
-    Parameters
-    ----------
-    bands : sequence of fifesim.base.bands.Band
-    wavelength : array, shape (n,)
-        Increasing, and covering the bands. [um]
-    values : array, shape (..., n)
-
-    Returns
-    -------
-    means : array, shape (..., band)
-
-    Raises
-    ------
-    ValueError
-        If the spectrum does not cover a band.
-
-    Examples
-    --------
-    >>> from fifesim.base.bands import Band
-    >>> band_means([Band("red", (0.6, 0.65, 0.7), (0, 1, 0))], [0.5, 0.8], [0.3, 0.3]).round(12).tolist()
-    [0.3]
-    """
+    """Means of spectra over the response of bands, weighted by extraterrestrial sunlight, shape (..., band)."""
     wavelength, values = np.asarray(wavelength, float), np.asarray(values, float)
     for band in bands:
         if band.limits[0] < wavelength[0] or band.limits[1] > wavelength[-1]:
@@ -182,9 +211,9 @@ def band_means(bands, wavelength, values):
     return np.stack([band.mean(fine, nodes, weight) for band in bands], axis=-1)
 
 
-@lru_cache(maxsize=32)
+@cached(32, "wavelengths and sunlight of a spectrum")
 def _nodes(wavelength):
-    """Wavelengths of a spectrum (its bytes) and of the sun, sunlight there, and their places in the spectrum."""
+    """Union of the wavelengths of a spectrum (its bytes) and sunlight, sunlight there, and places in the spectrum."""
     wavelength = np.frombuffer(wavelength)
     sun_wavelength, sun = solar_spectrum()
     inside = (sun_wavelength > wavelength[0]) & (sun_wavelength < wavelength[-1])
@@ -195,57 +224,14 @@ def _nodes(wavelength):
 
 
 def background_means(bands, given):
-    """
-    Reflectance of a background in bands.
-
-    Parameters
-    ----------
-    bands : sequence of fifesim.base.bands.Band
-    given : Background or Spectrum
-
-    Returns
-    -------
-    reflectance : array, shape (band,)
-        [1]
-
-    Raises
-    ------
-    ValueError
-        If a spectrum does not cover a band.
-
-    Examples
-    --------
-    >>> from fifesim.base.bands import Band
-    >>> red = Band("red", (0.6, 0.65, 0.7), (0, 1, 0))
-    >>> half = background_means([red], Background({"soil_dry": 0.5, "shade": 0.5}))
-    >>> bool(abs(2 * half - background_means([red], Background({"soil_dry": 1.0}))) < 1e-15)
-    True
-    """
+    """Reflectance of a background in bands, shape (band,). [1]"""
     parts = [(given, 1.0)] if isinstance(given, Spectrum) else given.spectra()
     means = [share * band_means(bands, part.wavelength, part.reflectance) for part, share in parts]
     return np.sum([np.zeros(len(bands)), *means], axis=0)
 
 
 def did_you_mean(name, allowed):
-    """
-    Nearest of some names, in the words that follow one that is none of them.
-
-    Parameters
-    ----------
-    name : object
-        Taken as text.
-    allowed : iterable
-
-    Returns
-    -------
-    hint : str
-        A full stop if nothing is near.
-
-    Examples
-    --------
-    >>> did_you_mean("TM33", ["TM3", "TM4"])
-    ", did you mean 'TM3'?"
-    """
+    """Suggestion of the nearest name, as the end of a sentence."""
     near = closest(name, allowed)
     return f", did you mean {near!r}?" if near else "."
 
@@ -268,7 +254,7 @@ def _spectrum(name):
     return read_spectrum(name) if _is_file(name) else _known_spectrum(name)
 
 
-@lru_cache(maxsize=16)
+@cached(16, "ground spectra")
 def _known_spectrum(name):
-    table = datasets.table("ground_spectra.csv")
+    table = files.table("ground_spectra.csv")
     return Spectrum(table["wavelength"], table[name])

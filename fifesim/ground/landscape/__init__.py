@@ -1,1 +1,1 @@
-"""Where leaves are: random fields of leaf area with a given density."""
+"""Spatial distribution of leaves: random fields of leaf area with a given density."""

@@ -1,20 +1,120 @@
-"""What a landscape's classes of cover are: leaf area, leaves, what lies below, and how they stand."""
+"""Classes of cover with their properties, as objects and as text in files."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from numbers import Number
+from dataclasses import dataclass, fields, replace
+from numbers import Number, Real
 
 import numpy as np
+from scipy import stats
 
-from fifesim.base.annotations import Distribution, FilePath
-from fifesim.base.kinds import described
+from fifesim.base.annotations import FilePath, FrozenDistribution
+from fifesim.base.arguments import described
+from fifesim.base.caches import cached
 from fifesim.ground.canopy.description import TALLGRASS, Canopy
 from fifesim.ground.canopy.leaf_area import check_map
+from fifesim.ground.canopy.properties import DRAWN, PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
+from fifesim.ground.canopy.spectra import Background, Spectrum
 from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp
+from fifesim.ground.landscape.coarse_lattice import check_coarser
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
+
+SHARES = tuple(name for name, known in DRAWN.items() if (known.lowest, known.highest) == (0, 1))
+"""Properties between 0 and 1."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """
+    A property of a landscape that varies in a field.
+
+    Parameters
+    ----------
+    mean : float, optional
+        [1]
+    sd : float
+        Standard deviation. [1]
+    arp : float, optional
+        Autoregressive parameter of the field, in [0, 0.2498]. [1]
+    coarser : int, optional
+        Ground cells along a side of a cell of the field's own lattice, which `arp` counts in: with 4 a field varies
+        over 27 m and more on ground cells of 3.3 m, and takes a tenth of the time. By default it has the ground's.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range.
+    TypeError
+        If one is no number.
+
+    Examples
+    --------
+    >>> from fifesim import Field
+    >>> float(Field(mean=0.2, sd=0.1).distribution("brown").mean())
+    0.2
+    """
+
+    mean: float = 0.0
+    sd: float = 0.0
+    arp: float = 0.15
+    coarser: int = 1
+
+    def __post_init__(self):
+        for name in ("mean", "sd", "arp"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, Real):
+                raise TypeError(f"Field: {name} must be a number, got {described(value)}: type Field(mean=0.2, sd=0.1)")
+        if not 0 <= self.sd < float("inf"):
+            raise ValueError(f"Field: sd must be at least 0, got {self.sd:g}: it is a standard deviation")
+        if not abs(self.mean) <= 1:
+            raise ValueError(f"Field: mean must be in [-1, 1], got {self.mean:g}")
+        check_coarser(self.coarser)
+        check_arp(self.arp)
+        if self.arp > LARGEST_STREAMING_ARP:
+            raise ValueError(f"Field: arp must be at most {LARGEST_STREAMING_ARP}, got {self.arp:g}")
+
+    def distribution(self, name: str) -> FrozenDistribution:
+        """
+        Distribution of a share: the beta distribution of its mean and standard deviation.
+
+        Parameters
+        ----------
+        name : str
+            Of the property, ``"moisture"``, ``"brown"`` or ``"crown_cover"``.
+
+        Returns
+        -------
+        distribution : frozen scipy distribution
+            [1]
+
+        Raises
+        ------
+        ValueError
+            If nothing between 0 and 1 has this mean and standard deviation.
+        """
+        if not 0 < self.mean < 1:
+            raise ValueError(
+                f"{name} lies between 0 and 1: for it to vary its mean must lie between them, such as 0.2, got "
+                f"{self.mean:g}"
+            )
+        most = (self.mean * (1 - self.mean)) ** 0.5
+        if not 0 < self.sd < most:
+            raise ValueError(
+                f"{name} lies between 0 and 1: with a mean of {self.mean:g} its sd must be above 0 and below "
+                f"{most:.3g}, got {self.sd:g}"
+            )
+        return _beta(float(self.mean), float(self.sd))
+
+
+# The same object each time: what is tabulated of a distribution is kept with it.
+@cached(32, "beta distributions")
+def _beta(mean, sd):
+    weight = mean * (1 - mean) / sd**2 - 1
+    return stats.beta(mean * weight, (1 - mean) * weight)
+
 
 LARGEST_CODE = 2**15 - 1
 """Of a class in a map: codes are numbers of 16 bits, of which -1 is no data."""
@@ -55,7 +155,7 @@ class CoverClass:
     """
 
     name: str = ""
-    lai: FilePath | Distribution | float | None = None
+    lai: FilePath | FrozenDistribution | float | None = None
     arp: float | None = None
     canopy: Canopy = TALLGRASS
     code: int | None = None
@@ -63,8 +163,12 @@ class CoverClass:
     def __post_init__(self):
         if not isinstance(self.name, str) or len(self.name.split()) > 1:
             raise ValueError(f"the name of a class is one word, got {described(self.name)}: type burned-grazed")
-        with _Named(self.name):
+        try:
             self._check()
+        except (ValueError, TypeError) as error:
+            if type(error) not in (ValueError, TypeError):
+                raise
+            raise type(error)(f"class {self.name!r}: {error}" if self.name else f"CoverClass: {error}") from None
 
     def _check(self):
         if self.arp is not None:
@@ -89,46 +193,8 @@ class CoverClass:
                 )
 
 
-class _Named:
-    """A context in which errors say which class they are of."""
-
-    def __init__(self, name):
-        self._name = name
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, error, traceback):
-        if kind in (ValueError, TypeError):
-            raise kind(f"class {self._name!r}: {error}" if self._name else f"CoverClass: {error}") from None
-
-
 def class_table(classes):
-    """
-    Classes with their names and codes.
-
-    Parameters
-    ----------
-    classes : CoverClass, sequence of CoverClass, or mapping of str to CoverClass
-
-    Returns
-    -------
-    table : tuple of CoverClass
-        Each with a name and a code, which counts from 1 where classes say none.
-
-    Raises
-    ------
-    ValueError
-        If there is no class, two have one name or one code, or only some say theirs.
-    TypeError
-        If it holds something else.
-
-    Examples
-    --------
-    >>> table = class_table({"grass": CoverClass(lai="burned-grazed"), "water": CoverClass(lai=0)})
-    >>> [(each.name, each.code) for each in table]
-    [('grass', 1), ('water', 2)]
-    """
+    """Classes with names and codes, which count from 1 by default."""
     if isinstance(classes, CoverClass):
         classes = [classes]
     named = list(classes.items()) if isinstance(classes, Mapping) else [(None, each) for each in _listed(classes)]
@@ -180,7 +246,7 @@ def _listed(classes):
 
 
 def _with_name(found, name, number):
-    """A class by its name."""
+    """Class with its name."""
     if not isinstance(found, CoverClass):
         raise TypeError(
             f"class {name or number} must be a fifesim.CoverClass, got {described(found)}: type "
@@ -207,7 +273,7 @@ def _is_number(value):
 
 
 def _has_raster(value):
-    """Whether a description has something in it that varies from cell to cell."""
+    """Whether a description contains a raster."""
     if isinstance(value, Leaf):
         return bool(value.varying())
     if isinstance(value, Mapping):
@@ -215,3 +281,58 @@ def _has_raster(value):
     if isinstance(value, tuple | list):
         return any(_has_raster(each) for each in value)
     return getattr(value, "ndim", 0) > 1
+
+
+_KINDS = {kind.__name__: kind for kind in (Canopy, Leaf, Background, Spectrum)}
+
+
+def table_text(table):
+    """JSON text of a table of classes."""
+    # Distributions without a name, a file or an entry in scipy.stats are left out: they are not needed once leaf area
+    # exists.
+    rows = [{each.name: getattr(row, each.name) for each in fields(row)} for row in table]
+    rows = [{name: _plain(value) for name, value in row.items() if value is not TALLGRASS} for row in rows]
+    return json.dumps([{name: value for name, value in row.items() if value is not None} for row in rows])
+
+
+@cached(16, "class tables")
+def read_table(text):
+    """Table of classes from its text."""
+    try:
+        return tuple(CoverClass(**{name: _made(value) for name, value in row.items()}) for row in json.loads(text))
+    except (TypeError, AttributeError, json.JSONDecodeError) as error:
+        raise ValueError(f"the classes of the cover are not as landscape() writes them: {error}") from None
+
+
+def _plain(value):
+    """Value of a class as types of JSON."""
+    if isinstance(value, Canopy):
+        return {"Canopy": {name: _plain(getattr(value, name)) for name in PROPERTIES if name in value.given}}
+    if type(value).__name__ in _KINDS:
+        return {type(value).__name__: {each.name: _plain(getattr(value, each.name)) for each in fields(value)}}
+    if isinstance(value, dict):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, tuple | list | np.ndarray):
+        return [_plain(each) for each in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    if hasattr(value, "ppf"):
+        known = isinstance(getattr(stats, value.dist.name, None), stats.rv_continuous)
+        frozen = {"name": value.dist.name, "args": _plain(value.args), "kwds": _plain(value.kwds)}
+        return {"scipy.stats": frozen} if known else None
+    return value if value is None or isinstance(value, str | int | float) else str(value)
+
+
+def _made(value):
+    """Value of a class from types of JSON."""
+    if isinstance(value, list):
+        return tuple(map(_made, value))
+    if not isinstance(value, dict):
+        return value
+    name = next(iter(value), None)
+    if len(value) == 1 and name in _KINDS:
+        return _KINDS[name](**{key: _made(each) for key, each in value[name].items()})
+    if name == "scipy.stats":
+        frozen = value[name]
+        return getattr(stats, frozen["name"])(*frozen["args"], **frozen["kwds"])
+    return {key: _made(each) for key, each in value.items()}

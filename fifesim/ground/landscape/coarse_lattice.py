@@ -1,24 +1,142 @@
 """
-Fields of the autoregressive process on a coarser lattice, between whose cells those of the ground lie.
+Fields of the autoregressive process on a coarser lattice, and the variance that coarser cells keep.
 
 A cell of the lattice is a square of whole cells of the ground, counted from the origin of the reference system. Splines
-lead from its centres to those of the ground's cells. Their weights are divided, for each place within a cell of the
-lattice, by the standard deviation of what they make of the process: it is normal with variance 1 everywhere.
+interpolate from its centres to the centres of the ground cells. For each place within a cell of the lattice, their
+weights are divided by the standard deviation of the interpolated process, so that it is normal with variance 1
+everywhere.
 """
 
-from functools import lru_cache
 from numbers import Integral
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
+from scipy import fft
 
-from fifesim.base.kinds import described
-from fifesim.ground.landscape.dispersion import pair_correlations
-from fifesim.ground.landscape.field import mixed_field, streaming_field
+from fifesim.base.arguments import described
+from fifesim.base.caches import cached
+from fifesim.ground.landscape import autoregression
+
+# Largest standard deviation of the logarithm of cells.
+LARGEST_DEVIATION = 2.0
+
+_NODES = 41
+
+# Cells along a side of the sample, and pixels at least.
+_SAMPLE, _FEWEST = 504, 8
+
+
+def pair_correlations(arp, ratio):
+    """Correlations of all pairs of cells in a pixel by lag, and weights that sum to 1, of shape `ratio`. [1]"""
+    autoregression.check_arp(arp)
+    size = fft.next_fast_len(2 * (max(ratio) + autoregression.margin(arp)), real=True)
+    u = 2.0 * np.pi * fft.fftfreq(size)
+    covariance = fft.irfft2(autoregression.response(arp, u[:, None], np.abs(u[: size // 2 + 1])) ** 2, s=(size, size))
+    down, across = (
+        np.where(np.arange(number) > 0, 2.0, 1.0) * (number - np.arange(number)) / number**2 for number in ratio
+    )
+    return covariance[: ratio[0], : ratio[1]] / covariance[0, 0], down[:, None] * across
+
+
+def kept_variance(arp, ratio):
+    r"""
+    Share of the variance of cells that the means over pixels keep.
+
+    .. math:: v = \frac{1}{n^2} \sum_{ij} \rho_{ij}
+
+    Parameters
+    ----------
+    arp : float
+        [1]
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+
+    Returns
+    -------
+    share : float
+        [1]
+
+    Examples
+    --------
+    >>> round(kept_variance(0.0, (2, 3)), 9)
+    0.166666667
+    """
+    correlation, weight = pair_correlations(arp, ratio)
+    return float(np.sum(weight * correlation))
+
+
+def pixel_sample(arp, ratio):
+    """Standard normal cells of some pixels of the process, a fixed draw of shape (pixels, cells)."""
+    # The mean of each pixel is scaled so that their variance is exactly the one of the process.
+    size = [max(_SAMPLE // number, _FEWEST) for number in ratio]
+    field = autoregression.periodic_field(
+        0, arp, tuple(count * number for count, number in zip(size, ratio, strict=True))
+    )
+    cells = field.reshape(size[0], ratio[0], size[1], ratio[1]).transpose(0, 2, 1, 3).reshape(size[0] * size[1], -1)
+    means = cells.mean(axis=1, keepdims=True)
+    kept = kept_variance(arp, ratio)
+    inside = (cells - means) * np.sqrt((1.0 - kept) / np.mean((cells - means) ** 2)) if cells.shape[1] > 1 else 0.0
+    means = means - np.mean(means)
+    return means * np.sqrt(kept / np.mean(means**2)) + inside
+
+
+def deviation_table(arp, ratio):
+    r"""
+    Standard deviation of the logarithm of cells, tabulated by their coefficient of variation within pixels.
+
+    .. math:: c^2 = \left\langle \frac{\overline{l^2} - \bar l^2}{\bar l^2} \right\rangle, \quad l = e^{s z}
+
+    Parameters
+    ----------
+    arp, ratio
+        As in `kept_variance`.
+
+    Returns
+    -------
+    variations, deviations : array, shape (41,)
+        c and s, increasing from 0. Those of `pixel_sample`, good to 0.5 %. [1]
+    """
+    sample = pixel_sample(arp, ratio)
+    sample = sample - sample.mean(axis=1, keepdims=True)
+    deviations = np.linspace(0.0, LARGEST_DEVIATION, _NODES)
+    squared = []
+    for deviation in deviations:
+        cells = np.exp(deviation * sample)
+        squared.append(np.mean(np.mean(cells**2, axis=1) / np.mean(cells, axis=1) ** 2) - 1.0)
+    return np.sqrt(np.maximum.accumulate(squared)), deviations
+
+
+def level_deviations(transform, deviations, arp, ratio):
+    r"""
+    Deviations of a process whose means over pixels vary as the levels of the means of leaf area.
+
+    .. math:: s_l^2 = \mathrm{var}\,g(\bar l) / v
+
+    with g the level of a mean and v the share of `kept_variance`. They exceed those for cells where leaf area is
+    a nonlinear function: variation within a pixel changes its mean.
+
+    Parameters
+    ----------
+    transform : object
+        Gives leaf area ``cells(field)`` and the ``level(mean)`` of pixels.
+    deviations : array, shape (n,)
+        Deviations of the field of cells.
+    arp, ratio
+        As in `kept_variance`.
+
+    Returns
+    -------
+    deviations : array, shape (n,)
+        Those of `pixel_sample`.
+    """
+    sample = pixel_sample(arp, ratio)
+    found = [np.std(transform.level(transform.cells(each * sample).mean(axis=1))) for each in deviations]
+    return np.array(found) / np.sqrt(kept_variance(arp, ratio))
+
 
 # Edge of a tile. [cell of the lattice]
-TILE = 252
+COARSE_TILE = 252
 
 LARGEST = 100
 """Cells of the ground along a side of a cell of the lattice."""
@@ -63,7 +181,7 @@ def coarse_field(seed, arp, coarser, row, column, shape):
     Notes
     -----
     The splines are smooth to the second derivative, and no structure is finer than the lattice. A correlation over
-    cells of the ground is that of the process, further by about 0.6 cells of the lattice.
+    cells of the ground is longer than in the process by about 0.6 cells of the lattice.
 
     Examples
     --------
@@ -74,11 +192,11 @@ def coarse_field(seed, arp, coarser, row, column, shape):
     True
     """
     if check_coarser(coarser) == 1:
-        return streaming_field(seed, arp, row, column, shape)
+        return autoregression.streaming_field(seed, arp, row, column, shape)
     rows, columns = (_knots(first, size, coarser) for first, size in zip((row, column), shape, strict=True))
     size = tuple(int(knots[-1]) + _TAPS - int(knots[0]) if knots.size else 0 for knots in (rows, columns))
     start = tuple(int(knots[0]) if knots.size else 0 for knots in (rows, columns))
-    lattice = mixed_field({seed: 1.0}, arp, *start, size, tile=TILE)
+    lattice = autoregression.mixed_field({seed: 1.0}, arp, *start, size, tile=COARSE_TILE)
     out = np.empty(shape)
     phases = tuple((first + np.arange(length)) % coarser for first, length in zip((row, column), shape, strict=True))
     _interpolate(lattice, rows - start[0], columns - start[1], *phases, *spline_weights(arp, coarser), out)
@@ -86,30 +204,7 @@ def coarse_field(seed, arp, coarser, row, column, shape):
 
 
 def check_coarser(coarser):
-    """
-    Refuse what is no size of a cell of a coarser lattice.
-
-    Parameters
-    ----------
-    coarser : int
-        Cells of the ground along a side.
-
-    Returns
-    -------
-    coarser : int
-
-    Raises
-    ------
-    ValueError
-        If it is below 1 or above 100.
-    TypeError
-        If it is no whole number.
-
-    Examples
-    --------
-    >>> check_coarser(4)
-    4
-    """
+    """Raise an error if the coarsening factor is invalid."""
     if isinstance(coarser, bool) or not isinstance(coarser, Integral):
         raise TypeError(f"coarser must be a whole number of ground cells, got {described(coarser)}: type coarser=4")
     if not 1 <= coarser <= LARGEST:
@@ -119,33 +214,9 @@ def check_coarser(coarser):
     return int(coarser)
 
 
-@lru_cache(maxsize=32)
+@cached(32, "spline weights of a coarse lattice")
 def spline_weights(arp, coarser):
-    """
-    Weights of the cells of the lattice by where in one of them a cell of the ground lies.
-
-    Parameters
-    ----------
-    arp : float
-        [1]
-    coarser : int
-
-    Returns
-    -------
-    along : array, shape (coarser, 4)
-        Along an axis. [1]
-    factor : array, shape (coarser, coarser)
-        What the sum over both axes is multiplied with, so that its variance is 1. [1]
-
-    Examples
-    --------
-    Of white noise the squares sum to 1:
-
-    >>> along, factor = spline_weights(0.0, 3)
-    >>> squares = np.sum(along**2, axis=1)
-    >>> bool(np.allclose(squares[:, None] * squares * factor**2, 1.0))
-    True
-    """
+    """Spline weights by place, shape (coarser, 4), and factors for variance 1, shape (coarser, coarser). [1]"""
     share = ((2 * np.arange(coarser) + 1 + coarser) % (2 * coarser)) / (2 * coarser)
     rest = 1.0 - share
     along = np.stack(
@@ -160,14 +231,15 @@ def spline_weights(arp, coarser):
 
 
 def _knots(first, size, coarser):
-    """First of the cells of the lattice that each cell of the ground is made from, along an axis."""
+    """First of the four lattice cells from which each ground cell along an axis is interpolated."""
     # A centre lies at (2 i + 1 - coarser) / (2 coarser) centres of the lattice; one more lies before it.
     return (2 * (first + np.arange(size)) + 1 - coarser) // (2 * coarser) - 1
 
 
 @njit(nogil=True, cache=True)
 def _interpolate(lattice, rows, columns, down, across, along, factor, out):
-    """Along rows of the lattice first, of which there are few; then cells of the ground are done several at once."""
+    """Interpolate the lattice to cells."""
+    # First along rows of the lattice, which are few, then for several cells of the ground at once.
     lines, scaled = np.empty((_TAPS, columns.size)), np.empty((factor.shape[0], columns.size))
     for p in range(factor.shape[0]):
         for j in range(columns.size):
@@ -187,7 +259,7 @@ def _interpolate(lattice, rows, columns, down, across, along, factor, out):
 
 @register_jitable
 def _expand(line, columns, across, along, out):
-    """A row of the lattice at the columns of the ground."""
+    """Interpolate a row of the lattice to the columns of the ground."""
     for j in range(columns.size):
         c, q = columns[j], across[j]
         value = along[q, 0] * line[c] + along[q, 1] * line[c + 1]

@@ -1,37 +1,187 @@
 """
-Fields that correlate with each other and with the ground: a Gaussian copula.
+Correlated fields: correlations between fields and with the ground, by a Gaussian copula.
 
-Each field is standard normal: a part that follows the ground, and noise of the autoregressive process. What it becomes
-by the quantiles of any distribution keeps the correlation of ranks.
+Each field is standard normal: the sum of a part that follows the ground, and noise of the autoregressive process.
+Mapped to the quantiles of any distribution, fields keep the correlation of their ranks.
 """
 
 import zlib
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
+from numba import njit
+from scipy import special, stats
 
-from fifesim.base.seeds import check_seed, generator
+from fifesim.base.lattice import check_seed, generator
 from fifesim.ground.landscape.autoregression import field_variance
-from fifesim.ground.landscape.correlations import Impossible, largest_share, refused
-from fifesim.ground.landscape.scores import Scores, add_scores, normal_scores, score_table
+
+
+class Impossible(Exception):
+    """Correlations that no set of fields can have."""
+
+
+def pairs_of(correlations, fields, ground=()):
+    """Correlations by pairs, each once and with a field first."""
+    known = [*fields, *ground]
+    pairs = {}
+    for one, other, r in flat(correlations or {}):
+        for name in (one, other):
+            if name not in known:
+                raise ValueError(f"correlations name {name!r}, there are {', '.join(map(repr, known))}")
+        if one == other or not {one, other} & set(fields):
+            raise ValueError(
+                f"a correlation is of two fields, or of a field with the ground, got {one!r} with {other!r}: fields "
+                f"are {', '.join(fields)}; how the ground correlates with itself is known"
+            )
+        if one not in fields:
+            one, other = other, one
+        if (one, other) in pairs or (other, one) in pairs:
+            raise ValueError(f"the correlation of {one!r} with {other!r} is given twice: give it once")
+        pairs[one, other] = _correlation(one, other, r)
+    return pairs
+
+
+def flat(correlations):
+    """Iterate over the correlations one by one."""
+    if not isinstance(correlations, Mapping):
+        raise TypeError(f"correlations are {{(name, name): number}}, got {type(correlations).__name__}")
+    for key, value in correlations.items():
+        if isinstance(value, Mapping):
+            yield from ((key, other, r) for other, r in value.items())
+        elif isinstance(key, tuple) and len(key) == 2:
+            yield *key, value
+        else:
+            raise TypeError(f"correlations are {{(name, name): number}}, got the key {key!r}: name the other one too")
+
+
+def _correlation(one, other, r):
+    if isinstance(r, bool) or not isinstance(r, int | float | np.number):
+        raise TypeError(f"the correlation of {one} with {other} must be a number, got {type(r).__name__}")
+    if not -1 <= r <= 1:
+        raise ValueError(f"the correlation of {one} with {other} must be in [-1, 1], got {r:g}")
+    return float(r)
+
+
+def largest_share(attempt):
+    """Largest factor, in [0, 1), by which all correlations can be multiplied so that fields exist."""
+    low, high = 0.0, 1.0
+    for _ in range(20):
+        middle = (low + high) / 2
+        try:
+            attempt(middle)
+        except Impossible:
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+def refused(correlations, share, reason):
+    """Message for impossible correlations, which names the nearest possible ones."""
+    asked = ", ".join(f"{one}-{other} {r:g}" for (one, other), r in correlations.items())
+    # Cut, not rounded, to hundredths, so that the values in the message are allowed.
+    near = ", ".join(f"{one}-{other} {np.trunc(100 * share * r) / 100:g}" for (one, other), r in correlations.items())
+    return f"correlations {asked} cannot be: {reason}. The nearest allowed in their proportion are {near}"
+
+
+# Nodes of a table; values between two nodes are interpolated.
+_NODES = 2049
+
+# Starting points of searches; with this number most searches end at once, and the table stays in the cache.
+_STARTS = 32768
+
+# Share of the spacing of the starting points.
+_ROUNDING = 1e-6
+
+# Values that are processed together, so that they stay in the nearest cache.
+_RUN = 1024
+
+
+class Scores(NamedTuple):
+    """Standard normal scores of values by their ranks in a sample."""
+
+    values: np.ndarray
+    scores: np.ndarray
+    slopes: np.ndarray
+    """Of the lines between them."""
+    starts: np.ndarray
+    """Which of the values is the last below each of evenly spaced ones, from which a search goes on."""
+    steps: int
+    """The most that a search goes on."""
+
+
+def score_table(sample):
+    """Table of the standard normal scores of a sample, mean 0 and deviation 1; ties share their mean rank."""
+    values, counts = np.unique(sample, return_counts=True)
+    if values.size < 2:
+        raise ValueError("is the same everywhere: nothing can follow it")
+    scores = stats.norm.ppf((np.cumsum(counts) - counts / 2) / counts.sum())
+    mean = np.average(scores, weights=counts)
+    scores = (scores - mean) / np.sqrt(np.average((scores - mean) ** 2, weights=counts))
+    kept = np.unique(np.linspace(0, values.size - 1, _NODES).round().astype(int))
+    values, scores = values[kept], scores[kept]
+    even, rounding = np.linspace(values[0], values[-1], _STARTS, retstep=True)
+    # A value that lies on one of the even ones may by rounding be taken for one beside.
+    first, last = (
+        np.clip(np.searchsorted(values, even + aside * rounding, side="right") - 1, 0, values.size - 2)
+        for aside in (-_ROUNDING, 1 + _ROUNDING)
+    )
+    return Scores(values, scores, np.diff(scores) / np.diff(values), first.astype(np.int32), int(np.max(last - first)))
+
+
+def normal_scores(values, scores):
+    """Scores of values by a table, constant beyond its ends. [1]"""
+    out = np.zeros(np.size(values))
+    add_scores(values, scores, 1.0, out)
+    return out.reshape(np.shape(values))
+
+
+def add_scores(values, scores, weight, out):
+    """Add the weighted scores of values to an array in place."""
+    _lookup(np.ascontiguousarray(values, float).ravel(), *scores, float(weight), out)
+
+
+@njit(nogil=True, cache=True)
+def _lookup(values, nodes, scores, slopes, starts, steps, weight, out):
+    """Add the weighted scores of values, linear between nodes."""
+    lowest, highest, last = nodes[0], nodes[-1], np.uint32(nodes.size - 2)
+    per_start = (starts.size - 1) / (highest - lowest)
+    inside, at = np.empty(_RUN), np.empty(_RUN, np.uint32)
+    for first in range(0, values.size, _RUN):
+        cells, to = values[first : first + _RUN], out[first : first + _RUN]
+        # Without branches, so that the loops are done for several values at once.
+        for i in range(cells.size):
+            inside[i] = min(max(cells[i], lowest), highest) if cells[i] == cells[i] else lowest
+            at[i] = np.uint32((inside[i] - lowest) * per_start)
+        for i in range(cells.size):
+            at[i] = starts[at[i]]
+        for _ in range(steps):
+            for i in range(cells.size):
+                up = np.uint32(at[i] + 1)
+                at[i] = min(up, last) if inside[i] >= nodes[up] else at[i]
+        for i in range(cells.size):
+            k = at[i]
+            score = scores[k] + (inside[i] - nodes[k]) * slopes[k]
+            to[i] = to[i] + weight * score if cells[i] == cells[i] else np.nan
+
 
 # First of the streams of random numbers that are named after fields.
 _STREAM = 2**50
 
-# The ranks of what several properties of the ground make together bend it a little; the weights are mended
-# at most so often, until correlations are so close.
+# Ranks of a sum of several ground properties change its correlations a little; the weights are corrected at most this
+# many times, until the correlations are this close.
 _ROUNDS = 30
 _CLOSE = 1e-4
 
-# Cells at once, of which all that is between stays in a processor's cache.
+# Cells that are processed together, so that intermediate arrays stay in the cache.
 _AT_ONCE = 2**16
 
-# What is left of a correlation may be so far from what is asked.
+# Largest accepted difference from a requested correlation. [1]
 _APART = 0.01
 
 
-class Ground(NamedTuple):
+class GroundPart(NamedTuple):
     """The part of a field that follows the ground."""
 
     covariates: tuple[str, ...]
@@ -42,10 +192,10 @@ class Ground(NamedTuple):
 
 
 class Copula(NamedTuple):
-    """How fields are put together."""
+    """Weights that combine ground, noises and coarser fields to correlated fields."""
 
     covariates: dict[str, Scores]
-    ground: dict[str, Ground]
+    ground: dict[str, GroundPart]
     noise: dict[str, dict[str, float]]
     """For each field the weights of the noises, by the fields that they belong to."""
     coarse: dict[str, dict[str, float]]
@@ -53,25 +203,7 @@ class Copula(NamedTuple):
 
 
 def field_seed(seed, name):
-    """
-    Seed of the noise of a field.
-
-    Parameters
-    ----------
-    seed : int
-        Of the landscape, in [0, 2**63).
-    name : str
-        Of the field: "lai" has the seed itself, each other a stream of its own.
-
-    Returns
-    -------
-    seed : int
-
-    Examples
-    --------
-    >>> field_seed(7, "lai"), field_seed(7, "soil") == field_seed(7, "brown")
-    (7, False)
-    """
+    """Seed of the noise of a field; "lai" has the seed of the landscape."""
     seed = check_seed(seed)
     if name == "lai":
         return seed
@@ -80,7 +212,7 @@ def field_seed(seed, name):
 
 def cross_correlation(arp, other):
     r"""
-    Correlation of two autoregressive fields that are made of the same noise.
+    Correlation of two autoregressive fields of the same noise.
 
     .. math::
 
@@ -112,39 +244,9 @@ def cross_correlation(arp, other):
 
 
 def copula(arps, correlations, samples=None, coarser=()):
-    """
-    How fields are put together so that they correlate as asked.
-
-    Parameters
-    ----------
-    arps : dict of str to float
-        Of the fields. [1]
-    correlations : dict of (str, str) to float
-        Of pairs of fields, and of fields with properties of the ground, as
-        `fifesim.ground.landscape.correlations.pairs_of` gives them. [1]
-    samples : dict of str to array, shape (n,), optional
-        The ground at some places.
-    coarser : collection of str, optional
-        Names of the fields that vary on a coarser lattice.
-
-    Returns
-    -------
-    copula : Copula
-
-    Raises
-    ------
-    ValueError
-        If no fields correlate like that; the message tells the nearest in the same proportion.
-
-    Notes
-    -----
-    Properties of the ground that a field's correlations do not name have no part in it, and correlate with it by those
-    that they name. Fields whose pair is not named share nothing but the ground.
-
-    Where fields have different arps, their noises correlate more than the fields: by the inverse of
-    `cross_correlation`. Fields on coarser lattices share no noise with others. They come first, and are given to those
-    as what is known: these have a part of their texture then, and may correlate by any number.
-    """
+    """Weights for fields with the requested correlations."""
+    # Properties of the ground that are not named for a field have no part in it, and correlate with it only through the
+    # named ones. Fields whose pair is not named share only the ground.
     samples = {} if samples is None else _complete(samples)
     tables = {}
     for name, values in samples.items():
@@ -165,7 +267,7 @@ def copula(arps, correlations, samples=None, coarser=()):
 
 
 def _complete(samples):
-    """The ground at the places where all of it is known."""
+    """Ground at the places where all of its properties are known."""
     known = np.all([np.isfinite(each) for each in samples.values()], axis=0)
     if not known.any():
         raise ValueError(f"{', '.join(samples)}: nowhere are all known, there is nothing to follow")
@@ -173,7 +275,7 @@ def _complete(samples):
 
 
 def _parts(arps, correlations, scores, coarser):
-    """What of each field follows the ground; weights of the noises, and of the fields on coarser lattices."""
+    """Part of each field that follows the ground, and weights of the noises and of the fields on coarser lattices."""
     ground, signals = {}, {}
     for name in arps:
         asked = {other: r for (one, other), r in correlations.items() if one == name and other in scores}
@@ -188,12 +290,13 @@ def _parts(arps, correlations, scores, coarser):
         if one in names and other in names:
             i, j = names.index(one), names.index(other)
             needed[i, j] = needed[j, i] = _noise_correlation(one, other, left, most, known, arps)
-    noise = _weights(names, needed) | {name: {name: 1.0} for name in coarse}
+    _check_matrix(needed)
+    noise = _weights(names, names, needed) | {name: {name: 1.0} for name in coarse}
     return ground, noise, {name: each for name, each in known.items() if each}
 
 
 def _left(one, other, r, arps, coarser, ground, signals):
-    """What of the covariance of two fields does not come of the ground, and the most that it can be."""
+    """Covariance of two fields that is not due to the ground, and its largest possible value."""
     shared = float(np.mean(signals[one] * signals[other])) if one in signals and other in signals else 0.0
     rests = [1 - ground[name].share ** 2 if name in ground else 1.0 for name in (one, other)]
     alike = 1.0 if {one, other} & set(coarser) else cross_correlation(arps[one], arps[other])
@@ -207,27 +310,22 @@ def _left(one, other, r, arps, coarser, ground, signals):
 
 
 def _known(coarse, names, shares):
-    """Weights of independent fields on coarser lattices, in those themselves and in the others."""
+    """Weights of independent fields on coarser lattices, in these fields and in the others."""
     every = [*coarse, *names]
     matrix = np.eye(len(every))
     for (one, other), (left, most) in shares.items():
         if {one, other} & set(coarse):
             i, j = every.index(one), every.index(other)
             matrix[i, j] = matrix[j, i] = left / most if most > 0 else 0.0
-    within = matrix[: len(coarse), : len(coarse)]
-    _check_matrix(within)
+    _check_matrix(matrix[: len(coarse), : len(coarse)])
     for i in range(len(coarse), len(every)):
         # Each of the others by itself: what they share beside this is a matter of their noises.
         _check_matrix(matrix[np.ix_([*range(len(coarse)), i], [*range(len(coarse)), i])])
-    weights = _lower(matrix)
-    return {
-        name: {coarse[j]: float(weights[i, j]) for j in range(min(i + 1, len(coarse))) if weights[i, j]}
-        for i, name in enumerate(every)
-    }
+    return _weights(every, coarse, matrix)
 
 
 def _noise_correlation(one, other, left, most, known, arps):
-    """Correlation of the noises of two fields on the ground's own lattice."""
+    """Correlation of the noises of two fields on the lattice of the ground."""
     through = sum(weight * known[other].get(name, 0.0) for name, weight in known[one].items())
     if not known[one] and not known[other]:
         return left / most if most > 0 else 0.0
@@ -240,26 +338,26 @@ def _noise_correlation(one, other, left, most, known, arps):
 
 
 def _check_matrix(matrix):
-    if np.linalg.eigvalsh(matrix)[0] < -1e-9 if len(matrix) else False:
+    if len(matrix) and np.linalg.eigvalsh(matrix)[0] < -1e-9:
         raise Impossible("no correlation matrix has them together; pairs of fields that are not named count as 0")
 
 
-def _weights(names, needed):
-    """Weights of the noises of fields."""
-    _check_matrix(needed)
-    weights = _lower(needed)
+def _weights(names, sources, matrix):
+    """Weights of independent fields, the sources, in fields that correlate as in a matrix."""
+    weights = _lower(matrix)
     return {
-        name: {names[j]: float(weights[i, j]) for j in range(i + 1) if weights[i, j]} for i, name in enumerate(names)
+        name: {source: float(weights[i, j]) for j, source in enumerate(sources[: i + 1]) if weights[i, j]}
+        for i, name in enumerate(names)
     }
 
 
 def _follow(name, asked, scores):
-    """The part of a field that follows the ground, and its values over the sample."""
+    """Part of a field that follows the ground, and its values over the sample."""
     known = np.stack([scores[each] for each in asked])
     between = np.atleast_2d(np.corrcoef(known))
     wanted = np.array(list(asked.values()))
     if not wanted.any():
-        return Ground(tuple(asked), wanted, score_table(np.array([-1.0, 1.0])), 0.0), np.zeros(known.shape[1])
+        return GroundPart(tuple(asked), wanted, score_table(np.array([-1.0, 1.0])), 0.0), np.zeros(known.shape[1])
     best, target, step = None, wanted, 1.0
     for _ in range(_ROUNDS):
         weights = np.linalg.lstsq(between, target, rcond=1e-9)[0]
@@ -270,7 +368,7 @@ def _follow(name, asked, scores):
         signal = share * normal_scores(weights @ known, table)
         missed = wanted - np.mean(signal * known, axis=1)
         if best is None or np.abs(missed).max() < np.abs(best[0]).max():
-            best = missed, target, Ground(tuple(asked), weights, table, min(share, 1.0)), signal
+            best = missed, target, GroundPart(tuple(asked), weights, table, min(share, 1.0)), signal
         else:
             step /= 2
         if np.abs(best[0]).max() < _CLOSE or len(asked) == 1:
@@ -283,7 +381,7 @@ def _follow(name, asked, scores):
 
 
 def _lower(matrix):
-    """Lower triangle whose rows make correlated noise of independent ones; the matrix may be singular."""
+    """Lower triangle that turns independent into correlated noise; the matrix may be singular."""
     out = np.zeros_like(matrix)
     for i in range(len(matrix)):
         for j in range(i + 1):
@@ -297,18 +395,18 @@ def _lower(matrix):
 
 def correlated(ground, noise, scores, covariates):
     r"""
-    A field: what follows the ground, and noise.
+    Field as the sum of a part that follows the ground, and noise.
 
     .. math:: z = R \, s + \sqrt{1 - R^2} \, n
 
     Parameters
     ----------
     ground : Ground
-        Of the field.
+        Part of the field that follows the ground.
     noise : array, shape (y, x)
         Standard normal field :math:`n` of the field's own arp.
-    scores : dict of str to fifesim.ground.landscape.scores.Scores
-        Of the ground.
+    scores : dict of str to fifesim.ground.landscape.covariance.Scores
+        Scores of the ground.
     covariates : dict of str to array, shape (y, x)
         The ground.
 

@@ -1,5 +1,7 @@
 """
-Patches of cover as a function of seed and place.
+Patches and patterns of cover as functions of seed and place.
+
+Each block of the lattice draws separate numbers, so that any place can be made alone.
 
 All patterns are functions of northing and easting, so that a window is a slice of the whole, chunks change nothing, and
 cells of another size show the same patches.
@@ -9,13 +11,204 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from math import exp
 from typing import Literal
 
 import numpy as np
+from numba import njit
 from scipy.stats import norm
 
-from fifesim.base.kinds import described
-from fifesim.ground.landscape.patterns import pastures, smooth_field, voronoi
+from fifesim.base.arguments import described
+from fifesim.base.caches import cached
+from fifesim.base.lattice import assemble, generator
+
+# Streams of a seed.
+_VORONOI, _SMOOTH, _PASTURES = 8, 9, 10
+
+# Side of the squares in which random numbers are drawn. [block]
+_SQUARE = 64
+
+# Weights of the smooth field end this many knots away, where they are 1.5e-8 of the largest.
+_REACH = 6
+
+# Uniform numbers are multiples of 2**-53, and 0 has no normal deviate.
+_LEAST = 2.0**-54
+
+# Pastures along a side of a block that is fenced as a whole.
+_ALONG = 3
+
+
+def voronoi(seed, down, across, class_of=None):
+    """Number of the Voronoi cell of each place, uniform in [0, 1), or its class, shape (y, x)."""
+    # Each square of the unit lattice has one uniform random point, so that the mean area of the cells is 1.
+    # The nearest point lies within sqrt(2), so at most two squares away.
+    (top, rows), (left, columns) = (_blocks(each, 2) for each in (down, across))
+    points = _drawn(seed, _VORONOI, top, left, (rows, columns), 3)
+    points[0] += np.arange(top, top + rows)[:, None]
+    points[1] += np.arange(left, left + columns)
+    out = np.empty((down.size, across.size), float if class_of is None else np.int16)
+    # Patches are fewer than places.
+    points[2] = points[2] if class_of is None else class_of(points[2])
+    _nearest(down, across, top, left, points, out)
+    return out
+
+
+def smooth_field(seed, down, across):
+    r"""
+    Standard normal field with Gaussian correlation, 1/e at distance 1.
+
+    .. math:: z = \sum_k w_k \, n_k / \sqrt{\textstyle\sum_k w_k^2}, \quad w_k = \exp(-2 d_k^2)
+
+    over white noise at knots half a unit apart, each at a distance d from the place.
+
+    Parameters
+    ----------
+    seed : int
+    down, across : array, shape (y,), (x,)
+        Places, in units of the length.
+
+    Returns
+    -------
+    field : array, shape (y, x)
+        [1]
+
+    Notes
+    -----
+    Knots as far apart as the standard deviation of their weights are not visible: the correlation equals a
+    continuous sum within 1e-8.
+    """
+    # In units of the knots.
+    down, across = 2.0 * np.asarray(down, float), 2.0 * np.asarray(across, float)
+    (top, rows), (left, columns) = (_blocks(each, _REACH) for each in (down, across))
+    drawn = _drawn(seed, _SMOOTH, top, left, (rows, columns), 1)[0]
+    knots = norm.ppf(np.maximum(drawn, _LEAST))
+    out = np.empty((down.size, across.size))
+    _weighted(down, across, top, left, knots, out)
+    return out
+
+
+def pastures(seed, down, across, class_of=None):
+    """Number of the pasture of each place, uniform in [0, 1), or its class, shape (y, x)."""
+    # Blocks of 3 x 3 units are divided into nine pastures: always the largest so far, across its longer side at 3/8,
+    # 1/2 or 5/8 of it. The mean area of the pastures is 1.
+    down, across = np.asarray(down, float) / _ALONG, np.asarray(across, float) / _ALONG
+    out = np.empty((down.size, across.size), float if class_of is None else np.int16)
+    for row in np.unique(np.floor(down)).astype(int).tolist():
+        rows = np.flatnonzero(np.floor(down) == row)
+        for column in np.unique(np.floor(across)).astype(int).tolist():
+            columns = np.flatnonzero(np.floor(across) == column)
+            for (top, left, bottom, right), number in _fenced(seed, row, column):
+                within = (down[rows] - row >= top) & (down[rows] - row < bottom)
+                beside = (across[columns] - column >= left) & (across[columns] - column < right)
+                _paint(rows[within], columns[beside], number if class_of is None else class_of(number), out)
+    return out
+
+
+@njit(nogil=True, cache=True)
+def _paint(rows, columns, value, out):
+    """Set all crossings of rows and columns to a value, several times as fast as numpy."""
+    for i in rows:
+        for j in columns:
+            out[i, j] = value
+
+
+@cached(1024, "pastures of a block")
+def _fenced(seed, row, column):
+    """Pastures of a block: edges (top, left, bottom, right) in units of the block, and a number for each."""
+    drawn = generator(seed, _PASTURES, (0, 0, row, column)).random((2, _ALONG**2))
+    parts = [(0.0, 0.0, 1.0, 1.0)]
+    for number in drawn[0, 1:].tolist():
+        areas = [(bottom - top) * (right - left) for top, left, bottom, right in parts]
+        top, left, bottom, right = parts.pop(areas.index(max(areas)))
+        share = (3 + int(3 * number)) / 8
+        if bottom - top >= right - left:
+            fence = top + share * (bottom - top)
+            parts += [(top, left, fence, right), (fence, left, bottom, right)]
+        else:
+            fence = left + share * (right - left)
+            parts += [(top, left, bottom, fence), (top, fence, bottom, right)]
+    return tuple(zip(parts, drawn[1].tolist(), strict=True))
+
+
+def _blocks(places, around):
+    """First unit square of the places along an axis with a margin, and the number of squares."""
+    first = int(np.floor(np.min(places))) - around
+    return first, int(np.floor(np.max(places))) + around + 1 - first
+
+
+def _drawn(seed, stream, top, left, shape, numbers):
+    """Uniform numbers of a window of unit squares, shape (numbers, rows, columns)."""
+    out = np.empty((numbers, *shape))
+    for index in range(numbers):
+        out[index] = assemble(partial(_square, seed, stream, index), _SQUARE, top, left, shape)
+    return out
+
+
+@cached(64, "random numbers of patches")
+def _square(seed, stream, index, row, column):
+    """Uniform numbers of a block of unit squares."""
+    return generator(seed, stream, (0, index, row, column)).random((_SQUARE, _SQUARE))
+
+
+@njit(nogil=True, cache=True)
+def _nearest(down, across, top, left, points, out):
+    for i in range(down.size):
+        row = int(np.floor(down[i])) - top
+        below = down[i] - np.floor(down[i])
+        for j in range(across.size):
+            column = int(np.floor(across[j])) - left
+            beside = across[j] - np.floor(across[j])
+            least = np.inf
+            for k in range(row - 1, row + 2):
+                for m in range(column - 1, column + 2):
+                    away = (points[0, k, m] - down[i]) ** 2 + (points[1, k, m] - across[j]) ** 2
+                    if away < least:
+                        least = away
+                        out[i, j] = points[2, k, m]
+            # Squares further out are at least so far away.
+            if least <= (1.0 + min(min(below, 1.0 - below), min(beside, 1.0 - beside))) ** 2:
+                continue
+            for k in range(row - 2, row + 3):
+                for m in range(column - 2, column + 3):
+                    away = (points[0, k, m] - down[i]) ** 2 + (points[1, k, m] - across[j]) ** 2
+                    if away < least:
+                        least = away
+                        out[i, j] = points[2, k, m]
+
+
+@njit(nogil=True, cache=True)
+def _knot_weights(place, first, weights):
+    """Index of the first knot for a place along an axis, and the weights of the knots, whose squares sum to 1."""
+    knot = int(np.floor(place)) - _REACH + 1
+    total = 0.0
+    for k in range(2 * _REACH):
+        away = place - (knot + k)
+        weights[k] = exp(-0.5 * away * away)
+        total += weights[k] * weights[k]
+    for k in range(2 * _REACH):
+        weights[k] /= np.sqrt(total)
+    return knot - first
+
+
+@njit(nogil=True, cache=True)
+def _weighted(down, across, top, left, knots, out):
+    weights, line = np.empty(2 * _REACH), np.empty(knots.shape[1])
+    starts, sides = np.empty(across.size, np.int64), np.empty((across.size, 2 * _REACH))
+    for j in range(across.size):
+        starts[j] = _knot_weights(across[j], left, sides[j])
+    for i in range(down.size):
+        first = _knot_weights(down[i], top, weights)
+        line[:] = 0.0
+        for k in range(2 * _REACH):
+            for m in range(line.size):
+                line[m] += weights[k] * knots[first + k, m]
+        for j in range(across.size):
+            total = 0.0
+            for k in range(2 * _REACH):
+                total += sides[j, k] * line[starts[j] + k]
+            out[i, j] = total
+
 
 PATTERNS = ("voronoi", "levels", "pastures")
 
@@ -100,36 +293,7 @@ class Patches:
 
 
 def patch_classes(patches, shares, seed, northing, easting, codes=None):
-    """
-    Number of the class of each cell.
-
-    Parameters
-    ----------
-    patches : Patches
-    shares : sequence of float, shape (n,)
-        They sum to 1. [1]
-    seed : int
-        In [0, 2**63).
-    northing, easting : array, shape (y,), (x,)
-        Of cell centres. [m]
-    codes : array of int16, shape (n,), optional
-        Of the classes, in the place of their numbers.
-
-    Returns
-    -------
-    classes : array of int16, shape (y, x)
-        From 0 to n - 1, or codes.
-
-    Examples
-    --------
-    A window is a slice of the whole:
-
-    >>> north, east = np.arange(40) * -10.0, np.arange(50) * 10.0
-    >>> whole = patch_classes(Patches("voronoi", 90), (0.5, 0.5), 7, north, east)
-    >>> part = patch_classes(Patches("voronoi", 90), (0.5, 0.5), 7, north[5:20], east[9:])
-    >>> bool((whole[5:20, 9:] == part).all())
-    True
-    """
+    """Class number, or code, of each cell, shape (y, x)."""
     if not np.size(northing) or not np.size(easting):
         return np.zeros((np.size(northing), np.size(easting)), np.int16)
     codes = np.arange(len(shares), dtype=np.int16) if codes is None else codes

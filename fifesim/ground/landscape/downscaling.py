@@ -1,25 +1,346 @@
 """
-Cells below the pixels of a map of leaf area: they vary as the autoregressive process, and their means are the map's.
+Downscaling of maps of leaf area: cells within pixels by block kriging of the autoregressive process.
 
-The field of cells is conditioned on levels of the pixels by block kriging, and mapped to leaf area. Levels are found so
-that means over pixels are those of the map, and residuals are shifted for what these means say of them. What is left of
-some pixels shifts these by themselves, and a last factor, 0.999 to 1.001 as a rule, makes means exact.
+A field x of cells is a trend plus the process. Its means over pixels, :math:`B x`, are known to be m. The best linear
+estimate of the cells is :math:`K m` with :math:`K = C B^T (B C B^T)^{-1}`, and any field z with the same covariance is
+conditioned on these means as :math:`z + K (m - B z)`. Pixels are whole numbers of cells, so that K is a filter, which a
+Fourier transform applies exactly.
+
+A field of pixel means y is K y + r, and its residuals r are independent of y. Where the means m of a function g(x) are
+known, and g is not linear, m also contains information on r: the density of r is the density without m times a weight
+w. Here residuals that were drawn without m are shifted so that they have this density, to second order in the curvature
+of g.
+
+The field of cells is conditioned on levels of the pixels by block kriging, and mapped to leaf area. Levels are solved
+so that means over pixels are those in the map. Pixels with a remaining deviation are shifted separately, and a last
+factor, usually 0.999 to 1.001, makes the means exact.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
+from scipy import fft, ndimage
 
-from fifesim.ground.landscape.block_kriging import block_means, by_pixel, kriged
-from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
-from fifesim.ground.landscape.skewed_residuals import residual_shift
+from fifesim.base.caches import cached
+from fifesim.ground.landscape.autoregression import field_variance, response
+from fifesim.ground.landscape.distribution import quantile_map, quantile_table
+
+# Of the squared frequency, so that the trend has a spectral density at zero. [radian2 per pixel2]
+_SLOWEST = 1e-5
+
+
+def kriging_block_means(cells, ratio):
+    """Means of cells over pixels of whole cells, shape (rows, columns)."""
+    down, across = ratio
+    # Strides are several times faster than a mean over two axes of a few cells each.
+    rows = sum(cells[i::down] for i in range(1, down)) + cells[::down]
+    return (sum(rows[:, j::across] for j in range(1, across)) + rows[:, ::across]) / (down * across)
+
+
+def by_pixel(pixels, ratio):
+    """Values of pixels repeated on their cells."""
+    return np.repeat(np.repeat(pixels, ratio[0], axis=0), ratio[1], axis=1)
+
+
+def kriging_filter(arp, trend, ratio, shape):
+    r"""
+    Frequency response of block kriging, from pixels to cells.
+
+    .. math::
+
+        K(f) = \frac{S(f) \, \overline{b(f)}}{\frac{1}{n} \sum_{f'} S(f') |b(f')|^2}, \quad
+        S(f) = \frac{H^2(f)}{\sigma^2} + n \frac{\tau^2}{|\omega|^4}
+
+    with H the response of the process, :math:`\sigma^2` its variance, b the response of the mean over the n cells of a
+    pixel, and the sum over the frequencies of cells that are one of pixels. The trend's density, where :math:`\omega`
+    is the frequency per pixel, makes K reproduce what changes linearly.
+
+    Parameters
+    ----------
+    arp : float
+        Autoregressive parameter of the cells. [1]
+    trend : float
+        Root of the trend's density at one radian a pixel, over the deviation of the process, :math:`\tau`: from
+        `fifesim.ground.landscape.downscaling.map_trend`. Infinite where the trend alone is interpolated. [1]
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+    shape : (int, int)
+        Pixels, down and across, of a periodic lattice.
+
+    Returns
+    -------
+    response : array of complex64, shape (rows * ratio[0], columns * ratio[1] // 2 + 1)
+        Half plane of a real transform of the cells.
+
+    References
+    ----------
+    [Kyriakidis2004]_ for estimates of points from areas; [KyriakidisYoo2005]_ for the simulation
+    """
+    process, slow, mean = spectral_densities(arp, ratio, shape)
+    density = slow if np.isinf(trend) else process + trend**2 * slow
+    seen = of_means(density, mean, ratio)
+    half = mean.shape[1] // 2 + 1
+    columns = np.arange(half) % shape[1]
+    estimated = density[:, :half] * np.conj(mean[:, :half]) / np.tile(seen, (ratio[0], 1))[:, columns]
+    return estimated.astype(np.complex64)
+
+
+def spectral_densities(arp, ratio, shape):
+    """Spectral densities of process and trend on the cells, and the complex response of means over pixels. [1]"""
+    u, v = (2.0 * np.pi * fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
+    return _densities(arp, ratio, u, v)
+
+
+def _densities(arp, ratio, u, v):
+    """Spectral densities and response of `spectral_densities` at angular frequencies of rows and columns."""
+    squared = 2.0 * (1.0 - np.cos(u[:, None])) * ratio[0] ** 2 + 2.0 * (1.0 - np.cos(v)) * ratio[1] ** 2
+    trend = ratio[0] * ratio[1] / (squared + _SLOWEST) ** 2
+    process = response(arp, u[:, None], v) ** 2 / field_variance(arp)
+    return process, trend, _mean_response(u, ratio[0])[:, None] * _mean_response(v, ratio[1])
+
+
+def densities_of_means(arp, ratio, shape):
+    """Spectral densities of means over pixels of the process and of a trend, shape (rows, columns). [1]"""
+    u, v = (2.0 * np.pi * fft.fftfreq(size * number) for size, number in zip(shape, ratio, strict=True))
+    process, trend = np.zeros(shape), np.zeros(shape)
+    # The frequencies of rows that are one of pixels after one another: those of all cells would be large.
+    for some in u.reshape(ratio[0], shape[0]):
+        *both, mean = _densities(arp, ratio, some, v)
+        for total, each in zip((process, trend), both, strict=True):
+            total += of_means(each, mean, (1, ratio[1])) / ratio[0]
+    return process, trend
+
+
+def of_means(density, mean, ratio):
+    """Spectral density of means over pixels, whose mean is their variance, shape (rows, columns). [1]"""
+    rows, columns = (size // number for size, number in zip(density.shape, ratio, strict=True))
+    seen = (density * np.abs(mean) ** 2).reshape(ratio[0], rows, ratio[1], columns).sum((0, 2))
+    return seen / (ratio[0] * ratio[1])
+
+
+def _mean_response(frequency, number):
+    """Response of the mean over some successive cells."""
+    return np.exp(1j * frequency[:, None] * np.arange(number)).mean(axis=1)
+
+
+def kriged(pixels, response, ratio):
+    """Cells estimated from pixels by block kriging, in single precision."""
+    spectrum = fft.fft2(pixels.astype(np.float32))
+    spectrum = spectrum[:, np.arange(response.shape[1]) % pixels.shape[1]]
+    # Frequencies of cells that are one of pixels have its value.
+    repeated = (response.reshape(ratio[0], *spectrum.shape) * spectrum).reshape(response.shape)
+    size = pixels.shape[0] * ratio[0], pixels.shape[1] * ratio[1]
+    return fft.irfft2(repeated, s=size, overwrite_x=True)
+
+
+def weighed(cells, response, ratio):
+    """Sums of cells weighted as in the estimate from pixels, the transpose of `kriged`, shape (rows, columns)."""
+    spectrum = fft.rfft2(cells)
+    spectrum *= np.conj(response)
+    # Of every ratio-th row the spectrum is the mean over the frequencies that are one of pixels.
+    folded = spectrum.reshape(ratio[0], -1, spectrum.shape[1]).mean(axis=0)
+    return fft.irfft2(folded, s=(len(folded), cells.shape[1]))[:, :: ratio[1]]
+
+
+# Over so many pixels second differences are taken; and the pixels along an axis whose frequencies they are summed over.
+_LAGS, _PIXELS = (1, 2, 4, 8), 128
+
+# Median of the square of a standard normal number.
+_MEDIAN = 0.454936423119572
+
+# Powers of two that are told apart: beyond these the process, or the trend, alone is left.
+_LEAST, _MOST = -4, 6
+
+
+def map_trend(levels, known, deviation, arp, ratio):
+    r"""
+    Ratio of the trend of a map to the process, from its second differences.
+
+    .. math:: \tau^2 = \frac{D^2 / s^2 - v_p}{v_t}
+
+    with :math:`D^2` the variance of the second differences of pixels, the mean of those along rows and columns, s the
+    deviation of the process, and :math:`v_p` and :math:`v_t` the variances that second differences of means over pixels
+    for a process and a trend of one. Among differences over 1, 2, 4 and 8 pixels those are used that show most of a
+    trend: a gentle one is known by the wide ones.
+
+    Parameters
+    ----------
+    levels : array, shape (rows, columns)
+        Levels of the pixels.
+    known : array of bool, shape (rows, columns)
+        Where they are.
+    deviation : float or array, shape (rows, columns)
+        Standard deviation of the process, in units of levels.
+    arp : float
+        [1]
+    ratio : (int, int)
+        Cells in a pixel, down and across.
+
+    Returns
+    -------
+    trend : float
+        What `fifesim.ground.landscape.downscaling.kriging_filter` takes, as a power of two; 0 where pixels vary no
+        more than the process, infinite where there is none. [1]
+
+    Notes
+    -----
+    The variance is from the median of the squares of normal numbers, which is robust against fences and shores. A trend
+    that is a factor of 1.4 off changes semivariances by less than 1 %.
+
+    Examples
+    --------
+    A map without curvature has no trend beyond the process:
+
+    >>> map_trend(np.arange(64.0).reshape(8, 8), np.ones((8, 8), bool), 0.3, 0.15, (3, 3))
+    0.0
+    """
+    variance = float(np.mean(np.square(np.broadcast_to(deviation, levels.shape)[known])))
+    if not variance:
+        return np.inf
+    found = [0.0]
+    for lag, axes in _second_differences(arp, ratio).items():
+        squares = [_bends(levels, known, lag, axis) for axis in (0, 1)]
+        if all(each.size for each in squares):
+            excess = [
+                (np.median(each) / _MEDIAN / variance - process) / slow
+                for each, (process, slow) in zip(squares, axes, strict=True)
+            ]
+            found.append(float(np.mean(excess)))
+    strength = max(found)
+    if strength <= 4.0**_LEAST:
+        return 0.0
+    power = round(float(np.log2(strength)) / 2)
+    return np.inf if power > _MOST else 2.0**power
+
+
+def _bends(levels, known, lag, axis):
+    """Squared second differences of three known pixels in a row or a column."""
+    levels, known = np.moveaxis(levels, axis, 0), np.moveaxis(known, axis, 0)
+    first, middle, last = slice(None, -2 * lag), slice(lag, -lag), slice(2 * lag, None)
+    whole = known[first] & known[middle] & known[last]
+    return (levels[first] - 2.0 * levels[middle] + levels[last])[whole] ** 2
+
+
+@cached(8, "variances of second differences")
+def _second_differences(arp, ratio):
+    """Variances by lag of second differences of means over pixels along each axis, for a process and a trend of one."""
+    process, slow = densities_of_means(arp, ratio, (_PIXELS, _PIXELS))
+    frequency = 2.0 * np.pi * np.fft.fftfreq(_PIXELS)
+    variances = {}
+    for lag in _LAGS:
+        bend = (2.0 - 2.0 * np.cos(lag * frequency)) ** 2
+        axes = bend[:, None], bend
+        variances[lag] = [(float(np.mean(process * each)), float(np.mean(slow * each))) for each in axes]
+    return variances
+
+
+# Of the shift before, where the gradient is asked again: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for a quadratic ln w.
+_AGAIN = 0.75
+
+# What the levels of pixels vary about is their mean by weights of this standard deviation, a quarter of the pixels that
+# are read around a tile; by narrower weights, the process itself would count as its mean. [pixel]
+_SURROUNDINGS = 3.0
+
+
+class Kriging(NamedTuple):
+    """Filters of a window of pixels, for a process of unit variance."""
+
+    response: np.ndarray  # from pixels to cells, of `kriging_filter`
+    process: np.ndarray  # spectral density of the cells, on the half plane of a real transform
+    precision: np.ndarray  # inverse spectral density of the pixels without their local mean, on such a half plane
+    shares: np.ndarray  # shape (down, across): weight that a cell has in its own estimate from the means over pixels
+
+    @classmethod
+    def of(cls, arp, trend, ratio, shape):
+        """Filters of a process on a trend, in a window of pixels."""
+        response = kriging_filter(arp, trend, ratio, shape)
+        precision = np.zeros(shape)
+        if np.isfinite(trend):
+            process, slow = densities_of_means(arp, ratio, shape)
+            squared = [(2.0 * np.pi * fft.fftfreq(size) * _SURROUNDINGS) ** 2 for size in shape]
+            around = np.exp(-0.5 * (squared[0][:, None] + squared[1]))
+            precision = (1.0 - around) / (process + trend**2 * slow)
+        single = np.zeros(shape)
+        single[0, 0] = 1.0 / (ratio[0] * ratio[1])
+        return cls(
+            response,
+            spectral_densities(arp, ratio, shape)[0][:, : response.shape[1]].astype(np.float32),
+            precision[:, : shape[1] // 2 + 1].astype(np.float32),
+            kriged(single, response, ratio)[: ratio[0], : ratio[1]],
+        )
+
+
+def residual_shift(own, known, shift, kriging, transform, deviation):
+    r"""
+    Shift of the residuals to their density given the means of a function of the field.
+
+    .. math::
+
+        \ln w = -\tfrac12 y^\mathsf{T} P y - \ln \left| \frac{\partial m}{\partial y} \right|, \qquad
+        r' = r + C \, \nabla_r \ln w
+
+    with y the means of the field for r and m, P the inverse of their covariance, and C the covariance of the cells.
+
+    Parameters
+    ----------
+    own : array, shape (rows * down, columns * across)
+        Field of the process.
+    known : array, shape (rows, columns)
+        y, for this field and the shift so far.
+    shift : array, shape of own, or 0.0
+        Previous shift: the gradient is taken at half the residuals of own plus three quarters of this.
+    kriging : Kriging
+    transform : object
+        Gives the ``slopes(field)`` of the function: its first and second derivatives.
+    deviation : float or array, shape of own
+        Standard deviation of own.
+
+    Returns
+    -------
+    shift : array of float32, shape of own
+        To be added to own; at most one standard deviation.
+
+    Notes
+    -----
+    For a quadratic ln w, half of the gradient corrects variances, for a linear one all of it: both is the gradient
+    at half of the residuals. A second shift, which knows the first, is right in the square of ln w as well. The
+    derivative of m is inverted as if it were diagonal.
+
+    The weight follows from a change of variables, from y to m, in the normal density of r and y.
+
+    References
+    ----------
+    [KyriakidisYoo2005]_ for residuals of straight functions, which need none of this
+    """
+    variance = float(np.mean(np.square(deviation)))
+    if not variance:
+        return np.zeros_like(own)
+    ratio = kriging.shares.shape
+    half = own / 2 + np.float32(_AGAIN) * shift
+    steep, bent = transform.slopes(kriged(known - kriging_block_means(half, ratio), kriging.response, ratio) + half)
+    mean = kriging_block_means(steep, ratio)
+    inverse = by_pixel(np.divide(1.0, mean, out=np.zeros_like(mean), where=mean > 0), ratio)
+    steep = (steep * inverse).astype(np.float32)
+    bent = (bent * inverse).astype(np.float32) * np.tile(kriging.shares, mean.shape)
+    spectrum = fft.rfft2(known) * kriging.precision
+    # Where cells hardly vary, residuals have nowhere to go.
+    if np.ndim(deviation):
+        variance = np.maximum(kriging_block_means(np.square(deviation), ratio), variance / 4)
+    pixels = fft.irfft2(spectrum, s=known.shape) / variance + weighed(bent, kriging.response, ratio)
+    gradient = by_pixel((pixels / bent[: ratio[0], : ratio[1]].size).astype(np.float32), ratio) * steep - bent
+    # What all cells of a pixel share is no residual.
+    gradient -= by_pixel(kriging_block_means(gradient, ratio), ratio)
+    spectrum = fft.rfft2(deviation * gradient)
+    spectrum *= kriging.process
+    return np.clip(deviation * fft.irfft2(spectrum, s=own.shape, overwrite_x=True), -deviation, deviation)
+
 
 # Towards the map's means before, between and after the two shifts of residuals. Each step makes what is left of the
 # misfit five times smaller or more.
 STEPS = (1, 1, 3)
 
-SHIFTS = 8  # of single pixels
+PIXEL_SHIFTS = 8  # of single pixels
 
 _FURTHEST = 8.5  # level of a distribution's ends, in standard deviations
 
@@ -31,14 +352,14 @@ FIFE_LARGEST_VARIATION = 0.6
 
 def fife_variation(mean):
     r"""
-    Coefficient of variation of cells within pixels of 10 m, as of FIFE's grass.
+    Coefficient of variation of cells within pixels of 10 m, for the grass of FIFE.
 
     .. math:: c = \min(0.4 / \bar l, 0.6)
 
     Parameters
     ----------
     mean : array
-        Of pixels, above 0. [m2 m-2]
+        Mean leaf area of pixels, above 0. [m2 m-2]
 
     Returns
     -------
@@ -59,63 +380,23 @@ def fife_variation(mean):
 
 @dataclass(frozen=True, eq=False)
 class LogNormal:
-    """Cells whose logarithm is the field; the level of a pixel is the logarithm of its mean."""
+    """Log-normal cells, whose logarithm is the field; the level of a pixel is the logarithm of its mean."""
 
     def cells(self, field):
-        """
-        Leaf area of a field.
-
-        Parameters
-        ----------
-        field : array
-
-        Returns
-        -------
-        lai : array
-            [m2 m-2]
-        """
+        """Leaf area of a field. [m2 m-2]"""
         return np.exp(field)
 
     def slopes(self, field):
-        """
-        First and second derivatives of leaf area by the field.
-
-        Parameters
-        ----------
-        field : array
-
-        Returns
-        -------
-        first, second : array, shape of field
-            [m2 m-2]
-        """
+        """First and second derivatives of leaf area with respect to the field. [m2 m-2]"""
         lai = np.exp(field)
         return lai, lai
 
     def level(self, mean):
-        """
-        Level of the field in pixels of a mean.
-
-        Parameters
-        ----------
-        mean : array
-            Above 0. [m2 m-2]
-
-        Returns
-        -------
-        level : array
-        """
+        """Level of the field in pixels with a mean leaf area."""
         return np.log(mean)
 
     def check(self, mean):
-        """
-        Refuse means that cells cannot have; here all above 0 pass.
-
-        Parameters
-        ----------
-        mean : array
-            [m2 m-2]
-        """
+        """Raise ValueError for impossible means; all positive means are possible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +407,7 @@ class Marginal:
     Parameters
     ----------
     table : array, shape (16385,)
-        From `ground.landscape.quantiles.quantile_table`.
+        From `ground.landscape.distribution.quantile_table`.
     levels, means : array, shape (n,)
         Mean of pixels by the level of their field.
     steep, bent : array, shape (n,)
@@ -142,19 +423,7 @@ class Marginal:
 
     @classmethod
     def of(cls, distribution, kept):
-        """
-        Of a distribution.
-
-        Parameters
-        ----------
-        distribution : frozen scipy distribution
-        kept : float
-            Share of the variance of cells that means over pixels keep. [1]
-
-        Returns
-        -------
-        marginal : Marginal
-        """
+        """Marginal of a distribution, with the share of variance that means over pixels keep."""
         table = quantile_table(distribution)
         levels = np.linspace(-_FURTHEST, _FURTHEST, 1025)
         nodes, weights = np.polynomial.hermite_e.hermegauss(48)
@@ -167,65 +436,19 @@ class Marginal:
         return cls(table, levels, np.maximum.accumulate(around @ weights), steep, bent)
 
     def cells(self, field):
-        """
-        Leaf area of a field.
-
-        Parameters
-        ----------
-        field : array, shape (y, x)
-
-        Returns
-        -------
-        lai : array, shape (y, x)
-            [m2 m-2]
-        """
+        """Leaf area of a field. [m2 m-2]"""
         return quantile_map(field, self.table)
 
     def slopes(self, field):
-        """
-        First and second derivatives of leaf area by the field, where half of the residuals is known.
-
-        Parameters
-        ----------
-        field : array, shape (y, x)
-
-        Returns
-        -------
-        first, second : array, shape (y, x)
-            [m2 m-2]
-        """
+        """First and second derivatives of leaf area by the field, smoothed over unknown residuals. [m2 m-2]"""
         return quantile_map(field, self.steep), quantile_map(field, self.bent)
 
     def level(self, mean):
-        """
-        Level of the field in pixels of a mean.
-
-        Parameters
-        ----------
-        mean : array
-            [m2 m-2]
-
-        Returns
-        -------
-        level : array
-            In standard deviations.
-        """
+        """Level of the field in pixels with a mean leaf area."""
         return np.interp(mean, self.means, self.levels)
 
     def check(self, mean):
-        """
-        Refuse means that cells cannot have.
-
-        Parameters
-        ----------
-        mean : array
-            [m2 m-2]
-
-        Raises
-        ------
-        ValueError
-            If a mean is not between the ends of the distribution.
-        """
+        """Raise ValueError for means outside of the distribution."""
         lowest, highest = self.table[0], self.table[-1]
         wrong = mean[(mean <= lowest) | (mean >= highest)]
         if wrong.size:
@@ -236,36 +459,9 @@ class Marginal:
 
 
 def downscaled(pixels, field, kriging, transform, deviation):
-    """
-    Leaf area of the cells in a window of pixels.
-
-    Parameters
-    ----------
-    pixels : array, shape (rows, columns)
-        Means; NaN where unknown. [m2 m-2]
-    field : array, shape (rows * down, columns * across)
-        Standard normal field of the autoregressive process.
-    kriging : fifesim.ground.landscape.skewed_residuals.Kriging
-        For this shape of pixels.
-    transform : LogNormal or Marginal
-    deviation : float or array, shape of pixels
-        Standard deviation of the field of the cells, in units of levels.
-
-    Returns
-    -------
-    lai : array, shape of the field
-        NaN in pixels that are NaN, 0 in pixels of 0; means of the others are those of the map within rounding. [m2 m-2]
-
-    Raises
-    ------
-    ValueError
-        If cells of the distribution cannot have a pixel's mean.
-
-    Notes
-    -----
-    The filter wraps around, so that some pixels at the rim are to be dropped. Pixels that are NaN or 0 count as the
-    nearest of the others in the estimate of these.
-    """
+    """Leaf area of the cells in a window of pixels, with the pixel means of the map. [m2 m-2]"""
+    # The filter is periodic, so that some pixels at the rim must be dropped. Pixels that are NaN or 0 stay so, and
+    # count as the nearest other pixel in the estimate.
     ratio = tuple(cells // size for cells, size in zip(field.shape, pixels.shape, strict=True))
     vegetated = pixels > 0
     if not vegetated.any():
@@ -279,10 +475,12 @@ def downscaled(pixels, field, kriging, transform, deviation):
     own = field * deviation
 
     def solved(known, own, steps):
-        """Means of the field for those of leaf area."""
-        means_of_own = block_means(own, ratio)
+        """Means of the field that give the wanted means of leaf area."""
+        means_of_own = kriging_block_means(own, ratio)
         for _ in range(steps):
-            got = block_means(transform.cells(kriged(known - means_of_own, kriging.response, ratio) + own), ratio)
+            got = kriging_block_means(
+                transform.cells(kriged(known - means_of_own, kriging.response, ratio) + own), ratio
+            )
             known = known + (wanted - transform.level(got))[filled]
         return known
 
@@ -291,21 +489,23 @@ def downscaled(pixels, field, kriging, transform, deviation):
         shift = residual_shift(own, known, shift, kriging, transform, deviation)
         known = solved(known, own + shift, steps)
     own = own + shift
-    cells = kriged(known - block_means(own, ratio), kriging.response, ratio) + own
+    cells = kriged(known - kriging_block_means(own, ratio), kriging.response, ratio) + own
     lai = _met(cells, wanted, means, vegetated, transform)
-    lai *= by_pixel(np.where(vegetated, means / block_means(lai, ratio), np.where(pixels == 0, 0.0, np.nan)), ratio)
+    lai *= by_pixel(
+        np.where(vegetated, means / kriging_block_means(lai, ratio), np.where(pixels == 0, 0.0, np.nan)), ratio
+    )
     return lai
 
 
 def _met(field, wanted, means, vegetated, transform):
-    """Leaf area of a field; pixels whose mean is off by more than a thousandth are shifted, each by itself."""
+    """Leaf area of a field; pixels with an error of the mean above 0.001 are shifted one by one."""
     lai = transform.cells(field).astype(float)
     (rows, columns), ratio = means.shape, tuple(np.floor_divide(field.shape, means.shape))
-    off = np.nonzero(vegetated & (np.abs(block_means(lai, ratio) - means) > 1e-3 * means))
+    off = np.nonzero(vegetated & (np.abs(kriging_block_means(lai, ratio) - means) > 1e-3 * means))
     if off[0].size:
         apart = rows, ratio[0], columns, ratio[1]
         part = field.reshape(apart)[off[0], :, off[1]].reshape(off[0].size, -1)
-        for _ in range(SHIFTS):
+        for _ in range(PIXEL_SHIFTS):
             part += (wanted[off] - transform.level(transform.cells(part).mean(axis=1)))[:, None].astype(np.float32)
         lai.reshape(apart)[off[0], :, off[1]] = transform.cells(part).reshape(-1, *ratio)
     return lai
@@ -319,7 +519,7 @@ def _nearest(known):
 
 
 def _between(values, ratio):
-    """Values of pixels at their centres, linear between these."""
+    """Bilinear interpolation between the centres of pixels."""
     for axis, number in enumerate(ratio):
         size = values.shape[axis]
         place = np.clip((np.arange(size * number) + 0.5) / number - 0.5, 0, size - 1)

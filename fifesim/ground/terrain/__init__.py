@@ -1,1 +1,1 @@
-"""The shape of the land, and the light that falls on it."""
+"""Elevation, slopes and horizons, and the light on slopes."""

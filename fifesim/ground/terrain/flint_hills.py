@@ -1,32 +1,268 @@
 """
-A synthetic elevation model of the dissected Flint Hills of Kansas, as a function of place.
+Synthetic elevation model of the dissected Flint Hills of Kansas, with its uplands and streams.
 
-Rivers in a bent net enclose uplands. In each, streams cut into rising ground (stream power and hillslope creep), which
-makes a tree of valleys that falls to the rivers everywhere, and leaves level land where streams have not arrived yet.
-As the elevation of the rivers is given, each upland is made by itself: nothing depends on the window that asks for it.
-The result is bent by smooth noise, mapped to the elevations of a real watershed, cut by benches of limestone, and given
+Rivers in a deformed net enclose uplands. In each upland, streams cut into rising ground (stream power and hillslope
+creep). This makes a tree of valleys that drain to the rivers, and leaves level land where streams have not arrived yet.
+As the elevation of the rivers is given, each upland is independent of the others and of the requested window. The
+result is deformed by smooth noise, mapped to the elevations of a real watershed, cut by benches of limestone, and given
 the roughness of a real model.
 """
 
-from functools import lru_cache, partial
+import threading
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from scipy.interpolate import PchipInterpolator
 
-from fifesim.base.lattice import assemble, centres
-from fifesim.base.seeds import generator
-from fifesim.ground.terrain.spline import REACH, spline_grid, spline_of_tiles, spline_points
-from fifesim.ground.terrain.spline_noise import smooth_noise
-from fifesim.ground.terrain.uplands import NODES, UPLAND, upland
+from fifesim.base.caches import cached
+from fifesim.base.lattice import assemble, centres, generator
+from fifesim.ground.terrain.spline import (
+    SPLINE_REACH,
+    noise_square,
+    smooth_noise,
+    spline_coefficients,
+    spline_grid,
+    spline_of_tiles,
+    spline_points,
+)
+
+
+class StreamPower(NamedTuple):
+    r"""
+    Stream power law of erosion over one unit of time.
+
+    .. math:: \frac{\partial z}{\partial t} = U - K A^m S + D \nabla^2 z
+
+    with the uplift U, the erodibility K, the drained area A [m2] and its exponent m, the slope S and the creep D.
+    """
+
+    steps: int
+    area_exponent: float
+    uplift: float
+    creep: float
+    node: float  # distance of nodes [m]
+
+
+@njit(nogil=True, cache=True)
+def erode(start, erodibility, preference, law):
+    """
+    Ground after one unit of time of uplift, stream power and creep, with a fixed border.
+
+    Parameters
+    ----------
+    start : array, shape (n, n)
+        Ground before. [m]
+    erodibility : array, shape (n, n)
+        For drained areas in m2.
+    preference : array, shape (8, n * n)
+        Factors on the slopes to the neighbours, by which ways down are chosen. [1]
+    law : StreamPower
+
+    Returns
+    -------
+    ground : array, shape (n, n)
+        Stream power is implicit, creep explicit in parts of a step. [m]
+
+    References
+    ----------
+    [Braun2013]_
+    """
+    size, step = start.shape[0], 1.0 / law.steps
+    ground, new = start.copy().ravel(), np.empty(size * size)
+    receiver, order = np.empty(size * size, np.int32), np.empty(size * size, np.int32)
+    drained, distance = np.empty(size * size, np.int32), np.ones(size * size)
+    # Powers of areas, which are whole numbers of nodes; 0 where none has been asked for.
+    powers, factor = np.zeros(size * size + 1), np.empty(size * size)
+    # The explicit scheme is stable below a quarter.
+    parts = int(law.creep * step / law.node**2 / 0.2) + 1
+    share = law.creep * step / law.node**2 / parts
+    for _ in range(law.steps):
+        _receivers(ground, preference, size, law.node, receiver, distance)
+        _drain(receiver, order, drained)
+        _powers(drained, law.node**2, law.area_exponent, powers)
+        _factors(step, erodibility.ravel(), powers, drained, distance, receiver, factor)
+        _cut(order, receiver, factor, ground)
+        for _ in range(parts):
+            _creep(ground.reshape(size, size), share, law.uplift * step / parts, new.reshape(size, size))
+            ground, new = new, ground
+    return ground.reshape(size, size)
+
+
+@njit(nogil=True, cache=True)
+def least_ways(cost):
+    """Least cost of a path from each node to the border, by sweeps until convergence, shape (n, n). [node]"""
+    size = cost.shape[0]
+    way = np.full((size, size), np.inf)
+    way[0] = way[-1] = way[:, 0] = way[:, -1] = 0.0
+    diagonal = np.sqrt(2.0)
+    changed = True
+    while changed:
+        changed = False
+        for sweep in range(4):
+            for i in range(1, size - 1):
+                y = i if sweep < 2 else size - 1 - i
+                for j in range(1, size - 1):
+                    x = j if sweep % 2 == 0 else size - 1 - j
+                    for a in range(-1, 2):
+                        for b in range(-1, 2):
+                            length = diagonal if a * b != 0 else 1.0
+                            through = way[y + a, x + b] + length * 0.5 * (cost[y, x] + cost[y + a, x + b])
+                            if through < way[y, x]:
+                                way[y, x] = through
+                                changed = True
+    return way
+
+
+@njit(nogil=True, cache=True)
+def _receivers(ground, preference, size, node, receiver, distance):
+    """Fill in the receiver of each node: its neighbour down the steepest weighted slope, itself on the border."""
+    for i in range(size * size):
+        receiver[i] = i
+    steepest = np.empty(size - 2)
+    for y in range(1, size - 1):
+        first = y * size + 1
+        here, to = ground[first : first + size - 2], receiver[first : first + size - 2]
+        far = distance[first : first + size - 2]
+        steepest[:] = 0.0
+        k = 0
+        # Neighbour by neighbour and not node by node: each is a line of nodes without branches.
+        for a in range(-1, 2):
+            for b in range(-1, 2):
+                if a == 0 and b == 0:
+                    continue
+                j = first + a * size + b
+                there, liked = ground[j : j + size - 2], preference[k, first : first + size - 2]
+                length = node * (np.sqrt(2.0) if a * b != 0 else 1.0)
+                for x in range(size - 2):
+                    slope = (here[x] - there[x]) / length * liked[x]
+                    steeper = slope > steepest[x]
+                    steepest[x] = slope if steeper else steepest[x]
+                    to[x] = np.int32(j + x) if steeper else to[x]
+                    far[x] = length if steeper else far[x]
+                k += 1
+
+
+@njit(nogil=True, cache=True)
+def _drain(receiver, order, drained):
+    """Fill in an order of nodes in which each precedes its receiver, and how many nodes drain through each."""
+    above = np.zeros(receiver.size, np.int32)
+    for i in range(receiver.size):
+        above[receiver[i]] += receiver[i] != i
+    drained[:] = 1
+    # Sources, then whatever all water has come to that flows into it. An entry stays if the count goes on past it:
+    # a branch would be guessed wrongly at every other node.
+    filled = 0
+    for i in range(receiver.size):
+        order[filled] = i
+        filled += above[i] == 0
+    for done in range(receiver.size):
+        i = order[done]
+        into = receiver[i]
+        drained[into] += drained[i] if into != i else 0
+        above[into] -= 1
+        if filled < receiver.size:
+            order[filled] = into
+            filled += above[into] == 0
+
+
+@njit(nogil=True, cache=True)
+def _powers(drained, own, exponent, powers):
+    """Fill in the missing powers of the areas of numbers of nodes."""
+    for i in range(drained.size):
+        if powers[drained[i]] == 0.0:
+            powers[drained[i]] = (drained[i] * own) ** exponent
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _factors(step, erodibility, powers, drained, distance, receiver, factor):
+    """Fill in the weight of the receiver of each node in the implicit step, 0 on the fixed border."""
+    for i in range(factor.size):
+        cut = step * erodibility[i] * powers[drained[i]] / distance[i]
+        factor[i] = cut if receiver[i] != i else 0.0
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _cut(order, receiver, factor, ground):
+    """Apply one implicit step of stream power to the ground, from the border upstream."""
+    for k in range(order.size - 1, -1, -1):
+        i = order[k]
+        ground[i] = (ground[i] + factor[i] * ground[receiver[i]]) / (1.0 + factor[i])
+
+
+@njit(nogil=True, cache=True)
+def _creep(ground, share, uplift, new):
+    # A slice assignment of arrays would compile numba's error texts, which takes as long as all the rest.
+    for y in range(ground.shape[0]):
+        for x in range(ground.shape[1]):
+            new[y, x] = ground[y, x]
+    for y in range(1, ground.shape[0] - 1):
+        north, row, south, out = ground[y - 1], ground[y], ground[y + 1], new[y]
+        for x in range(1, row.size - 1):
+            around = row[x - 1] + row[x + 1] + north[x] + south[x]
+            out[x] = row[x] + share * (around - 4.0 * row[x]) + uplift
+
+
+# An upland is a square of nodes between rivers. [m]
+NODES = 181
+NODE = 45.0
+UPLAND = (NODES - 1) * NODE
+
+STREAM_POWER = StreamPower(steps=40, area_exponent=0.519, uplift=751.0, creep=5000.0, node=NODE)
+ERODIBILITY = 4.68  # mean, for areas in m2
+
+# Standard deviations of the logarithms, and lattice steps [m], of the noise in erodibility and in the cost of a way to
+# a river, which lays out the first streams; and that of the preference for one of eight neighbours.
+ERODIBILITY_NOISE = ((0.077, 2400.0), (0.09, 208.0))
+WAY_NOISE = ((0.286, 1050.0), (0.622, 150.0))
+PREFERENCE_NOISE = 0.104
+
+# Before uplift: elevation and its rise with the cost of the way to a river. Rivers lie at the base, and in the valleys
+# that join two of them the saddle is higher. [m], [1], [m], [m]
+START = 345.0
+TILT = 0.00077
+BASE = 335.0
+SADDLE = 63.0
+
+# Stream of random numbers, different from the streams of the hills.
+_STREAM = 80
+
+_lock = threading.Lock()
+
+
+def upland(seed, line, column):
+    """Spline coefficients of eroded ground between four rivers, mirrored there so that both sides meet. [m]"""
+    # Threads that want the same upland wait for the one that makes it.
+    with _lock:
+        return _upland(seed, line, column)
+
+
+# Those within reach of three landscapes of chips, in 20 MB.
+@cached(64, "uplands of hills")
+def _upland(seed, line, column):
+    drawn = generator(seed, _STREAM, (0, 0, line, column))
+    erodibility, cost = (
+        np.exp(sum(size * noise_square(drawn, NODE / step, NODES) for size, step in noise))
+        for noise in (ERODIBILITY_NOISE, WAY_NOISE)
+    )
+    preference = np.exp(PREFERENCE_NOISE * drawn.standard_normal((8, NODES * NODES)))
+    ground = START + TILT * NODE * least_ways(cost)
+    valley = BASE + SADDLE * (1 - np.abs(np.linspace(-1, 1, NODES))) ** 0.6
+    ground[0] = ground[-1] = BASE
+    ground[:, 0] = ground[:, -1] = valley
+    ground = erode(ground, ERODIBILITY * erodibility, preference, STREAM_POWER)
+    coefficients = spline_coefficients(np.pad(ground, 2 * SPLINE_REACH, mode="reflect", reflect_type="odd"))
+    return coefficients[SPLINE_REACH:-SPLINE_REACH, SPLINE_REACH:-SPLINE_REACH]
+
 
 # The surface is a quintic spline whose coefficients lie on a lattice of this step, a half of that on which uplands are
 # bent. Both are made in fixed tiles. [m], [lattice node]
-STEP = 10.0
+HILLS_STEP = 10.0
 BENT_STEP = 20.0
-TILE = 252
+HILLS_TILE = 252
 
-# Coarse cells that are made together: larger tiles reach far beyond what is asked for.
+# Coarse cells per tile: larger tiles extend far beyond the requested grid.
 _COARSE_TILE = 28
 
 # Noise that bends the axes, in base level, and of the roughness: standard deviation and lattice step. [m]
@@ -46,14 +282,14 @@ BENCH_NOISE = 900.0
 AXES_ANGLE = 23.0
 SHIFTS = np.array([0.0, 0.37, 0.71, 0.18, 0.55])
 
-# Elevations at quantiles 0, .01, .05, .25, .5, .75, .95, .99 and 1, of the eroded ground (900 km2, 36 seeds) and of a
-# watershed (Kings Creek, Konza Prairie; USGS 3DEP, 10 m). [m]
+# Elevations at quantiles 0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99 and 1, of the eroded ground (900 km2, 36 seeds) and
+# of a watershed (Kings Creek, Konza Prairie; USGS 3DEP, 10 m). [m]
 _ERODED = np.array([322.1, 398.9, 506.3, 751.0, 923.6, 1035.7, 1087.9, 1097.7, 1108.3])
 _WATERSHED = np.array([334.0, 341.0, 352.0, 379.0, 400.0, 412.0, 434.0, 440.0, 443.5])
 _CUBICS = PchipInterpolator(_ERODED, _WATERSHED).c
 
 
-def elevation(seed, northing, easting):
+def hills_elevation(seed, northing, easting):
     """
     Elevation of the synthetic hills on the cells of a grid.
 
@@ -62,7 +298,7 @@ def elevation(seed, northing, easting):
     seed : int
         In [0, 2**63).
     northing, easting : array, shape (y,), (x,)
-        Of rows and columns; northing falls, easting rises. [m]
+        Coordinates of rows and columns; northing decreases, easting increases. [m]
 
     Returns
     -------
@@ -71,7 +307,7 @@ def elevation(seed, northing, easting):
 
     Notes
     -----
-    The drainage is that of steady rain on nearly uniform rock: there are no floodplains, incised creeks, ponds or
+    The drainage results from steady rain on nearly uniform rock: there are no floodplains, incised creeks, ponds or
     roads. Rivers keep one level, in a net without a mouth, with saddles where a divide would be. Roughness leaves 1 %
     of 30 m cells without a lower neighbour.
 
@@ -84,59 +320,45 @@ def elevation(seed, northing, easting):
     A window is a slice of the whole, to the bit:
 
     >>> north, east = 4.3e6 - 3.0 * np.arange(9), 7e5 + 3.0 * np.arange(8)
-    >>> bool((elevation(7, north[4:], east[2:5]) == elevation(7, north, east)[4:, 2:5]).all())
+    >>> bool((hills_elevation(7, north[4:], east[2:5]) == hills_elevation(7, north, east)[4:, 2:5]).all())
     True
     """
     # Places in steps of 2**-30 of a node, 1e-8 m, from which whole nodes are taken off without rounding.
-    rows, columns = (np.rint(axis / STEP * 2**30) / 2**30 for axis in (-np.asarray(northing), np.asarray(easting)))
-    return spline_of_tiles(partial(_tile, int(seed)), TILE, rows, columns)
+    rows, columns = (
+        np.rint(axis / HILLS_STEP * 2**30) / 2**30 for axis in (-np.asarray(northing), np.asarray(easting))
+    )
+    return spline_of_tiles(partial(_tile, int(seed)), HILLS_TILE, rows, columns)
 
 
 def elevation_around(seed, cell, row, column, shape):
-    """
-    Elevation of the synthetic hills on a window of a lattice of coarse cells, which is kept for windows that share it.
-
-    Parameters
-    ----------
-    seed : int
-        In [0, 2**63).
-    cell : (float, float)
-        Down and across. [m]
-    row, column : int
-        Of the first cell, counted from the origin of the CRS; rows count southward.
-    shape : (int, int)
-        Rows and columns.
-
-    Returns
-    -------
-    elevation : array, shape (rows, columns)
-        The bits of `elevation`. [m]
-    """
+    """Elevation of the synthetic hills on a window of coarse cells, from cached tiles, shape (rows, columns). [m]"""
     return assemble(partial(_coarse_tile, int(seed), *cell), _COARSE_TILE, row, column, shape)
 
 
-# So many are 120 MB: what thirty landscapes of chips see around them.
-@lru_cache(maxsize=18432)
+# This number takes 120 MB, the surroundings of thirty landscapes of chips.
+@cached(18432, "coarse tiles of synthetic hills")
 def _coarse_tile(seed, down, across, tile_row, tile_column):
     rows, columns = (tile * _COARSE_TILE + np.arange(_COARSE_TILE) for tile in (tile_row, tile_column))
-    return elevation(seed, centres(0.0, -down, rows), centres(0.0, across, columns))
+    return hills_elevation(seed, centres(0.0, -down, rows), centres(0.0, across, columns))
 
 
 # The tiles of 29 km x 29 km, in 65 MB.
-@lru_cache(maxsize=128)
+@cached(128, "tiles of synthetic hills")
 def _tile(seed, tile_row, tile_column):
     """Coefficients of the surface on one tile of its lattice."""
-    per_bent = round(BENT_STEP / STEP)
-    nodes = TILE // per_bent + 2 * REACH
-    rows, columns = (tile * (TILE // per_bent) - REACH + np.arange(nodes) for tile in (tile_row, tile_column))
+    per_bent = round(BENT_STEP / HILLS_STEP)
+    nodes = HILLS_TILE // per_bent + 2 * SPLINE_REACH
+    rows, columns = (
+        tile * (HILLS_TILE // per_bent) - SPLINE_REACH + np.arange(nodes) for tile in (tile_row, tile_column)
+    )
     eroded = _bent_uplands(seed, rows * BENT_STEP, columns * BENT_STEP)
-    inside = REACH + np.arange(TILE) / per_bent
-    south, east = ((tile * TILE + np.arange(TILE)) * STEP for tile in (tile_row, tile_column))
+    inside = SPLINE_REACH + np.arange(HILLS_TILE) / per_bent
+    south, east = ((tile * HILLS_TILE + np.arange(HILLS_TILE)) * HILLS_STEP for tile in (tile_row, tile_column))
     return _detail(seed, south, east, hypsometry(spline_grid(eroded, inside, inside)))
 
 
 def _bent_uplands(seed, south, east):
-    """Eroded ground at nodes, in the bent net of rivers."""
+    """Eroded ground at nodes, in the deformed net of rivers."""
     bent = []
     for stream, axis in ((_ALONG, east[None, :]), (_ACROSS, south[:, None])):
         shift = sum(size * smooth_noise(seed, stream + k, step, south, east) for k, (size, step) in enumerate(BENDING))
@@ -153,8 +375,8 @@ def _bent_uplands(seed, south, east):
         for column in range(place.min(), place.max() + 1):
             here = np.nonzero(between & (place == column))
             if here[0].size:
-                rows = (across[here] - number) * (NODES - 1) + REACH
-                columns = (along[here] - column) * (NODES - 1) + REACH
+                rows = (across[here] - number) * (NODES - 1) + SPLINE_REACH
+                columns = (along[here] - column) * (NODES - 1) + SPLINE_REACH
                 out[here] = spline_points(upland(seed, number, column), rows[None], columns[None])[0]
     return out + BASE_NOISE[0] * smooth_noise(seed, _LEVEL, BASE_NOISE[1], south, east)
 
@@ -171,7 +393,7 @@ def _detail(seed, south, east, ground):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _add_bench(ground, clear, height, share):
-    """Ground with a sine of itself that changes its slope by a share where it is clear."""
+    """Add to the ground a sine of its elevation that changes its slope by a share, where `clear` is above 0."""
     ground, clear = ground.ravel(), clear.ravel()
     for i in range(ground.size):
         turns = ground[i] / height
@@ -186,19 +408,8 @@ def _add_bench(ground, clear, height, share):
 
 
 def hypsometry(eroded):
-    """
-    Elevation of the watershed at the same quantile.
-
-    Parameters
-    ----------
-    eroded : array, any shape
-        [m]
-
-    Returns
-    -------
-    elevation : array, shape of the input
-        A rising function: valleys keep falling. Beyond the table it goes on in a line of a fifth of the slope there.
-    """
+    """Elevation of the watershed at the same quantile, an increasing function, so that valleys keep draining. [m]"""
+    # Beyond the table it is linear, with a fifth of the slope at the end.
     out = np.empty(eroded.shape)
     _survey(np.ascontiguousarray(eroded, float).ravel(), _ERODED, _CUBICS, out.ravel())
     return out
@@ -206,7 +417,7 @@ def hypsometry(eroded):
 
 @njit(nogil=True, cache=True)
 def _survey(eroded, knots, cubics, out):
-    """Cubics between knots and lines beyond, in one pass: scipy's takes five times as long."""
+    """Cubics between knots and lines beyond them, in one pass that is five times as fast as scipy."""
     first, last = knots[0], knots[-1]
     for i in range(out.size):
         inside = min(max(eroded[i], first), last)

@@ -1,10 +1,13 @@
-"""Horizons: how far up from the horizontal the terrain around a cell reaches, in every direction."""
+"""Horizon around a cell, and the parts of sky and terrain that a slope sees."""
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
+
+from fifesim.base.caches import cached
+from fifesim.ground.terrain.slope import Vector, along_normal, slope_cosine
 
 # A ray is sampled where it crosses each line of cells up to this many of them, and from there on at steps of one part
 # in so many of the distance. On Kings Creek at 10 m that moves sky factors by 1e-5 rms.
@@ -22,59 +25,14 @@ class _Rays(NamedTuple):
 
 
 def azimuths(count):
-    """
-    Evenly spaced directions.
-
-    Parameters
-    ----------
-    count : int
-        At least 16.
-
-    Returns
-    -------
-    azimuths : array, shape (count,)
-        From north, clockwise. [degree]
-
-    Raises
-    ------
-    ValueError
-        If they are too few: between them the horizon is interpolated.
-
-    Examples
-    --------
-    >>> azimuths(16)[:3].tolist()
-    [0.0, 22.5, 45.0]
-    """
+    """Evenly spaced azimuths, clockwise from north, at least 16. [degree]"""
     if not (count >= 16 and count == int(count)):
         raise ValueError(f"directions must be a whole number from 16 up, got {count}: the horizon is interpolated")
     return np.arange(int(count)) * (360 / int(count))
 
 
 def horizon_margin(cell_y, cell_x, reach):
-    """
-    Cells around that a horizon depends on.
-
-    Parameters
-    ----------
-    cell_y, cell_x : float
-        [m]
-    reach : float
-        Greatest distance of terrain that is looked at. [m]
-
-    Returns
-    -------
-    rows, columns : int
-
-    Raises
-    ------
-    ValueError
-        If the reach is not a cell.
-
-    Examples
-    --------
-    >>> horizon_margin(30, 60, 300)
-    (11, 6)
-    """
+    """Margin of cells on which a horizon depends, rows and columns."""
     if not max(cell_y, cell_x) <= reach < np.inf:
         raise ValueError(f"reach must be at least one cell of {cell_y:g} x {cell_x:g} m, got {reach:g} m")
     return int(reach / cell_y) + 1, int(reach / cell_x) + 1
@@ -128,19 +86,7 @@ def horizon_zenith(dem, cell_y, cell_x, directions, reach):
 
 
 def horizon_tangent(dem, cell_y, cell_x, directions, reach):
-    """
-    Tangent of the elevation of the horizon, cot H.
-
-    Parameters
-    ----------
-    dem, cell_y, cell_x, directions, reach
-        As in `horizon_zenith`.
-
-    Returns
-    -------
-    tangent : array, shape (direction, rows, columns)
-        0 is level and open. [1]
-    """
+    """Tangent of the elevation angle of the horizon, cot H, 0 if level, shape (direction, rows, columns). [1]"""
     dem = np.ascontiguousarray(dem, float)
     rows, columns = horizon_margin(cell_y, cell_x, reach)
     rays = _rays(tuple(np.asarray(directions, float).tolist()), float(cell_y), float(cell_x), float(reach))
@@ -150,46 +96,17 @@ def horizon_tangent(dem, cell_y, cell_x, directions, reach):
 
 
 def zenith(tangent):
-    """
-    Zenith angle of a horizon from its tangent.
-
-    Parameters
-    ----------
-    tangent : array
-        Of its elevation. [1]
-
-    Returns
-    -------
-    zenith : array
-        [degree]
-    """
+    """Zenith angle of a horizon from the tangent of its elevation angle. [degree]"""
     return 90 - np.degrees(np.arctan(tangent))
 
 
 def tangent(zenith):
-    """
-    Tangent of the elevation of a horizon.
-
-    Parameters
-    ----------
-    zenith : array
-        Zenith angle H; NaN is open. [degree]
-
-    Returns
-    -------
-    tangent : array
-        cot H, 0 where the horizon lies below the horizontal. [1]
-
-    Examples
-    --------
-    >>> tangent([45.0, np.nan, 90.0]).round(12).tolist()
-    [1.0, 0.0, 0.0]
-    """
+    """Tangent of the elevation angle of a horizon, cot H, 0 below the horizontal. [1]"""
     return np.tan(np.radians(np.fmax(90 - np.asarray(zenith, float), 0.0)))
 
 
 # The chunks of a raster have the same.
-@lru_cache(maxsize=16)
+@cached(16, "rays of the horizon")
 def _rays(directions, cell_y, cell_x, reach):
     rays = [_samples(azimuth, cell_y, cell_x, reach) for azimuth in np.radians(directions)]
     ends = np.cumsum([0, *(len(ray[0]) for ray in rays)])
@@ -197,7 +114,7 @@ def _rays(directions, cell_y, cell_x, reach):
 
 
 def _samples(azimuth, cell_y, cell_x, reach):
-    """Where a ray is sampled: two cells (rows, columns away), the share of the second, and 1 / distance [1/m]."""
+    """Samples of a ray: two cells (rows, columns away), the weight of the second, and 1 / distance [m-1]."""
     down, right = -np.cos(azimuth) / cell_y, np.sin(azimuth) / cell_x
     along_columns = abs(right) >= abs(down)
     major = max(abs(right), abs(down))
@@ -218,30 +135,7 @@ def _samples(azimuth, cell_y, cell_x, reach):
 
 
 def horizon_toward(tangents, directions, azimuth):
-    r"""
-    Tangent of the elevation of the horizon in one azimuth.
-
-    Between two directions the horizon is a great circle, as that of a straight ridge is.
-
-    Parameters
-    ----------
-    tangents : array, shape (direction, ...)
-        cot H. [1]
-    directions : array, shape (direction,)
-        Azimuths, evenly spaced and clockwise from the first. [degree]
-    azimuth : float
-        [degree]
-
-    Returns
-    -------
-    tangent : array, shape (...)
-        [1]
-
-    Examples
-    --------
-    >>> float(horizon_toward(np.arange(16.0), np.arange(16) * 22.5, 45.0))
-    2.0
-    """
+    """Tangent of the elevation angle of the horizon at one azimuth, interpolated along a great circle. [1]"""
     count = len(directions)
     step = 360 / count
     position = ((azimuth - directions[0]) % 360) / step
@@ -273,7 +167,7 @@ def _march(dem, rays, top, left, out):
 
 @njit(nogil=True, cache=True)
 def _raise_horizon(near, far, here, line):
-    """Horizon of a row of cells with two more samples of their rays: elevations beside, share, 1 / distance."""
+    """Raise the horizon of a row of cells by two more samples of their rays."""
     first, second, share, per_metre = near
     far_first, far_second, far_share, far_per_metre = far
     for j in range(line.size):
@@ -282,3 +176,201 @@ def _raise_horizon(near, far, here, line):
         horizon = rise if rise > line[j] else line[j]
         rise = (far_first[j] + far_share * (far_second[j] - far_first[j]) - here[j]) * far_per_metre
         line[j] = rise if rise > horizon else horizon
+
+
+# Of Gregory's series of the arctangent of a quarter of an angle: an angle of 90 degrees is good to 2e-14 of it, one
+# of 60 to the last digit.
+_TERMS = 16
+
+# Places of which the sky is found together.
+_PLACES = 512
+
+
+def sky_vector(tangents, directions, east, north):
+    r"""
+    Visible sky of a slope, as a vector.
+
+    .. math::
+
+        \mathbf{F} = \frac{1}{\pi} \int_{\text{sky}} \boldsymbol\omega \, d\omega
+            = \frac{1}{2\pi} \oint \boldsymbol\Gamma \, d\Theta
+
+    The sky factor of a surface with the unit normal n is :math:`V_d = \mathbf{n} \cdot \mathbf{F}`, which is
+    Eq. 7b of Dozier and Frew. The sky is bounded by the horizon, taken as great circles between the directions, and by
+    the plane of the slope; Lambert's integral along great circles is exact.
+
+    Parameters
+    ----------
+    tangents : array, shape (direction, ...)
+        cot H of the horizon of the land around. [1]
+    directions : array, shape (direction,)
+        Evenly spaced azimuths, clockwise from north. [degree]
+    east, north : array, shape (...)
+        Gradient of the slope, whose plane is also a horizon. NaN is level. [m m-1]
+
+    Returns
+    -------
+    vector : array, shape (3, ...)
+        Eastward, northward and up. [1]
+
+    References
+    ----------
+    [Lambert1760]_; [DozierFrew1990]_, Eqs. 7b and 10
+    """
+    tangents = np.ascontiguousarray(tangents, float)
+    azimuth = np.radians(np.asarray(directions, float))
+    shape = tangents.shape[1:]
+    own = [np.nan_to_num(np.broadcast_to(each, shape), nan=0.0).ravel() for each in (east, north)]
+    out = np.zeros((3, own[0].size))
+    _sky_vector(tangents.reshape(azimuth.size, -1), np.sin(azimuth), np.cos(azimuth), *own, out)
+    return out.reshape(3, *shape)
+
+
+@register_jitable
+def sky_factor(vector, east, north):
+    r"""
+    Sky view factor: irradiance of a slope by a uniform sky relative to an open plain.
+
+    .. math:: V_d = \mathbf{n} \cdot \mathbf{F}, \qquad 0 \le V_d \le \frac{1 + \cos S}{2}
+
+    Parameters
+    ----------
+    vector : fifesim.ground.terrain.slope.Vector
+        Of `sky_vector`, of this slope or of one nearby. [1]
+    east, north : array
+        Gradient of the slope. [m m-1]
+
+    Returns
+    -------
+    sky_view : array
+        At most the sky view of an unbounded plane of this slope. [1]
+
+    References
+    ----------
+    [DozierFrew1990]_, Eq. 7b
+
+    Examples
+    --------
+    >>> float(sky_factor(Vector(0.0, 0.0, 0.75), 0.0, 0.0))
+    0.75
+    """
+    return np.maximum(np.minimum(along_normal(vector, east, north), (1 + slope_cosine(east, north)) / 2), 0.0)
+
+
+def horizon_sky_view(tangents, directions, east, north):
+    r"""
+    Sky view factor of slopes under a known horizon.
+
+    .. math::
+
+        V_d = \frac{1}{2\pi} \int_0^{2\pi} \left[ \cos S \sin^2 H
+            + \sin S \cos(\phi - A) \, (H - \sin H \cos H) \right] d\phi
+
+    with H the lower of the zenith angles of the horizon of the land around, of the slope's own, and 90 degrees.
+
+    Parameters
+    ----------
+    tangents, directions, east, north
+        As in `sky_vector`.
+
+    Returns
+    -------
+    sky_view : array, shape (...)
+        1 on an open plain. [1]
+
+    Notes
+    -----
+    The integral is exact for a horizon of great circles between the directions, such as the horizon of any plane.
+
+    References
+    ----------
+    [DozierFrew1990]_, Eq. 7b
+
+    Examples
+    --------
+    A wide plane of 60 degrees sees (1 + cos 60) / 2:
+
+    >>> round(float(horizon_sky_view(np.zeros(16), np.arange(16) * 22.5, np.sqrt(3.0), 0.0)), 12)
+    0.75
+    """
+    return sky_factor(Vector(*sky_vector(tangents, directions, east, north)), east, north)
+
+
+@register_jitable
+def horizon_terrain_view(sky_view, cosine):
+    r"""
+    Terrain configuration factor: share of land in the view of a slope above its plane.
+
+    .. math:: C_t = \frac{1 + \cos S}{2} - V_d
+
+    Parameters
+    ----------
+    sky_view : array
+        [1]
+    cosine : array
+        Cosine of the slope. [1]
+
+    Returns
+    -------
+    terrain_view : array
+        0 on any wide plane. [1]
+
+    References
+    ----------
+    [DozierFrew1990]_, Eq. 9b
+
+    Examples
+    --------
+    >>> horizon_terrain_view(0.75, 1.0)
+    0.25
+    """
+    return (1 + cosine) / 2 - sky_view
+
+
+@njit(nogil=True, cache=True)
+def _sky_vector(tangents, sin, cos, east, north, out):
+    count = tangents.shape[0]
+    # So many places at a time that all of theirs stays near the processor.
+    for first in range(0, out.shape[1], _PLACES):
+        part = slice(first, min(first + _PLACES, out.shape[1]))
+        for k in range(count):
+            n = (k + 1) % count
+            here, there = Vector(sin[k], cos[k], 0.0), Vector(sin[n], cos[n], 0.0)
+            found = Vector(out[0, part], out[1, part], out[2, part])
+            _add_sector(tangents[k, part], tangents[n, part], here, there, east[part], north[part], found)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _add_sector(tangents, next_tangents, toward, next_toward, east, north, out):
+    """Add the terms of Lambert of the sky edge between two directions."""
+    for cell in range(east.size):
+        land, next_land = tangents[cell], next_tangents[cell]
+        own = east[cell] * toward.x + north[cell] * toward.y
+        next_own = east[cell] * next_toward.x + north[cell] * next_toward.y
+        here = Vector(toward.x, toward.y, land if land > own else own)
+        there = Vector(next_toward.x, next_toward.y, next_land if next_land > next_own else next_own)
+        # The slope's plane and the land's horizon may cross in between; elsewhere the first arc has no length.
+        across = (land - own) * (next_land - next_own) < 0
+        w, v = abs(next_land - next_own) if across else 1.0, abs(land - own) if across else 0.0
+        height = w * land + v * next_land if across else here.z
+        crossing = Vector(w * toward.x + v * next_toward.x, w * toward.y + v * next_toward.y, height)
+        one, other = _arc(here, crossing), _arc(crossing, there)
+        out.x[cell] += one.x + other.x
+        out.y[cell] += one.y + other.y
+        out.z[cell] += one.z + other.z
+
+
+@register_jitable
+def _arc(a, b):
+    """Term of Lambert of the great circle from a to b, clockwise seen from above: its angle times its normal."""
+    x, y, z = b.y * a.z - b.z * a.y, b.z * a.x - b.x * a.z, b.x * a.y - b.y * a.x
+    # Of the angle from a to b, times the lengths of both.
+    squared_sine, cosine = x * x + y * y + z * z, a.x * b.x + a.y * b.y + a.z * b.z
+    # Tangents of its half and its quarter, over the sine, which may be 0.
+    half = 1 / (np.sqrt(squared_sine + cosine * cosine) + cosine)
+    quarter = half / (1 + np.sqrt(1 + squared_sine * half * half))
+    square, series = squared_sine * quarter * quarter, 0.0
+    for k in range(_TERMS - 1, -1, -1):
+        series = 1 / (2 * k + 1) - square * series
+    factor = 4 * quarter * series / (2 * np.pi)
+    return Vector(factor * x, factor * y, factor * z)

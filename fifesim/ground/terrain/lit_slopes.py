@@ -1,4 +1,4 @@
-"""All cells of lit slopes in one pass over the ground: their light, Kt and reflectance."""
+"""Irradiance, Kt and reflectance of all cells on slopes in one pass over the ground."""
 
 from typing import NamedTuple
 
@@ -6,19 +6,23 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from fifesim.ground.terrain.light import direction_vector, topographic_factor, upwelling_factor
-from fifesim.ground.terrain.sky import sky_factor, terrain_view
-from fifesim.ground.terrain.slope import Vector, along_normal, rise, slope_cosine
+from fifesim.ground.terrain.horizon import horizon_terrain_view, sky_factor
+from fifesim.ground.terrain.slope import (
+    Vector,
+    along_normal,
+    direction_vector,
+    rise,
+    slope_cosine,
+    topographic_factor,
+    upwelling_factor,
+)
 
 
 class Sky(NamedTuple):
-    """
-    The sky at places around, and where each row and each column of cells lies between these: which place is before it,
-    and the share of that after it.
-    """
+    """Sky at places, and for each row and column of cells the previous place and the weight of the next."""
 
     layers: np.ndarray
-    """Vector of `sky.sky_vector` and tangent of the horizon toward the sun, shape (4, places, places). [1]"""
+    """Vector of `horizon.sky_vector` and tangent of the horizon toward the sun, shape (4, places, places). [1]"""
     row: np.ndarray
     row_share: np.ndarray
     column: np.ndarray
@@ -26,7 +30,7 @@ class Sky(NamedTuple):
 
 
 class SlopeLight(NamedTuple):
-    """What the light on slopes depends on, each an array of cells. [1]"""
+    """Geometric terms of the light on slopes, by cell. [1]"""
 
     cosine: np.ndarray  # of the slope
     sky_view: np.ndarray
@@ -35,7 +39,7 @@ class SlopeLight(NamedTuple):
 
 
 class _Setting(NamedTuple):
-    """Unit vectors toward sun and sensor, tangent of the sun's elevation, and what makes a rise a gradient [1/m]."""
+    """Unit vectors toward sun and sensor, tangent of the solar elevation, and factors from rise to gradient [m-1]."""
 
     sun: Vector
     sun_tangent: float
@@ -46,7 +50,7 @@ class _Setting(NamedTuple):
 
 def slope_light(dem, sky, cell, geometry):
     """
-    What the light on slopes depends on.
+    Geometric terms of the light on slopes.
 
     Parameters
     ----------
@@ -56,7 +60,7 @@ def slope_light(dem, sky, cell, geometry):
     cell : (float, float)
         Size of a cell, down and across. [m]
     geometry : fifesim.base.geometry.Geometry
-        Of sun and sensor.
+        Directions of sun and sensor.
 
     Returns
     -------
@@ -78,7 +82,7 @@ def slope_reflectance(reflectance, dem, sky, cell, geometry, direct_transmittanc
     Parameters
     ----------
     reflectance : array, shape (band, rows, columns)
-        Of level ground. [1]
+        Reflectance on level ground. [1]
     dem, sky, cell, geometry
         As in `slope_light`.
     direct_transmittance, transmittance_down : array, shape (band,)
@@ -97,54 +101,20 @@ def slope_reflectance(reflectance, dem, sky, cell, geometry, direct_transmittanc
     """
     out = np.empty(reflectance.shape)
     air = direct_transmittance, transmittance_down
-    _pass_over(reflectance, dem, sky, cell, geometry, *air, upwelling, True, out, out)
-    return out
+    return _pass_over(reflectance, dem, sky, cell, geometry, *air, upwelling, True, out, out)
 
 
 def slope_factor(reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down):
-    """
-    Topographic correction factor Kt of cells.
-
-    Parameters
-    ----------
-    reflectance : array, shape (band, rows, columns)
-        Of the land around, as it is on level ground. [1]
-    dem, sky, cell, geometry
-        As in `slope_light`.
-    direct_transmittance, transmittance_down : array, shape (band,)
-        As in `topographic_factor`. [1]
-
-    Returns
-    -------
-    kt : array, shape (band, rows, columns)
-        To the bit that of the formula; NaN where elevation or reflectance is. [1]
-
-    See Also
-    --------
-    topographic_factor
-    """
+    """Topographic correction factor Kt, shape (band, rows, columns), NaN where elevation or reflectance is. [1]"""
     out = np.empty(reflectance.shape)
     air = direct_transmittance, transmittance_down
-    _pass_over(reflectance, dem, sky, cell, geometry, *air, False, False, out, out)
-    return out
+    return _pass_over(reflectance, dem, sky, cell, geometry, *air, False, False, out, out)
 
 
 def slope_factor_and_reflectance(
     reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down, upwelling=True
 ):
-    """
-    Kt of cells and their reflectance, in one pass.
-
-    Parameters
-    ----------
-    reflectance, dem, sky, cell, geometry, direct_transmittance, transmittance_down, upwelling
-        As in `slope_reflectance`.
-
-    Returns
-    -------
-    both : array, shape (2, band, rows, columns)
-        The bits of `slope_factor`, and of `slope_reflectance`. [1]
-    """
+    """Kt and reflectance in one pass, shape (2, band, rows, columns), with the bits of separate passes. [1]"""
     both = np.empty((2, *reflectance.shape))
     air = direct_transmittance, transmittance_down
     _pass_over(reflectance, dem, sky, cell, geometry, *air, upwelling, True, *both)
@@ -152,9 +122,10 @@ def slope_factor_and_reflectance(
 
 
 def _pass_over(reflectance, dem, sky, cell, geometry, direct, total, upwelling, reflected, kt, out):
-    """Fill in Kt and, if it is asked for, reflectance, which may be in the place of Kt."""
+    """Fill in Kt and, on request, reflectance, which may share the array of Kt; the array of reflectance."""
     rho, air = np.ascontiguousarray(reflectance, float), (np.asarray(direct, float), np.asarray(total, float))
     _slope_factors(rho, *_contiguous(dem, sky), _setting(cell, geometry), *air, upwelling, reflected, kt, out)
+    return out
 
 
 def _contiguous(dem, sky):
@@ -195,8 +166,7 @@ def _slope_factors(rho, dem, sky, setting, direct, total, upwelling, reflected, 
         for band in range(out.shape[0]):
             _factor_of_row(rho[band, i], line, setting.sun.z, direct[band], total[band], kt[band, i])
             if reflected:
-                out[band, i] = kt[band, i]
-                _reflect_row(rho[band, i], line.upwelling, out[band, i])
+                _reflect_row(rho[band, i], line.upwelling, kt[band, i], out[band, i])
 
 
 @register_jitable
@@ -206,12 +176,15 @@ def _between(before, after, share):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _sky_beside(sky, i, above, below):
-    """The sky of the rows of places above and below a row of cells, at its columns; those of the row before stay."""
+    """Fill in the sky at the columns of a row of cells, for the rows of places above and below; unchanged rows stay."""
     row, last = sky.row[i], sky.layers.shape[1] - 1
     if i > 0 and row == sky.row[i - 1]:
         return
     if i > 0 and row == sky.row[i - 1] + 1:
-        above[:] = below
+        # A slice assignment of arrays would compile numba's error texts, which takes as long as all the rest.
+        for layer in range(above.shape[0]):
+            for j in range(above.shape[1]):
+                above[layer, j] = below[layer, j]
     else:
         _sky_of_places(sky, row, above)
     _sky_of_places(sky, min(row + 1, last), below)
@@ -229,7 +202,7 @@ def _sky_of_places(sky, row, out):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _gradient_of_row(above, here, below, setting, east, north):
-    """Rise of one row of cells from its elevation and that of its neighbours, each with a margin of one cell."""
+    """Gradient of one row of cells from its elevation and the neighbouring rows, each with a margin of one cell."""
     for j in range(east.size):
         rising = rise(here[j], here[j + 1], here[j + 2]) * setting.per_x
         east[j] = np.nan if np.isnan(here[j + 1]) else rising
@@ -254,11 +227,11 @@ def _light_of_row(east, north, above, below, share, setting, light):
 @njit(nogil=True, cache=True, error_model="numpy")
 def _factor_of_row(rho, light, mu_s, direct, total, out):
     for j in range(out.size):
-        land = terrain_view(light.sky_view[j], light.cosine[j])
+        land = horizon_terrain_view(light.sky_view[j], light.cosine[j])
         out[j] = topographic_factor(light.sky_view[j], land, rho[j], light.mu_s_local[j], mu_s, direct, total)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _reflect_row(rho, upwelling, out):
+def _reflect_row(rho, upwelling, kt, out):
     for j in range(out.size):
-        out[j] = rho[j] * out[j] * upwelling[j]
+        out[j] = rho[j] * kt[j] * upwelling[j]

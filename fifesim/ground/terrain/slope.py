@@ -1,10 +1,68 @@
-"""The shape of the ground: its gradient, slope and aspect."""
+"""Gradient, slope and aspect of elevation, with its units, and the light on a slope (Equations 4 and 5)."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
+
+# Metres in one unit of elevation, and names that files use for it. NIST SP 811, App. B.8: the two feet differ by 2e-6.
+_UNITS = {
+    "m": (1.0, "metre", "metres", "meter", "meters"),
+    "ft": (0.3048, "foot", "feet", "international foot", "foot (international)"),
+    "us-ft": (1200.0 / 3937.0, "us survey foot", "us survey feet", "survey foot", "ftus", "foot us", "us foot"),
+    "km": (1000.0, "kilometre", "kilometer"),
+    "dm": (0.1, "decimetre", "decimeter"),
+    "cm": (0.01, "centimetre", "centimeter"),
+    "mm": (0.001, "millimetre", "millimeter"),
+}
+
+# Above this share of neighbours that are equal, whole numbers are terraces: their risers show in slope and aspect.
+TERRACES = 0.25
+
+
+def metres_per_unit(name):
+    """Length of a unit of elevation, by the spelling of files and coordinate reference systems. [m]"""
+    plain = str(name).strip().lower().replace("_", " ")
+    for unit, (metres, *names) in _UNITS.items():
+        if plain in (unit, *names):
+            return metres
+    raise ValueError(f"vertical units must be one of {', '.join(_UNITS)}, got {name!r}")
+
+
+def terrace_step(values):
+    """Vertical resolution of terraced whole-number elevations, None for elevations without terraces."""
+    # The greatest common divisor of the differences, where more than a quarter of the neighbours are equal and some are
+    # not.
+    differences = np.concatenate([np.diff(values, axis=axis).ravel() for axis in (0, 1)])
+    differences = differences[np.isfinite(differences)]
+    known = values[np.isfinite(values)]
+    if not known.size or not differences.any() or np.any(known != np.rint(known)):
+        return None
+    equal = np.mean(differences == 0)
+    return int(np.gcd.reduce(np.abs(differences).astype(np.int64))) if equal > TERRACES else None
+
+
+def bilinear(layer, rows, columns):
+    """Bilinear interpolation between places, constant after the last place, shape (rows, columns)."""
+    (row, down), (column, across) = rows, columns
+    out = np.empty((row.size, column.size))
+    _bilinear(np.asarray(layer, float), row, down, column, across, out)
+    return out
+
+
+@njit(nogil=True, cache=True)
+def _bilinear(layer, row, down, column, across, out):
+    line = np.empty(layer.shape[1])
+    last = layer.shape[0] - 1, layer.shape[1] - 1
+    for i in range(row.size):
+        one, other = row[i], min(row[i] + 1, last[0])
+        share = down[i]
+        for k in range(line.size):
+            line[k] = layer[one, k] * (1 - share) + layer[other, k] * share
+        for j in range(column.size):
+            before = column[j]
+            out[i, j] = line[before] * (1 - across[j]) + line[min(before + 1, last[1])] * across[j]
 
 
 class Vector(NamedTuple):
@@ -17,24 +75,7 @@ class Vector(NamedTuple):
 
 @register_jitable
 def rise(low, here, high):
-    """
-    Rise of the ground over two cells.
-
-    Parameters
-    ----------
-    low, here, high : float
-        Elevations in a line. [m]
-
-    Returns
-    -------
-    rise : float
-        Where an end is missing, of the straight line through the others; 0 where both are. [m]
-
-    Examples
-    --------
-    >>> rise(0.0, 1.0, 5.0), rise(np.nan, 1.0, 5.0), rise(np.nan, 1.0, np.nan)
-    (5.0, 8.0, 0.0)
-    """
+    """Rise of the ground over two cells, by the other half if an end is missing, 0 if both are. [m]"""
     before = 2 * here - high if np.isnan(low) else low
     after = 2 * here - low if np.isnan(high) else high
     return 0.0 if np.isnan(after - before) else after - before
@@ -56,7 +97,7 @@ def gradient(dem, cell_y, cell_x, rows=None, columns=None):
     cell_y, cell_x : float
         [m]
     rows, columns : array of int, optional
-        Where it is wanted, counted with the margin; at all cells inside of it by default.
+        Rows and columns of the result, counted with the margin; by default all cells inside of it.
 
     Returns
     -------
@@ -108,7 +149,7 @@ def along_normal(vector, east, north):
     .. math:: \mathbf{n} \cdot \mathbf{v}
         = \left( v_z - \frac{\partial z}{\partial x} v_x - \frac{\partial z}{\partial y} v_y \right) \cos S
 
-    Of the unit vector toward the sun or the sensor it is the cosine of the local zenith angle.
+    For the unit vector toward the sun or the sensor it is the cosine of the local zenith angle.
 
     Parameters
     ----------
@@ -172,23 +213,11 @@ def slope_aspect(dem, cell_y, cell_x):
     >>> round(float(slope[0, 0]), 9), float(aspect[0, 0])
     (45.0, 180.0)
     """
-    return angles(*gradient(dem, cell_y, cell_x))
+    return slope_angles(*gradient(dem, cell_y, cell_x))
 
 
-def angles(east, north):
-    """
-    Slope and aspect of a gradient.
-
-    Parameters
-    ----------
-    east, north : array
-        Rise eastward and northward. [m m-1]
-
-    Returns
-    -------
-    slope, aspect : array
-        As of `slope_aspect`. [degree]
-    """
+def slope_angles(east, north):
+    """Slope and aspect of a gradient. [degree]"""
     # np.hypot foresees overflow, and takes five times as long for the same digits but the last.
     slope = np.degrees(np.arctan(np.sqrt(east * east + north * north)))
     # 0 - x and not -x: level ground must not face -0.
@@ -197,24 +226,7 @@ def angles(east, north):
 
 
 def steepness(dem, cell_y, cell_x):
-    """
-    Slope of the ground alone, in one pass: aspects take longer.
-
-    Parameters
-    ----------
-    dem, cell_y, cell_x
-        As in `slope_aspect`.
-
-    Returns
-    -------
-    slope : array, shape (rows, columns)
-        To the bit that of `slope_aspect`. [degree]
-
-    Examples
-    --------
-    >>> steepness(np.array([[60.0] * 3, [30.0] * 3, [0.0] * 3]), 30, 30).round(9).tolist()
-    [[45.0]]
-    """
+    """Slope without aspect in one pass, with the bits of `slope_aspect`, shape (rows, columns). [degree]"""
     dem = np.ascontiguousarray(dem, float)
     out = np.empty((dem.shape[0] - 2, dem.shape[1] - 2))
     _tangent(dem, 2.0 * cell_y, 2.0 * cell_x, out)
@@ -244,3 +256,89 @@ def _tangent(dem, over_y, over_x, out):
             east = rise(here[j], here[j + 1], here[j + 2]) / over_x
             north = rise(below[j + 1], here[j + 1], above[j + 1]) / over_y
             line[j] = np.nan if np.isnan(here[j + 1]) else np.sqrt(east * east + north * north)
+
+
+def direction_vector(zenith, azimuth):
+    """Unit vector toward the sun or the sensor. [1]"""
+    zenith, azimuth = np.radians(zenith), np.radians(azimuth)
+    return Vector(np.sin(zenith) * np.sin(azimuth), np.sin(zenith) * np.cos(azimuth), np.cos(zenith))
+
+
+@register_jitable
+def topographic_factor(sky_view, terrain_view, reflectance, mu_s_local, mu_s, direct_transmittance, transmittance_down):
+    r"""
+    Topographic correction factor: irradiance of a slope relative to level ground.
+
+    .. math::
+
+        K_t = V_d + C_t \, \rho
+            + \frac{e^{-\tau / \mu_0}}{T(\theta_s)} \left[ \frac{\mu_s}{\mu_0} - V_d \right]
+
+    Parameters
+    ----------
+    sky_view, terrain_view : array
+        :math:`V_d` and :math:`C_t`. [1]
+    reflectance : array
+        Reflectance of the surrounding land, :math:`\rho`, as on level ground. [1]
+    mu_s_local : array
+        Cosine of the sun's zenith angle on the slope, :math:`\mu_s`; 0 in shadow. [1]
+    mu_s : float
+        The same on level ground, :math:`\mu_0`. [1]
+    direct_transmittance : array
+        Transmittance of the direct beam, :math:`e^{-\tau / \mu_0}`. [1]
+    transmittance_down : array
+        Total, direct and diffuse, :math:`T(\theta_s)`. [1]
+
+    Returns
+    -------
+    kt : array
+        1 on level and open ground. [1]
+
+    Notes
+    -----
+    The sky is uniform, the land around a slope is as bright as the slope's own cell, and its light comes once.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 4; [Dubayah1992]_
+
+    Examples
+    --------
+    >>> float(topographic_factor(1.0, 0.0, 0.3, 0.8, 0.8, 0.6, 0.9))
+    1.0
+    """
+    direct = direct_transmittance / transmittance_down
+    return sky_view + terrain_view * reflectance + direct * (mu_s_local / mu_s - sky_view)
+
+
+@register_jitable
+def upwelling_factor(mu_v_local, mu_v):
+    r"""
+    Cosine correction of the light that leaves a slope toward the sensor.
+
+    .. math:: \max(\mu_v, 0) / \cos \theta_v
+
+    The paper has no divisor; with it level ground has 1 in any view.
+
+    Parameters
+    ----------
+    mu_v_local : array
+        Cosine of the sensor's zenith angle on the slope, :math:`\mu_v`. [1]
+    mu_v : float
+        The same on level ground, :math:`\cos \theta_v`. [1]
+
+    Returns
+    -------
+    factor : array
+        1 on level ground, 0 where the slope faces away. [1]
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 5
+
+    Examples
+    --------
+    >>> upwelling_factor(np.array([0.5, 1.0, -0.1]), 0.5).tolist()
+    [1.0, 2.0, 0.0]
+    """
+    return np.maximum(mu_v_local, 0.0) / mu_v

@@ -1,45 +1,38 @@
-r"""
-Elevation onto finer cells by quintic B-splines: smooth to the fourth derivative, free of the source's facets.
+"""
+Quintic B-splines of elevation and of noise, and the filling of gaps before they are fitted.
 
 A spline that interpolates a lattice recovers a surface whose wavelengths are above five lattice cells within 1e-3 of
-its amplitude, and a plane exactly. What it gives at a point depends on lattice values d cells away as
-:math:`0.431^d`, so that a margin of `MARGIN` cells makes it a local operation.
+its amplitude, and a plane exactly. Its value at a point depends on lattice values d cells away as :math:`0.431^d`, so
+that a margin of `MARGIN` cells makes it a local operation.
 """
+
+from functools import partial
 
 import numba
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, sparse
+from scipy.sparse import linalg
 
-from fifesim.base.lattice import assemble
+from fifesim.base.caches import cached
+from fifesim.base.lattice import assemble, generator
 
 # Quintic: a wave of five cells is recovered within 5e-4 of its amplitude, by degree 3 within 3e-3. The larger pole of
 # the prefilter is -0.4306.
 DEGREE = 5
-MARGIN = 32
+SPLINE_MARGIN = 32
 
 # Lattice cells around positions that hold all that a spline there is made of, and more.
-REACH = 8
+SPLINE_REACH = 8
 
 
 def spline_coefficients(values):
-    """
-    Coefficients of the quintic B-spline that interpolates a lattice.
-
-    Parameters
-    ----------
-    values : array, shape (rows, columns)
-        Without NaN. Mirrored at the borders, which tells within `MARGIN` cells of them.
-
-    Returns
-    -------
-    coefficients : array, shape (rows, columns)
-    """
+    """Coefficients of the quintic B-spline that interpolates a lattice, mirrored at the borders."""
     return ndimage.spline_filter(values, order=DEGREE, output=np.float64, mode="mirror")
 
 
 @numba.njit(nogil=True, cache=True)
 def _weights(share, out):
-    """The six quintic B-splines that are not zero at a share of a cell past the third of their lattice points."""
+    """Fill in the six nonzero quintic B-splines at a share of a cell past the third of their lattice points."""
     t = share
     s = 1.0 - t
     out[0] = s**5 / 120.0
@@ -52,19 +45,8 @@ def _weights(share, out):
 
 @numba.njit(nogil=True, cache=True)
 def spline_grid(coefficients, rows, columns):
-    """
-    Values of a spline on a grid that is parallel to its lattice.
-
-    Parameters
-    ----------
-    coefficients : array, shape (m, n)
-    rows, columns : array, shape (rows,), (columns,)
-        Positions, at least two lattice cells inside; 0 is the centre of the first cell. [cell]
-
-    Returns
-    -------
-    values : array, shape (rows, columns)
-    """
+    """Values of a spline on a grid parallel to its lattice, shape (rows, columns)."""
+    # Positions are at least two lattice cells inside; 0 is the centre of the first cell.
     across = np.empty((coefficients.shape[0], columns.size))
     weights = np.empty((columns.size, 6))
     first = np.empty(columns.size, np.int64)
@@ -90,19 +72,8 @@ def spline_grid(coefficients, rows, columns):
 
 @numba.njit(nogil=True, cache=True)
 def spline_points(coefficients, rows, columns):
-    """
-    Values of a spline at points.
-
-    Parameters
-    ----------
-    coefficients : array, shape (m, n)
-    rows, columns : array, shape (y, x)
-        Positions, at least two lattice cells inside; 0 is the centre of the first cell. [cell]
-
-    Returns
-    -------
-    values : array, shape (y, x)
-    """
+    """Values of a spline at points, shape (y, x)."""
+    # Positions are at least two lattice cells inside; 0 is the centre of the first cell.
     out = np.empty(rows.shape)
     down, across = np.empty(6), np.empty(6)
     for i in range(rows.shape[0]):
@@ -121,21 +92,117 @@ def spline_points(coefficients, rows, columns):
 
 
 def spline_of_tiles(make_tile, tile, rows, columns):
-    """
-    Values on a grid of a spline without end, whose coefficients are made in fixed tiles of its lattice.
-
-    Parameters
-    ----------
-    make_tile, tile
-        As `fifesim.base.lattice.assemble` takes them.
-    rows, columns : array, shape (rows,), (columns,)
-        Rising positions on the lattice. [lattice cell]
-
-    Returns
-    -------
-    values : array, shape (rows, columns)
-        The same in every window, if whole cells come off the positions without rounding.
-    """
-    row, column = int(np.floor(rows[0])) - REACH, int(np.floor(columns[0])) - REACH
-    shape = int(np.floor(rows[-1])) + REACH - row, int(np.floor(columns[-1])) + REACH - column
+    """Values on a grid of an unbounded spline with coefficients in fixed tiles, shape (rows, columns)."""
+    # The same in every window, if whole cells can be subtracted from the positions without rounding.
+    row, column = int(np.floor(rows[0])) - SPLINE_REACH, int(np.floor(columns[0])) - SPLINE_REACH
+    shape = int(np.floor(rows[-1])) + SPLINE_REACH - row, int(np.floor(columns[-1])) + SPLINE_REACH - column
     return spline_grid(assemble(make_tile, tile, row, column, shape), rows - row, columns - column)
+
+
+# Standard deviation of a quintic spline of white noise, the value at 0 of the B-spline of degree 11.
+_DEVIATION = 0.3939255651755652
+
+# Noise is drawn in blocks of this size. [lattice node]
+_BLOCK = 64
+
+
+def smooth_noise(seed, stream, step, south, east):
+    """Gaussian noise of unit variance by place, without wavelengths much below two steps, shape (y, x). [1]"""
+    return spline_of_tiles(partial(_block, seed, stream), _BLOCK, south / step, east / step) / _DEVIATION
+
+
+def noise_square(drawn, spacing, count):
+    """Smooth noise on a square of nodes, from a generator, shape (count, count). [1]"""
+    positions = 3 + np.arange(count) * spacing
+    size = int(positions[-1]) + 5
+    return spline_grid(drawn.standard_normal((size, size)), positions, positions) / _DEVIATION
+
+
+@cached(256, "noise of hills")
+def _block(seed, stream, block_row, block_column):
+    """White noise of one lattice block, whose place is the upper half of the Philox counter."""
+    return generator(seed, stream, (0, 0, block_row, block_column)).standard_normal((_BLOCK, _BLOCK))
+
+
+def extend(values, rings, rest=True):
+    """Extrapolate a surface past its edge, ring by ring of cells, along lines and diagonals; a plane stays a plane."""
+    known = np.isfinite(values)
+    if known.all() or not known.any():
+        return values
+    rows, columns = values.shape
+    padded = np.pad(values, 2, constant_values=np.nan)
+    steps = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+
+    def shifted(down, across):
+        return padded[2 + down : 2 + down + rows, 2 + across : 2 + across + columns]
+
+    for _ in range(rings):
+        total, count = np.zeros(values.shape), np.zeros(values.shape)
+        for down, across in steps:
+            line = 2 * shifted(down, across) - shifted(2 * down, 2 * across)
+            found = np.isfinite(line)
+            total += np.where(found, line, 0.0)
+            count += found
+        inside = padded[2:-2, 2:-2]
+        new = ~np.isfinite(inside) & (count > 0)
+        if not new.any():
+            break
+        inside[new] = total[new] / count[new]
+    filled = padded[2:-2, 2:-2]
+    return np.where(np.isfinite(filled), filled, values[known].mean()) if rest else filled
+
+
+def fill_gaps(values, distance):
+    """Fill holes by the surface of least bending, and extrapolate past the edge; a plane stays a plane."""
+    # NaN remains farther from known values than `distance`, and in larger holes except for their rim. Gaps at the
+    # border are past the edge.
+    unknown = np.isnan(values)
+    if unknown.all() or not unknown.any():
+        return values
+    tall, wide = (2 * size + 1 for size in distance)
+    labels, _ = ndimage.label(unknown, structure=np.ones((3, 3)))
+    out = values.copy()
+    for number, (down, across) in enumerate(ndimage.find_objects(labels), start=1):
+        inside = min(down.start, across.start) > 0 and down.stop < values.shape[0] and across.stop < values.shape[1]
+        if inside and down.stop - down.start <= tall and across.stop - across.start <= wide:
+            around = tuple(slice(max(part.start - 4, 0), part.stop + 4) for part in (down, across))
+            hole = labels[around] == number
+            out[around][hole] = _least_bending(values[around], hole)
+    near = ndimage.distance_transform_edt(unknown, sampling=[1 / size for size in distance]) <= 1
+    rings = int(np.ceil(max(distance)))
+    # Farther out nothing is carried.
+    around = tuple(
+        slice(max(part.start - rings, 0), part.stop + rings) for part in ndimage.find_objects((~unknown).astype(int))[0]
+    )
+    carried = extend(values[around], rings, rest=False)
+    out[around] = np.where(np.isnan(out[around]) & near[around], carried, out[around])
+    return out
+
+
+def _least_bending(values, hole):
+    """Values in a hole that minimize the sum of squared second differences; other unknown cells are left out."""
+    index, usable = np.arange(values.size).reshape(values.shape), (np.isfinite(values) | hole).ravel()
+    along = [(index[:, :-2], index[:, 1:-1], index[:, 2:]), (index[:-2], index[1:-1], index[2:])]
+    lines = np.concatenate([np.reshape(triple, (3, -1)) for triple in along], axis=1)
+    corners = np.reshape((index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]), (4, -1))
+    # The mixed derivative counts twice in the bending energy.
+    mixed = _weighted_sums(corners, np.sqrt(2.0) * np.array([1.0, -1.0, -1.0, 1.0]), usable)
+    bending = sparse.vstack([_weighted_sums(lines, [1.0, -2.0, 1.0], usable), mixed]).tocsc()
+    unknown = np.flatnonzero(hole)
+    fixed = np.where(hole, 0.0, np.where(np.isfinite(values), values, 0.0)).ravel()
+    inner = bending[:, unknown]
+    return linalg.spsolve((inner.T @ inner).tocsc(), -(inner.T @ (bending @ fixed)))
+
+
+def _weighted_sums(cells, weights, usable):
+    """Matrix of weighted sums over a few cells each, shape (sums, cells), for sums with usable cells only."""
+    cells = cells[:, usable[cells].all(axis=0)]
+    number = np.arange(cells.shape[1])
+    entries = np.repeat(weights, number.size), (np.tile(number, len(weights)), cells.ravel())
+    return sparse.csr_array(entries, shape=(number.size, usable.size))
+
+
+def block_means(values, down, across):
+    """Means of blocks of cells, NaN where a cell is, shape (rows / down, columns / across)."""
+    rows, columns = values.shape
+    return values.reshape(rows // down, down, columns // across, across).mean(axis=(1, 3))

@@ -1,4 +1,4 @@
-"""Where water gathers: the topographic wetness index of an elevation model."""
+"""Topographic wetness index of an elevation model."""
 
 import numpy as np
 from numba import njit
@@ -36,7 +36,7 @@ def wetness_index(elevation, down, across):
 
     Notes
     -----
-    Pits are filled first. The slope is that of central differences, and of 0.001 at least. What lies beyond the
+    Pits are filled first. The slope is from central differences, at least 0.001. Land beyond the
     border drains nothing into the raster: along the border the index is too small.
 
     References
@@ -60,7 +60,7 @@ def wetness_index(elevation, down, across):
 
 
 def _steepness(ground, down, across):
-    """Tangent of the slope, one-sided beside what is unknown."""
+    """Tangent of the slope, one-sided next to unknown cells."""
     changes = []
     for axis, distance in ((0, down), (1, across)):
         if ground.shape[axis] < 2:
@@ -79,7 +79,7 @@ def _steepness(ground, down, across):
 @njit(nogil=True, cache=True)
 def fill_pits(elevation):
     """
-    Ground without pits: from each cell a way falls to the border, or to what is unknown.
+    Ground without pits: every cell has a descending path to the border, or to unknown cells.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def fill_pits(elevation):
 @njit(nogil=True, cache=True)
 def drained_area(ground, down, across):
     """
-    Area that drains through each cell, its own with it, by many ways.
+    Area that drains through each cell, including the cell, by multiple flow directions.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Training sets: many chips of a study as sharded Zarr, with what describes them."""
+"""Training sets: many chips of a study as sharded Zarr, with their documentation."""

@@ -1,40 +1,81 @@
-"""The datasheet of a dataset: what it is, what was drawn, how it is split, and the range of every variable."""
+"""Datasheet of a dataset: its contents, draws, split and variable ranges, with a contact sheet."""
 
 import hashlib
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
-from fifesim.output import pages
-from fifesim.output.chips.pictures import contact_sheet
+from fifesim.grids import cf
+from fifesim.output import report
+from fifesim.output.colours import NO_DATA, colours_of, dark_and_bright, percentile_limits, stretched
+from fifesim.output.maps import false_colour_names
 from fifesim.scenario.chips import is_of_a_landscape
+
+# Of each part of the split.
+_SHOWN = 4
+
+# Rows of truth at most, in the order of the table of quantities.
+_ROWS = 3
+
+
+def contact_sheet(dataset, parts):
+    """Contact sheet of the first chips of each part of a dataset; all chips of a row share their colours."""
+    split = dataset["split"].values
+    parts = {name: chips for name in parts if (chips := np.flatnonzero(split == name)[:_SHOWN]).size}
+    chosen = dataset.isel(chip=np.concatenate(list(parts.values()))).load()
+    names = [name for name in cf.QUANTITIES if name != "ndvi" and name in chosen and chosen[name].ndim == 3][:_ROWS]
+    figure = Figure(figsize=(1.15 * chosen.sizes["chip"] + 1.4, 1.25 * (len(names) + 1) + 0.9), layout="constrained")
+    axes = figure.subplots(len(names) + 1, chosen.sizes["chip"], squeeze=False)
+    rows = [_image_row(axes[0], chosen)]
+    rows += [(cf.QUANTITIES[name].label, _row(row, chosen[name])) for row, name in zip(axes[1:], names, strict=True)]
+    for row, (label, drawn) in zip(axes, rows, strict=True):
+        row[0].set_ylabel(label.replace(" of ", "\nof "), fontsize=8)
+        if drawn is not None:
+            figure.colorbar(drawn, ax=row, fraction=0.01, pad=0.005).ax.tick_params(labelsize=7)
+    for axis in axes.flat:
+        axis.set(xticks=[], yticks=[], facecolor=NO_DATA)
+    shown = [(name, chip, not at) for name, chips in parts.items() for at, chip in enumerate(chips)]
+    for axis, (name, chip, is_first) in zip(axes[0], shown, strict=True):
+        axis.set_title(f"{name if is_first else ''}\nchip {chip}", fontsize=8, fontweight="bold" if is_first else None)
+    return figure
+
+
+def _row(axes, array):
+    """Draw one quantity of all chips."""
+    colours, middle = colours_of(array.name)
+    low, high = percentile_limits(array, middle=middle)
+    style = {"cmap": colours, "vmin": low, "vmax": max(high, low + 1e-6), "interpolation": "nearest"}
+    drawn = [axis.imshow(each, **style) for axis, each in zip(axes, array.values, strict=True)]
+    return drawn[0]
+
+
+def _image_row(axes, chosen):
+    """Draw the images in false colours, else NDVI, else one band; return the label and the colour bar."""
+    names = false_colour_names(chosen["toa_reflectance"])
+    if not names and "ndvi" in chosen:
+        return f"{cf.QUANTITIES['ndvi'].label} of the image", _row(axes, chosen["ndvi"])
+    last = str(chosen["band"].values[-1])
+    layers = chosen["toa_reflectance"].sel(band=names or [last] * 3).transpose("band", ...).values
+    spans = map(dark_and_bright, layers)
+    shares = [stretched(layer, low, max(high, low + 1e-6)) for layer, (low, high) in zip(layers, spans, strict=True)]
+    pictures = np.stack([*np.nan_to_num(shares), np.isfinite(layers).all(axis=0)], axis=-1)
+    for axis, picture in zip(axes, pictures, strict=True):
+        axis.imshow(picture, interpolation="nearest")
+    return "image: " + ",\n".join(names or [last]), None
+
 
 _TEMPLATE = Path(__file__).with_name("datasheet.html.j2")
 _DPI = 110
 
-_SEQUENCES = {
-    "sobol": ("a scrambled Sobol sequence", "With more chips the first stay as they are."),
-    "latin-hypercube": ("a Latin hypercube", "Another number of chips makes all of them others."),
-    "random": ("independent random numbers", "With more chips the first stay as they are."),
-}
+_SEQUENCES = {"sobol": "a scrambled Sobol sequence", "random": "independent random numbers"}
 
 
-def write(folder, chips, shards, page, picture):
-    """
-    Write the datasheet and the contact sheet of a dataset.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Of its store, which is whole.
-    chips : fifesim.scenario.chips.Chips
-    shards : fifesim.output.chips.store.Shards
-    page, picture : str
-        Names of the files.
-    """
+def write_datasheet(folder, chips, shards, page, picture):
+    """Write the datasheet and the contact sheet of a dataset."""
     with xr.open_zarr(folder, chunks=None) as dataset:
-        sheet = pages.png(contact_sheet(dataset, list(chips.study.split)), _DPI)
+        sheet = report.png(contact_sheet(dataset, list(chips.study.split)), _DPI)
         ranges = ranges_of(dataset, shards)
         text = datasheet_page(dataset, chips, ranges, sheet)
     (folder / picture).write_bytes(sheet)
@@ -42,21 +83,7 @@ def write(folder, chips, shards, page, picture):
 
 
 def ranges_of(dataset, shards):
-    """
-    Range and means of the variables of chips, a shard at a time.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Lazy.
-    shards : fifesim.output.chips.store.Shards
-
-    Returns
-    -------
-    ranges : dict of str to dict
-        By variable ``least``, ``greatest``, ``without``, the share that has no data, ``mean``, and ``means`` by part of
-        the split. NaN where there are none.
-    """
+    """Range, mean and missing share of the variables of chips, one shard at a time, by name."""
     split, parts = dataset["split"].values, list(dict.fromkeys(dataset["split"].values.tolist()))
     sums = {str(name): {"least": np.inf, "greatest": -np.inf, "cells": 0} for name in dataset.data_vars}
     totals = {(name, part): np.zeros(2) for name in sums for part in parts}
@@ -84,24 +111,8 @@ def _ratio(total, count):
 
 
 def datasheet_page(dataset, chips, ranges, sheet):
-    """
-    One self-contained HTML page on a dataset.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-    chips : fifesim.scenario.chips.Chips
-    ranges : mapping
-        From `ranges_of`.
-    sheet : bytes
-        The contact sheet, a PNG.
-
-    Returns
-    -------
-    html : str
-    """
+    """One self-contained HTML page about a dataset."""
     study, scenario = chips.study.to_toml(), chips.study.scenario
-    by, prefix = _SEQUENCES[chips.study.sequence]
     about = {
         "chips": len(chips),
         "landscapes": chips.study.landscapes,
@@ -112,9 +123,8 @@ def datasheet_page(dataset, chips, ranges, sheet):
         "bands": dataset["band"].values.tolist(),
         "terrain": "level ground" if scenario.terrain.dem == "flat" else "synthetic hills",
         "engine": scenario.atmosphere.engine,
-        "sequence": by,
+        "sequence": _SEQUENCES[chips.study.sequence],
         "seed": chips.study.seed,
-        "prefix": prefix,
         "digest": hashlib.sha256(study.encode()).hexdigest()[:12],
     }
     parts = [_part(chips, name) for name in chips.study.split]
@@ -122,7 +132,7 @@ def datasheet_page(dataset, chips, ranges, sheet):
     variables = [_variable(dataset[name], found) for name, found in ranges.items()]
     drawn = [_drawn(chips, key) for key in chips.columns]
     values = {"about": about, "parts": parts, "names": shown, "empty": empty, "variables": variables, "drawn": drawn}
-    return pages.html(_TEMPLATE, title=dataset.attrs["title"], study=study, sheet=sheet, **values)
+    return report.page_html(_TEMPLATE, title=dataset.attrs["title"], study=study, sheet=sheet, **values)
 
 
 def _part(chips, name):
@@ -132,7 +142,7 @@ def _part(chips, name):
 
 
 def _drawn(chips, key):
-    """A row on what is drawn."""
+    """Table row of a drawn quantity."""
     column, attributes = chips.columns[key], key.attributes
     row = {"name": key.name, "meaning": attributes["long_name"], "unit": attributes.get("units", "")}
     distribution = chips.study.drawn.get(key)
@@ -144,16 +154,16 @@ def _drawn(chips, key):
 
 
 def _variable(array, found):
-    """A row on a variable."""
+    """Table row of a variable."""
     row = {"name": array.name, "meaning": array.attrs["long_name"], "unit": array.attrs["units"]}
     row |= {"dims": ", ".join(map(str, array.dims)), "type": str(array.encoding.get("dtype", array.dtype))}
     row |= {name: _short(found[name]) for name in ("least", "mean", "greatest")}
     means = {name: _short(value) for name, value in found["means"].items()}
-    return row | {"without": pages.fixed(100 * found["without"], 1), "means": means}
+    return row | {"without": report.fixed(100 * found["without"], 1), "means": means}
 
 
 def _short(value):
-    """Four digits of a number."""
+    """Number with four digits."""
     if isinstance(value, str):
         return value
     if isinstance(value, int):

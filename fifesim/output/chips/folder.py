@@ -1,4 +1,4 @@
-"""A dataset: the chips of a study written into a folder shard by shard, which can be stopped and gone on with."""
+"""A dataset: the chips of a study written into a folder shard by shard, which can be interrupted and resumed."""
 
 from __future__ import annotations
 
@@ -11,41 +11,29 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.annotations import FilePath, WholeNumber
-from fifesim.base.kinds import described
-from fifesim.base.warned import warn
-from fifesim.ground.landscape.field import TILE
-from fifesim.output.chips import datasheet
-from fifesim.output.chips.arrays import layout_of
-from fifesim.output.chips.makers import makers_of
-from fifesim.output.chips.making import made_shards
-from fifesim.output.chips.store import ROOT, Shards, checksums, chips_in, make_store, stored_names, write_shard
+from fifesim.base.arguments import described
+from fifesim.base.messages import warn
+from fifesim.grids.chunks import found_client
+from fifesim.ground.landscape.autoregression import FIELD_TILE
+from fifesim.output.chips import datasheet, store
+from fifesim.output.chips.makers import made_shards, processes, workers_of
 from fifesim.output.folders import BEGUN, UNFINISHED, check_folder, errors_with_their_file, results
 from fifesim.output.progress import ChipProgress
-from fifesim.output.provenance import versions
-from fifesim.output.run.identity import (
-    STATE,
-    begin,
-    check_finished,
-    check_inputs,
-    inputs_of,
-    kept_state,
-    with_checksums,
-)
-from fifesim.output.run.saved import has_blocks, save_block, saved_block
-from fifesim.rasters.clients import found_client
+from fifesim.output.run import identity
+from fifesim.output.run.products import has_blocks, save_block, saved_block
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.studies import Study, StudyLike, read_study
 
 _FILES = DATASHEET, CONTACT_SHEET, STUDY = "datasheet.html", "contact_sheet.png", "study.toml"
 
-WHOLE = (*_FILES, ROOT)
+WHOLE = (*_FILES, store.ROOT)
 """Files by which a dataset is known to be whole."""
 
-# Of shards that are written, what their files' checksums are saved by.
+# Name under which the checksums of written shards are saved.
 _SAVED = "chips"
 
-# So many chips are looked at before the first is made, and so many closely: what cannot be is told early. [1]
+# Number of chips that are validated before the first is made, and number of these that are validated completely.
 _LOOKED_AT, _CLOSELY = 1000, 50
 
 
@@ -111,108 +99,80 @@ def dataset(
         raise ValueError(f"workers must be a whole number of processes from 1 up, got {described(workers)}")
     if workers > 1 and client is not None:
         raise ValueError("workers starts processes and client is of a cluster that runs: give one of them")
-    # One by itself is this process.
-    workers = workers if workers > 1 else None
     dataset_to_folder(study, folder, n, overwrite=overwrite, resume=resume, workers=workers, client=client)
     return xr.open_zarr(folder)
 
 
 def dataset_to_folder(study, folder, count, *, overwrite=False, resume=False, workers=None, client=None, as_json=False):
-    """
-    Make the chips of a study in a folder.
-
-    Parameters
-    ----------
-    study : fifesim.scenario.studies.Study
-    folder : str or path
-    count : int
-        Chips.
-    overwrite, resume, client
-        As in `dataset`.
-    workers : int, optional
-        Make them in so many processes of this machine.
-    as_json : bool, optional
-        Print progress as lines of JSON.
-
-    Returns
-    -------
-    files : list of pathlib.Path
-        The folder, and what in it is for people.
-
-    Raises
-    ------
-    ValueError
-        As in `dataset`.
-    OSError
-        As in `dataset`.
-    """
+    """Make the chips of a study in a folder; return the paths of the folder and its documentation."""
     folder = Path(folder)
     if check_folder(folder, overwrite, resume, WHOLE):
         _check_finished(folder, chips_of(study, count))
         return [folder, *(folder / name for name in _FILES)]
-    with makers_of(study, count, workers) if workers else nullcontext() as makers:
-        way = {"makers": makers, "client": client or found_client()}
+    # One worker is this process.
+    own = workers is not None and workers > 1
+    client = None if own else client or found_client()
+    with processes(workers) if own else workers_of(client) if client else nullcontext() as makers:
         chips = chips_of(study, count)
         _look_at(chips)
         _warn_of_empty_parts(chips)
-        layout = layout_of(chips)
+        layout = store.layout_of(chips)
         # The root makes the folder a store: it comes last.
-        names = [*stored_names(chips, layout), *_FILES, ROOT]
-        stale = _other_arrays(folder, names) if overwrite or resume else ()
+        names = [*store.stored_names(chips, layout), *_FILES, store.ROOT]
+        earlier = folder.iterdir() if folder.is_dir() and (overwrite or resume) else ()
+        # Arrays of an earlier dataset that the new one does not have.
+        stale = [
+            path.name for path in earlier if path.name not in (UNFINISHED, *names) and (path / store.ROOT).is_file()
+        ]
         kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks, stale=stale)
         with errors_with_their_file(folder), kept as unfinished:
-            _make(chips, layout, unfinished, as_json, way)
+            _make(chips, layout, unfinished, as_json, makers)
     return [folder, *(folder / name for name in _FILES)]
 
 
 def _check_finished(folder, chips):
-    """Refuse a finished dataset that is not the one asked for."""
-    check_finished(folder / STUDY, read_study(folder / STUDY).to_toml(), chips.study.to_toml(), _inputs(chips))
-    if (found := chips_in(folder)) != len(chips):
+    """Raise ValueError if a finished dataset is not the requested one."""
+    identity.check_finished(folder / STUDY, read_study(folder / STUDY).to_toml(), chips.study.to_toml(), _inputs(chips))
+    if (found := store.chips_in(folder)) != len(chips):
         raise ValueError(
             f"{folder} holds a finished dataset of {found} chips, not {len(chips)}: give that number, name another "
             "folder with -o, or make it again with --overwrite"
         )
 
 
-def _make(chips, layout, folder, as_json, way):
-    """The whole dataset, in a folder that may hold a part of it."""
-    identity, shards = _identity_of(chips), Shards(len(chips), layout.size, _together(chips.study))
-    begin(folder, identity)
-    _remove_partial(folder)
-    make_store(folder, chips, layout, shards)
-    _compute(chips, layout, shards, folder, as_json, way)
-    datasheet.write(folder, chips, shards, DATASHEET, CONTACT_SHEET)
-    (folder / STUDY).write_text(chips.study.to_toml(), encoding="utf-8")
-    check_inputs(json.loads(identity[STATE])["inputs"], _inputs(chips))
+def _make(chips, layout, folder, as_json, makers):
+    """Make the dataset in a folder that may hold a part of it."""
+    study = chips.study
+    state = identity.state_of(_inputs(chips), study.to_toml(), chips=len(chips))
+    identity.begin(folder, state)
+    for path in folder.rglob("*.partial"):
+        # Left by a killed run.
+        if path.is_file():
+            path.unlink()
+    rows, columns = study.scenario.geobox().shape
+    # Chips of all landscapes that fill one tile of each field are made fastest together.
+    together = max(FIELD_TILE // rows, 1) * max(FIELD_TILE // columns, 1) * study.landscapes
+    shards = store.Shards(len(chips), layout.size, together)
+    store.make_store(folder, chips, layout, shards)
+    _compute(chips, layout, shards, folder, as_json, makers)
+    datasheet.write_datasheet(folder, chips, shards, DATASHEET, CONTACT_SHEET)
+    (folder / STUDY).write_text(study.to_toml(), encoding="utf-8")
+    identity.check_inputs(json.loads(state[identity.STATE])["inputs"], _inputs(chips))
 
 
 def study_to_resume(folder):
-    """
-    Study of an unfinished or finished run, and how many chips it makes.
-
-    Parameters
-    ----------
-    folder : path
-        Folder of the results.
-
-    Returns
-    -------
-    study : fifesim.scenario.studies.Study or None
-        None if there is no run in the folder.
-    count : int or None
-    """
+    """Study of an unfinished or finished run, and its number of chips; None if there is no run."""
     folder = Path(folder)
     if (folder / UNFINISHED / BEGUN).is_file():
-        count = kept_state(folder / UNFINISHED).get("chips")
+        count = identity.kept_state(folder / UNFINISHED).get("chips")
         return read_study(folder / UNFINISHED / BEGUN), count if isinstance(count, int) else None
-    if all((folder / name).is_file() for name in (STUDY, ROOT)):
-        return read_study(folder / STUDY), chips_in(folder)
+    if all((folder / name).is_file() for name in (STUDY, store.ROOT)):
+        return read_study(folder / STUDY), store.chips_in(folder)
     return None, None
 
 
 def _look_at(chips):
-    """Scenarios of some chips, so that one that cannot be is found before a day of work."""
+    """Validate the scenarios of some chips before the work starts."""
     last = len(chips) - 1
     warn_of_canopy(chips.scenario(0))
     for chip in (*range(min(last, _LOOKED_AT)), last):
@@ -229,7 +189,7 @@ def _look_at(chips):
 
 
 def _warn_of_empty_parts(chips):
-    """The first chips lie in as many landscapes, each of which belongs to one part of the split."""
+    """Warn of parts of the split without chips: the first chips are in different landscapes, each in one part."""
     empty, count = sorted(set(chips.study.split) - set(chips.split)), chips.study.landscapes
     if empty:
         warn(
@@ -238,55 +198,30 @@ def _warn_of_empty_parts(chips):
         )
 
 
-def _remove_partial(folder):
-    """What a run that was killed was writing."""
-    for path in folder.rglob("*.partial"):
-        if path.is_file():
-            path.unlink()
-
-
-def _together(study):
-    """Chips of all landscapes that fill a tile of their fields each."""
-    rows, columns = study.scenario.geobox().shape
-    return max(TILE // rows, 1) * max(TILE // columns, 1) * study.landscapes
-
-
-def _identity_of(chips):
-    """What must be the same for shards of two runs to fit together."""
-    state = {"versions": versions(), "inputs": with_checksums(_inputs(chips)), "chips": len(chips)}
-    return {STATE: json.dumps(state), BEGUN: chips.study.to_toml()}
-
-
 def _inputs(chips):
-    """Files that chips read, those among which it is drawn included."""
-    study, found = chips.study, inputs_of(chips.study.scenario)
+    """Input files of the chips, including the files among which one is drawn."""
+    study, found = chips.study, identity.inputs_of(chips.study.scenario)
     for key, distribution in study.drawn.items():
         if key.entry is None and any(key.section.names_a_file(key.key, value) for value in distribution.extremes):
             for value in distribution.extremes:
-                found |= inputs_of(study.scenario_with({key.path: value}))
+                found |= identity.inputs_of(study.scenario_with({key.path: value}))
     return found
 
 
-def _compute(chips, layout, shards, folder, as_json, way):
-    """Make and write the shards that are not written yet."""
+def _compute(chips, layout, shards, folder, as_json, makers):
+    """Make and write the missing shards."""
     blocks, names = folder / "blocks", list(layout.variables)
     wanted = [shard for shard in range(len(shards)) if not _is_written(folder, blocks, names, shard)]
     done = len(chips) - sum(np.diff(shards.range_of(shard)).item() for shard in wanted)
     with ChipProgress(len(chips), done, as_json) as progress:
-        for shard, arrays in made_shards(chips, layout, shards, wanted, progress.advance, **way):
-            write_shard(folder, shards.range_of(shard)[0], arrays)
-            save_block(blocks, _SAVED, (shard,), checksums(folder, names, shard))
+        for shard, arrays in made_shards(chips, layout, shards, wanted, progress.advance, makers):
+            store.write_shard(folder, shards.range_of(shard)[0], arrays)
+            save_block(blocks, _SAVED, (shard,), store.checksums(folder, names, shard))
 
 
 def _is_written(folder, blocks, names, shard):
-    """Whether the files of a shard are what was written."""
+    """Whether the files of a shard have their checksums."""
     try:
-        return np.array_equal(saved_block(blocks, _SAVED, (shard,)), checksums(folder, names, shard))
+        return np.array_equal(saved_block(blocks, _SAVED, (shard,)), store.checksums(folder, names, shard))
     except (OSError, ValueError):
         return False
-
-
-def _other_arrays(folder, names):
-    """Names of arrays of an earlier dataset that the new one does not have."""
-    paths = folder.iterdir() if folder.is_dir() else ()
-    return [path.name for path in paths if path.name not in (UNFINISHED, *names) and (path / ROOT).is_file()]

@@ -1,19 +1,23 @@
-"""Processes of this machine that make chips: each those of landscapes of its own, whose ground it keeps."""
+"""Processes that make shards of chips, on this machine or on a cluster."""
 
 import multiprocessing
 import os
+import pickle
 import signal
-from collections import deque
-from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from functools import partial
-from multiprocessing import connection
+from itertools import islice
+from threading import Thread
 from typing import NamedTuple
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from fifesim.output.chips.arrays import chip_arrays
-from fifesim.output.process import interrupts_blocked
+from fifesim.base.caches import cached
+from fifesim.output.chips.store import chip_arrays, empty_arrays
+from fifesim.output.run.workers import RETRIES
+from fifesim.output.terminal import interrupts_blocked
 from fifesim.scenario.chips import chips_of
 
 # Not on Windows.
@@ -21,209 +25,127 @@ _FORKS = "forkserver" in multiprocessing.get_all_start_methods()
 if _FORKS:
     from multiprocessing import forkserver, resource_tracker
 
-# Landscapes of a process in so many groups: when others are done they take over some of them.
+# Number of groups of landscapes, whose chips are made together, for each process.
 _GROUPS = 4
 
-# The hills around a landscape take longer to make than one chip after the other: of so many shards they are made once.
+# Number of shards for which the hills around a landscape are made once, because they take longer than many chips.
 _SHARDS_ON_HILLS = 4
 
-# So many jobs a process has at hand: it does not wait for an answer to what it sent. [1]
+# Jobs submitted for each process: none waits for work, and few results wait to be written. [1]
 _AT_HAND = 2
 
-# Chips are many and small: a thread for each of their products would wait for the others.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+class Makers(NamedTuple):
+    """Processes that make chips, how many they are, and the errors that say that one of them ended."""
+
+    executor: Executor
+    number: int
+    ended: tuple[type[Exception], ...]
 
 
-class Job(NamedTuple):
-    """Some chips, and the group of landscapes that they lie in."""
+@contextmanager
+def processes(number):
+    """Processes of this machine that make chips; a context manager, with which they end."""
+    # A fork server, where available, imports the libraries once, while this process validates the study. Its processes
+    # start at once and share its memory. Unlike this process, it has no threads.
+    context = multiprocessing.get_context("forkserver" if _FORKS else "spawn")
+    if _FORKS:
+        context.set_forkserver_preload([__name__])
+        # The tracker ignores Ctrl-C by itself, but lets it in again here.
+        resource_tracker.ensure_running()
+        with interrupts_blocked():
+            forkserver.ensure_running()
+    wanted, held = context.Pipe(duplex=False)
+    executor = ProcessPoolExecutor(number, context, _begin, (wanted,))
+    try:
+        yield Makers(executor, number, (BrokenProcessPool,))
+    finally:
+        held.close()
+        executor.shutdown(cancel_futures=True)
+        wanted.close()
 
-    chips: np.ndarray
-    group: int
+
+def _begin(wanted):
+    """Prepare a process: it ends at once when the other end of a pipe is closed, or who holds that end is killed."""
+    # The parent process handles Ctrl-C.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Chips are many and small: BLAS threads would wait for each other.
+    threadpool_limits(1)
+    Thread(target=_end_with, args=(wanted,), daemon=True).start()
 
 
-class _Maker(NamedTuple):
-    """A process that makes chips, the pipe to it, the jobs meant for it, and those that it has."""
+def _end_with(wanted):
+    with suppress(EOFError, OSError):
+        wanted.recv()
+    os._exit(1)
 
-    process: multiprocessing.process.BaseProcess
-    pipe: connection.Connection
-    queue: deque
-    at_hand: deque
+
+@contextmanager
+def workers_of(client):
+    """Workers of a cluster that make chips; a context manager, with which what they do is cancelled."""
+    from distributed import KilledWorker  # there already, where a client is
+
+    executor = client.get_executor(pure=False, retries=RETRIES)
+    try:
+        yield Makers(executor, max(len(client.ncores()), 1), (KilledWorker,))
+    finally:
+        executor.shutdown(wait=False)
 
 
 def jobs_of(chips, shards, wanted, makers):
-    """
-    What is to be done, in the order of the shards.
-
-    Parameters
-    ----------
-    chips : fifesim.scenario.chips.Chips
-    shards : fifesim.output.chips.store.Shards
-    wanted : sequence of int
-        Shards that are to be made.
-    makers : int
-        Processes.
-
-    Returns
-    -------
-    jobs : list of Job
-        Each chip of the shards once.
-    """
+    """Chips that are made together, in the order of the shards."""
     on_hills = chips.study.scenario.terrain.dem != "flat"
     step, groups = (_SHARDS_ON_HILLS, chips.study.landscapes) if on_hills else (1, makers * _GROUPS)
     jobs = []
     for first in range(0, len(wanted), step):
-        ranges = [np.arange(*shards.range_of(shard)) for shard in wanted[first : first + step]]
-        numbers = np.concatenate(ranges)
+        numbers = np.concatenate([np.arange(*shards.range_of(shard)) for shard in wanted[first : first + step]])
         group = chips.landscape[numbers] % groups
-        jobs += [Job(numbers[group == each], int(each)) for each in np.unique(group)]
+        jobs += [numbers[group == each] for each in np.unique(group)]
     return jobs
 
 
-class Makers(NamedTuple):
-    """Processes that make chips, from `makers_of`."""
-
-    number: int
-    begin: Callable
-
-    def made(self, jobs, layout):
-        """
-        Make chips.
-
-        Parameters
-        ----------
-        jobs : sequence of Job
-        layout : fifesim.output.chips.arrays.Layout
-
-        Yields
-        ------
-        job : Job
-            In the order in which they are done.
-        arrays : dict of str to array
-            Of its chips.
-
-        Raises
-        ------
-        ValueError
-            As of `fifesim.output.chips.arrays.chip_arrays`.
-        RuntimeError
-            If a process ends by itself.
-        """
-        makers = self.begin() if jobs else []
-        for maker in makers:
-            maker.pipe.send(layout)
-        for job in jobs:
-            makers[job.group % len(makers)].queue.append(job)
-        for maker in makers:
-            _give(maker, makers)
-        while working := {maker.pipe: maker for maker in makers if maker.at_hand}:
-            for pipe in connection.wait(list(working)):
-                maker = working[pipe]
-                arrays = _answer(maker)
-                job = maker.at_hand.popleft()
-                _give(maker, makers)
-                yield job, arrays
+def made_shards(chips, layout, shards, wanted, advance, makers=None):
+    """Iterate over shards and their arrays as they are finished."""
+    jobs, begun = jobs_of(chips, shards, wanted, 1 if makers is None else makers.number), {}
+    here = ((job, chip_arrays(chips, job, layout)) for job in jobs)
+    for job, arrays in here if makers is None else _made(makers, chips, jobs, layout):
+        of = shards.shard_of(job)
+        for shard in np.unique(of).tolist():
+            first, last = shards.range_of(shard)
+            whole, left = begun.pop(shard, None) or (empty_arrays(last - first, layout), last - first)
+            for name, values in arrays.items():
+                whole[name][job[of == shard] - first] = values[of == shard]
+            left -= np.count_nonzero(of == shard)
+            if left:
+                begun[shard] = whole, left
+            else:
+                yield shard, whole
+        advance(len(job))
 
 
-@contextmanager
-def makers_of(study, count, number):
-    """
-    Processes that make the chips of a study; a context manager, with which they end.
-
-    Parameters
-    ----------
-    study : fifesim.scenario.studies.Study
-    count : int
-        Chips in all.
-    number : int
-        Processes.
-
-    Yields
-    ------
-    makers : Makers
-    """
-    # A server that has imported all once makes the processes, where the system has one: they begin at once and share
-    # its memory. It has no threads, unlike this process, and imports while this one looks at the study.
-    context, makers = multiprocessing.get_context("forkserver" if _FORKS else "spawn"), []
-    with _environment(dict.fromkeys(_THREADS, "1")):
-        if _FORKS:
-            context.set_forkserver_preload([__name__])
-            # The tracker ignores Ctrl-C by itself, but lets it in again here.
-            resource_tracker.ensure_running()
-            with interrupts_blocked():
-                forkserver.ensure_running()
-        try:
-            yield Makers(number, partial(_begun, context, study, count, number, makers))
-        finally:
-            for maker in makers:
-                maker.process.kill()
-            for maker in makers:
-                maker.process.join()
-                maker.pipe.close()
-
-
-def _begun(context, study, count, number, makers):
-    """The processes, which are added to a list as they begin."""
-    for _ in range(number):
-        here, there = context.Pipe()
-        process = context.Process(target=_work, args=(there, study, count), daemon=True)
-        process.start()
-        there.close()
-        makers.append(_Maker(process, here, deque(), deque()))
-    return makers
-
-
-def _answer(maker):
-    """The arrays that a process sends."""
+def _made(makers, chips, jobs, layout):
+    """Jobs and the arrays of their chips, in the order in which they are done."""
+    known, waiting, working = pickle.dumps((chips.study, len(chips))), iter(jobs), {}
     try:
-        arrays, error = maker.pipe.recv()
-    except (EOFError, ConnectionError):
-        maker.process.join()
-        raise RuntimeError(
-            f"a process that made chips ended by itself (exit code {maker.process.exitcode}): is there too little "
-            "memory? What is finished is kept, use --resume"
-        ) from None
-    if error is not None:
-        raise error
-    return arrays
-
-
-def _give(maker, makers):
-    """Give a process more to do: what is meant for it, else the last of what others have left."""
-    while len(maker.at_hand) < _AT_HAND:
-        longest = max(makers, key=lambda other: len(other.queue))
-        if not (maker.queue or longest.queue):
-            return
-        job = maker.queue.popleft() if maker.queue else longest.queue.pop()
-        # That it has ended is told where it is waited for.
-        with suppress(BrokenPipeError):
-            maker.pipe.send(job.chips)
-        maker.at_hand.append(job)
-
-
-def _work(pipe, study, count):
-    """What a process does: chips that it is asked for, as long as somebody asks."""
-    # Ctrl-C is for who started it, and ends it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    chips = chips_of(study, count)
-    # Nobody is there any more.
-    with suppress(EOFError, ConnectionError):
-        layout = pipe.recv()
         while True:
-            numbers = pipe.recv()
-            try:
-                answer = chip_arrays(chips, numbers, layout), None
-            except (ValueError, OSError, MemoryError) as error:
-                answer = None, error
-            pipe.send(answer)
+            for job in islice(waiting, _AT_HAND * makers.number - len(working)):
+                working[makers.executor.submit(_chip_arrays, known, job, layout)] = job
+            if not working:
+                return
+            for future in wait(working, return_when=FIRST_COMPLETED).done:
+                yield working.pop(future), future.result()
+    except makers.ended as error:
+        raise RuntimeError(
+            f"a process that made chips ended by itself: is there too little memory? What is finished is kept, use "
+            f"--resume ({error})"
+        ) from None
 
 
-@contextmanager
-def _environment(values):
-    """Other variables of the environment for a while; those that are set stay."""
-    added = {name: value for name, value in values.items() if name not in os.environ}
-    os.environ.update(added)
-    try:
-        yield
-    finally:
-        for name in added:
-            del os.environ[name]
+def _chip_arrays(known, numbers, layout):
+    """Arrays of some chips, where a study and the number of its chips are known by their pickle."""
+    return chip_arrays(_chips(known), numbers, layout)
+
+
+@cached(1, "chips of a study")
+def _chips(known):
+    return chips_of(*pickle.loads(known))

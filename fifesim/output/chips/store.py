@@ -1,20 +1,163 @@
-"""The Zarr store of chips: metadata that are made at once, and shards that are written one by one."""
+"""Zarr store of chips: metadata written at once, and shards written one by one from chips in memory."""
 
 import os
 import shutil
 import warnings
 import zlib
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
-from fifesim.output.provenance import versions
-from fifesim.rasters import cf
-from fifesim.scenario.ensemble import LIGHT
+from fifesim.grids import cf
+from fifesim.output.folders import versions
+from fifesim.scenario.ensemble import LIGHT, realise, realise_arrays
+from fifesim.sensor.response import calibration
 
-# Of a shard in memory, and of the part of one that is read at once. [byte]
+_ALONG_BAND = ("band", "wavelength", "gain", "offset", "compression", "solar_irradiance")
+
+# Number of chips whose reflectance is computed at once, in double precision.
+_AT_ONCE = 50
+
+# Seven digits are more than a mean of leaf area has.
+_FLOAT = np.float32
+
+
+class Layout(NamedTuple):
+    """
+    Description that all chips of a study share.
+
+    Parameters
+    ----------
+    bands : xarray.Dataset
+        Coordinates along ``band``.
+    truth : tuple of str
+        Names of the true quantities of the ground of the pixels.
+    has_ndvi : bool
+    dn : numpy.dtype
+        Type of the digital numbers.
+    pixels : (int, int)
+        Rows and columns.
+    pixel : float
+        [m]
+    crs : xarray.Variable
+        Without dimensions, whose attributes are the coordinate reference system.
+    """
+
+    bands: xr.Dataset
+    truth: tuple[str, ...]
+    has_ndvi: bool
+    dn: np.dtype
+    pixels: tuple[int, int]
+    pixel: float
+    crs: xr.Variable
+
+    @property
+    def variables(self):
+        """Dimensions and type of each stored variable of a chip, by name."""
+        planes = ("ndvi",) * self.has_ndvi + self.truth
+        found = {"dn": (("band", "y", "x"), self.dn), "toa_reflectance": (("band", "y", "x"), np.dtype(_FLOAT))}
+        found |= {name: (("y", "x"), np.dtype(_FLOAT)) for name in planes}
+        return found | {name: ((), np.dtype(float)) for name in LIGHT}
+
+    def attributes(self, name):
+        """Attributes of a stored variable."""
+        return cf.attributes(name) | ({"cell_methods": "area: mean"} if name in self.truth else {})
+
+    def shape(self, dims):
+        """Lengths of dimensions of a chip."""
+        sizes = dict(zip(("band", "y", "x"), (self.bands.sizes["band"], *self.pixels), strict=True))
+        return tuple(sizes[name] for name in dims)
+
+    @property
+    def size(self):
+        """Size of a chip in memory. [byte]"""
+        return sum(dtype.itemsize * int(np.prod(self.shape(dims))) for dims, dtype in self.variables.values())
+
+
+def layout_of(chips):
+    """Layout of the chips, from the first of them."""
+    nodes = realise(chips.scenario(0))
+    image, truth = nodes["image"], _fullest(chips.study)
+    size = chips.study.scenario.sensor.size
+    return Layout(
+        bands=xr.Dataset(coords={name: image[name].variable for name in _ALONG_BAND if name in image.coords}),
+        truth=tuple(dict.fromkeys((*nodes["truth"].data_vars, *truth))),
+        has_ndvi="ndvi" in image,
+        dn=image["dn"].dtype,
+        pixels=(image.sizes["y"], image.sizes["x"]),
+        pixel=size,
+        crs=image["spatial_ref"].variable,
+    )
+
+
+def _fullest(study):
+    """Names of the truth variables if no drawn property has the value 0, which would omit it."""
+    drawn = {}
+    for key, distribution in study.drawn.items():
+        ends = distribution.extremes
+        numbers = all(isinstance(value, int | float) for value in ends)
+        drawn[key.path] = max(ends) if numbers and min(ends) == 0 else distribution.usual
+    side = 2 * study.scenario.sensor.size
+    small = {("grid", "width"): side, ("grid", "height"): side}
+    return realise(study.scenario_with(drawn | small), complete=True)["truth"].data_vars
+
+
+def chip_arrays(chips, numbers, layout):
+    """Chips as stacked arrays in the order of their numbers, by name, shape (n, ...)."""
+    count, numbers = len(numbers), np.asarray(numbers)
+    found = empty_arrays(count, layout)
+    # Neighbours of a landscape are cut from one tile of its field.
+    for at in np.lexsort((numbers, chips.landscape[numbers])).tolist():
+        chip = int(numbers[at])
+        scenario = chips.scenario(chip)
+        try:
+            _put(found, at, *realise_arrays(scenario, complete=True), layout)
+        except ValueError as error:
+            raise ValueError(f"chip {chip}: {error}") from error
+    for start in range(0, count, _AT_ONCE):
+        part = {name: values[start : start + _AT_ONCE] for name, values in found.items()}
+        part["toa_reflectance"][:] = _reflectance(part, layout)
+    return found
+
+
+def empty_arrays(count, layout):
+    """Uninitialized arrays of chips, by name, shape (count, ...)."""
+    return {name: np.empty((count, *layout.shape(dims)), dtype) for name, (dims, dtype) in layout.variables.items()}
+
+
+def _put(found, at, image, truth, layout):
+    """Copy the results of a simulation to the place of a chip."""
+    unknown = set(truth) - set(layout.truth)
+    if unknown:
+        raise ValueError(
+            f"has a truth that others have not, {', '.join(sorted(unknown))}: draw it for all, or for none"
+        )
+    found["dn"][at] = image["dn"]
+    if layout.has_ndvi:
+        found["ndvi"][at] = image["ndvi"]
+    for name in layout.truth:
+        # Where no leaf is dead, green leaves are all leaves.
+        other = "fpar" if name == "green_fpar" else None
+        found[name][at] = truth.get(name, truth.get(other, np.nan))
+    for name in LIGHT:
+        found[name][at] = image[name]
+
+
+def _reflectance(found, layout):
+    """Planetary reflectance of the digital numbers."""
+    bands = {name: layout.bands[name].values[:, None, None] for name in layout.bands.coords if name != "band"}
+    scale = (bands["gain"], bands["offset"], bands.get("compression", 0))
+    radiance = calibration.dn_to_radiance(found["dn"], *scale)
+    sza, distance = (found[name][:, None, None, None] for name in ("sza", "earth_sun_distance"))
+    mu_s = np.cos(np.radians(sza))
+    return calibration.radiance_to_reflectance(radiance, bands["solar_irradiance"], mu_s, distance)
+
+
+# Size of a shard in memory, and of the part of a shard that is read at once. [byte]
 _SHARD, _CHUNK = 32 * 2**20, 2**19
 
-# A run has so many shards at least, to be spread over workers, unless they had fewer chips than this.
+# Least number of shards, to be spread over workers, unless they would have fewer chips than the second number.
 _SHARDS, _FEWEST = 4, 20
 
 ROOT = "zarr.json"
@@ -22,14 +165,14 @@ ROOT = "zarr.json"
 
 class Shards:
     """
-    How chips of a dataset are cut into shards.
+    Division of the chips of a dataset into shards.
 
     Parameters
     ----------
     count : int
         Chips in all.
     size : int
-        Of a chip. [byte]
+        Size of a chip. [byte]
     together : int
         Chips that are made fastest together.
     """
@@ -44,48 +187,16 @@ class Shards:
         return -(-self._count // self.length)
 
     def range_of(self, shard):
-        """
-        Chips of a shard.
-
-        Parameters
-        ----------
-        shard : int
-
-        Returns
-        -------
-        first, last : int
-            The first of them, and that behind the last.
-        """
+        """First chip of a shard, and the chip after its last."""
         return shard * self.length, min((shard + 1) * self.length, self._count)
 
     def shard_of(self, chips):
-        """
-        Shards that chips lie in.
-
-        Parameters
-        ----------
-        chips : array of int
-            Their numbers.
-
-        Returns
-        -------
-        shards : array of int
-        """
+        """Shard numbers of chips."""
         return np.asarray(chips) // self.length
 
 
 def make_store(folder, chips, layout, shards):
-    """
-    Make a store whose chips have no values yet, or mend the metadata of one; shards that are there stay.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Of the store.
-    chips : fifesim.scenario.chips.Chips
-    layout : fifesim.output.chips.arrays.Layout
-    shards : Shards
-    """
+    """Create a store whose chips have no values yet, or repair its metadata; existing shards stay."""
     import zarr  # slow, and few runs write chips
 
     fresh = folder / "fresh.partial"
@@ -93,14 +204,9 @@ def make_store(folder, chips, layout, shards):
     table = chips.table()
     group = zarr.create_group(fresh, zarr_format=3, attributes=_about(chips, layout, table))
     for name, (dims, values, attributes) in _known(chips, layout, table).items():
-        text = values.dtype == object
+        dtype, shape = str if values.dtype == object else values.dtype, values.shape
         array = group.create_array(
-            name,
-            shape=values.shape,
-            dtype=str if text else values.dtype,
-            chunks=values.shape,
-            dimension_names=dims,
-            attributes=attributes,
+            name, shape=shape, dtype=dtype, chunks=shape, dimension_names=dims, attributes=attributes
         )
         array[...] = values
     # A fifth smaller than bytes shuffled, in half the time of level 5.
@@ -123,100 +229,53 @@ def make_store(folder, chips, layout, shards):
         # All readers of Zarr 3 pass over what they do not know.
         warnings.filterwarnings("ignore", "Consolidated metadata is currently not part")
         zarr.consolidate_metadata(fresh)
-    _move(fresh, folder)
+    # Complete files replace earlier ones, which are identical, one by one.
+    for path in sorted(fresh.rglob("*")):
+        if path.is_file():
+            target = folder / path.relative_to(fresh)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(path, target)
+    shutil.rmtree(fresh)
 
 
 def stored_names(chips, layout):
-    """
-    Names of the arrays of a store, which are folders.
-
-    Parameters
-    ----------
-    chips : fifesim.scenario.chips.Chips
-    layout : fifesim.output.chips.arrays.Layout
-
-    Returns
-    -------
-    names : list of str
-    """
+    """Names of the arrays of a store, which are folders."""
     return [*_known(chips, layout, chips.table()), *layout.variables]
 
 
 def chips_in(folder):
-    """
-    Number of chips in a store.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-
-    Returns
-    -------
-    count : int
-    """
+    """Number of chips in a store."""
     import zarr  # slow, and few runs write chips
 
     return zarr.open_array(folder, path="chip", mode="r").shape[0]
 
 
 def write_shard(folder, first, arrays):
-    """
-    Write a shard.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Of the store.
-    first : int
-        Its first chip.
-    arrays : mapping of str to array
-        All chips of the shard.
-    """
+    """Write a shard."""
     import zarr  # slow, and few runs write chips
 
     for name, values in arrays.items():
         array = zarr.open_array(folder, path=name, mode="r+")
-        # What may lie there of a run that was stopped would be read first.
+        # A shard left by an interrupted run would be read and merged.
         _file(folder / name / "c" / str(first // (array.shards or array.chunks)[0])).unlink(missing_ok=True)
         array[first : first + len(values)] = values
 
 
 def checksums(folder, names, shard):
-    """
-    Checksums of the files of a shard.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Of the store.
-    names : sequence of str
-        Of its arrays.
-    shard : int
-
-    Returns
-    -------
-    checksums : array of uint32
-
-    Raises
-    ------
-    OSError
-        If a file is missing.
-    """
-    found = []
-    for name in names:
-        found.append(zlib.crc32(_file(folder / name / "c" / str(shard)).read_bytes()))
-    return np.array(found, np.uint32)
+    """Checksums of the files of a shard."""
+    files = (_file(folder / name / "c" / str(shard)) for name in names)
+    return np.array([zlib.crc32(file.read_bytes()) for file in files], np.uint32)
 
 
 def _file(path):
-    """File of a shard, which lies as deep as its array has dimensions."""
+    """File of a shard, which is nested as deep as its array has dimensions."""
     while path.is_dir():
         path = path / "0"
     return path
 
 
 def _known(chips, layout, table):
-    """Dimensions, values and attributes of all that is known before chips are made, by name."""
+    """Dimensions, values and attributes of all variables known before chips are made, by name."""
     down, across = ((np.arange(size) + 0.5) * layout.pixel for size in layout.pixels)
     found = {"chip": (("chip",), table["chip"].values, {"long_name": "number of the chip"})}
     for name, word, values in (("y", "northing", -down), ("x", "easting", across)):
@@ -232,7 +291,7 @@ def _known(chips, layout, table):
 
 
 def _about(chips, layout, table):
-    """Attributes of the dataset."""
+    """Global attributes of the dataset."""
     study, (rows, columns) = chips.study, layout.pixels
     of_bands = (name for name in layout.bands.coords if name != "band")
     coordinates = [*table.data_vars, *LIGHT, "spatial_ref", *of_bands]
@@ -247,13 +306,3 @@ def _about(chips, layout, table):
         "study": study.to_toml(),
         "coordinates": " ".join(map(str, coordinates)),
     }
-
-
-def _move(fresh, folder):
-    """Files of a store to their places, one by one: each is whole, and an earlier one is the same."""
-    for path in sorted(fresh.rglob("*")):
-        if path.is_file():
-            target = folder / path.relative_to(fresh)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(path, target)
-    shutil.rmtree(fresh)

@@ -1,1 +1,1 @@
-"""A scenario into a folder, block by block."""
+"""Simulation of a scenario into a folder, block by block."""

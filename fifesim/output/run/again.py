@@ -1,4 +1,4 @@
-"""A file of a run made again from its own tags, and whether its bits are the same."""
+"""Reproduction of a file of a run from its tags, with a comparison bit by bit."""
 
 import json
 import os
@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 import rasterio
 
-from fifesim.base.foreign import in_a_line, shown
-from fifesim.output.provenance import versions
+from fifesim.base.files import in_a_line, shown
+from fifesim.grids.opening import ErrorsOfGdal, raster_file
+from fifesim.output.folders import versions
 from fifesim.output.run.folder import simulate_to_folder
-from fifesim.output.run.origin import PRODUCT, SCENARIO, VERSIONS
-from fifesim.rasters.opening import ErrorsOfGdal, raster_file
+from fifesim.output.run.identity import PRODUCT, SCENARIO_TAG, VERSIONS
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.toml import named_files, with_folder
 
@@ -24,18 +24,18 @@ _LONGEST = 1_000_000
 
 class Rerun(NamedTuple):
     """
-    A file made again beside the one that was there.
+    Result of the comparison of a file with its reproduction.
 
     Parameters
     ----------
     cells : int
         Over all bands.
     differing : int
-        Of them.
+        Number of differing cells.
     largest : float
         Difference.
     versions : dict of str to (str, str)
-        What it was made with and what is here, of packages where these are two; "none" where there is none.
+        Versions with which it was made and versions here, for packages that differ; "none" for a missing one.
     """
 
     cells: int
@@ -45,30 +45,7 @@ class Rerun(NamedTuple):
 
 
 def rerun(path, output=None, *, overwrite=False, threads=None):
-    """
-    Make a file of a run again from the scenario in its tags, and compare the values bit by bit.
-
-    Parameters
-    ----------
-    path : str or path
-        ``image.tif`` or ``truth.tif`` of a run.
-    output : str or path, optional
-        Where the new file goes; by default nothing stays of it.
-    overwrite : bool, optional
-        Replace a file of that name.
-    threads : int, optional
-        One for each core by default.
-
-    Returns
-    -------
-    found : Rerun
-
-    Raises
-    ------
-    ValueError
-        If the file has no scenario in its tags, the scenario cannot be simulated, such as for want of an input, or
-        there is such an output and ``overwrite`` is not given.
-    """
+    """Reproduce a file of a run from the scenario in its tags, and compare the values bit by bit."""
     path = Path(path)
     scenario, product, before = read_origin(path)
     output = None if output is None else Path(output)
@@ -82,48 +59,27 @@ def rerun(path, output=None, *, overwrite=False, threads=None):
         if output is not None:
             os.replace(run / product, output)
     here = versions()
-    names = [name for name in (*before, *here) if before.get(name) != here.get(name)]
-    differ = {name: (before.get(name, "none"), here.get(name, "none")) for name in dict.fromkeys(names)}
-    return Rerun(cells, differing, largest, differ)
+    pairs = {name: (before.get(name, "none"), here.get(name, "none")) for name in before | here}
+    return Rerun(cells, differing, largest, {name: pair for name, pair in pairs.items() if pair[0] != pair[1]})
 
 
 def read_origin(path):
-    """
-    What a file of a run was made of.
-
-    Parameters
-    ----------
-    path : str or path
-
-    Returns
-    -------
-    scenario : fifesim.scenario.scenario.Scenario
-        Its files lie relative to the file.
-    product : str
-        Name of the file in the folder of a run.
-    versions : dict of str to str
-        Of the packages that made it.
-
-    Raises
-    ------
-    ValueError
-        If the tags do not say it.
-    """
+    """Scenario, product and versions of a file of a run, from its tags."""
     file = raster_file(path)
     with ErrorsOfGdal(f"cannot read {file.name}"), file.opened() as source:
         tags = source.tags()
-    if not {SCENARIO, PRODUCT, VERSIONS} <= set(tags):
+    if not {SCENARIO_TAG, PRODUCT, VERSIONS} <= set(tags):
         raise ValueError(
             f"{file.name} does not say what it was made of: image.tif and truth.tif of fifesim simulate do, from "
             "version 0.2; for older ones, run the scenario.toml that lies beside them"
         )
     try:
         product, before = tags[PRODUCT], json.loads(tags[VERSIONS])
-        if max(len(tags[SCENARIO]), len(tags[VERSIONS])) > _LONGEST or product not in ("image.tif", "truth.tif"):
+        if max(len(tags[SCENARIO_TAG]), len(tags[VERSIONS])) > _LONGEST or product not in ("image.tif", "truth.tif"):
             raise ValueError("a product that no run has")
         if not isinstance(before, dict) or not all(isinstance(each, str) for each in before.values()):
             raise ValueError("no versions")
-        values = tomllib.loads(tags[SCENARIO])
+        values = tomllib.loads(tags[SCENARIO_TAG])
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{file.name} has tags that fifesim did not write: {in_a_line(error, 100)}") from None
     folder = Path(path).absolute().parent
@@ -141,7 +97,7 @@ def read_origin(path):
 
 
 def _check_inputs(values, folder, name):
-    """Files that a scenario names lie where they lay, seen from the file that was made of them."""
+    """Raise ValueError if an input file of the scenario is missing at its path relative to the file."""
     for place, table, key in named_files(values):
         there = os.path.normpath(folder / table[key])
         if not os.path.exists(there) and not there.startswith("/vsi"):
@@ -152,19 +108,8 @@ def _check_inputs(values, folder, name):
             )
 
 
-def in_words(path, found):
-    """
-    Whether a file is the same again, in words.
-
-    Parameters
-    ----------
-    path : str or path
-    found : Rerun
-
-    Returns
-    -------
-    text : str
-    """
+def outcome_in_words(path, found):
+    """Sentence on whether a reproduced file is identical."""
     other = ", ".join(f"{name} {before}, here {here}" for name, (before, here) in found.versions.items())
     made = f"; it was made with {other}" if other else ""
     if found.differing == 0:
@@ -176,7 +121,7 @@ def in_words(path, found):
 
 
 def _compared(one, other):
-    """How many values of two files differ, of how many, and by how much at most; block by block."""
+    """Number of differing values of two files, number of values, and largest difference, block by block."""
     differing, cells, largest = 0, 0, 0.0
     with rasterio.open(one) as first, rasterio.open(other) as second:
         for name in ("count", "shape", "dtypes", "crs"):

@@ -1,7 +1,10 @@
-"""A run: a scenario simulated into a folder of files, block by block, which can be stopped and gone on with."""
+"""Run of a scenario into a folder of files, block by block, which can be resumed; and its estimated cost."""
 
 import json
 import os
+import tempfile
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import dask
@@ -9,53 +12,50 @@ import dask.threaded
 import numpy as np
 import rasterio
 import xarray as xr
+from dask.utils import format_bytes, format_time
 
-from fifesim.analysis.rasters.pairs import matched
-from fifesim.analysis.rasters.regression import regress
-from fifesim.base.logs import LOG
-from fifesim.chain.images import ndvi
+from fifesim.analysis.regression_labels import matched, regress
+from fifesim.atmosphere import engines
+from fifesim.base.messages import LOG
+from fifesim.chain.steps import ndvi
+from fifesim.grids import grid as grids
+from fifesim.grids.chunks import found_client
+from fifesim.grids.files import to_geotiff
+from fifesim.grids.reductions import computed
 from fifesim.output import report, stac
 from fifesim.output.folders import check_folder, errors_with_their_file, results
-from fifesim.output.progress import CellProgress, doing
-from fifesim.output.run.engine import run_engine
-from fifesim.output.run.identity import (
-    SCENARIO,
-    STATE,
-    begin,
-    check_finished,
-    check_inputs,
-    identity_of,
-    inputs_of,
-)
-from fifesim.output.run.origin import origin_tags
-from fifesim.output.run.products import chunk_checksum, make_scene_store, products_of, wanted_blocks
-from fifesim.output.run.saved import has_blocks, save_block, saved_array, saved_block, saved_blocks
-from fifesim.output.run.schedule import run_on_client, run_on_threads, tasks_of
-from fifesim.output.run.size import check_size
-from fifesim.output.run.workers import usable_cores
-from fifesim.output.styles import write_style
-from fifesim.rasters import grid as grids
-from fifesim.rasters.clients import found_client
-from fifesim.rasters.files import to_geotiff
-from fifesim.rasters.reductions import computed
+from fifesim.output.maps import write_style
+from fifesim.output.progress import CellProgress, doing, memory, steps
+from fifesim.output.run import identity, products, workers
 from fifesim.scenario.ground import warn_of_canopy
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
 from fifesim.scenario.sweeps import VARIABLES
 from fifesim.scenario.toml import write_scenario
+from fifesim.sensor.description.instruments import instrument
+
+
+def run_engine(scenario):
+    """Run the engine for the atmosphere of a scenario, whose results are cached."""
+    bands = [band.response for band in instrument(scenario.sensor.instrument).select(scenario.sensor.bands)]
+    atmosphere, light = scenario.model_atmosphere(), scenario.sun_and_view()
+    # The skylight on the canopy does not depend on the view.
+    for vza, raa in ((0.0, 0.0), (light.vza, light.raa)):
+        engines.band_terms(atmosphere, bands, light.sza, vza, raa, each=lambda runs: steps(runs, "6S, band by band"))
+
 
 FILES = (
-    "image.tif", "image.qml", "truth.tif", "truth.qml", "quicklook.png", "report.html", SCENARIO, "item.json",
+    "image.tif", "image.qml", "truth.tif", "truth.qml", "quicklook.png", "report.html", identity.SCENARIO, "item.json",
 )  # fmt: skip
 SCENE = "scene.zarr"
 
 # GDAL's own limit is a share of the machine's memory. [byte]
 _GDAL_CACHE = 32 * 2**20
 
-# Of pixels that are read back for statistics; dask's own choice is a whole image.
+# Chunks of pixels that are read back for statistics; dask would choose the whole image.
 _CHUNK_SIZE = "4MiB"
 
-# Pixels and their truth are read back once where they are no more than that. [byte]
+# Size of pixels and truth up to which they are read back once. [byte]
 _IN_MEMORY = 64 * 2**20
 
 
@@ -71,137 +71,89 @@ def simulate_to_folder(
     as_json=False,
     home=None,
 ):
-    """
-    Simulate a scenario into a folder: image and truth, their styles, pictures, scenario and a STAC item.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-    folder : str or path
-        Made where it does not exist.
-    overwrite : bool, optional
-        Replace the files of an earlier run, and remove its cells unless ``scene`` replaces them. Other files stay.
-    resume : bool, optional
-        Go on with an interrupted run of the same scenario in this folder, or begin if there is none. Nothing is
-        computed if the run is finished.
-    scene : bool, optional
-        Write leaf area index, elevation and reflectance of the cells too, as Zarr.
-    threads : int, optional
-        By default one for each core that this process may use.
-    client : distributed.Client, optional
-        Compute on the workers of a cluster, by default on those of the current client where there is one.
-    as_json : bool, optional
-        Print progress as lines of JSON.
-    home : str or path, optional
-        Where the files are to lie in the end, from which their tags name files of the scenario; the folder by default.
-
-    Returns
-    -------
-    files : list of pathlib.Path
-
-    Raises
-    ------
-    ValueError
-        If the scenario cannot be simulated, or the folder holds something else; nothing is written then.
-    OSError
-        If a file cannot be read or written. No half-written file is left; blocks that are finished are kept.
-
-    Notes
-    -----
-    Blocks are saved as they are finished, and the files made of them appear when all of them are whole. Memory does not
-    grow with the scene.
-    """
+    """Simulate a scenario into a folder: image and truth, their styles, pictures, scenario and a STAC item."""
+    # Blocks are saved as they are finished, and files appear when all are complete. Memory does not grow with the
+    # scene.
     folder, names = Path(folder), names_of(scene)
     finished = check_folder(folder, overwrite, resume, names)
     warn_of_canopy(scenario)
     complete = scenario.complete()
     if finished:
-        old = write_scenario(read_scenario(folder / SCENARIO).complete())
-        check_finished(folder / SCENARIO, old, write_scenario(complete), inputs_of(complete))
+        old = write_scenario(read_scenario(folder / identity.SCENARIO).complete())
+        identity.check_finished(folder / identity.SCENARIO, old, write_scenario(complete), identity.inputs_of(complete))
         return [folder / name for name in names]
-    check_size(complete, folder)
-    identity = identity_of(complete, scene)
+    workers.check_size(complete, folder)
+    state = identity.state_of(identity.inputs_of(complete), write_scenario(complete), scene=bool(scene))
     stale = () if scene else (SCENE,)
-    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=has_blocks, stale=stale)
+    kept = results(folder, names, overwrite=overwrite, resume=resume, worth_keeping=products.has_blocks, stale=stale)
     with errors_with_their_file(folder), kept as unfinished, rasterio.Env(GDAL_CACHEMAX=_GDAL_CACHE):
-        begin(unfinished, identity)
+        identity.begin(unfinished, state)
         run_engine(complete)
         tree = simulate(complete)
-        found = products_of(tree, unfinished / SCENE if scene else None)
+        found = products.products_of(tree, unfinished / SCENE if scene else None)
+        threads = threads or workers.usable_cores()
         if scene and not (unfinished / SCENE).exists():
-            make_scene_store(unfinished / f"{SCENE}.partial", found.scene)
+            products.make_scene_store(unfinished / f"{SCENE}.partial", found.scene)
             os.replace(unfinished / f"{SCENE}.partial", unfinished / SCENE)
         LOG.info("simulating %s into %s", grids.in_words(complete.geobox()), folder)
-        _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads or usable_cores(), as_json)
-        # The scheduler by itself: by its name, dask would look for a client, and import all that one needs.
-        scheduler = {"scheduler": dask.threaded.get, "num_workers": threads or usable_cores()}
+        _compute(found, tree["scene"]["lai"], unfinished, client or found_client(), threads, as_json)
+        # The function itself: given its name, dask would look for a client, and import what clients need.
+        scheduler = {"scheduler": dask.threaded.get, "num_workers": threads}
         with dask.config.set(scheduler | {"array.chunk-size": _CHUNK_SIZE}), doing("writing files and report"):
             _write_files(complete, tree, found, unfinished, folder if home is None else home)
-        check_inputs(json.loads(identity[STATE])["inputs"], inputs_of(complete))
+        identity.check_inputs(json.loads(state[identity.STATE])["inputs"], identity.inputs_of(complete))
     LOG.info("wrote %s into %s", ", ".join(names), folder)
     return [folder / name for name in names]
 
 
 def names_of(scene):
-    """
-    Names of the files of a run.
-
-    Parameters
-    ----------
-    scene : bool
-        With the products of the scene.
-
-    Returns
-    -------
-    names : tuple of str
-        The last one marks the run as complete.
-    """
+    """Names of the files of a run, the last of which marks it as complete."""
     return FILES + (SCENE,) * scene
 
 
 def _compute(found, lai, folder, client, threads, as_json):
-    """Compute and save the blocks that are not saved yet."""
+    """Compute and save the missing blocks."""
     blocks = folder / "blocks"
-    saved = {name: saved_blocks(blocks, name, array) for name, array in found.arrays.items()}
+    saved = {name: products.saved_blocks(blocks, name, array) for name, array in found.arrays.items()}
     for name in found.scene:
-        saved[f"scene-{name}"] = {each for each in saved[f"scene-{name}"] if _is_in_store(folder, name, each)}
-    cells, image = grids.geobox(lai), found.arrays["image"]
-    wanted = [each for each in wanted_blocks(found, lai.chunks, cells) if each[1] not in saved[each[0]]]
-    per_pixel = cells.shape.x * cells.shape.y / (image.shape[-1] * image.shape[-2])
-    sizes = {index: round(per_pixel * _pixels(image, index)) for index in np.ndindex(image.numblocks)}
+        saved[f"scene-{name}"] = {index for index in saved[f"scene-{name}"] if _is_in_store(folder, name, index)}
+    image = found.arrays["image"]
+    wanted = products.wanted_blocks(found, lai)
+    wanted = [(name, index) for name, index in wanted if index not in saved[name]]
+    per_pixel = lai.size / (image.shape[-1] * image.shape[-2])
+    rows, columns = image.chunks[-2:]
+    sizes = {index: round(per_pixel * (rows[index[-2]] * columns[index[-1]])) for index in np.ndindex(image.numblocks)}
     done = sum(sizes[index] for index in saved["image"])
     LOG.info("%d blocks to make, %d are saved", len(wanted), sum(map(len, saved.values())))
     with CellProgress(sum(sizes.values()), done, as_json) as progress:
 
         def deliver(name, index, block):
-            save_block(blocks, name, index, block)
+            products.save_block(blocks, name, index, block)
             LOG.debug("saved block %s of %s", index, name)
             if name == "image":
                 progress.advance(sizes[index])
 
-        tasks = tasks_of(found.arrays, wanted)
+        tasks = workers.tasks_of(found.arrays, wanted)
         if client is None:
-            run_on_threads(*tasks, deliver, threads)
+            workers.run_on_threads(*tasks, deliver, threads)
         else:
-            run_on_client(*tasks, deliver, client)
+            workers.run_on_client(*tasks, deliver, client)
 
 
 def _is_in_store(folder, name, index):
-    """Whether the chunk of a block that is said to be saved holds what was written."""
+    """Whether the chunk of a saved block has its checksum in the store."""
     try:
-        return chunk_checksum(folder / SCENE, name, index) == saved_block(folder / "blocks", f"scene-{name}", index)
+        return products.chunk_checksum(folder / SCENE, name, index) == products.saved_block(
+            folder / "blocks", f"scene-{name}", index
+        )
     except (OSError, ValueError, RuntimeError):
         return False
 
 
-def _pixels(array, index):
-    return int(np.prod([sizes[at] for sizes, at in zip(array.chunks[-2:], index[-2:], strict=True)]))
-
-
 def _write_files(scenario, tree, found, folder, home):
-    """The files of a run from its saved blocks."""
+    """Write the files of a run from its saved blocks."""
     saved = {
-        name: raster.copy(data=saved_array(folder / "blocks", name, found.arrays[name]))
+        name: raster.copy(data=products.saved_array(folder / "blocks", name, found.arrays[name]))
         for name, raster in found.rasters.items()
     }
     if sum(raster.nbytes for raster in saved.values()) <= _IN_MEMORY:
@@ -213,10 +165,8 @@ def _write_files(scenario, tree, found, folder, home):
     truth = xr.Dataset({name: saved[name] for name in tree["truth"].data_vars})
     # Seven digits are more than a mean of leaf area has.
     for name, raster in (("image", image["dn"]), ("truth", truth.astype(np.float32))):
-        path = to_geotiff(
-            raster, folder / f"{name}.tif", overwrite=True, tags=origin_tags(scenario, f"{name}.tif", home)
-        )
-        write_style(path, overwrite=True)
+        tags = identity.origin_tags(scenario, f"{name}.tif", home)
+        write_style(to_geotiff(raster, folder / f"{name}.tif", overwrite=True, tags=tags), overwrite=True)
     terrain = level = None
     if "terrain" in tree.children:
         level = saved["level"].compute()
@@ -226,8 +176,8 @@ def _write_files(scenario, tree, found, folder, home):
     quicklook, page = report.run_page(scenario, image, truth, detail, terrain, level, *_fits(image, truth))
     (folder / "quicklook.png").write_bytes(quicklook)
     (folder / "report.html").write_text(page, encoding="utf-8")
-    (folder / SCENARIO).write_text(write_scenario(scenario), encoding="utf-8")
-    stac.write(stac.item(scenario, folder, report.title(scenario)), folder / "item.json")
+    (folder / identity.SCENARIO).write_text(write_scenario(scenario), encoding="utf-8")
+    stac.write_stac(stac.item(scenario, folder, report.title(scenario)), folder / "item.json")
 
 
 def _check_some_data(scenario, image):
@@ -240,12 +190,100 @@ def _check_some_data(scenario, image):
 
 
 def _fits(image, truth):
-    """Regressions of the true means on NDVI where there is one, and why a line fits to none of some."""
+    """Regressions of the true means on NDVI, and reasons for missing ones."""
     fits, reasons = {}, {}
     for name in VARIABLES if "ndvi" in image else ():
         try:
-            # By row and column: with an interval of its own, the image lies on other places than its truth.
+            # By row and column, because with its own interval the image has other pixel centres than its truth.
             fits[name] = regress(*matched(truth[name], image["ndvi"], "index"), pair="index")
         except ValueError as error:
             reasons[name] = str(error)
     return fits, reasons
+
+
+# Side of the piece that is simulated to see how fast this machine is: a few chunks of the field. [cell]
+_PIECE = 2016
+
+# Beyond imports and task graph, memory holds chunks at work and chunks that wait for their neighbours. The piece has
+# two chunks in a row; in a scene more of them wait. Peaks of scenes of n x n chunks relative to the piece, two threads:
+# level ground 1.55 for n = 5 and 1.71 for n = 12, hills 1.28 to 1.63 for n = 5 and 1.57 to 1.99 for n = 9, three
+# classes of cover on hills 1.47 for n = 5. So chunks wait up to the fifth column, and their rims beyond it. [1]
+_COLUMNS, _WAITING_COLUMNS = 2, 5
+_WAITING, _RIM = 0.25, 0.03
+
+# Twice the difference between processes that do the same: 424 to 431 MiB in a run of 90 x 90 cells. [byte]
+_SPREAD = 16 * 2**20
+
+# Time of a run relative to computing alone, with waiting for a free thread and writing files. [1]
+_SLACK = 1.1
+
+
+def estimate(scenario, folder=".", *, threads=None, scene=False, start=0.0):
+    """Cells, pixels, tasks, threads, memory and disk [byte] and time [s] of a run, from two runs of a piece."""
+    # A piece of up to 2016 x 2016 cells of the same ground is run once with its report, and computed a second time.
+    complete = scenario.complete()
+    workers.check_size(complete, folder)
+    threads = threads or workers.usable_cores()
+    lai, image, (graph, _) = _run_tasks(complete)
+    before = memory()
+    once, cells, rate, peak = _calibrate(complete, threads)
+    return {
+        "cells": lai.size,
+        "pixels": image.shape[-2] * image.shape[-1],
+        "tasks": len(graph),
+        "threads": threads,
+        "memory": round(_SPREAD + before + (peak - before) * _growth(len(lai.chunks[-1]))),
+        "disk": round(workers.disk_of(complete, scene)[1]),
+        "seconds": start + once + _SLACK * (lai.size - cells) / rate,
+    }
+
+
+def _run_tasks(scenario):
+    """LAI and image of a run, and its tasks with their outputs."""
+    tree = simulate(scenario)
+    lai, found = tree["scene"]["lai"], products.products_of(tree)
+    return lai, found.arrays["image"], workers.tasks_of(found.arrays, products.wanted_blocks(found, lai))
+
+
+def estimate_in_words(found, as_json=False):
+    """Text of an estimate."""
+    if as_json:
+        return json.dumps({"event": "estimate"} | found)
+    return (
+        f"cells    {found['cells'] / 1e6:.1f} million, seen by {found['pixels'] / 1e6:.2f} million pixels\n"
+        f"tasks    {found['tasks']}\n"
+        f"memory   about {format_bytes(found['memory'])} with {found['threads']} threads or workers\n"
+        f"disk     at most {format_bytes(found['disk'])} while it runs\n"
+        f"time     about {format_time(found['seconds'])} on this machine as busy as it is now"
+    )
+
+
+def _growth(columns):
+    """Memory of active and waiting chunks of a scene, relative to the piece."""
+    waiting = max(min(columns, _WAITING_COLUMNS) - _COLUMNS, 0)
+    return 1 + _WAITING * waiting + _RIM * max(columns - _WAITING_COLUMNS, 0)
+
+
+def _calibrate(scenario, threads):
+    """Seconds of a run of a piece in the middle of the scene, its cells, cells per second, and peak memory."""
+    piece = _piece(scenario)
+    start = time.monotonic()
+    # A piece without data has no files, where the scene may have some.
+    with tempfile.TemporaryDirectory(prefix="fifesim-") as folder, suppress(ValueError):
+        simulate_to_folder(piece, Path(folder) / "piece", threads=threads)
+    once, used = time.monotonic() - start, [memory()]
+    start = time.monotonic()
+    lai, _, tasks = _run_tasks(piece)
+    workers.run_on_threads(*tasks, lambda name, index, block: used.append(memory()), threads)
+    return once, lai.size, lai.size / (time.monotonic() - start), max(used)
+
+
+def _piece(scenario):
+    """Scenario on a smaller grid of whole pixels in its middle."""
+    grid, pixel = scenario.grid, scenario.sensor.pixel
+    longest = max(float(np.floor(_PIECE * grid.cell / pixel)), 2.0) * pixel
+    width, height = min(grid.width, longest), min(grid.height, longest)
+    west = grid.west + float(np.floor((grid.width - width) / 2 / pixel)) * pixel
+    north = grid.north - float(np.floor((grid.height - height) / 2 / pixel)) * pixel
+    update = {"width": width, "height": height, "west": west, "north": north}
+    return scenario.model_copy(update={"grid": grid.model_copy(update=update)})

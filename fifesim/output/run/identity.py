@@ -1,16 +1,35 @@
-"""Identity of a run: its scenario, the state of its input files, and the versions of the packages."""
+"""Identity of a run: its scenario, input files and package versions, also as tags of its files."""
 
 import hashlib
 import json
 import os
 from pathlib import Path
 
-from fifesim.output.folders import BEGUN, UNFINISHED
-from fifesim.output.provenance import versions
-from fifesim.rasters.opening import archive_of, raster_file
+from fifesim.grids.opening import archive_of, raster_file
+from fifesim.output.folders import BEGUN, UNFINISHED, versions
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.toml import write_scenario
 from fifesim.sensor.description.instruments import tables_of
+
+SCENARIO_TAG, PRODUCT, VERSIONS = "FIFESIM_SCENARIO", "FIFESIM_PRODUCT", "FIFESIM_VERSIONS"
+
+
+def origin_tags(scenario, product, folder):
+    """Tags by which a file of a run can be reproduced."""
+    home = os.path.abspath(folder)
+    text = write_scenario(scenario.with_paths(lambda path: _beside(path, home)))
+    return {SCENARIO_TAG: text, PRODUCT: product, VERSIONS: json.dumps(versions())}
+
+
+def _beside(path, home):
+    """Path relative to a folder; virtual files of GDAL and paths on other drives stay."""
+    if not os.path.isfile(path):
+        return path
+    try:
+        return Path(os.path.relpath(path, home)).as_posix()
+    except ValueError:
+        return path
+
 
 SCENARIO, STATE = "scenario.toml", "run.json"
 """File of the scenario in the results, and file of what else must be the same in an unfinished run."""
@@ -20,61 +39,24 @@ _COMPARED = 2**30
 
 
 class NotThisRun(ValueError):
-    """The run to resume is another one, which is none of this one's business to remove."""
+    """Error: the folder holds another run, which must not be removed."""
 
 
 def scenario_to_resume(folder):
-    """
-    Scenario of an unfinished or finished run.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Folder of the results.
-
-    Returns
-    -------
-    scenario : fifesim.scenario.scenario.Scenario or None
-        None if there is no run in the folder.
-    """
+    """Scenario of an unfinished or finished run, None if there is no run in the folder."""
     found = [path for path in (Path(folder) / UNFINISHED / BEGUN, Path(folder) / SCENARIO) if path.is_file()]
     return read_scenario(found[0]) if found else None
 
 
-def identity_of(scenario, scene):
-    """
-    What must be the same for blocks of two runs to fit together.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-        Complete.
-    scene : bool
-        With the products of the scene.
-
-    Returns
-    -------
-    identity : dict of str to str
-        Texts of files by name.
-    """
-    state = {"versions": versions(), "inputs": with_checksums(inputs_of(scenario)), "scene": bool(scene)}
-    return {STATE: json.dumps(state), BEGUN: write_scenario(scenario)}
+def state_of(inputs, begun, **options):
+    """Properties that must agree for the blocks of two runs to fit together, as texts of files by name."""
+    return {STATE: json.dumps({"versions": versions(), "inputs": with_checksums(inputs), **options}), BEGUN: begun}
 
 
 def inputs_of(scenario):
-    """
-    State of the files that a scenario reads, including files that they name: sources of a VRT, tables of an instrument.
-
-    Parameters
-    ----------
-    scenario : fifesim.scenario.scenario.Scenario
-
-    Returns
-    -------
-    inputs : dict of str to list of int
-        Size [byte], times of the last change of content and of attributes [ns], and inode, by path. A file in an
-        archive has the state of the archive.
-    """
+    """State of the input files of a scenario, including files that these name, such as the sources of a VRT."""
+    # Size [byte], times of the last change of content and of attributes [ns], and inode, by path. A file in an archive
+    # has the state of the archive.
     found = {}
     for (*_, key), name in scenario.files.items():
         for path in _read_with(key, name) if os.path.isfile(name) or name.startswith("/vsi") else ():
@@ -95,18 +77,7 @@ def _read_with(key, name):
 
 
 def with_checksums(inputs):
-    """
-    State of files with a checksum of their content; without it where reading all of them would take long.
-
-    Parameters
-    ----------
-    inputs : dict of str to list of int
-        From `inputs_of`.
-
-    Returns
-    -------
-    inputs : dict of str to list
-    """
+    """State of files with a checksum of their content, or without where reading would take long."""
     small = sum(state[0] for state in inputs.values()) <= _COMPARED
     return {path: [*state, _checksum(path) if small else None] for path, state in inputs.items()}
 
@@ -117,28 +88,9 @@ def _checksum(path):
 
 
 def changed_inputs(before, now):
-    """
-    Input files that are not what they were.
-
-    Parameters
-    ----------
-    before : dict of str to list
-        From `with_checksums`.
-    now : dict of str to list of int
-        From `inputs_of`.
-
-    Returns
-    -------
-    paths : list of str
-        Files that appeared, disappeared or changed.
-
-    Notes
-    -----
-    A copy that keeps its time of modification changes the time of its attributes, the inode, or both. So do chmod, a
-    hard link, a move to another disk, and file systems that number files anew when they are mounted. In these cases
-    the content decides if there is a checksum of it. A file that was written anew has changed, even to the same
-    content: the run may have read it half-written.
-    """
+    """Paths of input files that appeared, disappeared or changed."""
+    # A copy that keeps its time of modification changes the time of its attributes, the inode, or both. So do chmod, a
+    # hard link and a move to another disk, for which the checksum decides.
     return [
         path
         for path in sorted(before | now)
@@ -147,53 +99,25 @@ def changed_inputs(before, now):
 
 
 def _is_same(path, before, now):
-    """Whether a file has the size, time and identity that it had, or else the size, time and content."""
+    """Whether a file has the same size, time and inode, or else the same size, time and content."""
     *state, checksum = before
-    if state[:2] != now[:2]:
-        return False
-    return state == now[:4] or (checksum is not None and checksum == _checksum(path))
+    return state[:2] == now[:2] and (state == now[:4] or (checksum is not None and checksum == _checksum(path)))
 
 
 def begin(unfinished, identity):
-    """
-    Begin a run, or see that it is the one that was begun.
-
-    Parameters
-    ----------
-    unfinished : pathlib.Path
-        Its hidden folder.
-    identity : dict of str to str
-        From `identity_of`.
-
-    Raises
-    ------
-    NotThisRun
-        If another run was begun.
-    """
+    """Begin a run, or check that the one begun is the same."""
     if (unfinished / BEGUN).is_file():
         _check_same(unfinished, identity)
         return
     for name, text in identity.items():
         (unfinished / f"{name}.partial").write_text(text, encoding="utf-8")
-    # By the last of them it is begun.
+    # The last file marks the run as begun.
     for name in identity:
         os.replace(unfinished / f"{name}.partial", unfinished / name)
 
 
 def kept_state(unfinished):
-    """
-    State of an unfinished run.
-
-    Parameters
-    ----------
-    unfinished : pathlib.Path
-        Hidden folder of the run.
-
-    Returns
-    -------
-    state : dict
-        Empty if the file is missing, or holds what no run writes.
-    """
+    """State of an unfinished run, empty if the file is missing or invalid."""
     try:
         state = json.loads((unfinished / STATE).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -214,7 +138,7 @@ def _check_same(unfinished, identity):
             f"the run to resume is of another scenario, with {_other_lines(begun, identity[BEGUN])}: "
             "leave out SCENARIO to go on with that one, or begin again with --overwrite"
         )
-    said = {
+    reasons = {
         "versions": "was begun with other versions of its packages: begin again with --overwrite",
         "inputs": "was begun with an input file that has changed: begin again with --overwrite",
         "scene": "was begun with --scene or without it: give it as it was",
@@ -222,36 +146,22 @@ def _check_same(unfinished, identity):
     }
     for key in state:
         if not same[key]:
-            raise NotThisRun(f"the run to resume {said[key]}")
+            raise NotThisRun(f"the run to resume {reasons[key]}")
 
 
 def _keys(text):
-    """Lines of a text in TOML that have keys, in their order: comments are no part of a scenario."""
+    """Lines of a TOML text without comments."""
     return [line.strip() for line in text.splitlines() if not line.startswith("#")]
 
 
 def _other_lines(old, new):
-    """Some of the lines that only the old of two texts has, without their comments."""
+    """Some of the lines that only the first of two texts has, without their comments."""
     lines = set(_keys(old)) - set(_keys(new))
     return ", ".join((sorted(line.partition("#")[0].strip() for line in lines) or ["keys"])[:3])
 
 
 def check_inputs(before, now):
-    """
-    Refuse results of files that changed while they were read.
-
-    Parameters
-    ----------
-    before : dict of str to list
-        From `with_checksums`, at the start.
-    now : dict of str to list of int
-        From `inputs_of`.
-
-    Raises
-    ------
-    ValueError
-        If a file is not what it was.
-    """
+    """Raise ValueError if input files changed while they were read."""
     if changed := changed_inputs(before, now):
         raise ValueError(
             f"{changed[0]} changed while it was read, so that nothing of this run is kept: "
@@ -260,23 +170,7 @@ def check_inputs(before, now):
 
 
 def check_finished(path, old, new, inputs):
-    """
-    Refuse to resume a finished run that is not the one asked for.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        File of the scenario or study in the folder of the results, written at the end of the run.
-    old, new : str
-        Text of the scenario or study, of the finished run and of the one asked for.
-    inputs : dict of str to list of int
-        From `inputs_of`.
-
-    Raises
-    ------
-    ValueError
-        If it is another run, or if an input file is newer than the results.
-    """
+    """Raise ValueError if a finished run is not the requested one."""
     cure = "name another folder with -o, or run it again with --overwrite"
     if old != new:
         raise ValueError(

@@ -1,6 +1,15 @@
-"""What a run computes of a scenario, block by block, and the order of the blocks."""
+"""
+Products of a run: the blocks to compute in their order, and finished blocks saved on disk.
 
+The default run saves 332 blocks of 72 kB. To save and load one takes 0.4 ms of processor time. A Zarr array for each
+block, with the codec crc32c, takes 3.9 ms: 9 % of the run. One Zarr array for all blocks of a raster takes 1.0 ms, but
+its chunks are of one size, and it reads a block that is missing as its fill value.
+"""
+
+import io
+import os
 import zlib
+from pathlib import Path
 from typing import NamedTuple
 
 import dask.array as da
@@ -8,9 +17,9 @@ import numpy as np
 import xarray as xr
 from dask.base import tokenize
 
-from fifesim.rasters import geozarr
-from fifesim.rasters import grid as grids
-from fifesim.rasters.windows import array_from_windows
+from fifesim.grids import grid as grids
+from fifesim.grids.windows import array_from_windows
+from fifesim.output.run.identity import NotThisRun
 
 # The report shows the cells below this many pixels across, in the middle: enough to see what a pixel averages. [pixel]
 _DETAIL = 16
@@ -23,7 +32,7 @@ _SIDE = 1008
 
 
 class Products(NamedTuple):
-    """Lazy rasters of a run by name, and those of the scene, whose blocks are written to Zarr when they are made."""
+    """Lazy rasters of a run by name, and the scene products, whose blocks are written to Zarr directly."""
 
     rasters: dict[str, xr.DataArray]
     scene: dict[str, xr.DataArray]
@@ -31,20 +40,7 @@ class Products(NamedTuple):
 
 
 def products_of(tree, zarr_path=None):
-    """
-    Lazy arrays of a run, and where their blocks are.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-        From `fifesim.scenario.simulation.simulate`.
-    zarr_path : path, optional
-        Where scene products are to be written.
-
-    Returns
-    -------
-    products : Products
-    """
+    """Lazy arrays of a run, and the place of their blocks."""
     rasters = {"image": tree["image"]["dn"], **tree["truth"].data_vars}
     rasters["detail"] = _middle_cells(tree["scene"]["lai"], tree["image"]["dn"])
     if "terrain" in tree.children:
@@ -57,24 +53,9 @@ def products_of(tree, zarr_path=None):
     return Products(rasters, scene, arrays)
 
 
-def wanted_blocks(found, grid_chunks, cells):
-    """
-    Blocks of all products in the order to make them: by the chunk of the scene that they lie in.
-
-    Parameters
-    ----------
-    found : Products
-    grid_chunks : (tuple of int, tuple of int)
-        Chunks of the scene over y and x.
-    cells : odc.geo.geobox.GeoBox
-        Of the scene.
-
-    Returns
-    -------
-    wanted : list of (str, tuple of int)
-    """
-    edges = [np.cumsum(sizes) for sizes in grid_chunks]
-    ranked = []
+def wanted_blocks(found, lai):
+    """Blocks of all products in the order of computation: by the chunk of the scene in which they are."""
+    cells, edges, ranked = grids.geobox(lai), [np.cumsum(sizes) for sizes in lai.chunks], []
     for number, (name, array) in enumerate(found.arrays.items()):
         raster = found.rasters.get(name)
         grid = cells if raster is None else grids.geobox(raster)
@@ -92,24 +73,14 @@ def wanted_blocks(found, grid_chunks, cells):
 
 
 def make_scene_store(path, scene):
-    """
-    Zarr store of scene products, without their values.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-    scene : mapping of str to xarray.DataArray, dims ([band], y, x)
-
-    Notes
-    -----
-    In format 2: GDAL before 3.13 reads no shards, and in some releases no array of format 3.
-    """
+    """Create the Zarr store of scene products without values."""
+    # In format 2: GDAL before 3.13 reads no shards, and in some releases no array of format 3.
     dataset = xr.Dataset(dict(scene))
     written = dataset.map(lambda array: array.copy(data=da.zeros(array.shape, chunks=-1)), keep_attrs=True)
     for array in written.data_vars.values():
         chunks = (1,) * (array.ndim - 2) + (_SIDE, _SIDE)
         array.encoding = {"chunks": chunks, "grid_mapping": "spatial_ref"}
-    written.attrs = geozarr.attributes(grids.geobox(dataset[next(iter(scene))]))
+    written.attrs = grids.geozarr_attributes(grids.geobox(dataset[next(iter(scene))]))
     written.to_zarr(path, compute=False, mode="w", zarr_format=2, consolidated=True)
 
 
@@ -119,7 +90,7 @@ def _middle(size, shown):
 
 
 def _shown(terrain):
-    """The part of terrain that the report shows."""
+    """Part of the terrain that the report shows."""
     return terrain.isel({axis: _middle(terrain.sizes[axis], _TERRAIN) for axis in ("y", "x")})
 
 
@@ -138,13 +109,13 @@ def _one_chunk_of_bands(array):
 
 
 def _cell(grid, cells, axis, at):
-    """Row or column of the scene at a place of another grid."""
+    """Row or column of the scene at a place in another grid."""
     a, b = grid.affine, cells.affine
     return (a.f + at * a.e - b.f) / b.e if axis == 0 else (a.c + at * a.a - b.c) / b.a
 
 
 def _written(array, path, name):
-    """Blocks that write a place of the store each, and give its checksum."""
+    """Blocks that write their part of the store, and return its checksum."""
     array = _one_chunk_of_bands(array)
     sizes = [tuple(min(_SIDE, size - start) for start in range(0, size, _SIDE)) for size in array.shape[-2:]]
 
@@ -164,30 +135,101 @@ def _written(array, path, name):
 
 
 def chunk_checksum(path, name, index):
-    """
-    Checksum of what a scene product holds in one place.
-
-    Parameters
-    ----------
-    path : path
-        Of the store.
-    name : str
-        Of the product.
-    index : (int, int)
-        Of the chunk, over y and x.
-
-    Returns
-    -------
-    checksum : numpy.uint32
-    """
+    """Checksum of a chunk of a scene product in the store."""
     sink, place = _place(path, name, index)
     return np.uint32(zlib.crc32(np.ascontiguousarray(sink[place])))
 
 
 def _place(path, name, index):
-    """An array of a store, and the place of a chunk in it."""
+    """Array of a store, and the slices of a chunk in it."""
     import zarr  # slow, and few runs write cells
 
     sink = zarr.open_array(str(path), path=name, mode="r+")
     sides = [slice(at * _SIDE, min((at + 1) * _SIDE, size)) for at, size in zip(index, sink.shape[-2:], strict=True)]
     return sink, (..., *sides)
+
+
+SUFFIX = ".npy"
+
+# A block is followed by its checksum. [byte]
+_CHECKSUM = 4
+
+
+def save_block(folder, name, index, block):
+    """Save a block atomically."""
+    path = _path(folder, name, index)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial_path = path.with_suffix(".partial")
+    # numpy would not say why a file cannot be written.
+    content = io.BytesIO()
+    np.save(content, block)
+    with content.getbuffer() as whole:
+        checksum = _checksum(whole)
+    content.write(checksum)
+    try:
+        partial_path.write_bytes(content.getbuffer())
+        os.replace(partial_path, path)
+    except OSError as error:
+        partial_path.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def saved_blocks(folder, name, array):
+    """Indices of the saved blocks of an array whose files are intact, with the right shape and type."""
+    return {index for index in np.ndindex(array.numblocks) if _is_whole(_path(folder, name, index), array, index)}
+
+
+def saved_block(folder, name, index):
+    """Load a saved block."""
+    return _load(_path(folder, name, index))
+
+
+def saved_array(folder, name, array):
+    """Array whose blocks are read from disk, in chunks of rows of blocks, which are far fewer tasks."""
+    leading, (down, across) = array.shape[:-2], array.chunks[-2:]
+    numbers = {start: number for number, start in enumerate(np.cumsum((0, *down)).tolist())}
+
+    def row_of_blocks(number):
+        paths = (_path(folder, name, (*(0 for _ in leading), number, column)) for column in range(len(across)))
+        return np.concatenate([_load(path) for path in paths], axis=-1)
+
+    return array_from_windows(
+        row_of_blocks,
+        [],
+        (down, (sum(across),)),
+        lambda rows, columns: ((numbers[rows.start],), ()),
+        token=f"saved-{folder}-{name}",
+        leading=leading,
+        dtype=array.dtype,
+    )
+
+
+def has_blocks(unfinished, error):
+    """Whether a run stopped by an error can be resumed: not after invalid input, nor without blocks."""
+    hopeless = isinstance(error, ValueError | TypeError) and not isinstance(error, NotThisRun)
+    return not hopeless and any((unfinished / "blocks").glob(f"*/*{SUFFIX}"))
+
+
+def _path(folder, name, index):
+    return Path(folder) / name / ("-".join(f"{number:05d}" for number in index) + SUFFIX)
+
+
+def _checksum(content):
+    return zlib.crc32(content).to_bytes(_CHECKSUM, "little")
+
+
+def _load(path):
+    """Load a block and check its checksum."""
+    content = Path(path).read_bytes()
+    if _checksum(content[:-_CHECKSUM]) != content[-_CHECKSUM:]:
+        raise OSError(f"{path} is not what was written: a run with --resume makes it again")
+    return np.load(io.BytesIO(content), allow_pickle=False)
+
+
+def _is_whole(path, array, index):
+    try:
+        block = _load(path)
+    except (OSError, ValueError, EOFError):
+        return False
+    shape = tuple(sizes[number] for sizes, number in zip(array.chunks, index, strict=True))
+    return block.shape == shape and block.dtype == array.dtype

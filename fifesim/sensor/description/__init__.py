@@ -1,1 +1,1 @@
-"""Instruments as files describe them."""
+"""Descriptions of instruments from files."""

@@ -1,23 +1,263 @@
 """Description of an instrument: bands, sampling, spatial response and radiometry, each number with its source."""
 
-from dataclasses import field, replace
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from dataclasses import asdict, field, replace
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from fifesim.base.annotations import Names
-from fifesim.base.bands import NEAR_INFRARED, RED, nearest
+from fifesim.base.annotations import FilePath, Names
+from fifesim.base.arguments import NAMES, Kind
+from fifesim.base.bands import NEAR_INFRARED, RED, nearest_band, solar_irradiance
 from fifesim.base.line_spread import LineSpread
-from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS, InstrumentBand, Sources
-from fifesim.sensor.description.band_names import band_called
-from fifesim.sensor.description.fields import CONFIG, AlongAcross, Angle, Count, Name, Positive, by_axes
-from fifesim.sensor.description.names import key, lookup
-from fifesim.sensor.description.performance import Product, Scan
+from fifesim.sensor.description.fields import (
+    CONFIG,
+    AlongAcross,
+    Angle,
+    Count,
+    Name,
+    Number,
+    Positive,
+    band_called,
+    by_axes,
+    key,
+    lookup,
+    worded,
+)
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
-from fifesim.sensor.description.wording import worded
+from fifesim.sensor.description.spectral_response import SpectralResponse
 from fifesim.sensor.response.noise import NoiseModel
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Noise:
+    r"""
+    Random noise of one band at a stated radiance.
+
+    .. math:: \mathrm{NEdL} = L / \mathrm{SNR}
+
+    Parameters
+    ----------
+    radiance : float
+        Radiance L that the figure holds for. [W m-2 sr-1 um-1]
+    snr : float, optional
+        Ratio of signal to noise there. [1]
+    nedl : float, optional
+        Noise equivalent radiance there, standard deviation; instead of the ratio. [W m-2 sr-1 um-1]
+    shot : float, optional
+        Share of the variance there that grows in proportion to the signal; the rest is constant. Where it is not
+        given it is not known, and all of the noise is taken as constant. [1]
+    gain_spread : float, optional
+        Standard deviation of the detectors' relative gain: fixed pattern, which stripes the image. [1]
+    offset_spread : float, optional
+        Standard deviation of the detectors' offset. [W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    pydantic.ValidationError
+        Unless one of the ratio and the noise is given.
+    """
+
+    radiance: Positive
+    snr: Positive | None = None
+    nedl: Positive | None = None
+    shot: Annotated[float, Field(strict=True, ge=0, le=1)] | None = None
+    gain_spread: Annotated[float, Field(strict=True, ge=0, lt=1)] = 0.0
+    offset_spread: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
+
+    def __post_init__(self):
+        if (self.snr is None) == (self.nedl is None):
+            raise ValueError("give either snr or nedl [W m-2 sr-1 um-1], at the radiance")
+
+    @property
+    def equivalent_radiance(self):
+        """Noise equivalent radiance at `radiance`, as a standard deviation. [W m-2 sr-1 um-1]"""
+        return self.radiance / self.snr if self.nedl is None else self.nedl
+
+    def model(self, detectors, along):
+        """Noise model at every radiance."""
+        snr, shot = self.radiance / self.equivalent_radiance, self.shot or 0.0
+        model = NoiseModel.from_snr(self.radiance, snr, shot, detectors=detectors, along=along)
+        return replace(model, gain_spread=self.gain_spread, offset_spread=self.offset_spread)
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Gain:
+    """
+    Radiances that a gain state spreads over the digital numbers.
+
+    Parameters
+    ----------
+    full_scale_radiance, min_radiance : float
+        Radiances of the largest digital number and of digital number 0. [W m-2 sr-1 um-1]
+    """
+
+    full_scale_radiance: Number
+    min_radiance: Number
+
+    def __post_init__(self):
+        if self.full_scale_radiance <= self.min_radiance:
+            raise ValueError(
+                f"full_scale_radiance must be above min_radiance, got {self.full_scale_radiance:g} "
+                f"and {self.min_radiance:g} W m-2 sr-1 um-1"
+            )
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Product:
+    """
+    How the agency scales the digital numbers of its Level-1 product: by reflectance.
+
+    Parameters
+    ----------
+    gain, offset : float
+        Reflectance of one count and of digital number 0. [1]
+    bits : int
+        Number of bits of the digital numbers of the product.
+    sun_corrected : bool
+        Whether that reflectance has the cosine of the solar zenith angle divided out.
+    """
+
+    gain: Positive
+    offset: Number
+    bits: Annotated[int, Field(strict=True, ge=2, le=16)]
+    sun_corrected: Annotated[bool, Field(strict=True)]
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Scan:
+    """
+    How an instrument covers the width of its swath.
+
+    Parameters
+    ----------
+    kind : "whiskbroom" or "pushbroom"
+        A mirror that sweeps a few detectors across the track, or a row of detectors as long as the line.
+    max_angle : float
+        Largest angle from nadir, at the instrument. [degree]
+    samples : int, optional
+        Samples of a line.
+    lines : int, optional
+        Lines of a sweep, which are seen at once.
+    period : float, optional
+        Time from one sweep, or one line, to the next. [s]
+    swath : float, optional
+        Width on the ground that is published. [m]
+    """
+
+    kind: Literal["whiskbroom", "pushbroom"]
+    max_angle: Annotated[float, Field(strict=True, gt=0, lt=75)]
+    samples: Count | None = None
+    lines: Count | None = None
+    period: Positive | None = None
+    swath: Positive | None = None
+
+
+# Numbers that must be there and those that may; each that is there has a source.
+INSTRUMENT_NUMBERS = ("altitude", "gsd", "interval", "bits", "lsf")
+BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance")
+OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "product", "noise", "gains", "limits", "geolocation", "compression")
+
+# Publications by number.
+Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]  # type: ignore[valid-type]
+
+# Fields that the text of a band shows where they are given.
+_SHOWN = ("name", "srf", "full_scale_radiance", "min_radiance", "solar_irradiance", "limits", "gsd", "gain")
+
+
+@dataclass(frozen=True, config=CONFIG)
+class InstrumentBand:
+    """
+    One band of an instrument.
+
+    Parameters
+    ----------
+    name : str
+        Name, such as ``"TM3"``.
+    srf : spectral response
+        Where the relative spectral response is found; see `fifesim.sensor.description.spectral_response`.
+    full_scale_radiance, min_radiance : float
+        Radiances of the largest digital number and of digital number 0. [W m-2 sr-1 um-1]
+    solar_irradiance : float
+        Extraterrestrial irradiance that the agency publishes for planetary reflectance. [W m-2 um-1]
+    limits : tuple of float, optional
+        Wavelengths between which the band is nominally. [um]
+    gsd, interval, ifov, lsf, detectors : optional
+        Where they differ from the instrument's.
+    noise : Noise, optional
+    gain : str, optional
+        Name of the gain state that the radiances belong to.
+    gains : dict of Gain, optional
+        Other gain states by name.
+    compression : "square-root", optional
+        Scale of the digital numbers, which meets the linear one at both ends; that is linear by default.
+    sources : dict
+        Key of the instrument's references for each number that has another source than the instrument says.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If a value is wrong; `fifesim.sensor.description.instruments.read_instrument` names file and key.
+    """
+
+    name: Name
+    srf: SpectralResponse
+    full_scale_radiance: Number
+    min_radiance: Number
+    solar_irradiance: Positive
+    limits: tuple[Positive, Positive] | None = None
+    gsd: Positive | None = None
+    interval: Angle | None = None
+    ifov: Angle | None = None
+    lsf: SpatialResponse | None = None
+    detectors: Count | None = None
+    noise: Noise | None = None
+    gain: Name = "nominal"
+    gains: dict[str, Gain] = field(default_factory=dict, repr=False, hash=False)
+    compression: Literal["square-root"] | None = None
+    sources: Sources = field(default_factory=dict, repr=False, hash=False)  # type: ignore[valid-type]
+
+    def __post_init__(self):
+        Gain(self.full_scale_radiance, self.min_radiance)
+        if self.limits and self.limits[0] >= self.limits[1]:
+            raise ValueError(f"limits: the first must be below the second, got {self.limits} um")
+        if self.gain in self.gains:
+            raise ValueError(f"gains: {self.gain!r} is the band's own gain state, give the others")
+
+    def __repr__(self):
+        parts = [f"{name}={value!r}" for name, value in vars(self).items() if value is not None and name in _SHOWN]
+        return f"InstrumentBand({', '.join(parts)})"
+
+    @property
+    def response(self):
+        """Relative spectral response."""
+        return self.srf.read(self.name)
+
+    @property
+    def wavelength(self):
+        """Response-weighted mean wavelength. [um]"""
+        return self.response.center
+
+    @property
+    def spectrum_irradiance(self):
+        """Solar irradiance of ASTM G173 over the response, as a reference for the published one. [W m-2 um-1]"""
+        return solar_irradiance(self.response)
+
+    def compressed_count(self, bits):
+        """Digital number at which the square-root and linear scales meet, 0 for a linear scale."""
+        return 2**bits - 1 if self.compression else 0
+
+    def with_gain(self, gain):
+        """Band in another gain state."""
+        if gain == self.gain:
+            return self
+        if gain not in self.gains:
+            raise ValueError(f"{self.name} has no gain state {gain!r}: it has {', '.join([self.gain, *self.gains])}")
+        own = Gain(self.full_scale_radiance, self.min_radiance)
+        others = {name: state for name, state in self.gains.items() if name != gain}
+        return replace(self, gain=gain, gains={self.gain: own, **others}, **asdict(self.gains[gain]))
 
 
 @worded
@@ -41,7 +281,7 @@ class Instrument:
     lsf : response of both axes or TwoAxesResponse
         Spatial response; see `fifesim.sensor.description.spatial_response`.
     bands : tuple of InstrumentBand
-        As `fifesim.sensor.description.band` has them; at least one.
+        As `fifesim.sensor.description.instrument_file` has them; at least one.
     sources : dict
         Key of ``references`` for each number; a band's own sources come first.
     references : dict
@@ -246,7 +486,7 @@ class Instrument:
         Parameters
         ----------
         bands : str or sequence of str, optional
-            Names in any case, or as `fifesim.sensor.description.band_names.band_called` knows them; all by default.
+            Names in any case, or as `fifesim.sensor.description.fields.band_called` knows them; all by default.
 
         Returns
         -------
@@ -266,10 +506,9 @@ class Instrument:
         """
         known = {key(band.name): band for band in self.bands}
         names = known if bands is None else [bands] if isinstance(bands, str) else bands
-        called = [band_called(name, self) if isinstance(name, str) else None for name in names]
         found = tuple(
-            lookup(name, known, f"band of {self.name}") if band is None else band
-            for name, band in zip(names, called, strict=True)
+            (isinstance(name, str) and band_called(name, self)) or lookup(name, known, f"band of {self.name}")
+            for name in names
         )
         if not found or len(set(found)) < len(found):
             raise ValueError(
@@ -305,9 +544,9 @@ class Instrument:
         return tuple(pair.values())
 
     def _showing(self, window, pixel=None):
-        """The band that shows best what a window is for, among those of a size of pixels."""
+        """Band that is best for a window, among those with a pixel size."""
         bands = [band for band in self.bands if pixel is None or self.pixel(band) == pixel]
-        number = nearest([band.wavelength for band in bands], window)
+        number = nearest_band([band.wavelength for band in bands], window)
         return None if number is None else bands[number]
 
     def source(self, number: str, band: InstrumentBand | None = None) -> str:
@@ -337,6 +576,14 @@ class Instrument:
 
 
 def _given(item):
-    """Names of the optional numbers that an instrument or a band has."""
+    """Names of the optional numbers of an instrument or a band that are given."""
     names = OPTIONAL_NUMBERS + (INSTRUMENT_NUMBERS if isinstance(item, InstrumentBand) else ())
     return [name for name in names if getattr(item, name, None)]
+
+
+InstrumentLike: TypeAlias = Annotated[
+    FilePath | Instrument, Kind("the name of an instrument, such as 'TM', or a fifesim.Instrument")
+]
+InstrumentsLike: TypeAlias = Annotated[
+    Sequence[InstrumentLike], Kind("a list of instruments, such as ['TM', 'OLI']", NAMES.fits)
+]

@@ -1,36 +1,31 @@
 """
-Instruments by name, and from files of one's own.
+Instruments by name, and from user-supplied files.
 
-The descriptions are the files ``data/instruments/*.toml``; a further instrument is a further file.
+The descriptions are the files ``data/instruments/*.toml``; a new instrument is a new file.
 """
 
 from __future__ import annotations
 
 from dataclasses import fields
-from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import TypeAdapter, ValidationError
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.base.annotations import FilePath
-from fifesim.base.foreign import in_a_line, read_toml
-from fifesim.base.kinds import UNCHECKED
-from fifesim.sensor.description.annotations import InstrumentLike
-from fifesim.sensor.description.band import InstrumentBand
-from fifesim.sensor.description.instrument_file import Instrument
-from fifesim.sensor.description.names import key, lookup
-from fifesim.sensor.description.performance import Noise, Product, Scan
-from fifesim.sensor.description.plausibility import check_units
-from fifesim.sensor.description.responses import with_response
+from fifesim.base.arguments import UNCHECKED
+from fifesim.base.caches import cached
+from fifesim.base.files import in_a_line, read_toml
+from fifesim.sensor.description.fields import errors_in_words, key, lookup
+from fifesim.sensor.description.instrument_file import Instrument, InstrumentBand, InstrumentLike, Noise, Product, Scan
+from fifesim.sensor.description.plausibility import check_instrument_units
 from fifesim.sensor.description.short_file import completed
-from fifesim.sensor.description.wording import in_words
+from fifesim.sensor.description.spatial_response import with_response
 
 # What a misspelt key may be; those of short files among them.
-_KEYS = {each.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan) for each in fields(kind)} | {
-    "center", "width", "shape", "snr", "snr_radiance", "snr_shot",
-}  # fmt: skip
+_KEYS = {key.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan) for key in fields(kind)}
+_KEYS |= {"center", "width", "shape", "snr", "snr_radiance", "snr_shot"}
 
 
 def instrument(
@@ -45,8 +40,8 @@ def instrument(
         Name or alias in any case, such as ``"TM"`` or ``"Landsat 8"``; or the path of a file, which ends in
         ``.toml``. An Instrument passes through.
     response : {"system", "detector", "paper"}, optional
-        Spatial response, as `fifesim.sensor.description.responses.with_response` takes it; by default what the file
-        has.
+        Spatial response, as `fifesim.sensor.description.spatial_response.with_response` takes it; by default what the
+        file has.
 
     Returns
     -------
@@ -81,23 +76,7 @@ def _found(name):
 
 
 def catalogued(name):
-    """
-    An instrument that fifesim has.
-
-    Parameters
-    ----------
-    name : str
-        Name or alias in any case.
-
-    Returns
-    -------
-    instrument : Instrument
-
-    Raises
-    ------
-    ValueError
-        If no instrument has this name.
-    """
+    """Built-in instrument by name or alias."""
     # Most are called as their file is; to read all of them takes ten times as long.
     path = _files().get(key(name)) if isinstance(name, str) else None
     if path and key(_listed(path).name) == key(name):
@@ -161,26 +140,14 @@ def read_instrument(path: FilePath) -> Instrument:
     path = Path(path).absolute()
     found = _parse(path)
     try:
-        check_units(found)
+        check_instrument_units(found)
     except ValueError as error:
         raise ValueError(f"{path.name}: {error}") from None
     return found
 
 
 def tables_of(path):
-    """
-    Tables that an instrument's file names, of its bands and of their responses.
-
-    Parameters
-    ----------
-    path : str or path-like
-        TOML file.
-
-    Returns
-    -------
-    paths : tuple of pathlib.Path
-        Beside it, where they are to lie.
-    """
+    """Paths of the tables that an instrument file names, in its folder."""
     bands, folder = read_toml(path).get("bands"), Path(path).absolute().parent
     if isinstance(bands, str):
         return (folder / bands,)
@@ -190,23 +157,7 @@ def tables_of(path):
 
 
 def noise_of(description, band):
-    """
-    Noise of a band of an instrument at every radiance.
-
-    Parameters
-    ----------
-    description : Instrument
-    band : fifesim.sensor.description.band.InstrumentBand
-
-    Returns
-    -------
-    model : fifesim.sensor.response.noise.NoiseModel
-
-    Raises
-    ------
-    ValueError
-        If the instrument's file has none; the message says whose have.
-    """
+    """Noise model of a band of an instrument."""
     if band.noise is None:
         known = [name for name in instrument_names() if any(each.noise for each in instrument(name).bands)]
         raise ValueError(
@@ -223,37 +174,25 @@ def _parse(path):
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no instrument file {in_a_line(str(path))}") from None
     try:
-        content = completed(content, path)
+        return TypeAdapter(Instrument).validate_python(completed(content, path))
+    except ValidationError as error:
+        raise ValueError(in_a_line(f"{path.name}: {errors_in_words(error, _KEYS)}")) from None
     except ValueError as error:
         raise ValueError(f"{path.name}: {error}") from None
-    try:
-        return TypeAdapter(Instrument).validate_python(_with_folder(content, path.parent))
-    except ValidationError as error:
-        raise ValueError(in_a_line(f"{path.name}: {in_words(error, _KEYS)}")) from None
 
 
-def _with_folder(content, folder):
-    """The content of a file, whose tables of responses know the folder that they may lie in."""
-    bands = content.get("bands")
-    for band in bands if isinstance(bands, list) else []:
-        srf = band.get("srf") if isinstance(band, dict) else None
-        if isinstance(srf, dict) and "table" in srf:
-            srf["folder"] = str(folder)
-    return content
-
-
-@lru_cache
+@cached(128, "instrument files")
 def _files():
-    """Files of instruments by what they are called."""
-    return {path.stem: path for path in sorted(datasets.path("instruments").glob("*.toml"))}
+    """Instrument files by name."""
+    return {path.stem: path for path in sorted(files.path("instruments").glob("*.toml"))}
 
 
-_listed = lru_cache(maxsize=None)(_parse)
+_listed = cached(None, "instruments of the package")(_parse)
 
 
-@lru_cache
+@cached(128, "instrument names")
 def _catalogue():
-    """Instruments by names and aliases. The tests check the units of these files."""
+    """Instruments by names and aliases."""
     found = {}
     for item in map(_listed, _files().values()):
         for name in (item.name, *item.aliases):
@@ -262,18 +201,18 @@ def _catalogue():
     return found
 
 
-@lru_cache(maxsize=32)
+@cached(32, "own instrument files")
 def _read_again(path, states):
     return read_instrument(path)
 
 
-@lru_cache(maxsize=32)
+@cached(32, "spectral files of instruments")
 def _tables(path, state):
     return tables_of(path)
 
 
 def _state(path):
-    """By which a file is told from what it was; None where it is not there."""
+    """State by which a changed file is recognized, None if it is missing."""
     try:
         found = path.stat()
     except (OSError, ValueError):

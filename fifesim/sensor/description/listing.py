@@ -1,30 +1,13 @@
-"""Instruments as text, for people to read."""
+"""Instruments as text."""
 
 from fifesim.sensor.description.fields import TwoAxes, by_axes
-from fifesim.sensor.description.responses import knows_blur, with_response
+from fifesim.sensor.description.spatial_response import knows_blur, with_response
 from fifesim.sensor.description.spectral_response import half_peak
 from fifesim.sensor.response.noise import ALL
 
 
 def list_instruments(instruments):
-    """
-    Instruments in a line each.
-
-    Parameters
-    ----------
-    instruments : sequence of fifesim.sensor.description.instruments.Instrument
-
-    Returns
-    -------
-    text : str
-        Name, pixels of the gridded product, bits, number of bands and title.
-
-    Examples
-    --------
-    >>> from fifesim.sensor.description.instruments import instrument
-    >>> list_instruments([instrument("TM")]).splitlines()[1].split()
-    ['TM', '30', '8', '6', 'Landsat-5', 'Thematic', 'Mapper']
-    """
+    """List of instruments, one line each."""
     lines = [f"{'name':<11}{'pixels, m':>14}{'bits':>6}{'bands':>7}  instrument"]
     for item in instruments:
         pixels = ", ".join(f"{size:g}" for size in sorted({item.pixel(band) for band in item.bands}))
@@ -33,31 +16,12 @@ def list_instruments(instruments):
 
 
 def instrument_in_words(instrument):
-    """
-    What an instrument is, in lines of text.
-
-    Parameters
-    ----------
-    instrument : fifesim.sensor.description.instruments.Instrument
-
-    Returns
-    -------
-    text : str
-        Sampling, spatial response, radiometry and noise of its bands, and the sources.
-
-    Examples
-    --------
-    >>> from fifesim.sensor.description.instruments import instrument
-    >>> instrument_in_words(instrument("TM")).splitlines()[0]
-    'TM  Landsat-5 Thematic Mapper'
-    """
+    """Text of an instrument: sampling, spatial response, radiometry, noise and sources."""
     lines = [f"{instrument.name}  {instrument.title}"]
     if instrument.aliases:
         lines.append(f"  also called {', '.join(instrument.aliases)}")
     lines += [f"  altitude {instrument.altitude / 1000:g} km, {instrument.bits} bits", *_scan(instrument)]
-    lines += _product(instrument)
-    lines += _sampling(instrument)
-    lines += _radiometry(instrument)
+    lines += [*_product(instrument), *_sampling(instrument), *_radiometry(instrument)]
     lines += [f"  not known: {name}, {text}" for name, text in instrument.not_found.items()]
     lines += ["  sources", *(f"    {text}" for text in instrument.references.values())]
     return "\n".join(lines)
@@ -82,7 +46,7 @@ def _product(instrument):
 
 
 def _sampling(instrument):
-    """Lines on pixels and line spread, one for each group of bands that share them."""
+    """Lines on pixels and line spread functions, one for each group of bands that share them."""
     groups = {}
     for band in instrument.bands:
         angles = instrument.ground_intervals(band), instrument.ground_fields(band)
@@ -114,24 +78,7 @@ def _pair(values, form):
 
 
 def sensor_in_words(instrument, bands):
-    """
-    What an instrument is and how it sees in some bands, in a sentence or two.
-
-    Parameters
-    ----------
-    instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of str
-
-    Returns
-    -------
-    text : str
-
-    Examples
-    --------
-    >>> from fifesim.sensor.description.instruments import instrument
-    >>> sensor_in_words(instrument("TM"), ["TM3", "TM4"])
-    'Landsat-5 Thematic Mapper, a whiskbroom scanner, 705 km up, in TM3 (0.66 µm) and TM4 (0.84 µm); 8 bits'
-    """
+    """Description of an instrument and its view in some bands, in one or two sentences."""
     names = [f"{band.name} ({band.wavelength:.2f} µm)" for band in instrument.select(bands)]
     text = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
     kind = {"whiskbroom": ", a whiskbroom scanner", "pushbroom": ", a pushbroom scanner"}
@@ -140,30 +87,12 @@ def sensor_in_words(instrument, bands):
 
 
 def blur_in_words(instrument, bands):
-    """
-    What is known of the spatial response of some bands, in a line.
-
-    Parameters
-    ----------
-    instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of str
-
-    Returns
-    -------
-    text : str
-
-    Examples
-    --------
-    >>> from fifesim.sensor.description.instruments import instrument
-    >>> blur_in_words(instrument("TM"), ["TM3", "TM4"])
-    'modulation transfer at the Nyquist frequency 0.69; the detector alone has 0.64: the image of TM3, TM4 is sharper'
-    """
+    """Known spatial response of some bands, in one line."""
     chosen = instrument.select(bands)
-    passed = [_transfer(instrument, band) for band in chosen]
-    found = [_pair(each, ".2f") for each in passed]
-    named = [f"{band.name} {text}" for band, text in zip(chosen, found, strict=True)]
-    each = found[:1] if len(set(found)) == 1 else named
-    text = f"modulation transfer at the Nyquist frequency {', '.join(each)}"
+    found = {band.name: _pair(_transfer(instrument, band), ".2f") for band in chosen}
+    same = len(set(found.values())) == 1
+    transfers = [found[chosen[0].name]] if same else [f"{name} {text}" for name, text in found.items()]
+    text = f"modulation transfer at the Nyquist frequency {', '.join(transfers)}"
     unknown = [band.name for band in chosen if not knows_blur(instrument, band)]
     if unknown:
         text += f"; of {', '.join(unknown)} the detector alone is known: the image is sharper than the instrument's"
@@ -175,13 +104,13 @@ def blur_in_words(instrument, bands):
 
 
 def _transfer(instrument, band):
-    """Modulation transfer at the Nyquist frequency of the own interval, along and across the track."""
+    """Modulation transfer at the Nyquist frequency of the sampling interval, along and across the track."""
     pairs = zip(instrument.line_spreads(band), instrument.ground_intervals(band), strict=True)
     return [float(spread.mtf(0.5 / step)) for spread, step in pairs]
 
 
 def _detector(instrument, band):
-    """What the detector alone transfers, in a list of one line, or of none where it is no less than the band does."""
+    """Line on the transfer of the detector alone, if it is below that in the band."""
     passed = _transfer(instrument, band)
     detector = with_response(instrument, "detector")
     alone = _transfer(detector, *detector.select([band.name]))
@@ -190,28 +119,7 @@ def _detector(instrument, band):
 
 
 def noise_in_words(instrument, bands, kinds=()):
-    """
-    Which noise is added to some bands, or that it is not known, in a line.
-
-    Parameters
-    ----------
-    instrument : fifesim.sensor.description.instruments.Instrument
-    bands : sequence of str
-    kinds : sequence of str, optional
-        Kinds of noise that are added.
-
-    Returns
-    -------
-    text : str
-
-    Examples
-    --------
-    >>> from fifesim.sensor.description.instruments import instrument
-    >>> noise_in_words(instrument("L4TM"), ["TM3", "TM4"])
-    'none is added'
-    >>> noise_in_words(instrument("VIIRS"), ["I1"])
-    'none is added; that of I1 is not known, by band: Twedt, Lei and Xiong (2017), doi:10.1117/12.2274025'
-    """
+    """Noise added to some bands, or its absence, in one line."""
     if kinds:
         return "all kinds that are described" if tuple(kinds) == (ALL,) else ", ".join(kinds)
     unknown = [band.name for band in instrument.select(bands) if band.noise is None]
@@ -221,7 +129,7 @@ def noise_in_words(instrument, bands, kinds=()):
 
 
 def _published(instrument, quantity):
-    """Who published what an instrument's file does not know."""
+    """Publisher of a quantity that is missing in the instrument file, as text."""
     return f", {instrument.not_found[quantity]}" if quantity in instrument.not_found else ""
 
 

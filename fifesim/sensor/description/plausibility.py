@@ -1,10 +1,10 @@
-"""Is a number of an instrument file in the unit that its key has? Kilometres, degrees and nanometres are found out."""
+"""Plausibility of the units of an instrument file: kilometres, degrees and nanometres are detected."""
 
 import numpy as np
 
 from fifesim.sensor.description.fields import by_axes
 from fifesim.sensor.description.spectral_response import half_peak
-from fifesim.sensor.scan.track import swath_width
+from fifesim.sensor.response.scan import swath_width
 
 # Angles between samples above this one are degrees, or no imager's [rad].
 _WIDEST = 0.02
@@ -44,19 +44,8 @@ _SWATH = 0.25
 _SAMPLED = 6.0
 
 
-def check_units(instrument):
-    """
-    Refuse an instrument with a number that cannot be in its key's unit, or a response that does not cover its band.
-
-    Parameters
-    ----------
-    instrument : fifesim.sensor.description.instrument_file.Instrument
-
-    Raises
-    ------
-    ValueError
-        The message names the key, the number, its unit, and what to type instead.
-    """
+def check_instrument_units(instrument):
+    """Raise ValueError for numbers in a wrong unit, or a response that does not cover its band."""
     _check_sampling(instrument, instrument.interval, instrument.gsd, "")
     for number, band in enumerate(instrument.bands, 1):
         key = f"bands.{number}."
@@ -67,7 +56,12 @@ def check_units(instrument):
             _check_spread(instrument, band)
         except ValueError as error:
             raise ValueError(f"{key}{error}") from None
-    _check_brightest(instrument)
+    ratios = [band.full_scale_radiance / band.spectrum_irradiance * np.pi for band in instrument.bands]
+    if max(ratios) < _BRIGHTEST:
+        raise ValueError(
+            f"bands.full_scale_radiance: it is in W m-2 sr-1 um-1, and no band records more than {max(ratios):.0%} of "
+            "a white surface; mW cm-2 sr-1 um-1 times 10"
+        )
     if instrument.scan is not None:
         _check_scan(instrument)
 
@@ -150,15 +144,6 @@ def _check_radiance(band):
         raise ValueError(
             f"noise.radiance = {band.noise.radiance:g}: it is in W m-2 sr-1 um-1 and must lie between min_radiance and "
             f"full_scale_radiance, {band.min_radiance:g} and {band.full_scale_radiance:g}"
-        )
-
-
-def _check_brightest(instrument):
-    ratios = [band.full_scale_radiance / band.spectrum_irradiance * np.pi for band in instrument.bands]
-    if max(ratios) < _BRIGHTEST:
-        raise ValueError(
-            f"bands.full_scale_radiance: it is in W m-2 sr-1 um-1, and no band records more than {max(ratios):.0%} of "
-            "a white surface; mW cm-2 sr-1 um-1 times 10"
         )
 
 

@@ -1,4 +1,4 @@
-"""Short instrument files: what a file leaves out is taken from the rest of it, and said so as the number's source."""
+"""Short instrument files: missing values are derived from the rest of the file, with this as their source."""
 
 import os
 from pathlib import Path
@@ -8,8 +8,8 @@ import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
 from fifesim.base.bands import solar_irradiance
-from fifesim.base.foreign import check_regular, in_a_line, shown
-from fifesim.sensor.description.band import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS
+from fifesim.base.files import check_regular, in_a_line, shown
+from fifesim.sensor.description.instrument_file import BAND_NUMBERS, INSTRUMENT_NUMBERS, OPTIONAL_NUMBERS
 from fifesim.sensor.description.spectral_response import SpectralResponse
 
 # References that are added, by their keys.
@@ -22,7 +22,6 @@ _REFERENCES = {
     _SPECTRUM: "ASTM G173-03, extraterrestrial spectrum, as distributed with pvlib, over the band's response",
     _WHITE: "taken for a white surface below an overhead sun of ASTM G173-03, and 0 for digital number 0",
 }
-_RESPONSE = ("center", "width", "shape")
 _NOISE = {"snr": "snr", "snr_radiance": "radiance", "snr_shot": "shot"}
 
 # Made once: making it takes longer than what it does.
@@ -30,30 +29,7 @@ _ADAPTER = TypeAdapter(SpectralResponse)
 
 
 def completed(content, path):
-    """
-    Content of an instrument file with what a short one leaves out.
-
-    Parameters
-    ----------
-    content : dict
-        As TOML gives it. ``bands`` may be the name of a CSV file beside it, a row for each. A band may have ``center``,
-        ``width`` [um] and ``shape`` instead of ``srf``, and ``snr`` at ``snr_radiance`` [W m-2 sr-1 um-1] instead of
-        ``noise``.
-    path : pathlib.Path
-        Of the file.
-
-    Returns
-    -------
-    content : dict
-        With ``interval``, ``ifov`` and ``lsf`` by ``gsd`` and ``altitude``, ``solar_irradiance`` by the reference
-        spectrum, ``full_scale_radiance`` and ``min_radiance`` of a white surface and of none, and a source for each of
-        these; where the file has no ``sources``, its numbers have the file itself as source.
-
-    Raises
-    ------
-    ValueError
-        If there is no such CSV file, or it has no columns name, center and width.
-    """
+    """Content of a short instrument file, completed by derived values."""
     content = dict(content)
     references = content.get("references", {})
     if isinstance(content.get("bands"), str):
@@ -64,10 +40,10 @@ def completed(content, path):
         references = {_FILE: f"as {in_a_line(path.name, 100)} says"} | references
     if "name" in content:
         content.setdefault("title", content["name"])
-    added, sources = _sampling(content, content)
+    added = _sampling(content, content)
     content |= added
     if isinstance(content["sources"], dict):
-        content["sources"] = content["sources"] | sources
+        content["sources"] = content["sources"] | dict.fromkeys(added, _SAMPLING)
     if isinstance(content.get("bands"), list):
         content["bands"] = [
             _band(each, content, bool(added), path.parent) if isinstance(each, dict) else each
@@ -79,51 +55,52 @@ def completed(content, path):
 
 
 def _used(content):
-    """Keys of references that an instrument and its bands have as sources."""
+    """Keys of references that an instrument and its bands cite as sources."""
     bands = content["bands"] if isinstance(content.get("bands"), list) else []
     tables = [content["sources"], *(band.get("sources") for band in bands if isinstance(band, dict))]
     return [key for table in tables if isinstance(table, dict) for key in table.values() if isinstance(key, str)]
 
 
 def _sampling(item, content):
-    """Interval, field of view and line spread of an instrument or a band, by its pixel, where it has none."""
+    """Missing interval, field of view and line spread of an instrument or a band, from its pixel."""
     gsd, altitude = item.get("gsd"), content.get("altitude")
     if "interval" in item or not all(isinstance(each, int | float) and each > 0 for each in (gsd, altitude)):
-        return {}, {}
+        return {}
     found = {"interval": gsd / altitude}
     found |= {} if "ifov" in item else {"ifov": gsd / altitude}
-    found |= {} if "lsf" in item or item is not content else {"lsf": {"kind": "boxcar"}}
-    return found, dict.fromkeys(found, _SAMPLING)
+    return found | ({} if "lsf" in item or item is not content else {"lsf": {"kind": "boxcar"}})
 
 
 def _band(given, content, sampled, folder):
-    """A band with what it leaves out."""
+    """Band with its missing values."""
     band, sources = dict(given), {}
-    response = {key: band.pop(key) for key in _RESPONSE if key in band}
+    response = {key: band.pop(key) for key in ("center", "width", "shape") if key in band}
     if response:
         band.setdefault("srf", response)
+    srf = band.get("srf")
+    if isinstance(srf, dict) and "table" in srf:
+        band["srf"] = srf | {"folder": str(folder)}
     noise = {name: band.pop(key) for key, name in _NOISE.items() if key in band}
     if noise:
         band.setdefault("noise", noise)
     if sampled:
-        added, sources = _sampling(band, content)
-        band |= added
+        added = _sampling(band, content)
+        band, sources = band | added, dict.fromkeys(added, _SAMPLING)
+    derived = {}
     if not {"solar_irradiance", "full_scale_radiance"} <= set(band):
-        irradiance = _irradiance(band, folder)
-        taken = {"solar_irradiance": irradiance, "full_scale_radiance": irradiance / np.pi}
-        taken = {key: value for key, value in taken.items() if key not in band}
-        band |= taken
-        sources |= {key: _SPECTRUM if key == "solar_irradiance" else _WHITE for key in taken}
-    if "min_radiance" not in band:
-        band["min_radiance"], sources["min_radiance"] = 0.0, _WHITE
+        irradiance = _irradiance(band.get("srf"))
+        derived["solar_irradiance"] = irradiance, _SPECTRUM
+        derived["full_scale_radiance"] = irradiance / np.pi, _WHITE
+    derived["min_radiance"] = 0.0, _WHITE
+    for key, (value, source) in derived.items():
+        if key not in band:
+            band[key], sources[key] = value, source
     own = band.get("sources", {})
     return band | {"sources": sources | own} if sources and isinstance(own, dict) else band
 
 
-def _irradiance(band, folder):
-    """Of the sun over the response. One that cannot be read is told by who reads the whole file."""
-    srf = band.get("srf")
-    srf = srf | {"folder": str(folder)} if isinstance(srf, dict) and "table" in srf else srf
+def _irradiance(srf):
+    """Solar irradiance over the response [W m-2 um-1], None if unreadable, which the reader of the file reports."""
     try:
         return solar_irradiance(_ADAPTER.validate_python(srf).read("band"))
     except (ValidationError, ValueError, TypeError, OSError):
@@ -131,7 +108,7 @@ def _irradiance(band, folder):
 
 
 def _table(folder, name):
-    """Bands of a CSV file, each a dict of what its row has."""
+    """Bands of a CSV file, one dict for each row."""
     path = Path(folder) / name
     try:
         if Path(name).name != name or not os.path.isfile(path):

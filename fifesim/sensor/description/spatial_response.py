@@ -1,9 +1,10 @@
 """
-Spatial responses as instrument files give them: angles, which an altitude turns into metres on the ground.
+Spatial responses of instrument files: angles, which an altitude turns into metres on the ground.
 
-`fifesim.sensor.response.spatial` has their formulas.
+The formulas are in `spatial`.
 """
 
+from dataclasses import replace
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -11,9 +12,8 @@ from pydantic import Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
 from fifesim.base.line_spread import Boxcar
-from fifesim.sensor.description.fields import CONFIG, Count, Number, Positive, Share, TwoAxes
-from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread, TableSpread
-from fifesim.sensor.response.transfer import Diffraction, LowPass, SystemSpread
+from fifesim.sensor.description.fields import CONFIG, Count, Number, Positive, Share, TwoAxes, by_axes
+from fifesim.sensor.response import spatial
 
 
 class View(NamedTuple):
@@ -38,50 +38,17 @@ class View(NamedTuple):
     band: object
 
     def width(self, response):
-        """
-        Instantaneous field of view on the ground.
-
-        Parameters
-        ----------
-        response : str
-            Kind of the response that needs it, for the message.
-
-        Returns
-        -------
-        width : float
-            [m]
-
-        Raises
-        ------
-        ValueError
-            If the instrument has none.
-        """
+        """Instantaneous field of view on the ground. [m]"""
         if self.ifov is None:
             raise ValueError(f"lsf: kind {response!r} needs the instantaneous field of view: add ifov, in radians")
         return self.ifov * self.altitude
 
 
-class OneAxis:
-    """Response of one axis: each kind gives its line spread function, ``_spread(view)``."""
-
-    def spread(self, view):
-        """
-        Line spread function on the ground.
-
-        Parameters
-        ----------
-        view : View
-
-        Returns
-        -------
-        lsf : line spread function
-            As `fifesim.base.footprints` takes it.
-        """
-        return self._spread(view)
+# The response of one axis is a class whose ``spread(view)`` is its line spread function on the ground.
 
 
 @dataclass(frozen=True, config=CONFIG)
-class CosineResponse(OneAxis):
+class CosineResponse:
     """
     A cosine truncated at half amplitude, sampled at angles, as tables of sensors give it.
 
@@ -98,12 +65,13 @@ class CosineResponse(OneAxis):
     step: Positive
     count: Count
 
-    def _spread(self, view):
-        return CosineSpread(self.count * self.step * view.altitude)
+    def spread(self, view):
+        """Line spread function on the ground."""
+        return spatial.CosineSpread(self.count * self.step * view.altitude)
 
 
 @dataclass(frozen=True, config=CONFIG)
-class BoxcarResponse(OneAxis):
+class BoxcarResponse:
     """
     The detector alone: uniform over an angle.
 
@@ -117,12 +85,13 @@ class BoxcarResponse(OneAxis):
     kind: Literal["boxcar"]
     width: Positive | None = None
 
-    def _spread(self, view):
+    def spread(self, view):
+        """Line spread function on the ground."""
         return Boxcar(view.width("boxcar") if self.width is None else self.width * view.altitude)
 
 
 @dataclass(frozen=True, config=CONFIG)
-class GaussianResponse(OneAxis):
+class GaussianResponse:
     r"""
     A Gaussian, by one of three measures.
 
@@ -156,15 +125,16 @@ class GaussianResponse(OneAxis):
         if len(given) != 1:
             raise ValueError(f"give one of fwhm, mtf_at_nyquist and eifov, got {' and '.join(given) or 'none'}")
 
-    def _spread(self, view):
+    def spread(self, view):
+        """Line spread function on the ground."""
         if self.mtf_at_nyquist is not None:
-            return GaussianSpread.from_mtf(self.mtf_at_nyquist, view.interval * view.altitude)
+            return spatial.GaussianSpread.from_mtf(self.mtf_at_nyquist, view.interval * view.altitude)
         fwhm = self.fwhm if self.eifov is None else 4 * np.log(2) / np.pi * self.eifov
-        return GaussianSpread(float(fwhm * view.altitude))
+        return spatial.GaussianSpread(float(fwhm * view.altitude))
 
 
 @dataclass(frozen=True, config=CONFIG)
-class TableResponse(OneAxis):
+class TableResponse:
     """
     A measured response, linear between angles and zero beyond them.
 
@@ -183,16 +153,17 @@ class TableResponse(OneAxis):
 
     def __post_init__(self):
         # Raises what is wrong with the table before anything is simulated.
-        TableSpread(self.angles, self.values)
+        spatial.TableSpread(self.angles, self.values)
 
-    def _spread(self, view):
-        return TableSpread(tuple(angle * view.altitude for angle in self.angles), self.values)
+    def spread(self, view):
+        """Line spread function on the ground."""
+        return spatial.TableSpread(tuple(angle * view.altitude for angle in self.angles), self.values)
 
 
 @dataclass(frozen=True, config=CONFIG)
-class SystemResponse(OneAxis):
+class SystemResponse:
     """
-    Product of the modulation transfers of an instrument's parts, in units of its own field of view and interval.
+    Product of the modulation transfers of the parts of an instrument, in units of its field of view and interval.
 
     Parameters
     ----------
@@ -208,7 +179,7 @@ class SystemResponse(OneAxis):
     electronics : float, optional
         Frequency at which the filter of the electronics halves the power. [cycles per sampling interval]
     poles : int, optional
-        Of that filter.
+        Number of poles of this filter.
     truncation : float, optional
         Largest share of the response that may be cut off. [1]
     """
@@ -222,18 +193,19 @@ class SystemResponse(OneAxis):
     poles: Count = 1
     truncation: Share = 1e-3
 
-    def _spread(self, view):
+    def spread(self, view):
+        """Line spread function on the ground."""
         width, interval = view.width("system"), view.interval * view.altitude
         parts = [Boxcar(self.detector * width)]
         if self.smear is not None:
             parts.append(Boxcar(self.smear * interval))
         if self.blur is not None:
-            parts.append(GaussianSpread(self.blur * width))
+            parts.append(spatial.GaussianSpread(self.blur * width))
         if self.aperture is not None:
-            parts.append(Diffraction(self.aperture / (1e-6 * view.band.wavelength * view.altitude)))
+            parts.append(spatial.Diffraction(self.aperture / (1e-6 * view.band.wavelength * view.altitude)))
         if self.electronics is not None:
-            parts.append(LowPass(self.electronics / interval, self.poles))
-        return SystemSpread(tuple(parts), self.truncation)
+            parts.append(spatial.LowPass(self.electronics / interval, self.poles))
+        return spatial.SystemSpread(tuple(parts), self.truncation)
 
 
 AxisResponse = Annotated[
@@ -243,14 +215,7 @@ AxisResponse = Annotated[
 
 @dataclass(frozen=True, config=CONFIG)
 class TwoAxesResponse(TwoAxes):
-    """
-    Spatial response that differs between the axes.
-
-    Parameters
-    ----------
-    along, across : response of one axis
-        Along and across the track.
-    """
+    """Spatial response that differs between the axes, along and across the track."""
 
     along: AxisResponse
     across: AxisResponse
@@ -264,3 +229,45 @@ def _form(value):
 SpatialResponse = Annotated[
     Annotated[AxisResponse, Tag("both")] | Annotated[TwoAxesResponse, Tag("axes")], Discriminator(_form)
 ]
+
+
+RESPONSES = ("system", "detector", "paper")
+
+_DETECTOR = BoxcarResponse(kind="boxcar")
+
+
+def knows_blur(instrument, band):
+    """Whether the spatial response of a band is known beyond its detector; else images are too sharp."""
+    return _kinds(instrument, band) != {"boxcar"}
+
+
+def with_response(instrument, response):
+    """Instrument with the response of the whole system, the detector alone, or the paper."""
+    # Detectors are as wide as the instantaneous field of view, or as the interval where the file has none.
+    if response not in RESPONSES:
+        raise ValueError(f"response must be one of {', '.join(RESPONSES)}, got {response!r}")
+    if response == "detector":
+        return replace(instrument, lsf=_DETECTOR, bands=tuple(_sharp(instrument, band) for band in instrument.bands))
+    if response == "paper":
+        known = any(_kinds(instrument, band) == {"cosine"} for band in instrument.bands)
+    else:
+        known = any(knows_blur(instrument, band) for band in instrument.bands)
+    if not known:
+        raise ValueError(
+            f"the description of {instrument.name} has no {response!r} response: type response='detector', or give an "
+            "instrument whose file has it"
+        )
+    return instrument
+
+
+def _kinds(instrument, band):
+    return {part.kind for part in by_axes(band.lsf or instrument.lsf)}
+
+
+def _sharp(instrument, band):
+    """Band with its field of view and without a separate response."""
+    number = "ifov" if band.ifov or instrument.ifov else "interval"
+    width = getattr(band, number) or getattr(instrument, number)
+    sources = {key: value for key, value in band.sources.items() if key != "lsf"}
+    source = sources[number] if number in sources else instrument.sources[number]
+    return replace(band, lsf=None, ifov=width, sources=sources | {"ifov": source})

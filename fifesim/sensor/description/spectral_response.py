@@ -1,7 +1,6 @@
-"""Spectral responses as instrument files name them: in pyrsr, in a table beside the file, written out, or by width."""
+"""Spectral responses of instrument files: in pyrsr, in a table in its folder, as lists, or by width."""
 
 import os
-from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,9 +10,10 @@ from pydantic import Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 from pyrsr.rsr import RSR_reader
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.base.bands import Band
-from fifesim.base.foreign import check_regular, shown
+from fifesim.base.caches import cached
+from fifesim.base.files import check_regular, shown
 from fifesim.sensor.description.fields import CONFIG, Name, Number, Positive
 
 # No band of these instruments reaches 100 um, and none begins below 100 nm.
@@ -24,27 +24,12 @@ _REACH, _NODES = 1.5, 121
 
 
 class NamedResponse:
-    """Relative spectral response as a file names it: each kind finds it, ``_read(name)``."""
+    """Relative spectral response by name; subclasses find it, ``_read(name)``."""
 
+    @cached(512, "spectral responses")
     def read(self, name):
-        """
-        The response.
-
-        Parameters
-        ----------
-        name : str
-            Of the band that it is made for.
-
-        Returns
-        -------
-        response : fifesim.base.bands.Band
-
-        Raises
-        ------
-        ValueError
-            If there is no such response, its wavelengths are not in um or do not increase, or it is negative.
-        """
-        return _read(self, name)
+        """Response, for a band of a given name."""
+        return self._read(name)
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -100,7 +85,7 @@ class ResponseTable(NamedResponse):
         beside = Path(self.folder) / self.table
         try:
             # A name may be too long to ask for.
-            path = beside if self.folder and os.path.isfile(beside) else datasets.path(self.table)
+            path = beside if self.folder and os.path.isfile(beside) else files.path(self.table)
             check_regular(path)
         except (OSError, ValueError):
             raise ValueError(
@@ -197,28 +182,7 @@ SpectralResponse = Annotated[
 
 
 def half_peak(response):
-    """
-    Limits of a band: first and last tabulated wavelengths at which the response is at least half of its maximum.
-
-    Parameters
-    ----------
-    response : fifesim.base.bands.Band
-
-    Returns
-    -------
-    low, high : float
-        [um]
-
-    Examples
-    --------
-    >>> half_peak(Band("a", (0.5, 0.6, 0.7, 0.8), (0.0, 0.6, 1.0, 0.2)))
-    (0.6, 0.7)
-    """
+    """Limits of a band: first and last tabulated wavelength with at least half of the maximum response. [um]"""
     half = max(response.response) / 2
     above = [w for w, r in zip(response.wavelength, response.response, strict=True) if r >= half]
     return above[0], above[-1]
-
-
-@lru_cache(maxsize=512)
-def _read(response, name):
-    return response._read(name)

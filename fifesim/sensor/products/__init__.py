@@ -1,1 +1,1 @@
-"""Images as agencies deliver them: what their metadata say, and how their digital numbers are scaled."""
+"""Images as delivered by agencies: their metadata, and the scaling of their digital numbers."""

@@ -1,8 +1,10 @@
-"""Calibration: digital numbers, radiance and planetary reflectance."""
+"""Calibration between digital numbers, radiance and reflectance, and the scaling of agencies' products."""
 
+from dataclasses import dataclass
 from operator import index
 
 import numpy as np
+from scipy import ndimage
 
 
 def gain_offset(full_scale_radiance, min_radiance, bits):
@@ -53,7 +55,7 @@ def gain_offset(full_scale_radiance, min_radiance, bits):
 
 def radiance_to_dn(radiance, gain, offset, bits, compression=0):
     r"""
-    Digital numbers that an instrument records.
+    Digital numbers recorded by an instrument.
 
     .. math:: DN = \mathrm{round}(x), \qquad x = \frac{L - o}{g}, \qquad 1 \le DN \le 2^b - 1
 
@@ -62,7 +64,7 @@ def radiance_to_dn(radiance, gain, offset, bits, compression=0):
 
     .. math:: DN = \mathrm{round}(\sqrt{c \, x})
 
-    Halves go to the even number. What is darker or brighter than the range is clipped, never wrapped.
+    Halves go to the even number. Radiance below or above the range is clipped, never wrapped.
 
     Parameters
     ----------
@@ -233,7 +235,7 @@ def radiance_to_reflectance(radiance, solar_irradiance, mu_s, earth_sun_distance
 
 
 def _white_radiance(solar_irradiance, mu_s, earth_sun_distance):
-    """Radiance of a planetary reflectance of 1."""
+    """Radiance of a planetary reflectance of 1. [W m-2 sr-1 um-1]"""
     _check_positive(solar_irradiance, "solar_irradiance", "in W m-2 um-1")
     _check_positive(mu_s, "mu_s", "the cosine of a solar zenith angle below 90 degrees")
     _check_positive(earth_sun_distance, "earth_sun_distance", "in astronomical units")
@@ -255,3 +257,175 @@ def _largest_dn(bits):
     if not 2 <= number <= 16:
         raise ValueError(f"bits must be in 2 to 16, got {bits}: digital numbers are kept as uint8 or uint16")
     return 2**number - 1
+
+
+def product_gain_offset(gain, offset, solar_irradiance, mu_s, earth_sun_distance=1.0):
+    r"""
+    Gain and offset in radiance of digital numbers that are scaled by reflectance.
+
+    .. math:: L = \frac{E_s \, \mu_s}{\pi \, d^2} \, (g \, DN + o)
+
+    Parameters
+    ----------
+    gain, offset : float
+        Reflectance of one count and of digital number 0. [1]
+    solar_irradiance : array
+        Extraterrestrial, at one astronomical unit, by band. [W m-2 um-1]
+    mu_s : float
+        Cosine of the solar zenith angle that the reflectance has divided out; 1 where it has not. [1]
+    earth_sun_distance : float, optional
+        [astronomical unit]
+
+    Returns
+    -------
+    gain, offset : array
+        Radiance of one count and of digital number 0. [W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    ValueError
+        If the irradiance, ``mu_s`` or the distance is not positive.
+
+    References
+    ----------
+    USGS, Landsat 8-9 Collection 2 Level-1 data format control book (LSDS-1822); ESA, Sentinel-2 products specification
+    document (S2-PDGS-TAS-DI-PSD); [Chander2009]_, Eq. 2
+
+    Examples
+    --------
+    >>> gain, offset = product_gain_offset(1e-4, -0.1, np.pi, 0.5)
+    >>> round(float(gain) * 3000 + float(offset), 12)
+    0.1
+    """
+    radiances = [reflectance_to_radiance(each, solar_irradiance, mu_s, earth_sun_distance) for each in (gain, offset)]
+    return np.asarray(radiances[0]), np.asarray(radiances[1])
+
+
+@dataclass(frozen=True)
+class ProductBand:
+    """
+    Band of a product.
+
+    Parameters
+    ----------
+    name : str
+        Name of the instrument's band, such as ``"TM3"``.
+    file : str
+        Path below the folder of the metadata.
+    gain, offset : float
+        Reflectance of one count and of digital number 0. [1]
+    largest : int
+        Digital number of saturation.
+    solar_irradiance : float or None
+        Extraterrestrial, at one astronomical unit, by which the product is scaled; None where it is not said.
+        [W m-2 um-1]
+    flag : int, optional
+        Bit of the raster of saturation that stands for the band; 0 where it has none.
+    """
+
+    name: str
+    file: str
+    gain: float
+    offset: float
+    largest: int
+    solar_irradiance: float | None
+    flag: int = 0
+
+
+def product_reflectance(dn, gain, offset, largest, flag=0, flags=0, mu_s=1.0):
+    r"""
+    Reflectance of the digital numbers of a product.
+
+    .. math:: \rho = \frac{g \, DN + o}{\mu_s}
+
+    Parameters
+    ----------
+    dn : array of unsigned integers
+        0 is no data. [1]
+    gain, offset : array, broadcastable
+        Reflectance of one count and of digital number 0. [1]
+    largest : array, broadcastable
+        Digital number of saturated pixels. [1]
+    flag : array of unsigned integers, broadcastable, optional
+        Bit that says in ``flags`` that the band is saturated.
+    flags : array of unsigned integers, broadcastable, optional
+    mu_s : array, broadcastable, optional
+        Cosine of the solar zenith angle, where the product has it still in its reflectance. [1]
+
+    Returns
+    -------
+    reflectance : array of float32
+        NaN where there are no data, where the band is saturated, and where the sun is down. [1]
+
+    References
+    ----------
+    USGS, Landsat 8-9 Collection 2 Level-1 data format control book (LSDS-1822), and Using the USGS Landsat Level-1
+    data product; ESA, Sentinel-2 products specification document (S2-PDGS-TAS-DI-PSD), radiometric offset
+
+    Examples
+    --------
+    >>> product_reflectance([0, 10000, 65535], 2e-5, -0.1, 65535, mu_s=0.5).astype(float).round(6).tolist()
+    [nan, 0.2, nan]
+    """
+    dn = np.asarray(dn)
+    usable = (dn != 0) & (dn < largest) & (np.bitwise_and(flags, flag) == 0)
+    mu_s = np.where(np.asarray(mu_s) > 0, mu_s, np.nan)
+    return np.where(usable, (dn * np.asarray(gain, float) + offset) / mu_s, np.nan).astype(np.float32)
+
+
+def mask_bits(*masks):
+    """Masks as the bits of one uint8, the first as bit 0."""
+    return sum((np.asarray(mask) != 0).astype(np.uint8) << bit for bit, mask in enumerate(masks)).astype(np.uint8)
+
+
+def hundredths(angle, fill, turns=False):
+    """Angle from hundredths of a degree, NaN for no data, azimuths in 0 to 360. [degree]"""
+    degrees = np.asarray(angle) / 100.0
+    return np.where(fill, np.nan, degrees % 360.0 if turns else degrees)
+
+
+def direction_vectors(zenith, azimuth):
+    """Unit vectors toward directions, components north, east and up, shape (3, ...). [1]"""
+    zenith, azimuth = np.radians(zenith), np.radians(azimuth)
+    return np.stack([np.sin(zenith) * np.cos(azimuth), np.sin(zenith) * np.sin(azimuth), np.cos(zenith)])
+
+
+def direction_angles(vectors):
+    """Zenith and azimuth of vectors of any length, the azimuth in 0 to 360. [degree]"""
+    north, east, up = vectors
+    return np.degrees(np.arctan2(np.hypot(north, east), up)), np.degrees(np.arctan2(east, north)) % 360.0
+
+
+def mean_direction(zenith, azimuth):
+    """Mean vector of the known directions, NaN if none is known, shape (3, ...). [1]"""
+    vectors = direction_vectors(zenith, azimuth)
+    known = np.isfinite(vectors).all(axis=0)
+    total, count = np.where(known, vectors, 0.0).sum(axis=1), known.sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def filled(vectors):
+    """Vectors on a coarse grid with gaps filled by the nearest vector, shape (3, n, m)."""
+    missing = ~np.isfinite(vectors).all(axis=0)
+    if missing.all():
+        raise ValueError("the metadata have no direction of the view: open it with angles='centre'")
+    nearest = ndimage.distance_transform_edt(missing, return_distances=False, return_indices=True)
+    return vectors[:, *nearest]
+
+
+def between_nodes(vectors, rows, columns):
+    """
+    Zenith and azimuth between nodes of a coarse grid, by bilinear interpolation of vectors, shape (r, c). [degree]
+    """
+    i, down = _nodes(rows, vectors.shape[1])
+    j, right = _nodes(columns, vectors.shape[2])
+    across = vectors[:, :, j] * (1 - right) + vectors[:, :, j + 1] * right
+    down = down[:, None]
+    return direction_angles([part[i] * (1 - down) + part[i + 1] * down for part in across])
+
+
+def _nodes(places, count):
+    """Index of the node before each place, and the weight of the next."""
+    places = np.clip(np.asarray(places, float), 0, count - 1)
+    before = np.minimum(places.astype(int), count - 2)
+    return before, places - before

@@ -9,9 +9,8 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 import numpy as np
 
 from fifesim.base.annotations import Names, Numbers
-from fifesim.base.arguments import check_fields
-from fifesim.base.kinds import PLAIN
-from fifesim.base.seeds import generator
+from fifesim.base.arguments import PLAIN, check_fields
+from fifesim.base.lattice import generator
 
 # Kinds of noise that can be requested by name.
 KINDS = ("shot", "thermal", "fixed-pattern")
@@ -197,23 +196,7 @@ NoiseModels: TypeAlias = Annotated[NoiseModel | Mapping[str, NoiseModel], PLAIN]
 
 
 def check_kinds(kinds):
-    """
-    Check the names of kinds of noise.
-
-    Parameters
-    ----------
-    kinds : str or sequence of str
-        Among `KINDS`, or `ALL` alone.
-
-    Returns
-    -------
-    kinds : tuple of str
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown, or "all" is combined with another name.
-    """
+    """Check the names of kinds of noise, and return a tuple."""
     kinds = (kinds,) if isinstance(kinds, str) else tuple(kinds)
     unknown = [str(kind) for kind in kinds if kind not in (*KINDS, ALL)]
     if unknown:
@@ -226,55 +209,14 @@ def check_kinds(kinds):
 
 
 def fixed_pattern(model, seed, band):
-    """
-    Gain and offset of each detector.
-
-    Parameters
-    ----------
-    model : NoiseModel
-    seed : int
-    band : int
-        Number of the band in its instrument.
-
-    Returns
-    -------
-    gain : array, shape (detectors,)
-        [1]
-    offset : array, shape (detectors,)
-        [W m-2 sr-1 um-1]
-    """
+    """Gain [1] and offset [W m-2 sr-1 um-1] of each detector, shape (detectors,)."""
     # Apart from the lines: there, the second word of the counter is 0.
     drawn = _normals(seed, band, (0, 1, 0, 0), (2, model.detectors))
     return 1 + model.gain_spread * drawn[0], model.offset_spread * drawn[1]
 
 
 def line_noise(seed, band, line, column, size, epoch=0):
-    """
-    Standard normal deviates of a piece of a scan line.
-
-    Parameters
-    ----------
-    seed : int
-    band : int
-        Number of the band in its instrument.
-    line, column : int
-        Place of the first pixel, counted as `fifesim.rasters.grid.lattice_position` does; may be negative.
-    size : int
-        Number of pixels.
-    epoch : int, optional
-        Which of several images of one place.
-
-    Returns
-    -------
-    deviates : array, shape (size,)
-        The same pixels hold the same numbers whatever the piece. [1]
-
-    Examples
-    --------
-    >>> whole = line_noise(7, 2, -5, 1000, 60)
-    >>> bool((line_noise(7, 2, -5, 1030, 20) == whole[30:50]).all())
-    True
-    """
+    """Standard normal deviates of a part of a scan line, the same for each pixel in any part, shape (size,)."""
     first, last = column // _TILE, (column + size - 1) // _TILE
     # Beside that of the fixed pattern, 1.
     image = epoch + (epoch > 0)
@@ -285,7 +227,7 @@ def line_noise(seed, band, line, column, size, epoch=0):
 
 def add_noise(radiance, model, kinds, *, seed, band, row=0, column=0, epoch=0):
     r"""
-    Radiance as a noisy detector reads it.
+    Radiance measured by a noisy detector.
 
     .. math:: L' = g_d \, (L + \sigma(L) \, z) + o_d
 

@@ -6,7 +6,7 @@ import xarray as xr
 from lazy import ODD_CHUNKS, check_place, in_chunks, no_compute
 
 import fifesim
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 
 DATES = np.array(["1987-06-06T16:35", "1987-07-08T16:35", "1987-08-09T16:34"], "datetime64[ns]")
 

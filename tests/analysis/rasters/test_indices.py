@@ -7,9 +7,9 @@ from lazy import check_raster_function
 
 import fifesim
 from fifesim.analysis import indices
-from fifesim.analysis.rasters.indices import INDICES, index, ndvi
-from fifesim.base.bands import nearest
-from fifesim.rasters import grid as grids
+from fifesim.analysis.index_labels import INDICES, reflectance_index, reflectance_ndvi
+from fifesim.base.bands import nearest_band
+from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
 
 CELL = 30 / 9
@@ -25,7 +25,7 @@ def reflectance(lai, wavelengths=(0.56, 0.66, 0.83, 1.65)):
 
 def test_ndvi_keeps_its_word_and_equals_the_kernel(lai_with_hole):
     cube = reflectance(lai_with_hole)
-    result = check_raster_function(ndvi, cube, quantity="ndvi")
+    result = check_raster_function(reflectance_ndvi, cube, quantity="ndvi")
     np.testing.assert_array_equal(result, indices.normalized_difference(cube.values[2], cube.values[1]))
     np.testing.assert_array_equal(np.isnan(result), np.isnan(lai_with_hole))
     assert result.dims == ("y", "x") and "band" not in result.coords and "wavelength" not in result.coords
@@ -38,7 +38,9 @@ def test_ndvi_keeps_its_word_and_equals_the_kernel(lai_with_hole):
 )
 def test_bands_are_picked_by_wavelength(lai, wavelengths, red, nir):
     cube = reflectance(lai, wavelengths)
-    np.testing.assert_array_equal(ndvi(cube), indices.normalized_difference(cube.values[nir], cube.values[red]))
+    np.testing.assert_array_equal(
+        reflectance_ndvi(cube), indices.normalized_difference(cube.values[nir], cube.values[red])
+    )
 
 
 @pytest.mark.parametrize(
@@ -53,14 +55,14 @@ def test_bands_are_picked_by_wavelength(lai, wavelengths, red, nir):
 )
 def test_raster_without_the_bands_is_refused(lai, change, message):
     with pytest.raises(ValueError, match=message):
-        ndvi(change(reflectance(lai)))
+        reflectance_ndvi(change(reflectance(lai)))
 
 
 @pytest.mark.parametrize("name", INDICES)
 def test_index_keeps_its_word(lai_with_hole, name):
     """Bands go to the formula in its order: blue, green, red, near and shortwave infrared are 0 to 4."""
     cube = reflectance(lai_with_hole, (0.48, 0.56, 0.66, 0.83, 1.65))
-    result = check_raster_function(lambda array: index(array, name), cube, quantity=name.lower())
+    result = check_raster_function(lambda array: reflectance_index(array, name), cube, quantity=name.lower())
     blue, green, red, nir, swir = cube.values
     kernel, _ = INDICES[name]
     bands = {"EVI": (nir, red, blue), "NDWI": (green, nir), "NDMI": (nir, swir)}
@@ -75,7 +77,7 @@ def test_water_indices_have_the_signs_of_their_authors():
             cube.assign_coords(wavelength=("band", [0.48, 0.56, 0.66, 0.83, 1.65])),
             fifesim.grid_at("EPSG:26914", 705000, 4334000, 60, 60, 30),
         )
-        assert (index(cube, name) > 0.3).all()
+        assert (reflectance_index(cube, name) > 0.3).all()
 
 
 @pytest.mark.parametrize("name", ["TM", "ETM+", "OLI", "MSI", "MODIS"])
@@ -83,7 +85,7 @@ def test_instruments_have_the_bands_of_every_index(name):
     """The broad bands of their makers: the coastal blue, the red edge and 1.24 um are none of them."""
     bands = instrument(name).bands
     wavelengths = [band.wavelength for band in bands]
-    picked = {window.name: bands[nearest(wavelengths, window)].name for _, ws in INDICES.values() for window in ws}
+    picked = {window.name: bands[nearest_band(wavelengths, window)].name for _, ws in INDICES.values() for window in ws}
     expected = {
         "TM": "TM1 TM2 TM3 TM4 TM5",
         "ETM+": "ETM1 ETM2 ETM3 ETM4 ETM5",
@@ -97,7 +99,7 @@ def test_instruments_have_the_bands_of_every_index(name):
 
 def test_index_that_is_none_or_lacks_a_band_is_named(lai):
     with pytest.raises(ValueError, match="there is no index 'GNDVI': type one of NDVI, EVI, EVI2"):
-        index(reflectance(lai), "GNDVI")
+        reflectance_index(reflectance(lai), "GNDVI")
     with pytest.raises(ValueError, match=r"no blue band between 0\.45 and 0\.52 um"):
-        index(reflectance(lai), "EVI")
-    assert index(reflectance(lai), "evi2").name == "evi2"
+        reflectance_index(reflectance(lai), "EVI")
+    assert reflectance_index(reflectance(lai), "evi2").name == "evi2"

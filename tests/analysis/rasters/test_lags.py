@@ -6,16 +6,16 @@ import xarray as xr
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks
 
 import fifesim
-from fifesim.analysis.rasters import lags as variogram_raster
+from fifesim.analysis import scaling_labels as variogram_raster
 from fifesim.ground.landscape import autoregression
-from fifesim.ground.landscape.field import streaming_field
+from fifesim.ground.landscape.autoregression import streaming_field
 
 CELL = 30 / 9
 
 
 def test_blocks_add_up_to_the_whole(monkeypatch, lai_with_hole):
     whole = fifesim.autocovariance(lai_with_hole, 30.0)
-    monkeypatch.setattr(variogram_raster, "_BLOCK", 16)
+    monkeypatch.setattr(variogram_raster, "_LAG_BLOCK", 16)
     parts = fifesim.autocovariance(lai_with_hole, 30.0)
     np.testing.assert_array_equal(parts["count"], whole["count"])
     np.testing.assert_allclose(parts["covariance"], whole["covariance"], atol=1e-13)
@@ -23,7 +23,7 @@ def test_blocks_add_up_to_the_whole(monkeypatch, lai_with_hole):
 
 
 def test_chunks_change_no_bit(monkeypatch, lai_with_hole):
-    monkeypatch.setattr(variogram_raster, "_BLOCK", 16)
+    monkeypatch.setattr(variogram_raster, "_LAG_BLOCK", 16)
     whole = fifesim.variogram(lai_with_hole, 40.0)
     for chunks in (CHUNKS, ODD_CHUNKS):
         xr.testing.assert_identical(fifesim.variogram(in_chunks(lai_with_hole, chunks), 40.0), whole)

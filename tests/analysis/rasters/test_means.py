@@ -6,7 +6,7 @@ import xarray as xr
 from lazy import ODD_CHUNKS, check_place, check_raster_function, in_chunks, no_compute
 
 import fifesim
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 
 CELL = 30 / 9
 
@@ -16,7 +16,7 @@ def test_aggregate_is_the_mean_of_blocks(lai):
     truth = check_raster_function(lambda lai: fifesim.aggregate(lai, 30.0), lai, quantity="lai")
     expected = lai.values.reshape(5, 9, 6, 9).mean(axis=(1, 3))
     np.testing.assert_allclose(truth, expected, rtol=1e-14)
-    assert grids.same_grid(grids.geobox(truth), grids.aligned(grids.geobox(lai), 30.0))
+    assert grids.same_grid(grids.geobox(truth), grids.aligned_grid(grids.geobox(lai), 30.0))
 
 
 def test_mean_of_the_scene_is_the_mean_of_its_aggregates(lai):

@@ -5,8 +5,8 @@ import pytest
 from lazy import ODD_CHUNKS, in_chunks
 
 import fifesim
-from fifesim.analysis.rasters.pairs import matched, origins, sound_cells
-from fifesim.rasters import grid as grids
+from fifesim.analysis.regression_labels import matched, origins, sound_cells
+from fifesim.grids import grid as grids
 
 CELL = 30 / 9
 

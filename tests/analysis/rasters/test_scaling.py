@@ -7,9 +7,9 @@ from lazy import CHUNKS, ODD_CHUNKS, check_raster_function, in_chunks, no_comput
 from scipy import integrate
 
 import fifesim
-from fifesim.analysis import density, scaling
-from fifesim.ground.canopy import absorption
-from fifesim.rasters import grid as grids
+from fifesim.analysis import scaling
+from fifesim.grids import grid as grids
+from fifesim.ground.canopy import layers
 
 CELL = 30 / 9
 
@@ -41,7 +41,7 @@ def test_predicted_bias_of_ndvi_is_the_simulated_one(lai):
 
 def test_predicted_bias_of_fpar_is_the_simulated_one(lai):
     """The third order is K times the skewness and deviation of LAI, a tenth."""
-    extinction = float(absorption.extinction_coefficient(fifesim.fife_geometry().sza))
+    extinction = float(layers.extinction_coefficient(fifesim.fife_geometry().sza))
     simulated = fifesim.scale_bias(fifesim.fpar, lai)["bias"]
     predicted = check_raster_function(lambda lai: fifesim.fpar_bias(lai, extinction), lai, quantity="fpar_bias")
     assert (predicted < 0).all() and (simulated < 0).all()
@@ -62,7 +62,7 @@ def test_white_noise_keeps_a_ninth_of_its_deviation():
     kept = fifesim.share_kept(fifesim.aggregate(cells), cells)
     assert float(kept["variance"]) == pytest.approx(1 / 81, rel=0.2)
     assert 0 < float(kept["range"]) < 0.35
-    assert scaling.share_kept(fifesim.aggregate(cells), cells) == pytest.approx(
+    assert scaling.pixel_shares(fifesim.aggregate(cells), cells) == pytest.approx(
         (float(kept["range"]), float(kept["variance"])), rel=1e-12
     )
 
@@ -80,7 +80,7 @@ def test_density_of_a_raster_integrates_to_one_and_ignores_chunks(lai_with_hole)
     assert 0.95 < integrate.trapezoid(whole, whole["value"]) <= 1
     xr.testing.assert_identical(fifesim.density(in_chunks(lai_with_hole, ODD_CHUNKS), points=400), whole)
     values = lai_with_hole.values[np.isfinite(lai_with_hole)]
-    exact = density.gaussian_density(values, whole["value"].values, whole.attrs["bandwidth"], reflect=True)
+    exact = scaling.gaussian_density(values, whole["value"].values, whole.attrs["bandwidth"], reflect=True)
     # Bins of 1/2000 of the range beside a bandwidth of a tenth of it: (bin / bandwidth)^2 / 24 of the curvature.
     np.testing.assert_allclose(whole, exact, rtol=1e-3)
 
@@ -141,4 +141,4 @@ def test_linearity_of_rasters_is_that_of_their_values(lai):
     red, nir = cube(lai).values
     for chunks in ({}, ODD_CHUNKS):
         found = fifesim.ndvi_linearity(in_chunks(cube(lai), chunks))
-        assert found == pytest.approx(scaling.ndvi_linearity(red, nir), rel=1e-9)
+        assert found == pytest.approx(scaling.linearity_correlation(red, nir), rel=1e-9)

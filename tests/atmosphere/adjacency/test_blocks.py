@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.adjacency.blocks import Blocks, block_sums, blocks_along, on_cells, whole_blocks
+from fifesim.atmosphere.adjacency import Blocks, block_sums, blocks_along, on_cells, whole_blocks
 
 Y, X = Blocks(cells=4, offset=3, n_cells=21), Blocks(cells=3, offset=0, n_cells=16)
 

@@ -7,13 +7,13 @@ import pandas as pd
 import pytest
 from scipy.integrate import dblquad, quad
 
-from fifesim.atmosphere.adjacency.environment import (
+from fifesim.atmosphere.adjacency import (
     environment_function,
     environment_weights,
     mixed_environment_function,
     point_spread,
 )
-from fifesim.atmosphere.schemes.coupling import TargetTerms, inhomogeneous_reflectance
+from fifesim.atmosphere.coupling import TargetTerms, inhomogeneous_reflectance
 
 SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_adjacency.csv", comment="#")
 

@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.adjacency.blocks import Blocks, block_sums, whole_blocks
-from fifesim.atmosphere.adjacency.environment import point_spread
-from fifesim.atmosphere.adjacency.environment_grid import environment, environment_of_target, spread_over
-from fifesim.atmosphere.schemes.coupling import TargetTerms, inhomogeneous_reflectance
+from fifesim.atmosphere.adjacency import (
+    Blocks,
+    block_environment,
+    block_sums,
+    environment_of_target,
+    point_spread,
+    spread_over,
+    whole_blocks,
+)
+from fifesim.atmosphere.coupling import TargetTerms, inhomogeneous_reflectance
 
 # Cells as large as blocks: what is between blocks is not asked for.
 Y, X = Blocks(1, 0, 9), Blocks(1, 0, 12)
@@ -44,14 +50,14 @@ def test_one_bright_block_is_seen_by_the_point_spread():
 def test_even_ground_with_holes_is_its_own_environment(ground, around):
     even = np.where(np.isnan(ground), np.nan, 0.3)
     margin = (1, 1) if np.ndim(around) == 0 else (2, 2)
-    np.testing.assert_allclose(environment(sums_of(even), around, spread(margin)), 0.3, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(block_environment(sums_of(even), around, spread(margin)), 0.3, rtol=0, atol=1e-14)
 
 
 def test_bright_surroundings_are_seen_where_they_are():
     """In the east: more the nearer, on a black scene."""
     around = np.zeros((13, 16))
     around[:, -2:] = 0.8
-    found = environment(sums_of(np.zeros((9, 12))), around, spread((2, 2)))
+    found = block_environment(sums_of(np.zeros((9, 12))), around, spread((2, 2)))
     share = found - found[:, :1]
     assert np.all(np.diff(share[1:-1], axis=1)[:, -5:] > 0)
     assert found.max() < 0.8
@@ -60,7 +66,7 @@ def test_bright_surroundings_are_seen_where_they_are():
 @pytest.mark.parametrize("around", [None, 0.2])
 def test_environment_is_found_from_apparent_reflectance(ground, around):
     """Solved to 1e-12."""
-    known = environment(sums_of(ground), around, spread())
+    known = block_environment(sums_of(ground), around, spread())
     toa = inhomogeneous_reflectance(ground, known[1:-1, 1:-1], TERMS)
     found = environment_of_target(sums_of(toa, linear=True), around, spread(), TERMS)
     np.testing.assert_allclose(found, known, rtol=0, atol=1e-11)
@@ -68,5 +74,5 @@ def test_environment_is_found_from_apparent_reflectance(ground, around):
 
 def test_scene_without_cells_has_no_environment_of_its_own():
     nothing = sums_of(np.full((9, 12), np.nan))
-    assert np.isnan(environment(nothing, None, spread())).all()
-    np.testing.assert_allclose(environment(nothing, 0.2, spread()), 0.2)
+    assert np.isnan(block_environment(nothing, None, spread())).all()
+    np.testing.assert_allclose(block_environment(nothing, 0.2, spread()), 0.2)

@@ -13,10 +13,10 @@ from lazy import CHUNKS, ODD_CHUNKS, check_place, in_chunks, no_compute
 from scipy.interpolate import RegularGridInterpolator
 
 import fifesim
-from fifesim.atmosphere.adjacency import environment as adjacency
-from fifesim.atmosphere.adjacency import raster as adjacency_raster
-from fifesim.atmosphere.schemes.terms import BandTerms
-from fifesim.rasters import grid as grids
+from fifesim.atmosphere import adjacency
+from fifesim.atmosphere import adjacency_labels as adjacency_raster
+from fifesim.atmosphere.coupling import BandTerms
+from fifesim.grids import grid as grids
 
 SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_adjacency.csv", comment="#")
 CRS = "EPSG:26914"
@@ -49,7 +49,7 @@ SLANTED = make_terms((0.3, 0.6, 0.7, 0.1, 0.1, 0.5, 0.2, 0.9), (0.3, 0.6, 0.7, 0
 def raster(values, cell, west=700_000.0, north=4_330_000.0):
     values = np.asarray(values, float)
     down, across = np.broadcast_to(cell, 2)
-    grid = fifesim.rasters.grid.grid_at(CRS, west, north, values.shape[-1] * across, values.shape[-2] * down, cell)
+    grid = fifesim.grids.grid.grid_at(CRS, west, north, values.shape[-1] * across, values.shape[-2] * down, cell)
     dims = ("band", "y", "x")[-values.ndim :]
     return grids.place(xr.DataArray(values, dims=dims, name="surface_reflectance"), grid)
 

@@ -4,10 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fifesim.atmosphere.air import components
-from fifesim.atmosphere.air.aerosols import aerosol_optics, aerosol_phase, aerosol_polarization, phase_moments
-from fifesim.atmosphere.air.components import COMPONENTS
-from fifesim.atmosphere.air.mixtures import MODELS
+from fifesim.atmosphere import mixtures
+from fifesim.atmosphere.aerosols import aerosol_optics, aerosol_phase, aerosol_polarization, phase_moments
+from fifesim.atmosphere.mixtures import COMPONENTS, MODELS
 
 DATA = Path(__file__).parents[2] / "data"
 OPTICS = pd.read_csv(DATA / "sixs_aerosol_optics.csv", comment="#")
@@ -153,7 +152,7 @@ def test_inputs_broadcast():
 
 def test_a_mixture_scatters_as_its_parts():
     """Half the volume of each: cross sections add, whatever the number of particles."""
-    parts = np.array([components.cross_sections(name, WAVELENGTH) for name in ("dust", "soot")]).mean(axis=0)
+    parts = np.array([mixtures.cross_sections(name, WAVELENGTH) for name in ("dust", "soot")]).mean(axis=0)
     _, albedo, asymmetry = aerosol_optics("dust:0.5+soot:0.5", WAVELENGTH)
     np.testing.assert_allclose(albedo, parts[1] / parts[0], rtol=1e-12)
     np.testing.assert_allclose(asymmetry, parts[2] / parts[1], rtol=1e-12)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.air.components import COMPONENTS, cross_sections, phase, phase_moments, polarized_phase
-from fifesim.base import datasets
+from fifesim.atmosphere.mixtures import COMPONENTS, component_phase_moments, cross_sections, phase, polarized_phase
+from fifesim.base import files
 
 
 def of(name, component):
-    return datasets.table(name).query("component == @component").drop(columns="component")
+    return files.table(name).query("component == @component").drop(columns="component")
 
 
 @pytest.mark.parametrize("component", COMPONENTS)
@@ -46,4 +46,4 @@ def test_moments_are_means_of_legendre_polynomials(component):
     wavelength = np.array([0.5, 0.86])
     values = phase(component, np.cos(angle), wavelength[:, None]) * weights
     expected = values @ np.polynomial.legendre.legvander(np.cos(angle), 6)
-    np.testing.assert_allclose(phase_moments(component, wavelength, 7), expected, atol=1e-4)
+    np.testing.assert_allclose(component_phase_moments(component, wavelength, 7), expected, atol=1e-4)

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fifesim.atmosphere.air.gases import GASES, gas_transmittance, goody, malkmus, table_wavelengths
-from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.atmosphere.gases import GASES, gas_transmittance, goody, malkmus, table_wavelengths
+from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.bands import solar_irradiance_steps
 from fifesim.sensor.description.instruments import instrument
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fifesim.atmosphere.air.mixtures import MODELS, canonical, mixture
+from fifesim.atmosphere.mixtures import MODELS, canonical, mixture
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.air import ENGINES, components, mixtures, models
-from fifesim.atmosphere.air.models import Atmosphere
+from fifesim.atmosphere import ENGINES, mixtures, models
+from fifesim.atmosphere.models import Atmosphere
 
 
 def test_columns_are_the_published_ones():
@@ -135,7 +135,7 @@ def test_text_tells_everything(arguments):
 
 def test_documentation_names_all_that_may_be_asked_for():
     said = Atmosphere.__doc__
-    names = (*models.PROFILES, *mixtures.MODELS, *components.COMPONENTS, *ENGINES)
+    names = (*models.PROFILES, *mixtures.MODELS, *mixtures.COMPONENTS, *ENGINES)
     assert [name for name in names if name not in said] == []
 
 

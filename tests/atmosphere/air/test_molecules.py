@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.air.molecules import DEPOLARIZATION, rayleigh_cross_section, rayleigh_phase, refractive_index
+from fifesim.atmosphere.gases import DEPOLARIZATION, rayleigh_cross_section, rayleigh_phase, refractive_index
 
 
 def test_rayleigh_optical_depth_of_hydrostatic_air_is_the_published_one():

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.air import aerosols
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.air.own_aerosol import Aerosol, known_aerosol, phase_of_moments
+from fifesim.atmosphere import aerosols
+from fifesim.atmosphere.aerosols import Aerosol, known_aerosol, phase_of_moments
+from fifesim.atmosphere.models import Atmosphere
 
 ANGLE = np.linspace(0, 180, 361)
 WAVELENGTH = np.array([0.44, 0.675, 0.87, 1.02])

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.air.profiles import PROFILES, profile_above
+from fifesim.atmosphere.gases import PROFILES, profile_above
+from fifesim.atmosphere.models import Atmosphere
 
 # Runs of 6SV1.1; the columns are integrals over its levels, not the labels that it prints.
 DATA = Path(__file__).parents[2] / "data"

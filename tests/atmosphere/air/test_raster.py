@@ -8,9 +8,9 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.atmosphere.air import aerosols
-from fifesim.atmosphere.air.raster import aerosol_tables, read_aerosol
-from fifesim.atmosphere.schemes.engines import band_terms, scattering
+from fifesim.atmosphere import aerosols
+from fifesim.atmosphere.aerosol_labels import aerosol_tables, read_aerosol
+from fifesim.atmosphere.engines import band_terms, scattering
 
 TM = tuple(band.response for band in fifesim.instrument("TM").select(["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]))
 
@@ -60,11 +60,13 @@ def test_tables_of_the_continental_model_give_5s_what_it_gives(tables):
     np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
-@pytest.mark.parametrize("engine", ["successive-orders", "successive-orders-scalar"])
-def test_tables_of_the_continental_model_give_successive_orders_what_it_gives(engine, tables):
+def test_tables_of_the_continental_model_give_successive_orders_what_it_gives(tables):
     """At wavelengths of the bands, over which their means are taken."""
     at = np.array([0.47, 0.67, 2.25]), 50.0, np.array([20.0]), np.array([40.0])
-    airs = [fifesim.Atmosphere(aerosol=each, aot=0.3, engine=engine) for each in (read_aerosol(tables), "continental")]
+    airs = [
+        fifesim.Atmosphere(aerosol=each, aot=0.3, engine="successive-orders")
+        for each in (read_aerosol(tables), "continental")
+    ]
     for found, expected in zip(*(scattering(air, *at) for air in airs), strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-10)
 
@@ -83,7 +85,7 @@ def test_matrix_as_eradiate_has_it(totals):
     mine = read_aerosol(totals)
     np.testing.assert_allclose(optics(mine, 0.67), optics("continental", 0.67), rtol=2e-4)
     np.testing.assert_allclose(optics(mine, 0.6), optics("continental", 0.6), rtol=4e-3)
-    assert aerosols.limits(read_aerosol(totals)) == pytest.approx((0.44, 1.02))
+    assert aerosols.wavelength_limits(read_aerosol(totals)) == pytest.approx((0.44, 1.02))
 
 
 def test_moments_as_libradtran_has_them(totals):
@@ -128,11 +130,11 @@ def test_aerosol_aloft_hides_molecules_from_successive_orders_and_5s_does_not_kn
     dark = tables.assign(single_scattering_albedo=0 * tables["single_scattering_albedo"] + 0.2)
     low, high = (read_aerosol(dark, layer=layer) for layer in ((0, 1), (20, 30)))
     path = {}
-    for engine in ("5S", "successive-orders-scalar"):
+    for engine in ("5S", "successive-orders"):
         airs = [fifesim.Atmosphere(aerosol=each, aot=0.5, engine=engine) for each in (low, high)]
         path[engine] = [float(band_terms(air, TM[2:3], 40.0, 0.0, 0.0).path_reflectance[0]) for air in airs]
     assert path["5S"][0] == path["5S"][1]
-    below, above = path["successive-orders-scalar"]
+    below, above = path["successive-orders"]
     assert above < 0.8 * below
 
 

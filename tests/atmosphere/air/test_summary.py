@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.atmosphere.air.summary import atmosphere_in_words
+from fifesim.atmosphere.models import atmosphere_in_words
 
 
 def rows(atmosphere):

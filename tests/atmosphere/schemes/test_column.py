@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.schemes.column import mixed_column
-from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
+from fifesim.atmosphere.column import mixed_column
+from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
 
 TAU_MOLECULES, TAU_AEROSOL, ALBEDO = 0.15, 0.4, 0.9
 MU = np.array([0.2, 0.7, 1.0])

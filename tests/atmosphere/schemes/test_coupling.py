@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.schemes.coupling import (
+from fifesim.atmosphere.coupling import (
     TargetTerms,
     apparent_reflectance,
     apparent_reflectance_of_cell,

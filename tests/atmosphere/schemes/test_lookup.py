@@ -3,10 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.coupling import apparent_reflectance
-from fifesim.atmosphere.schemes.engines import band_terms
-from fifesim.atmosphere.schemes.lookup import varying_reflectance
+from fifesim.atmosphere.coupling import apparent_reflectance
+from fifesim.atmosphere.engines import band_terms
+from fifesim.atmosphere.lookup import varying_reflectance
+from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.bands import Band
 from fifesim.base.geometry import relative_azimuth
 

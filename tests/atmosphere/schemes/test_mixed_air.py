@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from oracles_atmosphere import mixed_stokes
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.mixed_air import _quadrature, mixed_scattering, mixed_stokes, whole_scattering
+from fifesim.atmosphere.engines import _quadrature, mixed_scattering, whole_scattering
+from fifesim.atmosphere.models import Atmosphere
 
 WAVELENGTH = np.array([0.47, 0.86])
 SZA, VZA, RAA = 50.0, np.array([0.0, 35.0]), np.array([60.0])

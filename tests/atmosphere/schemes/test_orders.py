@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.schemes.column import mixed_column
-from fifesim.atmosphere.schemes.orders import (
+from fifesim.atmosphere.column import mixed_column
+from fifesim.atmosphere.successive_orders import (
     fluxes,
     leaving_light,
     lit_from_below,

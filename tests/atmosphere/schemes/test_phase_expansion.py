@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss, legval
 
-from fifesim.atmosphere.air.molecules import rayleigh_phase
-from fifesim.atmosphere.schemes.phase_expansion import (
-    matrix_moments,
-    rayleigh_expansion,
-    stokes_basis,
-    truncated_expansion,
-    wigner,
-)
+from fifesim.atmosphere.column import matrix_moments, rayleigh_expansion, stokes_basis, truncated_expansion, wigner
+from fifesim.atmosphere.gases import rayleigh_phase
 
 NODES, WEIGHTS = leggauss(500)
 ORDERS = 2 * np.arange(64) + 1

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.atmosphere.schemes.engines import band_terms
+from fifesim.atmosphere.engines import band_terms
 from fifesim.base.bands import Band
 
 SUN = fifesim.Geometry(40.0, 120.0, 20.0, 30.0)

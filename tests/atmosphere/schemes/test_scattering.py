@@ -6,9 +6,8 @@ import pytest
 from oracles_atmosphere import eddington_flux
 from oracles_atmosphere import sobolev_reflectance as integrated_reflectance
 
-from fifesim.atmosphere.air.aerosols import aerosol_optics, aerosol_phase
-from fifesim.atmosphere.air.molecules import rayleigh_phase
-from fifesim.atmosphere.schemes.scattering import (
+from fifesim.atmosphere.aerosols import aerosol_optics, aerosol_phase
+from fifesim.atmosphere.five_s import (
     conservative_spherical_albedo,
     conservative_transmittance,
     delta_eddington,
@@ -16,6 +15,7 @@ from fifesim.atmosphere.schemes.scattering import (
     sobolev_reflectance,
     spherical_albedo,
 )
+from fifesim.atmosphere.gases import rayleigh_phase
 from fifesim.base.geometry import scattering_angle_cosine
 
 SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_grid.csv", comment="#")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.air.aerosols import aerosol_phase
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.single_scattering import Once, once_on_nodes, once_reflectance, scattered_once
-from fifesim.atmosphere.schemes.successive_orders import path_reflectance
+from fifesim.atmosphere.aerosols import aerosol_phase
+from fifesim.atmosphere.lookup import Once, once_on_nodes, once_reflectance, scattered_once
+from fifesim.atmosphere.models import Atmosphere
+from fifesim.atmosphere.successive_orders import path_reflectance
 from fifesim.base.bands import Band
 from fifesim.base.geometry import scattering_angle_cosine
 

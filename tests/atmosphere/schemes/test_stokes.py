@@ -3,8 +3,7 @@ import pytest
 from numpy.polynomial.legendre import leggauss, legval
 from oracles_atmosphere import SIEWERT
 
-from fifesim.atmosphere.schemes.stokes import stokes_reflectance
-from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
+from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance, stokes_reflectance
 from fifesim.base.geometry import scattering_angle_cosine
 
 SPHERES = SIEWERT[:9]

@@ -6,10 +6,10 @@ import pytest
 from numpy.polynomial.legendre import leggauss, legval
 from oracles_atmosphere import SIEWERT
 
-from fifesim.atmosphere.air.aerosols import aerosol_phase, aerosol_polarization
-from fifesim.atmosphere.air.molecules import rayleigh_phase
-from fifesim.atmosphere.schemes.phase_expansion import matrix_moments, rayleigh_expansion
-from fifesim.atmosphere.schemes.successive_orders import flux_transmittance, path_reflectance
+from fifesim.atmosphere.aerosols import aerosol_phase, aerosol_polarization
+from fifesim.atmosphere.column import matrix_moments, rayleigh_expansion
+from fifesim.atmosphere.gases import rayleigh_phase
+from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
 from fifesim.base.geometry import scattering_angle_cosine
 
 SIXS = pd.read_csv(Path(__file__).parents[2] / "data" / "sixs_scattering.csv", comment="#")

@@ -5,10 +5,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fifesim.atmosphere.air.models import Atmosphere
-from fifesim.atmosphere.schemes.coupling import apparent_reflectance
-from fifesim.atmosphere.schemes.engines import band_terms
-from fifesim.atmosphere.schemes.terms import WAVELENGTHS, BandTerms, Scattering, on_wavelengths, spectral_nodes
+from fifesim.atmosphere.coupling import (
+    WAVELENGTHS,
+    BandTerms,
+    Scattering,
+    apparent_reflectance,
+    on_wavelengths,
+    spectral_nodes,
+)
+from fifesim.atmosphere.engines import band_terms
+from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.bands import Band, solar_irradiance
 
 

@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from fifesim.experiments.explorer.packing import packed, stepped
+from fifesim.experiments.explorer.page import packed, stepped
 
 ARRAYS = {
     "a": np.arange(5, dtype=np.uint8),

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from fifesim.experiments.explorer import words
+from fifesim.experiments.explorer import page
 from fifesim.experiments.explorer.settings import sweep_of
 from fifesim.experiments.scatter.shares import CURVATURE
 from fifesim.experiments.scatter.stages import STAGES
@@ -10,11 +10,11 @@ from fifesim.scenario.scenario import parse_scenario
 
 
 def test_every_stage_has_its_words():
-    assert set(words.STAGES) == {CURVATURE, *STAGES}
+    assert set(page.STAGE_WORDS) == {CURVATURE, *STAGES}
 
 
 def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
-    arp, haze, sza, instrument, registration = words.slider_words(sweep)
+    arp, haze, sza, instrument, registration = page.slider_words(sweep)
     assert arp["start"] == 0 and "leaves are alike up to 8 m, arp 0.15" in arp["texts"][0]
     assert haze["marks"] == ["45 km"] and haze["start"] == 0
     assert sza["texts"][0] == "28.5° from overhead"
@@ -24,11 +24,11 @@ def test_sliders_begin_at_the_scenario_and_say_its_values(sweep):
 
 
 def test_what_cannot_vary_says_so(sweep):
-    arp, haze, *_ = words.slider_words(replace(sweep, arps=(None,), hazes=(None,)))
+    arp, haze, *_ = page.slider_words(replace(sweep, arps=(None,), hazes=(None,)))
     assert arp["texts"] == ["as the map has them"] and haze["texts"] == ["without haze"]
 
 
 def test_haze_is_said_as_it_is_given(small):
     values = small.model_dump(exclude_unset=True) | {"atmosphere": {"aot": 0.15}}
-    haze = words.slider_words(sweep_of(parse_scenario(values)))[1]
+    haze = page.slider_words(sweep_of(parse_scenario(values)))[1]
     assert haze["name"] == "Haze" and haze["texts"][haze["start"]] == "aerosol optical thickness 0.15"

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import fifesim
 from fifesim.cli import app
-from fifesim.experiments.explorer import writing
+from fifesim.experiments.explorer import page
 from fifesim.scenario.toml import write_scenario
 
 
@@ -15,7 +15,7 @@ from fifesim.scenario.toml import write_scenario
 def quick(sweep, monkeypatch):
     """Four settings in the place of all."""
     few = type(sweep)(**{**vars(sweep), "arps": sweep.arps[:1], "szas": sweep.szas[:1], "instruments": ("TM",)})
-    monkeypatch.setattr(writing, "sweep_of", lambda scenario: few)
+    monkeypatch.setattr(page, "sweep_of", lambda scenario: few)
 
 
 def test_command_writes_one_page_and_replaces_none(quick, small, tmp_path, monkeypatch):

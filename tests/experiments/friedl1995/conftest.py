@@ -1,12 +1,24 @@
 """The experiment as the default has it, with few realisations, and small scenes."""
 
+import jinja2
 import pytest
 
 import fifesim
 from fifesim.experiments.friedl1995 import effects
-from fifesim.experiments.friedl1995.case import case_of
-from fifesim.experiments.friedl1995.readings import READINGS
+from fifesim.experiments.friedl1995.case import READINGS, case_of
+from fifesim.experiments.friedl1995.report import _TEMPLATE
 from fifesim.experiments.friedl1995.reproduction import reproduce_case
+from fifesim.output.report import fixed
+
+
+@pytest.fixture(scope="session")
+def sentence():
+    """Text of a macro of the sentences of the report."""
+    folder = jinja2.FileSystemLoader(_TEMPLATE.parent)
+    environment = jinja2.Environment(loader=folder, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["fixed"] = fixed
+    macros = environment.get_template("sentences.j2").module
+    return lambda name, *arguments: getattr(macros, name)(*arguments).strip()
 
 
 @pytest.fixture(scope="session")

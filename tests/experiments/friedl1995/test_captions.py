@@ -5,19 +5,31 @@ import re
 import numpy as np
 import pytest
 
-from fifesim.experiments.friedl1995 import captions
+from fifesim.experiments.friedl1995 import figures
+from fifesim.experiments.friedl1995.table import INCREMENTS
+
+
+@pytest.fixture
+def caption(found, sentence):
+    """Caption of a figure for a reading."""
+
+    def text(number, reading, own_densities=True):
+        numbers = figures.caption_numbers(found, reading)
+        return sentence("caption", number, reading, numbers, found.attrs["cell"], own_densities, INCREMENTS)
+
+    return text
 
 
 def test_peaks_are_counted():
     rng = np.random.default_rng(1)
     one = rng.normal(0, 1, 4000)
-    assert captions.peaks(one) == 1
-    assert captions.peaks(np.concatenate([one, one + 8])) == 2
+    assert figures.peaks(one) == 1
+    assert figures.peaks(np.concatenate([one, one + 8])) == 2
 
 
-def test_most_of_the_scatter_of_figure_9_is_the_drift(found):
+def test_most_of_the_scatter_of_figure_9_is_the_drift(found, caption):
     """1 - R2 of reflectance, by hand, in both readings."""
-    share = captions.drift_share(found)
+    share = figures.drift_share(found)
     scene = found.sel(arp=0.15)
     left = {}
     for reading in ("native", "aligned"):
@@ -25,27 +37,26 @@ def test_most_of_the_scatter_of_figure_9_is_the_drift(found):
         left[reading] = 1 - np.corrcoef(boa, toa)[0, 1] ** 2
     assert share[1, 1] == pytest.approx(1 - left["aligned"] / left["native"], rel=1e-9)
     assert (share > 0.5).all()
-    told = captions.figure_captions(found, "native", True)[9]
+    told = caption(9, "native")
     low, high = map(int, re.search(r"Most of the scatter about it, (\d+) to (\d+) %", told).groups())
     assert (low, high) == (round(100 * share.min()), round(100 * share.max()))
     assert "11.0 m" in told and "assumed drift" in told
-    assert "Most of" not in captions.figure_captions(found, "aligned", True)[9]
+    assert "Most of" not in caption(9, "aligned")
 
 
-def test_every_caption_of_pixels_says_the_reading(found):
+def test_every_caption_of_pixels_says_the_reading(caption):
     for reading in ("native", "aligned"):
-        texts = captions.figure_captions(found, reading, True)
-        assert sorted(texts) == list(range(3, 10))
-        assert all(f"pixels read as {reading}" in texts[number] for number in (5, 6, 7, 9))
+        assert all(caption(number, reading) for number in figures.FIGURE_NUMBERS)
+        assert all(f"pixels read as {reading}" in caption(number, reading) for number in (5, 6, 7, 9))
 
 
-def test_caption_of_figure_6_counts_the_peaks_of_digitising(found):
+def test_caption_of_figure_6_counts_the_peaks_of_digitising(caption):
     """In this sample NDVI has more peaks with 8 bits than before them."""
-    told = captions.figure_captions(found, "native", True)[6]
-    digital, analogue = re.search(r"its curve has (.*?); before digitising \(grey\) (.*?)\.", told).groups()
+    text = caption(6, "native")
+    digital, analogue = re.search(r"its curve has (.*?); before digitising \(grey\) (.*?)\.", text).groups()
     assert digital != "one peak" and analogue == "one peak"
 
 
-def test_densities_of_a_readers_own_are_not_called_inferred(found):
-    assert "were not found" in captions.figure_captions(found, "native", True)[3]
-    assert captions.figure_captions(found, "native", False)[3].endswith("as given.")
+def test_densities_of_a_readers_own_are_not_called_inferred(caption):
+    assert "were not found" in caption(3, "native")
+    assert caption(3, "native", own_densities=False).endswith("as given.")

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from fifesim.experiments.friedl1995.case import Case
-from fifesim.experiments.friedl1995.cells import cells_of, periodic_scene
-from fifesim.experiments.friedl1995.pixels import ground_of
+from fifesim.experiments.friedl1995.table import cells_of, ground_of, periodic_scene
 from fifesim.ground.landscape.distribution import lai_distribution
 
 

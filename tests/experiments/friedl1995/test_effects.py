@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from fifesim.experiments.friedl1995 import effects
-from fifesim.experiments.friedl1995.case import Case, case_of
-from fifesim.experiments.friedl1995.readings import READINGS
+from fifesim.experiments.friedl1995.case import READINGS, Case, case_of
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 
 

@@ -5,11 +5,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import fifesim
-from fifesim.analysis import density
+from fifesim.analysis import scaling
 from fifesim.experiments.friedl1995 import figures
 
 
-@pytest.mark.parametrize("number", figures.NUMBERS)
+@pytest.mark.parametrize("number", figures.FIGURE_NUMBERS)
 def test_figure_is_drawn_of_every_reading(number, small):
     for reading in (None, "aligned"):
         figure = fifesim.plot_reproduction(number, small, reading=reading)
@@ -36,7 +36,7 @@ def test_sample_is_200_pixels_by_name(found):
     values = figures.sample(found, "native", 0.15)
     assert {"lai", "fpar", "ndvi", "analogue_ndvi", "boa_red", "toa_nir"} <= set(values)
     assert all(each.size == 200 and np.isfinite(each).all() for each in values.values())
-    assert density.sample_density(values["lai"], values["lai"]).max() > 1
+    assert scaling.sample_density(values["lai"], values["lai"]).max() > 1
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,9 @@ from typer.testing import CliRunner
 
 from fifesim.cli import app
 from fifesim.experiments.friedl1995 import effects
-from fifesim.experiments.friedl1995 import folder as reproduction
+from fifesim.experiments.friedl1995 import report as reproduction
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import case_of
-from fifesim.experiments.friedl1995.readings import PASSAGES
+from fifesim.experiments.friedl1995.case import PASSAGES, case_of
 from fifesim.scenario.scenario import read_scenario
 
 TABLES = {"table2.csv", "readings.csv", "sizes.csv", "sensitivity.csv"}

@@ -2,14 +2,14 @@
 
 import pytest
 
-from fifesim.experiments.friedl1995 import inputs
+from fifesim.experiments.friedl1995 import case
 from fifesim.ground.landscape.distribution import lai_distribution, treatments
 
 BANDS = ("TM3", "TM4")
 
 
 def test_samples_of_a_folder_are_the_densities_with_their_modes(folders):
-    found = inputs.densities_of(folders["densities"])
+    found = case.densities_of(folders["densities"])
     assert list(found) == treatments()
     density = lai_distribution(found["burned-grazed"])
     middle, low, high = density.pdf([1.1, 0.7, 1.5])
@@ -17,7 +17,7 @@ def test_samples_of_a_folder_are_the_densities_with_their_modes(folders):
 
 
 def test_own_densities_are_the_default():
-    assert inputs.densities_of(None) == {name: name for name in treatments()}
+    assert case.densities_of(None) == {name: name for name in treatments()}
 
 
 def test_missing_density_is_named(folders, tmp_path):
@@ -26,22 +26,22 @@ def test_missing_density_is_named(folders, tmp_path):
     with pytest.raises(
         ValueError, match=r"lacks a file of burned-ungrazed: Table 2 needs burned-grazed\.csv, burned-un"
     ):
-        inputs.densities_of(tmp_path)
+        case.densities_of(tmp_path)
     with pytest.raises(ValueError, match="lacks an entry of burned-ungrazed and unburned-ungrazed"):
-        inputs.densities_of({"burned-grazed": "burned-grazed"})
+        case.densities_of({"burned-grazed": "burned-grazed"})
     with pytest.raises(ValueError, match="unknown treatment 'grazed'"):
-        inputs.densities_of(inputs.densities_of(None) | {"grazed": "burned-grazed"})
+        case.densities_of(case.densities_of(None) | {"grazed": "burned-grazed"})
     with pytest.raises(ValueError, match=r"is no folder: it holds burned-grazed\.csv"):
-        inputs.densities_of(tmp_path / "nowhere")
+        case.densities_of(tmp_path / "nowhere")
 
 
 def test_optics_and_background_of_a_file(folders):
-    optics = inputs.by_band(folders["optics"], BANDS, inputs.OPTICS, "optics")
+    optics = case.optics_by_band(folders["optics"], BANDS, case.OPTICS, "optics")
     assert optics == {"TM3": (0.09, 0.05), "TM4": (0.42, 0.4)}
-    assert inputs.background_of(folders["background"], BANDS) == {"TM3": 0.10, "TM4": 0.16}
-    assert inputs.background_of("soil_dry:0.4 + shade:0.6", BANDS) == {"soil_dry": 0.4, "shade": 0.6}
-    assert inputs.by_band(None, BANDS, inputs.OPTICS, "optics") is None
-    assert inputs.background_of(None, BANDS) is None
+    assert case.background_of(folders["background"], BANDS) == {"TM3": 0.10, "TM4": 0.16}
+    assert case.background_of("soil_dry:0.4 + shade:0.6", BANDS) == {"soil_dry": 0.4, "shade": 0.6}
+    assert case.optics_by_band(None, BANDS, case.OPTICS, "optics") is None
+    assert case.background_of(None, BANDS) is None
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_optics_and_background_of_a_file(folders):
 def test_optics_that_are_not_right_are_one_line(tmp_path, text, said):
     (tmp_path / "mine.csv").write_text(text)
     with pytest.raises(ValueError, match=said) as told:
-        inputs.by_band(tmp_path / "mine.csv", BANDS, inputs.OPTICS, "optics")
+        case.optics_by_band(tmp_path / "mine.csv", BANDS, case.OPTICS, "optics")
     assert "\n" not in str(told.value) and len(str(told.value)) < 500
 
 
@@ -73,7 +73,7 @@ def test_optics_that_are_not_right_are_one_line(tmp_path, text, said):
 )
 def test_background_that_is_not_right_is_named(given, said):
     with pytest.raises(ValueError, match=said):
-        inputs.background_of(given, BANDS)
+        case.background_of(given, BANDS)
 
 
 def test_sensor_without_a_near_infrared_band_is_refused(tmp_path):
@@ -81,5 +81,5 @@ def test_sensor_without_a_near_infrared_band_is_refused(tmp_path):
     text += "[[bands]]\nname = 'red'\ncenter = 0.65\nwidth = 0.04\n"
     (tmp_path / "camera.toml").write_text(text)
     with pytest.raises(ValueError, match="no near infrared band"):
-        inputs.sensor_of(str(tmp_path / "camera.toml"))
-    assert inputs.sensor_of("OLI")[1] == ("OLI4", "OLI5")
+        case.sensor_of(str(tmp_path / "camera.toml"))
+    assert case.sensor_of("OLI")[1] == ("OLI4", "OLI5")

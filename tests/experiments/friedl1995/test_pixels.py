@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from fifesim.chain.setup import image_of
-from fifesim.experiments.friedl1995.case import Case
-from fifesim.experiments.friedl1995.pixels import block_means, ground_of, pixel_values, scene_image
-from fifesim.experiments.friedl1995.readings import READINGS
+from fifesim.experiments.friedl1995.case import READINGS, Case
+from fifesim.experiments.friedl1995.table import ground_of, paired, scene_image, truth_means
+from fifesim.grids import grid as grids
 from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.rasters import grid as grids
 
 SCENE = ("burned-grazed", 0.24, 3)
 
@@ -25,7 +24,7 @@ def test_native_pixels_drift_from_the_truth_by_the_interval(ground):
     case = Case(cells=180)
     native = grids.geobox(scene_image(case, ground))
     assert grids.cell_size(native) == pytest.approx((30.315, 30.315), rel=1e-12)
-    blocks = grids.geobox(block_means(case, ground, ground.lai))
+    blocks = grids.geobox(truth_means(case, ground, ground.lai))
     drift = (native.affine * (15.5, 15.5))[0] - (blocks.affine * (15.5, 15.5))[0]
     assert drift == pytest.approx(15.5 * 0.315, rel=1e-6)
     assert case.drift == pytest.approx((native.shape.x - 1) * 0.315, rel=1e-9)
@@ -54,6 +53,6 @@ def test_pixels_pair_by_row_and_column_without_what_lacks_data(ground):
     truth = ground.lai[:3, :4].copy(deep=True)
     truth[0, 0] = np.nan
     other = ground.lai[:4, :3] * 2
-    values = pixel_values(truth, other)
+    values = paired(truth.values, other.values)
     assert values.shape == (2, 8)
     np.testing.assert_allclose(values[1], 2 * values[0])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE, READINGS, beside, reading_of
+from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, READINGS, beside, reading_of
 from fifesim.sensor.description.instruments import instrument, read_instrument
 
 OTHER = [name for name, reading in READINGS.items() if reading.other_response]

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.experiments.friedl1995.case import case_of
-from fifesim.experiments.friedl1995.readings import ALIGNED, NATIVE
-from fifesim.experiments.friedl1995.table import realise
+from fifesim.experiments.friedl1995.case import ALIGNED, NATIVE, case_of
+from fifesim.experiments.friedl1995.table import realise_scenes
 
 
 def test_dataset_holds_54_numbers_by_realisation_beside_the_papers(found):
@@ -23,7 +22,7 @@ def test_dataset_holds_54_numbers_by_realisation_beside_the_papers(found):
 def slopes(**options):
     """Of one scene, in two readings."""
     case = case_of(cells=90, **options)
-    return realise(case, [1995], [NATIVE, ALIGNED], ["unburned-ungrazed"], [0.15])["slope"].values
+    return realise_scenes(case, [1995], [NATIVE, ALIGNED], ["unburned-ungrazed"], [0.15])["slope"].values
 
 
 @pytest.mark.parametrize("name", ["densities", "optics", "background"])

@@ -8,9 +8,9 @@ import rasterio
 from scipy import stats
 
 from fifesim.experiments.friedl1995 import case as friedl1995
-from fifesim.experiments.friedl1995 import scenarios
+from fifesim.experiments.friedl1995 import reproduction
 from fifesim.experiments.friedl1995.case import case_of
-from fifesim.experiments.friedl1995.pixels import ground_of, scene_image
+from fifesim.experiments.friedl1995.table import ground_of, scene_image
 from fifesim.output.run.folder import simulate_to_folder
 from fifesim.scenario.scenario import read_scenario
 from fifesim.scenario.simulation import simulate
@@ -23,7 +23,7 @@ def read(path):
 
 def test_nine_scenarios_give_the_images_of_the_experiment_to_the_bit(tmp_path):
     case, images = case_of(cells=90), []
-    scenarios.write_scenarios(case, tmp_path, 11)
+    reproduction.write_scenarios(case, tmp_path, 11)
     for treatment, arp in friedl1995.scenes():
         run = simulate(read_scenario(tmp_path / f"{treatment}-{arp:g}" / "scenario.toml"))
         images.append(scene_image(case, ground_of(case, treatment, arp, 11)).values)
@@ -35,7 +35,7 @@ def test_nine_scenarios_give_the_images_of_the_experiment_to_the_bit(tmp_path):
 def one_of_nine(tmp_path, monkeypatch):
     """Folder of one of the nine with its rasters."""
     monkeypatch.setattr(friedl1995, "scenes", lambda: [("burned-ungrazed", 0.24)])
-    scenarios.write_scenarios(case_of(cells=90), tmp_path / "nine", 11, scenes=True)
+    reproduction.write_scenarios(case_of(cells=90), tmp_path / "nine", 11, scenes=True)
     return tmp_path / "nine" / "burned-ungrazed-0.24"
 
 
@@ -78,7 +78,7 @@ def test_inputs_and_readings_are_in_the_scenario(tmp_path, folders, options):
     place = tmp_path / "one"
     place.mkdir()
     scene = ("burned-ungrazed", 0.24, 11)
-    (place / "scenario.toml").write_text(scenarios.scenario_text(case, place, *scene), encoding="utf-8")
+    (place / "scenario.toml").write_text(reproduction.scenario_text(case, place, *scene), encoding="utf-8")
     image = scene_image(case, ground_of(case, *scene, case.land()))
     moved = place.rename(tmp_path / "elsewhere")
     run = simulate(read_scenario(moved / "scenario.toml"))
@@ -88,4 +88,4 @@ def test_inputs_and_readings_are_in_the_scenario(tmp_path, folders, options):
 def test_density_without_a_file_has_no_scenario():
     densities = {name: stats.uniform(0.5, 1.0) for name in friedl1995.treatments()}
     with pytest.raises(ValueError, match="that of burned-grazed is no file"):
-        scenarios.check_named(case_of(densities=densities, cells=90))
+        reproduction.check_named(case_of(densities=densities, cells=90))

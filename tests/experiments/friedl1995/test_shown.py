@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from fifesim.experiments.friedl1995 import shown
-from fifesim.experiments.friedl1995.case import Case
-from fifesim.experiments.friedl1995.pixels import ground_of
-from fifesim.experiments.friedl1995.readings import READINGS
+from fifesim.experiments.friedl1995 import reproduction
+from fifesim.experiments.friedl1995.case import READINGS, Case
+from fifesim.experiments.friedl1995.table import ground_of
 
 
 def test_relation_at_the_ground_is_tight_and_scaling_has_the_papers_sign(found):
@@ -43,17 +42,17 @@ def test_digitising_is_all_that_the_analogue_image_lacks(found):
 
 def test_cells_are_those_of_the_scene():
     case = Case(cells=90, reading=READINGS["offset"])
-    out = shown.shown_scenes(case, [case.reading], 4)
+    out = reproduction.shown_scenes(case, [case.reading], 4)
     np.testing.assert_array_equal(out["cell_lai"].sel(arp=0.15), ground_of(case, "burned-grazed", 0.15, 4).lai)
     assert list(out["reading"].values) == ["offset"]
 
 
 def test_densities_integrate_to_one_and_end_at_their_bounds(folders):
-    own = shown.densities(Case())
+    own = reproduction.densities(Case())
     for values in own:
         known = values.dropna("leaf_area")
         assert np.trapezoid(known, known["leaf_area"]) == pytest.approx(1, abs=0.005)
     ungrazed = own.sel(distribution="burned-ungrazed").dropna("leaf_area")
     assert float(ungrazed["leaf_area"][0]) == pytest.approx(0.475, abs=0.003)
     files = {str(name): str(folders["densities"] / f"{name}.csv") for name in own["distribution"].values}
-    assert shown.densities(Case(densities=files)).sizes == own.sizes
+    assert reproduction.densities(Case(densities=files)).sizes == own.sizes

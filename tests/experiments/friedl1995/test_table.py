@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fifesim.experiments.friedl1995 import fitted
+from fifesim.experiments.friedl1995 import effects
 from fifesim.experiments.friedl1995 import table as friedl1995_table
-from fifesim.experiments.friedl1995.case import Case
-from fifesim.experiments.friedl1995.readings import READINGS
+from fifesim.experiments.friedl1995.case import READINGS, Case
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +40,7 @@ def test_table_2_agrees_with_the_paper(tables):
     """
     native = tables["native"]
     assert list(native.columns[:6]) == ["variable", "distribution", "arp", "intercept", "slope", "r2"]
-    rows = fitted.limits(native, tables["aligned"])
+    rows = effects.limits(native, tables["aligned"])
     assert [row["name"] for row in rows if not row["met"]] == []
 
 
@@ -75,8 +74,8 @@ def test_aligned_pixels_do_not_explain_the_paper(tables):
 def test_readings_share_their_ground():
     """A reading gives the same numbers beside others as by itself."""
     options = {"distributions": ["burned-grazed"], "arps": [0.15]}
-    several = friedl1995_table.realise(Case(cells=90), [5], [READINGS["aligned"], READINGS["narrow"]], **options)
-    alone = friedl1995_table.realise(Case(cells=90, reading=READINGS["narrow"]), [5], **options)
+    several = friedl1995_table.realise_scenes(Case(cells=90), [5], [READINGS["aligned"], READINGS["narrow"]], **options)
+    alone = friedl1995_table.realise_scenes(Case(cells=90, reading=READINGS["narrow"]), [5], **options)
     np.testing.assert_array_equal(several["r2"].sel(reading="narrow"), alone["r2"].sel(reading="narrow"))
     assert (several["r2"].sel(reading="aligned") != several["r2"].sel(reading="narrow")).all()
 

@@ -5,12 +5,12 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.experiments.scatter.blocks import middle_cells, spread_out
-from fifesim.rasters import grid as grids
+from fifesim.experiments.scatter.stages import middle_cells, spread_out
+from fifesim.grids import grid as grids
 
 # Seven cells of 10 m along each axis: two blocks of 30 m, and a cell of none.
 GRID = fifesim.grid_at("EPSG:26914", 707970.0, 4331220.0, 70.0, 70.0, 10.0)
-BLOCKS = grids.aligned(GRID, 30.0)
+BLOCKS = grids.aligned_grid(GRID, 30.0)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from fifesim.cli import app
-from fifesim.experiments.scatter import folder as scatter_run
+from fifesim.experiments.scatter import report as scatter_run
 from fifesim.experiments.scatter import shares as scatter
 from fifesim.experiments.scatter.stages import STAGES
 
@@ -26,7 +26,7 @@ def command(tmp_path, monkeypatch):
 def test_command_writes_table_chart_and_page(command, tmp_path):
     result = command("mine.toml", "-o", "out", "--realisations", 2)
     assert result.exit_code == 0, result.output
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(scatter_run.FILES)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(scatter_run.BUDGET_FILES)
     table = pd.read_csv(tmp_path / "out" / "budget.csv")
     assert set(table["stage"]) == {*STAGES, scatter.CURVATURE, scatter.TOTAL, scatter.VARIATION}
     assert {"stage", "variable", "alone", "alone_error", "share", "share_error"} <= set(table.columns)
@@ -34,11 +34,11 @@ def test_command_writes_table_chart_and_page(command, tmp_path):
     assert page.count("data:image/png;base64,") == 1 and "http" not in page
     total = table[(table["stage"] == "total") & (table["variable"] == "lai")].iloc[0]
     assert f"{100 * total['share']:.1f}" in page
-    first = {name: (tmp_path / "out" / name).read_bytes() for name in scatter_run.FILES}
+    first = {name: (tmp_path / "out" / name).read_bytes() for name in scatter_run.BUDGET_FILES}
     assert command("mine.toml", "-o", "out", "--realisations", 2).exit_code == 2
     again = command("out/scenario.toml", "-o", "again", "--realisations", 2)
     assert again.exit_code == 0, again.output
-    assert {name: (tmp_path / "again" / name).read_bytes() for name in scatter_run.FILES} == first
+    assert {name: (tmp_path / "again" / name).read_bytes() for name in scatter_run.BUDGET_FILES} == first
 
 
 def test_one_realisation_has_no_error(command, tmp_path):
@@ -71,7 +71,7 @@ def test_failure_in_the_middle_leaves_nothing(command, tmp_path, monkeypatch):
     def full(*arguments):
         raise OSError("disk full")
 
-    monkeypatch.setattr(scatter_run.scatter_report, "budget_page", full)
+    monkeypatch.setattr(scatter_run, "budget_page", full)
     result = command("mine.toml", "-o", "out", "--realisations", 1)
     assert result.exit_code == 1 and "disk full" in result.stderr
     assert not (tmp_path / "out").exists()

@@ -9,8 +9,14 @@ from elevations import write
 
 import fifesim
 from fifesim.experiments.scatter import shares as scatter
-from fifesim.experiments.scatter.grounds import PROPERTIES, ground_with, varying
-from fifesim.experiments.scatter.stages import STAGES, pixels, working_stages
+from fifesim.experiments.scatter.stages import (
+    IDEAL_PROPERTIES,
+    STAGES,
+    ground_with,
+    pixels,
+    varying_ground,
+    working_stages,
+)
 from fifesim.scenario.ground import ground_scene
 from fifesim.scenario.scenario import parse_scenario
 
@@ -55,11 +61,11 @@ def whole(everything):
 @pytest.fixture(scope="module")
 def ideal(everything):
     """A function that makes this ground without one property, each once."""
-    return cache(lambda *left_out: ground_with(everything, everything.geobox(), set(PROPERTIES) - set(left_out)))
+    return cache(lambda *left_out: ground_with(everything, everything.geobox(), set(IDEAL_PROPERTIES) - set(left_out)))
 
 
 def test_properties_are_the_last_stages():
-    assert tuple(STAGES)[-len(PROPERTIES) :] == tuple(PROPERTIES)
+    assert tuple(STAGES)[-len(IDEAL_PROPERTIES) :] == tuple(IDEAL_PROPERTIES)
 
 
 @pytest.mark.parametrize(
@@ -81,14 +87,14 @@ def test_properties_are_the_last_stages():
         ({"landscape": {"cover": "voronoi"}, "classes": {"a": {"crown_cover": 0.9}}}, ("clumping",)),
         ({"landscape": {"deviations": {"soil": 0.02}, "covary": {"soil": 0.3}}}, ("soil", "covariance")),
         ({"landscape": {"deviations": {"soil": 0.02}, "covary": {"soil": 0.0}}}, ("soil",)),
-        (ALL, tuple(PROPERTIES)),
+        (ALL, tuple(IDEAL_PROPERTIES)),
     ],
     ids=str,
 )
 def test_what_varies_is_found(sections, found):
     case = case_of(**sections)
-    assert varying(case) == found
-    assert tuple(name for name in working_stages(case) if name in PROPERTIES) == found
+    assert varying_ground(case) == found
+    assert tuple(name for name in working_stages(case) if name in IDEAL_PROPERTIES) == found
 
 
 def test_with_all_at_work_the_ground_is_as_it_is(ideal, whole):
@@ -161,7 +167,7 @@ def test_with_all_at_work_pixels_are_those_of_the_simulation(sections):
     seen, run = pixels(case), fifesim.simulate(case)
     at_work = (1,) * len(seen.stages)
     rows, columns = (min(run[name].sizes[axis] for name in ("truth", "image")) for axis in ("y", "x"))
-    assert set(varying(case)) < set(seen.stages)
+    assert set(varying_ground(case)) < set(seen.stages)
     found = {"ndvi": seen.ndvi} | {name: np.broadcast_to(each, seen.ndvi.shape) for name, each in seen.truth.items()}
     for name, node in (("ndvi", "image"), ("lai", "truth"), ("fpar", "truth")):
         expected = run[node][name].values[:rows, :columns].ravel()
@@ -196,7 +202,7 @@ def test_shares_of_a_landscape_add_up(found):
 
 def test_soil_and_cover_scatter_and_what_does_not_vary_has_exactly_nothing(found):
     case, budget = found
-    assert varying(case) == ("soil", "cover")
+    assert varying_ground(case) == ("soil", "cover")
     for name in ("share", "alone", "first"):
         nothing = budget[name].sel(stage=["dead leaves", "covariance", "clumping", "topography"])
         assert (nothing == 0).all()
@@ -217,6 +223,6 @@ def test_brighter_and_darker_soils_scatter_more():
 def test_realisations_of_a_landscape_have_fields_of_their_own():
     case = case_of(landscape={"deviations": {"soil": 0.05}})
     one, other = (
-        ground_scene(each, each.geobox())["soil"] for each in scatter.realise(case, realisations=2, cells=120)
+        ground_scene(each, each.geobox())["soil"] for each in scatter.budget_cases(case, realisations=2, cells=120)
     )
     assert (one.values != other.values).mean() > 0.99

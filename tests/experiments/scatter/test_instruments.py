@@ -1,5 +1,6 @@
 """The same ground through every instrument."""
 
+import importlib
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,16 @@ import pandas as pd
 import pytest
 
 import fifesim
-from fifesim.experiments.scatter.instruments import KNOWN, compare_instruments, instrument_scenario, window_cells
-from fifesim.sensor.description.responses import knows_blur
+from fifesim.experiments.scatter.shares import instrument_scenario, window_cells
+from fifesim.sensor.description.spatial_response import knows_blur
+
+DOCS = Path(__file__).parents[3] / "docs"
+
+
+@pytest.fixture
+def make_instruments(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    return importlib.import_module("make_instruments")
 
 
 def test_an_instrument_is_flown_with_all_that_is_known_of_it():
@@ -24,9 +33,9 @@ def test_windows_hold_twelve_pixels():
     assert window_cells(instrument_scenario("MODIS")) == 12 * 250 * 3 / 10
 
 
-def test_blur_and_place_take_the_most_from_sentinel_2():
+def test_blur_and_place_take_the_most_from_sentinel_2(make_instruments):
     """At 10 m over burned-grazed ground, beside counts of twelve bits and the noise that they have."""
-    found = compare_instruments(["MSI"], arps=(0.15,), realisations=2)
+    found = make_instruments.compare_instruments(["MSI"], arps=(0.15,), realisations=2)
     assert set(found["instrument"]) == {"MSI"} and found["blur"].all() and found["noise"].all() and found["place"].all()
     shares = found[found["variable"] == "lai"].set_index("stage")["share"]
     parts = shares.drop(["total", "sub-pixel variation"], errors="ignore")
@@ -36,9 +45,9 @@ def test_blur_and_place_take_the_most_from_sentinel_2():
     assert not np.isnan(shares["total"]) and sharp.geolocation == 8.5
 
 
-def test_terms_that_no_source_states_are_unknown_and_so_is_their_total():
+def test_terms_that_no_source_states_are_unknown_and_so_is_their_total(make_instruments):
     """Of OLI the blur is unknown; of HRV blur, noise and place are."""
-    found = compare_instruments(["OLI", "HRV"], arps=(0.15,), realisations=2)
+    found = make_instruments.compare_instruments(["OLI", "HRV"], arps=(0.15,), realisations=2)
     unknown = found[found["share"].isna() & found["alone"].isna()]
     by_name = unknown[unknown["variable"] == "lai"].groupby("instrument")["stage"].agg(set)
     total = {"total", "sub-pixel variation"}
@@ -52,16 +61,16 @@ def test_terms_that_no_source_states_are_unknown_and_so_is_their_total():
     assert known["share"].notna().all() and (known.query("stage == 'quantisation'")["share"] != 0).all()
 
 
-def test_table_of_the_gallery_has_no_number_for_an_unknown_term():
-    table = pd.read_csv(Path(__file__).parents[3] / "docs" / "instruments.csv")
-    complete = table[list(KNOWN.values())].all(axis=1)
+def test_table_of_the_gallery_has_no_number_for_an_unknown_term(make_instruments):
+    table = pd.read_csv(DOCS / "instruments.csv")
+    complete = table[list(make_instruments.KNOWN.values())].all(axis=1)
     hidden = table["stage"].isin(["total", "sub-pixel variation"]) & ~complete
-    for stage, name in KNOWN.items():
+    for stage, name in make_instruments.KNOWN.items():
         hidden |= (table["stage"] == stage) & ~table[name]
     # The ground's own variation has no share that adds up.
     hidden |= table["stage"] == "sub-pixel variation"
     assert (table["share"].isna() == hidden).all() and (table["share_error"].isna() == hidden).all()
-    columns = table.drop_duplicates("instrument").set_index("instrument")[list(KNOWN.values())]
+    columns = table.drop_duplicates("instrument").set_index("instrument")[list(make_instruments.KNOWN.values())]
     for name, known in columns.iterrows():
         own = fifesim.instrument(name)
         bands = own.red_and_near_infrared()

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.experiments.scatter.sensed import images_of
-from fifesim.experiments.scatter.stages import _scene
+from fifesim.experiments.scatter.stages import _scene, images_of
 from fifesim.scenario.scenario import Scenario
 
 IDEAL = ((False,), (False,), (False,), (False,), (False,))

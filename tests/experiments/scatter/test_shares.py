@@ -8,16 +8,15 @@ import rasterio
 
 import fifesim
 from fifesim.experiments.scatter import shares as scatter
-from fifesim.experiments.scatter.grounds import PROPERTIES
-from fifesim.experiments.scatter.stages import STAGES, working_stages
+from fifesim.experiments.scatter.stages import IDEAL_PROPERTIES, STAGES, working_stages
 from fifesim.scenario.scenario import parse_scenario
 
 
 def test_shares_and_curvature_add_up_to_the_scatter(rough):
     found = fifesim.budget(rough, realisations=2)
-    assert (found["share"].drop_sel(stage=list(PROPERTIES)) != 0).all()
+    assert (found["share"].drop_sel(stage=list(IDEAL_PROPERTIES)) != 0).all()
     np.testing.assert_allclose(found["share"].sum("stage") + found["curvature"], found["total"], rtol=1e-12)
-    table = scatter.table(found)
+    table = scatter.budget_table(found)
     for _, rows in table.set_index("stage").groupby("variable"):
         parts = rows.loc[[*STAGES, scatter.CURVATURE], "share"]
         assert parts.sum() == pytest.approx(rows.loc[scatter.TOTAL, "share"], rel=1e-12)
@@ -25,7 +24,7 @@ def test_shares_and_curvature_add_up_to_the_scatter(rough):
 
 def test_stage_that_is_ideal_already_has_exactly_nothing(scenario):
     case = scenario()
-    nothing = ["registration", "noise", "topography", *PROPERTIES]
+    nothing = ["registration", "noise", "topography", *IDEAL_PROPERTIES]
     assert set(STAGES) - set(working_stages(case)) == set(nothing)
     found = fifesim.budget(case, realisations=2)
     for name in ("share", "alone", "first"):
@@ -59,11 +58,11 @@ def test_other_seeds_give_the_same_shares_within_their_errors(scenario):
 
 
 def test_realisations_lie_side_by_side_and_have_seeds_of_their_own(scenario):
-    cases = scatter.realise(fifesim.Scenario(), realisations=4, cells=333, seed=3)
+    cases = scatter.budget_cases(fifesim.Scenario(), realisations=4, cells=333, seed=3)
     corners = {(case.grid.west, case.grid.north) for case in cases}
     assert len(corners) == 4 and [case.ground.seed for case in cases] == [3, 4, 5, 6]
     assert all(case.geobox().shape == (333, 333) for case in cases)
-    one_place = scatter.realise(scenario(), realisations=3, cells=333)
+    one_place = scatter.budget_cases(scenario(), realisations=3, cells=333)
     assert {case.grid.west for case in one_place} == {case.grid.west for case in [scenario()]}
 
 

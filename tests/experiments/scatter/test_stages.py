@@ -5,8 +5,15 @@ import pytest
 
 import fifesim
 from fifesim.experiments.scatter import shares as scatter
-from fifesim.experiments.scatter.grounds import PROPERTIES
-from fifesim.experiments.scatter.stages import STAGES, displaced_pixels, pixels
+from fifesim.experiments.scatter.stages import (
+    IDEAL_PROPERTIES,
+    STAGES,
+    STEP,
+    _Scene,
+    along_tangent,
+    displaced_pixels,
+    pixels,
+)
 
 
 def of(seen, **at_work):
@@ -17,7 +24,7 @@ def of(seen, **at_work):
 def test_all_stages_at_work_are_the_simulation(rough):
     seen = pixels(rough)
     run = fifesim.simulate(rough)
-    assert seen.stages == tuple(name for name in STAGES if name not in PROPERTIES)
+    assert seen.stages == tuple(name for name in STAGES if name not in IDEAL_PROPERTIES)
     rows, columns = (min(run[name].sizes[axis] for name in ("truth", "image")) for axis in ("y", "x"))
     ndvi = run["image"]["ndvi"].values[:rows, :columns]
     found = np.isfinite(ndvi)
@@ -76,3 +83,35 @@ def test_pixels_at_several_displacements_are_those_of_each(rough):
 def test_without_displacement_registration_is_ideal(scenario):
     still, moved = displaced_pixels(scenario(), [(0.0, 0.0), (0.0, 0.5)])
     assert "registration" not in still.stages and "registration" in moved.stages
+
+
+@pytest.mark.parametrize("hills", [False, True])
+def test_plain_arrays_and_labelled_functions_give_the_same_pixels(scenario, monkeypatch, hills):
+    case = scenario(dem="flint-hills" if hills else "flat")
+    plain = pixels(case)
+    monkeypatch.setattr(_Scene, "is_stand", lambda scene, ground: False)
+    labelled = pixels(case)
+    np.testing.assert_array_equal(plain.ndvi, labelled.ndvi)
+    np.testing.assert_array_equal(plain.truth["fpar"], labelled.truth["fpar"])
+
+
+def test_adjacency_is_that_of_the_labelled_chain(scenario):
+    case = scenario()
+    hazy = case.model_copy(update={"atmosphere": case.atmosphere.model_copy(update={"adjacency": True})})
+    reflectance = fifesim.simulate(hazy)["scene"]["surface_reflectance"]
+    expected, without = (
+        fifesim.aggregate(fifesim.ndvi(fifesim.to_toa(reflectance, adjacency=adjacency)), 30).values.ravel()
+        for adjacency in (True, False)
+    )
+    found = of(pixels(hazy), atmosphere=1, **{"non-linearity": 1})
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert np.abs(found - without).max() > 1e-3
+
+
+def test_a_tangent_has_the_value_and_slope_of_the_curve_at_the_middle():
+    """Beer's law, whose derivative is known; a central difference is as near as its step squared."""
+    lai, extinction = np.linspace(0.2, 2.5, 40).reshape(5, 8), 0.7
+    found = along_tangent(lambda area: 1 - np.exp(-extinction * area), lai, np.full(lai.shape, 1.2))
+    left = np.exp(-extinction * 1.2)
+    np.testing.assert_allclose(found, 1 - left + extinction * left * (lai - 1.2), rtol=0, atol=STEP**2 / 10)
+    assert np.ptp(np.diff(found.ravel()) / np.diff(lai.ravel())) < 1e-10

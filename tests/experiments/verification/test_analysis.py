@@ -3,7 +3,7 @@
 import pytest
 from broken import exceeded, notices
 
-from fifesim.analysis import attribution, density, scaling, uncertainty, variogram
+from fifesim.analysis import regression, scaling
 from fifesim.experiments.verification import analysis
 
 
@@ -15,11 +15,11 @@ def test_all_is_well(check):
 @pytest.mark.parametrize(
     ("owner", "kernel", "check"),
     [
-        (uncertainty, "increment_sums", analysis._increments),
-        (variogram, "lag_sums", analysis._lags),
+        (regression, "increment_sums", analysis._increments),
+        (scaling, "lag_sums", analysis._lags),
         (scaling, "ndvi_hessian", analysis._scales),
-        (density, "sample_density", analysis._densities),
-        (attribution, "shapley", analysis._causes),
+        (scaling, "sample_density", analysis._densities),
+        (scaling, "shapley", analysis._causes),
     ],
 )
 def test_production_kernels_are_checked(monkeypatch, owner, kernel, check):

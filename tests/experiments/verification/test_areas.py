@@ -7,11 +7,10 @@ from typer.testing import CliRunner
 import fifesim
 from fifesim.analysis import scaling
 from fifesim.cli import app
-from fifesim.experiments.verification import areas, canopy, listing
-from fifesim.ground.canopy import absorption
-from fifesim.ground.terrain import sky, spline
-from fifesim.sensor.response import calibration
-from fifesim.sensor.scan import track
+from fifesim.experiments.verification import areas, canopy, deviations
+from fifesim.ground.canopy import layers
+from fifesim.ground.terrain import horizon, spline
+from fifesim.sensor.response import calibration, scan
 
 
 def run():
@@ -29,7 +28,7 @@ def test_installation_is_within_all_bounds():
     result = run()
     *lines, last = result.stdout.splitlines()
     assert result.exit_code == 0, last
-    checks = [line for line in lines[1:] if line and line not in listing.STAGES.values()]
+    checks = [line for line in lines[1:] if line and line not in deviations.AREA_STAGES.values()]
     assert last == f"{len(checks)} checks, all within their bounds"
     assert all(any(line.startswith(area) for line in lines) for area in areas.AREAS)
     assert any("6SV1.1" in line for line in lines) and any("prosail" in line for line in lines)
@@ -37,18 +36,18 @@ def test_installation_is_within_all_bounds():
 
 def test_every_area_has_a_stage():
     """In the order of the way of a pixel, so that every stage has one heading."""
-    assert list(listing.STAGES) == list(areas.AREAS)
+    assert list(deviations.AREA_STAGES) == list(areas.AREAS)
 
 
 @pytest.mark.parametrize(
     "area, owner, name, wrong, said",
     [
-        ("canopy", absorption, "extinction_coefficient", 1.01, "canopy: extinction by spherical leaves"),
-        ("terrain", sky, "sky_view", 1.01, "terrain: sky seen from a wide plane"),
-        ("terrain", sky, "sky_view", np.nan, "terrain: sky under a rugged horizon"),
+        ("canopy", layers, "extinction_coefficient", 1.01, "canopy: extinction by spherical leaves"),
+        ("terrain", horizon, "horizon_sky_view", 1.01, "terrain: sky seen from a wide plane"),
+        ("terrain", horizon, "horizon_sky_view", np.nan, "terrain: sky under a rugged horizon"),
         ("terrain", spline, "spline_grid", np.nan, "terrain: wave of six cells"),
         ("sensor", calibration, "gain_offset", 1.01, "sensor: counts of TM's radiances"),
-        ("sensor", track, "growth", 1.01, "sensor: growth of a footprint"),
+        ("sensor", scan, "growth", 1.01, "sensor: growth of a footprint"),
         ("analysis", scaling, "ndvi_hessian", 1.01, "analysis: second derivatives of NDVI"),
     ],
 )
@@ -68,7 +67,7 @@ def test_missing_table_is_one_line_with_exit_code_1(monkeypatch):
         raise FileNotFoundError(f"the data file {name!r} is missing from this installation: reinstall fifesim")
 
     monkeypatch.setattr(areas, "AREAS", {"canopy": (canopy._other_sail,)})
-    monkeypatch.setattr(canopy.datasets, "table", missing)
+    monkeypatch.setattr(canopy.files, "table", missing)
     result = run()
     assert result.exit_code == 1
     assert result.stderr.strip().splitlines() == [

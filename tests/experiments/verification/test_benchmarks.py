@@ -5,9 +5,9 @@ import pytest
 from broken import exceeded
 from typer.testing import CliRunner
 
-from fifesim.atmosphere.air import molecules
-from fifesim.atmosphere.schemes import orders, phase_expansion, stokes
-from fifesim.base import datasets
+from fifesim.atmosphere import column as phase_expansion
+from fifesim.atmosphere import gases, successive_orders
+from fifesim.base import files
 from fifesim.cli import app
 from fifesim.experiments.verification import areas, benchmarks
 
@@ -36,7 +36,7 @@ def test_every_view_of_the_references_is_compared():
     ],
 )
 def test_a_reference_changed_in_one_place_is_named(monkeypatch, check, name, column, row, factor, said):
-    right = datasets.table
+    right = files.table
 
     def wrong(path):
         table = right(path)
@@ -45,7 +45,7 @@ def test_a_reference_changed_in_one_place_is_named(monkeypatch, check, name, col
             table.loc[table.index[row], column] *= factor
         return table
 
-    monkeypatch.setattr(benchmarks.datasets, "table", wrong)
+    monkeypatch.setattr(benchmarks.files, "table", wrong)
     monkeypatch.setattr(areas, "AREAS", {"atmosphere": [check]})
     result = CliRunner().invoke(app, ["verify"])
     assert result.exit_code == 1
@@ -55,15 +55,15 @@ def test_a_reference_changed_in_one_place_is_named(monkeypatch, check, name, col
 @pytest.mark.parametrize("component", [1, 2])
 def test_turned_polarization_is_noticed(monkeypatch, component):
     """The plane of scattering, turned in one of two places: in what is scattered once."""
-    right = stokes._rotation
+    right = successive_orders._rotation
     turned = np.array([1, -1] if component == 2 else [-1, 1])[:, None, None]
-    monkeypatch.setattr(stokes, "_rotation", lambda *given: right(*given) * turned)
+    monkeypatch.setattr(successive_orders, "_rotation", lambda *given: right(*given) * turned)
     assert "IPRT A1b, Q and U" in exceeded(benchmarks._iprt)
 
 
 def test_another_depolarization_is_noticed(monkeypatch):
-    right, own = stokes.mixed_column, {"depolarization": molecules.DEPOLARIZATION}
-    monkeypatch.setattr(stokes, "mixed_column", lambda *given, **options: right(*given, **options | own))
+    right, own = successive_orders.mixed_column, {"depolarization": gases.DEPOLARIZATION}
+    monkeypatch.setattr(successive_orders, "mixed_column", lambda *given, **options: right(*given, **options | own))
     assert "IPRT A1c, Q and U" in exceeded(benchmarks._iprt)
 
 
@@ -73,7 +73,10 @@ def test_matrix_of_spheres_needs_its_diagonal(monkeypatch):
     assert exceeded(benchmarks._iprt) == ["IPRT A3, Q and U"]
 
 
-@pytest.mark.parametrize("owner, kernel", [(stokes, "_from_ground"), (orders, "_rescattered"), (stokes, "fluxes")])
+@pytest.mark.parametrize(
+    "owner, kernel",
+    [(successive_orders, "_from_ground"), (successive_orders, "_rescattered"), (successive_orders, "fluxes")],
+)
 def test_wrong_light_is_noticed(monkeypatch, owner, kernel):
     """By a thousandth."""
     right = getattr(owner, kernel)

@@ -4,7 +4,7 @@ import pytest
 from broken import exceeded, notices
 
 from fifesim.experiments.verification import canopy
-from fifesim.ground.canopy import divided_differences, lai_table
+from fifesim.ground.canopy import interpolation, sail_model
 
 
 @pytest.mark.parametrize("check", canopy.CHECKS)
@@ -15,9 +15,9 @@ def test_all_is_well(check):
 @pytest.mark.parametrize(
     "owner, kernel, check",
     [
-        (divided_differences, "_chains", canopy._chains),
-        (lai_table, "_interpolate", canopy._tables),
-        (lai_table, "_interpolate_over", canopy._tables),
+        (sail_model, "_chains", canopy._chains),
+        (interpolation, "_interpolate", canopy._tables),
+        (interpolation, "_interpolate_over", canopy._tables),
         (canopy, "directional_reflectance", canopy._tables),
         (canopy, "over_background", canopy._orders),
     ],

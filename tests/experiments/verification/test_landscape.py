@@ -4,7 +4,7 @@ import pytest
 from broken import exceeded, notices
 
 from fifesim.experiments.verification import landscape
-from fifesim.ground.landscape import noise
+from fifesim.ground.landscape import autoregression
 
 
 @pytest.mark.parametrize("check", landscape.CHECKS)
@@ -16,7 +16,7 @@ def test_all_is_well(check):
     "owner, kernel, check",
     [
         (landscape, "philox", landscape._generator),
-        (noise, "_fill", landscape._white_noise),
+        (autoregression, "_fill", landscape._white_noise),
         (landscape, "streaming_field", landscape._tiles),
         (landscape, "quantile_map", landscape._quantiles),
         (landscape, "rank_map", landscape._quantiles),

@@ -4,7 +4,7 @@ import pytest
 from broken import exceeded, notices
 
 from fifesim.experiments.verification import scan
-from fifesim.sensor.scan import track
+from fifesim.sensor.response import scan as track
 
 
 @pytest.mark.parametrize("check", scan.CHECKS)

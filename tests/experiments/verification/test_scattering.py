@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from broken import exceeded
 
-from fifesim.atmosphere.schemes import orders, phase_expansion, successive_orders
+from fifesim.atmosphere import column, successive_orders
 from fifesim.experiments.verification import scattering
 
 
@@ -15,12 +15,12 @@ def test_all_is_well(check):
 
 @pytest.mark.parametrize("turned", [(1, 0), (0, 2), (2, -2)])
 def test_turned_wigner_functions_are_noticed(monkeypatch, turned):
-    right = phase_expansion.wigner
+    right = column.wigner
 
     def wigner(order, spin, cosine, count):
         return right(order, spin, cosine, count) * (-1 if (order, spin) == turned else 1)
 
-    monkeypatch.setattr(phase_expansion, "wigner", wigner)
+    monkeypatch.setattr(column, "wigner", wigner)
     assert "Wigner functions" in exceeded(scattering._wigner_functions)
 
 
@@ -33,18 +33,18 @@ def test_turned_wigner_functions_are_noticed(monkeypatch, turned):
 )
 def test_turned_polarization_is_noticed(monkeypatch, name, what):
     """The last column is that of F12."""
-    right = getattr(phase_expansion, name)
-    monkeypatch.setattr(phase_expansion, name, lambda *given: right(*given) * [1, 1, 1, -1])
+    right = getattr(column, name)
+    monkeypatch.setattr(column, name, lambda *given: right(*given) * [1, 1, 1, -1])
     assert what in exceeded(scattering._expansions)
 
 
 @pytest.mark.parametrize(
     "owner, kernel",
     [
-        (orders, "_scattered"),
-        (orders, "_sum_orders"),
-        (orders, "_rescattered"),
-        (orders, "leaving_light"),
+        (successive_orders, "_scattered"),
+        (successive_orders, "_sum_orders"),
+        (successive_orders, "_rescattered"),
+        (successive_orders, "leaving_light"),
         (successive_orders, "once_scattered"),
     ],
 )

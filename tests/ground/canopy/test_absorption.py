@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fifesim.ground.canopy.absorption import FPAR_INF, extinction_coefficient, fpar, green_fpar
-from fifesim.ground.canopy.layers import layers_of
+from fifesim.ground.canopy.layers import FPAR_INF, beer_fpar, extinction_coefficient, green_fpar, leaf_layers
 from fifesim.ground.canopy.sail_model import sail
 
 
@@ -41,24 +40,24 @@ def test_extinction_is_that_of_sail(shape):
 def test_fpar_integrates_the_light_that_each_leaf_layer_takes():
     """Eq. 6 by quadrature of K exp(-K L)."""
     expected = 0.94 * quad(lambda depth: 0.569 * np.exp(-0.569 * depth), 0, 2.5)[0]
-    np.testing.assert_allclose(fpar(2.5, 0.569), expected, rtol=1e-12)
+    np.testing.assert_allclose(beer_fpar(2.5, 0.569), expected, rtol=1e-12)
 
 
 def test_fpar_ends():
-    assert fpar(0.0, 0.5) == 0
-    assert fpar(np.inf, 0.5) == FPAR_INF == 0.94
-    assert fpar(1e4, 0.5, fpar_inf=0.9) == 0.9
+    assert beer_fpar(0.0, 0.5) == 0
+    assert beer_fpar(np.inf, 0.5) == FPAR_INF == 0.94
+    assert beer_fpar(1e4, 0.5, fpar_inf=0.9) == 0.9
 
 
 def test_fpar_of_nan_is_nan_in_its_cell():
-    np.testing.assert_array_equal(np.isnan(fpar([np.nan, 1.0], 0.5)), [True, False])
+    np.testing.assert_array_equal(np.isnan(beer_fpar([np.nan, 1.0], 0.5)), [True, False])
 
 
 @pytest.mark.parametrize("dissociation", [0.0, 0.4, 1.0])
 def test_green_leaves_absorb_their_share_of_each_depth(dissociation):
     """By quadrature: at each depth the light that is left meets green leaves by their share there."""
     lai, brown, extinction = 3.0, 0.4, 0.6
-    layers = layers_of(lai, brown, dissociation)
+    layers = leaf_layers(lai, brown, dissociation)
 
     def taken(depth):
         share = layers.brown if depth < layers.lai else layers.brown_below
@@ -66,6 +65,6 @@ def test_green_leaves_absorb_their_share_of_each_depth(dissociation):
 
     expected = quad(taken, 0, layers.lai)[0] + quad(taken, layers.lai, lai)[0]
     np.testing.assert_allclose(green_fpar(lai, extinction, brown, dissociation), expected, rtol=1e-12)
-    for share, all_of_it in ((0.0, fpar(lai, extinction)), (1.0, 0.0)):
+    for share, all_of_it in ((0.0, beer_fpar(lai, extinction)), (1.0, 0.0)):
         found = green_fpar(lai, extinction, share, dissociation)
         np.testing.assert_allclose(found, all_of_it, rtol=1e-14)

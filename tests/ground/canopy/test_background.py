@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy.background import over_background, reflectance_factor, with_background
-from fifesim.ground.canopy.sail_model import sail
+from fifesim.ground.canopy.sail_model import over_background, reflectance_factor, sail, with_background
 
 RHO = np.linspace(0, 1, 6)[:, None, None]
 SZA = np.array([0, 28.5, 60, 85, 89.9])[:, None]

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.base import datasets
-from fifesim.ground.canopy.background import reflectance_factor, with_background
+from fifesim.base import files
 from fifesim.ground.canopy.crowns import (
     check_crowns,
     clumped,
@@ -13,7 +12,7 @@ from fifesim.ground.canopy.crowns import (
     crowns_over_background,
     lai_in_crowns,
 )
-from fifesim.ground.canopy.sail_model import sail
+from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
 
 COVER = np.array([0, 1e-9, 0.3, 0.8, 1 - 1e-9, 1])
 VIEWS = [(28.5, 0, 0), (28.5, 28.5, 0), (60, 45, 120), (75, 60, 180)]
@@ -87,7 +86,7 @@ def test_terms_of_crowns_are_the_clumped_canopy_over_its_ground(view):
 
 def test_spheres_full_of_leaves_are_nearer_with_crowns_than_without():
     """Another program's spheres, one by one: within 14 %, where a plain canopy is 14 to 36 % too bright."""
-    table = datasets.table("verification/spheres_of_leaves.csv")
+    table = files.table("verification/spheres_of_leaves.csv")
     angles = 20.0, table["vza"].to_numpy(), table["raa"].to_numpy()
     given = {"sza": 20.0, "vza": angles[1], "raa": angles[2], "hotspot": 0.01}
     canopy = sail(lai_in_crowns(2.356, 0.4712), 0.4957, 0.4409, **given)

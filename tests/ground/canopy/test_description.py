@@ -11,30 +11,31 @@ import xarray as xr
 import fifesim
 from fifesim import Canopy
 from fifesim.ground.canopy.description import LEAST_HOTSPOT, TALLGRASS
-from fifesim.ground.canopy.properties import NUMBERS, PROPERTIES
+from fifesim.ground.canopy.properties import NUMERIC_PROPERTIES, PROPERTIES
 from fifesim.scenario.ground import canopy_of
-from fifesim.scenario.ground_keys import ClassKeys, GroundKeys
-from fifesim.scenario.named_keys import find_key
-from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.keys import ClassKeys, GroundKeys
+from fifesim.scenario.scenario import find_key, parse_scenario
 from fifesim.scenario.toml import write_scenario
 
 ROOT = Path(__file__).parents[3]
 TM34 = ["TM3", "TM4"]
 RASTER = xr.DataArray(np.full((2, 3), 0.25), dims=("y", "x"))
-BY_CELL = [name for name, known in NUMBERS.items() if known.by_cell]
+BY_CELL = [name for name, known in NUMERIC_PROPERTIES.items() if known.by_cell]
 
 
 def given_by(canopy):
     return {name: getattr(canopy, name) for name in canopy.given}
 
 
-@pytest.mark.parametrize("name", list(NUMBERS))
+@pytest.mark.parametrize("name", list(NUMERIC_PROPERTIES))
 def test_a_number_may_be_a_limit_and_nothing_beyond(name):
-    low, high = NUMBERS[name].lowest, NUMBERS[name].highest
+    low, high = NUMERIC_PROPERTIES[name].lowest, NUMERIC_PROPERTIES[name].highest
     for value in (low, high, float(low), np.float32(high), np.int64(high)):
         assert getattr(Canopy(**{name: value}), name) == value
     for value in (np.nextafter(float(low), -np.inf), low - 1, high + 1, high * 30, np.inf, -np.inf, np.nan):
-        message = re.escape(f"{name} must be in [{low:g}, {high:g}], got {value:g}: it is the {NUMBERS[name].meaning}")
+        message = re.escape(
+            f"{name} must be in [{low:g}, {high:g}], got {value:g}: it is the {NUMERIC_PROPERTIES[name].meaning}"
+        )
         with pytest.raises(ValueError, match=f"^{message}"):
             Canopy(**{name: value})
 
@@ -53,7 +54,7 @@ def test_a_hot_spot_narrower_than_the_sun_is_refused():
         Canopy(hotspot=0.99 * LEAST_HOTSPOT)
 
 
-@pytest.mark.parametrize("name", list(NUMBERS))
+@pytest.mark.parametrize("name", list(NUMERIC_PROPERTIES))
 def test_what_is_no_number_is_refused_by_name(name):
     raster = r", or an xarray.DataArray over \(y, x\)" if name in BY_CELL else ""
     for value, said in (
@@ -84,7 +85,7 @@ def test_a_raster_is_over_the_cells_and_holds_real_numbers(name):
             Canopy(**{name: RASTER.astype(kind)})
 
 
-@pytest.mark.parametrize("name", sorted(set(NUMBERS) - set(BY_CELL)))
+@pytest.mark.parametrize("name", sorted(set(NUMERIC_PROPERTIES) - set(BY_CELL)))
 def test_what_is_the_same_everywhere_is_no_raster(name):
     with pytest.raises(TypeError, match=rf"^{name} must be a number, got an xarray.DataArray \(y: 2, x: 3\)"):
         Canopy(**{name: RASTER})
@@ -259,17 +260,17 @@ def test_a_class_takes_the_scenes_value_only_where_it_leaves_a_field_open(site, 
         np.testing.assert_array_equal(green.values[cells], absorbed.values[cells])
 
 
-@pytest.mark.parametrize("name", list(NUMBERS))
+@pytest.mark.parametrize("name", list(NUMERIC_PROPERTIES))
 def test_every_number_is_a_key_of_the_ground_and_of_a_class(name):
-    known = NUMBERS[name]
+    known = NUMERIC_PROPERTIES[name]
     for section in (GroundKeys, ClassKeys):
         field = section.model_fields[name]
         limits = {kind: value for each in field.metadata for kind, value in vars_of(each).items()}
         assert (field.default, field.description, section.unit(name)) == (known.default, known.meaning, known.unit)
         assert (limits["ge"], limits["le"]) == (known.lowest, known.highest)
     text = write_scenario(parse_scenario({"classes": {"wood": {name: 0.5}}, "landscape": {"cover": "voronoi"}}))
-    assert f"\n{name} = {known.default}  # {known.unit}; {known.meaning}\n" in text.split("[landscape]")[0]
-    assert f"\n{name} = 0.5  # {known.unit}; {known.meaning}\n" in text.split("[classes.wood]")[1]
+    assert f"\n{name} = {known.default} # {known.unit}; {known.meaning}\n" in text.split("[landscape]")[0]
+    assert f"\n{name} = 0.5 # {known.unit}; {known.meaning}\n" in text.split("[classes.wood]")[1]
     assert find_key(name).name == f"ground.{name}"
     assert find_key(f"classes.wood.{name}").name == f"classes.wood.{name}"
 
@@ -284,13 +285,13 @@ def test_leaf_angles_are_a_key_too():
         assert section.model_fields["leaf_angles"].default == PROPERTIES["leaf_angles"].default
 
 
-@pytest.mark.parametrize("name", list(NUMBERS))
+@pytest.mark.parametrize("name", list(NUMERIC_PROPERTIES))
 def test_keys_out_of_range_are_refused_by_place(name):
     for place, keys in (
         (f"ground.{name}", lambda value: {"ground": {name: value}}),
         (f"classes.wood.{name}", lambda value: {"classes": {"wood": {name: value}}, "landscape": {"cover": "voronoi"}}),
     ):
-        for value in (NUMBERS[name].lowest - 0.5, NUMBERS[name].highest + 0.5):
+        for value in (NUMERIC_PROPERTIES[name].lowest - 0.5, NUMERIC_PROPERTIES[name].highest + 0.5):
             with pytest.raises(ValueError, match=re.escape(f"{place} = {value:g}: must be at ")):
                 parse_scenario(keys(value))
 
@@ -334,6 +335,6 @@ def test_the_table_of_the_howto_is_that_of_the_fields():
     for name, known in PROPERTIES.items():
         meaning, default, limits, raster = shown[name]
         assert meaning == known.meaning
-        if name in NUMBERS:
+        if name in NUMERIC_PROPERTIES:
             found = (float(default), limits, raster == "yes")
             assert found == (known.default, f"{known.lowest:g} to {known.highest:g}", known.by_cell)

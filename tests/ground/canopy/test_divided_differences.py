@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from fifesim.ground.canopy import divided_differences
-from fifesim.ground.canopy.divided_differences import exponential_chain
+from fifesim.ground.canopy import sail_model
+from fifesim.ground.canopy.sail_model import exponential_chain
 
 
 @pytest.mark.parametrize("gap", [0, 1e-12, 1e-6, 0.01, 0.66, 0.67, 0.68, 1, 10, 1000])
@@ -20,7 +20,7 @@ def test_chain_matches_a_triangular_matrix_exponential(gap):
 def test_compiled_chains_stay_within_their_arrays(gap):
     """Beside the same in plain Python, which would notice a place beyond."""
     x, difference, homogeneous = np.sort([-0.9, -0.9 - 3 * gap, -0.3, -0.9]), np.empty(4), np.empty(4)
-    divided_differences._recursion.py_func(x, difference, homogeneous)
+    sail_model._recursion.py_func(x, difference, homogeneous)
     assert 3.0**3 * difference[0] == pytest.approx(exponential_chain(3.0, *(-x / 3)), rel=1e-12)
 
 

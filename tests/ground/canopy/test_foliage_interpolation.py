@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy.background import over_background
 from fifesim.ground.canopy.crowns import crown_shares, crowns_over_background
-from fifesim.ground.canopy.foliage_interpolation import interpolate_crowned, interpolate_foliage
-from fifesim.ground.canopy.foliage_table import LIMIT, crown_table, tabulate_foliage
+from fifesim.ground.canopy.interpolation import (
+    LARGEST_FOLIAGE_LAI,
+    crown_table,
+    interpolate_crowned,
+    interpolate_foliage,
+    tabulate_foliage,
+)
+from fifesim.ground.canopy.sail_model import over_background
 
 
 def terms_of(count, lai, brown):
@@ -18,7 +23,13 @@ def terms_of(count, lai, brown):
 @pytest.fixture(scope="module")
 def cells():
     rng = np.random.default_rng(3)
-    lai = np.concatenate([[0, 0, LIMIT, LIMIT], rng.gamma(1.5, 1.5, 500), rng.uniform(0, LIMIT, 500)])
+    lai = np.concatenate(
+        [
+            [0, 0, LARGEST_FOLIAGE_LAI, LARGEST_FOLIAGE_LAI],
+            rng.gamma(1.5, 1.5, 500),
+            rng.uniform(0, LARGEST_FOLIAGE_LAI, 500),
+        ]
+    )
     brown = np.concatenate([[0, 1, 0, 1], rng.uniform(0, 1, 1000)])
     return lai, brown, rng.uniform(0.1, 1, lai.size), rng.uniform(0, 0.4, (2, lai.size))
 
@@ -40,7 +51,7 @@ def test_terms_of_cells_are_joined_over_their_ground(cells, table):
 def test_crowns_of_cells_are_joined_with_their_gaps(cells, view):
     lai, brown, cover, ground = cells
     cover[:4] = 0, 1, 1, 1
-    lai = np.minimum(lai, 0.99 * LIMIT * cover)
+    lai = np.minimum(lai, 0.99 * LARGEST_FOLIAGE_LAI * cover)
     table = tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
     shares = crown_shares(cover, 0.8, *view)
     of_crowns = cover, shares.sun, shares.view, shares.apart, shares.lit
@@ -62,7 +73,7 @@ def test_leaves_of_one_kind_need_no_axis():
 
 
 def test_no_data_stay_and_what_is_beyond_is_marked(table):
-    lai, brown = np.array([1, np.nan, 1, LIMIT + 1e-9]), np.array([0.2, 0.2, np.nan, 0.2])
+    lai, brown = np.array([1, np.nan, 1, LARGEST_FOLIAGE_LAI + 1e-9]), np.array([0.2, 0.2, np.nan, 0.2])
     found, wrong = interpolate_foliage(table, lai, brown, np.array([[0.1], [0.2]]))
     assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:3]).all() and np.isinf(found[:, 3]).all()
     assert wrong == 0
@@ -70,7 +81,7 @@ def test_no_data_stay_and_what_is_beyond_is_marked(table):
 
 def test_crowns_without_data_stay_and_what_is_beyond_is_marked():
     table = tabulate_foliage(lambda lai, brown: 0.5 * terms_of(8, lai, brown), rate=2.0)
-    lai = np.array([1, np.nan, 1, 1, 1, 0.5 * LIMIT + 1e-9])
+    lai = np.array([1, np.nan, 1, 1, 1, 0.5 * LARGEST_FOLIAGE_LAI + 1e-9])
     brown, cover = np.array([0.2, 0.2, np.nan, 0.2, 0.2, 0.2]), np.array([0.5, 0.5, 0.5, np.nan, 1.5, 0.5])
     found, wrong = interpolate_crowned(table, crown_table(1.0, 30, 0, 0), lai, brown, cover, np.full((2, 1), 0.2))
     assert np.isfinite(found[:, 0]).all() and np.isnan(found[:, 1:5]).all() and np.isinf(found[:, 5]).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fifesim.ground.canopy.crowns import crown_shares
-from fifesim.ground.canopy.foliage_table import crown_table, tabulate_foliage
+from fifesim.ground.canopy.interpolation import crown_table, tabulate_foliage
 
 
 def test_nodes_of_a_table_are_its_function():

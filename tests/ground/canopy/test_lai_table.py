@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy.background import over_background
-from fifesim.ground.canopy.lai_table import LIMIT, interpolate, interpolate_over, tabulate
+from fifesim.ground.canopy.interpolation import LARGEST_TABLE_LAI, interpolate, interpolate_over, tabulate
+from fifesim.ground.canopy.sail_model import over_background
 
 
 def test_tables_meet_their_tolerance_or_say_so():
     table = tabulate(lambda lai: np.stack([np.exp(-5 * lai), lai**2 / (1 + lai**2)]), rate=5.0)
-    lai = np.random.default_rng(2).uniform(0, LIMIT, 10_000)
+    lai = np.random.default_rng(2).uniform(0, LARGEST_TABLE_LAI, 10_000)
     np.testing.assert_allclose(interpolate(table, lai), [np.exp(-5 * lai), lai**2 / (1 + lai**2)], atol=2.5e-7)
     with pytest.raises(ValueError, match="exact=True"):
         tabulate(lambda lai: np.floor(lai)[None], rate=1.0)
@@ -17,7 +17,7 @@ def test_tables_meet_their_tolerance_or_say_so():
 
 def test_outside_a_table_there_is_nothing():
     table = tabulate(lambda lai: np.exp(-lai)[None], rate=1.0)
-    assert np.all(np.isnan(interpolate(table, [np.nan, -1e-9, LIMIT * 1.001, np.inf])))
+    assert np.all(np.isnan(interpolate(table, [np.nan, -1e-9, LARGEST_TABLE_LAI * 1.001, np.inf])))
 
 
 def test_terms_of_a_layer_are_joined_over_each_background():

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from oracles_canopy import sunlit_and_seen
 
-from fifesim.base import datasets
-from fifesim.ground.canopy.background import with_background
-from fifesim.ground.canopy.hot_spot import apart
-from fifesim.ground.canopy.layers import added, layers_of, mixed, two_layers
+from fifesim.base import files
+from fifesim.ground.canopy.layers import added, leaf_layers, mixed, two_layers
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
-from fifesim.ground.canopy.sail_model import sail, scattering
+from fifesim.ground.canopy.sail_model import direction_distance, leaf_scattering, sail, with_background
 
 LAI = np.array([0, 1e-6, 0.5, 3, 20, 100])[:, None]
 BROWN = np.array([0, 1e-9, 0.2, 0.7, 1 - 1e-9, 1])
@@ -36,7 +34,7 @@ def check_equal(found, expected, atol=1e-12):
 
 def test_a_published_model_gives_the_same_reflectances():
     """Its last digit is 1e-7; its leaf angle fractions are good to 1e-8."""
-    for row in datasets.table("verification/two_layers.csv").itertuples():
+    for row in files.table("verification/two_layers.csv").itertuples():
         canopy = two_layers(
             row.lai, row.rho_green, row.tau_green, row.rho_brown, row.tau_brown, brown=row.brown, sza=row.sza,
             dissociation=row.dissociation, vza=row.vza, raa=row.raa, hotspot=row.hotspot,
@@ -82,7 +80,7 @@ def test_a_canopy_over_a_canopy_is_one_over_a_background():
 
 @pytest.mark.parametrize("dissociation", [0.0, 0.5, 1.0])
 def test_layers_hold_all_leaves_of_both_kinds(dissociation):
-    layers = layers_of(LAI, BROWN, dissociation)
+    layers = leaf_layers(LAI, BROWN, dissociation)
     np.testing.assert_allclose(layers.lai + layers.lai_below, LAI + 0 * BROWN, rtol=1e-14)
     dead = layers.lai * layers.brown + layers.lai_below * layers.brown_below
     np.testing.assert_allclose(dead, LAI * BROWN, rtol=1e-12, atol=1e-300)
@@ -92,9 +90,9 @@ def test_hot_spot_goes_through_both_layers():
     """What a hot spot adds to single scattering, with what both beams reach in each layer by quadrature."""
     sza, vza, raa, hotspot, lai, brown = 40.0, 30.0, 20.0, 0.2, 3.0, 0.6
     angles = {"sza": sza, "vza": vza, "raa": raa}
-    c = [scattering(*optics, *angles.values(), leaf_angle_classes("spherical")) for optics in (GREEN, DEAD)]
+    c = [leaf_scattering(*optics, *angles.values(), leaf_angle_classes("spherical")) for optics in (GREEN, DEAD)]
     ks, ko = float(c[0].ks), float(c[0].ko)
-    alpha = 2 * apart(sza, vza, raa) / (hotspot * (ks + ko))
+    alpha = 2 * direction_distance(sza, vza, raa) / (hotspot * (ks + ko))
     seen = sunlit_and_seen(lai, ks, ko, alpha)
     above = sunlit_and_seen((1 - brown) * lai, ks, ko, (1 - brown) * alpha)
     plain = [-np.expm1(-(ks + ko) * depth) / (ks + ko) for depth in (lai, (1 - brown) * lai)]

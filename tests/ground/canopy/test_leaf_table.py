@@ -7,14 +7,16 @@ import pytest
 
 import fifesim
 from fifesim.ground.canopy import optics
-from fifesim.ground.canopy.leaf_table import TOLERANCE, leaf_means
+from fifesim.ground.canopy.optics import LEAF_TOLERANCE, leaf_means
 from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf
 
 BANDS = tuple(band.response for band in fifesim.instrument("TM").select(["TM3", "TM4"]))
 
 
 def one_by_one(leaf, name, values):
-    return np.stack([optics.leaf_optics(BANDS, replace(leaf, **{name: float(value)})) for value in values], axis=-1)
+    return np.stack(
+        [optics.band_leaf_optics(BANDS, replace(leaf, **{name: float(value)})) for value in values], axis=-1
+    )
 
 
 @pytest.mark.parametrize("name", ["structure", *CONTENTS])
@@ -24,7 +26,7 @@ def test_table_of_a_content_is_within_its_bound(name):
     share = np.concatenate([[0, 1], np.random.default_rng(5).uniform(0, 1, 20) ** 4])
     values = np.minimum(low + share * (high - low), high)
     found = leaf_means(BANDS, Leaf(**{name: values}))
-    np.testing.assert_allclose(found, one_by_one(Leaf(), name, values), rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(found, one_by_one(Leaf(), name, values), rtol=0, atol=LEAF_TOLERANCE)
 
 
 def test_exact_leaves_are_those_of_prospect():
@@ -36,20 +38,20 @@ def test_exact_leaves_are_those_of_prospect():
 
 def test_several_contents_are_computed_by_kind_of_leaf(monkeypatch):
     """Equal leaves once, also across blocks, and contents that broadcast."""
-    from fifesim.ground.canopy import leaf_table
+    from fifesim.ground.canopy import optics as leaf_table
 
     asked = []
     spectrum = leaf_table.leaf_spectrum
     monkeypatch.setattr(leaf_table, "_BLOCK", 2)
     monkeypatch.setattr(
-        leaf_table, "leaf_spectrum", lambda leaf, limits: asked.append(leaf.water.size) or spectrum(leaf, limits)
+        leaf_table, "leaf_spectrum", lambda leaf, *limits: asked.append(np.size(leaf.water)) or spectrum(leaf, *limits)
     )
     water, chlorophyll = np.array([0.01, 0.02, 0.01, 0.02]), np.array([[30.0], [50.0], [30.0]])
     found = leaf_means(BANDS, Leaf(water=water, chlorophyll=chlorophyll))
     assert found.shape == (2, 2, 3, 4) and asked == [2, 2]
     for row, column in np.ndindex(3, 4):
         leaf = Leaf(water=float(water[column]), chlorophyll=float(chlorophyll[row, 0]))
-        np.testing.assert_allclose(found[..., row, column], optics.leaf_optics(BANDS, leaf), rtol=1e-12)
+        np.testing.assert_allclose(found[..., row, column], optics.band_leaf_optics(BANDS, leaf), rtol=1e-12)
 
 
 def test_missing_content_is_missing_optics():

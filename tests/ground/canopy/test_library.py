@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.ground.canopy.library import CANOPIES, LEAVES, library_spectra
 
 
@@ -20,7 +20,7 @@ def test_spectra_are_those_of_land():
 def test_library_reaches_from_dark_to_bright_ground():
     wavelength, spectra = library_spectra()
     at = np.argmin(abs(wavelength - 1.65))
-    ground = datasets.table("ground_spectra.csv").set_index("wavelength").loc[1.65]
+    ground = files.table("ground_spectra.csv").set_index("wavelength").loc[1.65]
     assert spectra[:, at].min() < 0.6 * ground.min() and spectra[:, at].max() > 0.8 * ground.max()
 
 

@@ -5,8 +5,7 @@ import pytest
 from oracles_canopy import turned_leaves
 from scipy.linalg import expm
 
-from fifesim.ground.canopy.layers import layers_of
-from fifesim.ground.canopy.light_sharing import light_budget
+from fifesim.ground.canopy.layers import leaf_layers, light_budget
 
 GREEN, DEAD, GROUND = (0.4, 0.3), (0.3, 0.1), 0.25
 
@@ -15,7 +14,7 @@ def followed(lai, brown, dissociation, sza, inclination, beam, sky):
     """Three streams and what leaves of unit absorptance take of them in each layer, by matrix exponentials."""
     sun, *_ = turned_leaves(inclination, sza, 0.0, 0.0)
     ks, bf = sun / np.cos(np.radians(sza)), np.cos(np.radians(inclination)) ** 2
-    layers, through, taken = layers_of(lai, brown, dissociation), np.eye(3), []
+    layers, through, taken = leaf_layers(lai, brown, dissociation), np.eye(3), []
     for depth, dead in ((layers.lai, layers.brown), (layers.lai_below, layers.brown_below)):
         rho, tau = ((1 - dead) * one + dead * other for one, other in zip(GREEN, DEAD, strict=True))
         forward, backward = ([((k + s * bf) * rho + (k - s * bf) * tau) / 2 for k in (ks, 1.0)] for s in (-1, 1))

@@ -4,41 +4,41 @@ import numpy as np
 import pytest
 
 from fifesim.ground.canopy.leaf_area import check_lai
-from fifesim.ground.canopy.optics import background, check_background, check_leaf_optics, leaf_optics
+from fifesim.ground.canopy.optics import band_background, band_leaf_optics, check_background, check_leaf_optics
 
 TM = ["TM1", "TM2", "TM3", "TM4", "TM5", "TM7"]
 
 
 def test_defaults_of_the_paper_are_those_calibrated_to_table_2():
-    reflectance, transmittance = leaf_optics(["TM4", "TM3"])
+    reflectance, transmittance = band_leaf_optics(["TM4", "TM3"])
     np.testing.assert_array_equal(reflectance, [0.45, 0.07])
     np.testing.assert_array_equal(transmittance, [0.42, 0.04])
-    np.testing.assert_array_equal(background(["TM3", "TM4"]), [0.15, 0.19])
+    np.testing.assert_array_equal(band_background(["TM3", "TM4"]), [0.15, 0.19])
 
 
 def test_modelled_bands_look_like_a_green_leaf_over_dry_soil():
     """A green peak, a near infrared plateau, water in the short-wave infrared; soil brightens with wavelength."""
-    reflectance, _ = leaf_optics(TM)
+    reflectance, _ = band_leaf_optics(TM)
     blue, green, red, near, short, shorter = reflectance
     assert red < green < near and blue < green and shorter < short < near
-    assert np.all(np.diff(background(TM)[:5]) > 0)
+    assert np.all(np.diff(band_background(TM)[:5]) > 0)
 
 
 def test_given_optics_are_taken_by_band_or_in_order():
     given = {"B3": (0.1, 0.05), "B4": (0.5, 0.4)}
-    np.testing.assert_array_equal(leaf_optics(["B4"], given), [[0.5], [0.4]])
-    np.testing.assert_array_equal(leaf_optics(["a", "b"], ([0.1, 0.5], [0.05, 0.4])), [[0.1, 0.5], [0.05, 0.4]])
-    np.testing.assert_array_equal(background(["B4"], {"B4": 0.2}), [0.2])
-    np.testing.assert_array_equal(background(["a", "b"], 0.2), [0.2, 0.2])
+    np.testing.assert_array_equal(band_leaf_optics(["B4"], given), [[0.5], [0.4]])
+    np.testing.assert_array_equal(band_leaf_optics(["a", "b"], ([0.1, 0.5], [0.05, 0.4])), [[0.1, 0.5], [0.05, 0.4]])
+    np.testing.assert_array_equal(band_background(["B4"], {"B4": 0.2}), [0.2])
+    np.testing.assert_array_equal(band_background(["a", "b"], 0.2), [0.2, 0.2])
 
 
 def test_results_are_free_to_change():
-    reflectance, _ = leaf_optics(["TM3"])
+    reflectance, _ = band_leaf_optics(["TM3"])
     reflectance[:] = 0
-    assert leaf_optics(["TM3"])[0] == 0.07
+    assert band_leaf_optics(["TM3"])[0] == 0.07
 
 
-@pytest.mark.parametrize("function", [leaf_optics, background])
+@pytest.mark.parametrize("function", [band_leaf_optics, band_background])
 def test_unknown_bands_are_told_what_to_pass(function):
     with pytest.raises(ValueError, match=r"band 'TM33', did you mean 'TM3'\? There are TM1, .*pass its own as {'TM33'"):
         function(["TM33"])
@@ -47,8 +47,11 @@ def test_unknown_bands_are_told_what_to_pass(function):
 @pytest.mark.parametrize(
     "call, message",
     [
-        (lambda: leaf_optics(["a", "b"], ([0.1, 0.2, 0.3], 0.1)), "shape \\(3,\\) for 2 bands"),
-        (lambda: leaf_optics(["a"], {"a": (7, 0.1)}), r"leaf reflectance must be in \[0, 1\], got 7: .* not percent"),
+        (lambda: band_leaf_optics(["a", "b"], ([0.1, 0.2, 0.3], 0.1)), "shape \\(3,\\) for 2 bands"),
+        (
+            lambda: band_leaf_optics(["a"], {"a": (7, 0.1)}),
+            r"leaf reflectance must be in \[0, 1\], got 7: .* not percent",
+        ),
         (lambda: check_leaf_optics([0.1, 0.6], [0.1, 0.5]), "more than 1, got 1.1"),
         (lambda: check_leaf_optics(0.1, -0.1), "leaf transmittance must be in"),
         (lambda: check_leaf_optics(np.nan, 0.1), "got nan"),

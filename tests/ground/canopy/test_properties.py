@@ -6,14 +6,14 @@ import sys
 from pathlib import Path
 from shutil import copytree
 
-from fifesim.ground.canopy.properties import DRAWN, NUMBERS, PROPERTIES
+from fifesim.ground.canopy.properties import DRAWN, NUMERIC_PROPERTIES, PROPERTIES
 
 ROOT = Path(__file__).parents[3]
-BY_CELL = [name for name, known in NUMBERS.items() if known.by_cell]
+BY_CELL = [name for name, known in NUMERIC_PROPERTIES.items() if known.by_cell]
 
 
 def test_numbers_have_these_defaults_and_ranges():
-    known = {name: (each.default, each.lowest, each.highest) for name, each in NUMBERS.items()}
+    known = {name: (each.default, each.lowest, each.highest) for name, each in NUMERIC_PROPERTIES.items()}
     assert known == {
         "hotspot": (0.0, 0, 10),
         "brown": (0.0, 0, 1),
@@ -23,7 +23,7 @@ def test_numbers_have_these_defaults_and_ranges():
         "soil": (0.0, -1, 1),
         "moisture": (0.0, 0, 1),
     }
-    assert set(PROPERTIES) - set(NUMBERS) == {"leaf_optics", "leaf_angles", "brown_leaf", "background"}
+    assert set(PROPERTIES) - set(NUMERIC_PROPERTIES) == {"leaf_optics", "leaf_angles", "brown_leaf", "background"}
     assert set(BY_CELL) == {"brown", "dissociation", "crown_cover", "soil", "moisture"}
     assert {name: each.effect for name, each in DRAWN.items()} == {
         "brown": "dead leaves",
@@ -42,7 +42,7 @@ ONE_MORE = {
 WITH_ONE_MORE = """
 import fifesim
 from fifesim.scenario.ground import canopy_of
-from fifesim.scenario.named_keys import find_key
+from fifesim.scenario.scenario import find_key
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.toml import write_scenario
 
@@ -68,8 +68,8 @@ refused(lambda: parse_scenario({"ground": {"clumping": 0.1}}), "ground.clumping 
 classes = {"a": {"clumping": 0.5}, "b": {}}
 case = parse_scenario({"ground": {"clumping": 0.7}, "landscape": {"cover": "voronoi"}, "classes": classes})
 text = write_scenario(case)
-assert "\\nclumping = 0.7  # 1; clumping index\\n" in text.split("[landscape]")[0]
-assert "\\nclumping = 0.5  # 1; clumping index\\n" in text.split("[classes.a]")[1]
+assert "\\nclumping = 0.7 # 1; clumping index\\n" in text.split("[landscape]")[0]
+assert "\\nclumping = 0.5 # 1; clumping index\\n" in text.split("[classes.a]")[1]
 scene = canopy_of(case)
 assert [each.canopy.over(scene).clumping for each in case.class_table().values()] == [0.5, 0.7]
 assert find_key("clumping").name == "ground.clumping"

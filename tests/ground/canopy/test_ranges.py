@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy.ranges import check_fraction, check_share, within
+from fifesim.ground.canopy.leaf_area import check_fraction, check_share, within
 
 
 def test_fractions_are_told_from_others():

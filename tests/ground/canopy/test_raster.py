@@ -10,12 +10,12 @@ from lazy import ODD_CHUNKS, check_raster_function, in_chunks, no_compute
 import fifesim
 from fifesim import Canopy
 from fifesim.base.geometry import Geometry
-from fifesim.ground.canopy import absorption, raster
-from fifesim.ground.canopy.raster import level_reflectance, reflectance_of_classes
-from fifesim.ground.canopy.rasters.evaluation import BandCanopy, Light
+from fifesim.grids import directions
+from fifesim.grids import grid as grids
+from fifesim.ground.canopy import labels as canopy_labels
+from fifesim.ground.canopy import layers
+from fifesim.ground.canopy.labels import BandCanopy, Light, level_reflectance, reflectance_of_classes
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
-from fifesim.rasters import directions
-from fifesim.rasters import grid as grids
 
 SUN = Geometry(35.0, 120.0, 10.0, 200.0)
 BANDS = [SimpleNamespace(name="TM3", wavelength=0.66), SimpleNamespace(name="TM4", wavelength=0.84)]
@@ -93,9 +93,9 @@ def test_fpar_keeps_its_word_and_equals_the_kernel(lai_with_hole):
         lai_with_hole,
         quantity="fpar",
     )
-    extinction = absorption.extinction_coefficient(SUN.sza, "planophile")
+    extinction = layers.extinction_coefficient(SUN.sza, "planophile")
     np.testing.assert_array_equal(
-        result, absorption.fpar(lai_with_hole.values, extinction=float(extinction), fpar_inf=0.9)
+        result, layers.beer_fpar(lai_with_hole.values, extinction=float(extinction), fpar_inf=0.9)
     )
     np.testing.assert_array_equal(np.isnan(result), np.isnan(lai_with_hole))
 
@@ -126,7 +126,7 @@ def test_negative_leaf_area_raises_when_it_computes(lai, function):
 
 
 def test_each_class_is_its_canopy_alone(lai, cover):
-    made = reflectance_of_classes(lai, cover, BANDS, STANDS, LIGHT, atmosphere="none")
+    made = reflectance_of_classes(lai, cover, BANDS, STANDS, LIGHT, attrs={"atmosphere": "none"})
     for code, stand in STANDS.items():
         alone = level_reflectance(lai, BANDS, stand, LIGHT)
         np.testing.assert_array_equal(made.values[:, cover == code], alone.values[:, cover == code])
@@ -137,8 +137,10 @@ def test_each_class_is_its_canopy_alone(lai, cover):
 def test_classes_of_one_canopy_are_evaluated_together(lai, cover, monkeypatch):
     """What differs by a number, or by another raster of the same values, is not."""
     asked = []
-    real = raster.canopy_kernel
-    monkeypatch.setattr(raster, "canopy_kernel", lambda *args, **given: asked.append(args) or real(*args, **given))
+    real = canopy_labels.canopy_kernel
+    monkeypatch.setattr(
+        canopy_labels, "canopy_kernel", lambda *args, **given: asked.append(args) or real(*args, **given)
+    )
     share = lai.drop_attrs(deep=False) / 10
     alike = STANDS[3]._replace(canopy=Canopy(crown_cover=share, hotspot=0.1))
     for other, kinds in (({}, 1), ({"hotspot": 0.2}, 2), ({"crown_cover": share.copy()}, 2), ({"crown_cover": 0.5}, 2)):

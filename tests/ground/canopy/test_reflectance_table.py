@@ -3,25 +3,24 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.canopy import foliage_table
-from fifesim.ground.canopy.background import reflectance_factor, with_background
+from fifesim.ground.canopy import interpolation
 from fifesim.ground.canopy.crowns import clumped, crown_shares
-from fifesim.ground.canopy.lai_table import LIMIT
+from fifesim.ground.canopy.interpolation import LARGEST_TABLE_LAI
 from fifesim.ground.canopy.layers import two_layers
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes
 from fifesim.ground.canopy.reflectance_table import (
     Scene,
-    canopy_of,
     canopy_reflectance,
     cell_by_cell,
+    cell_canopy,
     decay,
     directional_reflectance,
     leaves_of,
-    reflectance_of,
+    model_reflectance,
     sky_of,
     varied_reflectance,
 )
-from fifesim.ground.canopy.sail_model import sail
+from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
 
 RHO, TAU = np.array([0.07, 0.45, 0.5, 0.0, 0.6, 1.0]), np.array([0.04, 0.42, 0.5, 0.0, 0.4, 0.0])
 SKY, GROUND = np.array([0, 0.1, 0.2, 0.5, 1, 0.3]), np.array([0.15, 0.19, 1, 0, 1, 0.5])
@@ -41,7 +40,7 @@ SCENES = [
 
 def cells():
     rng = np.random.default_rng(8)
-    return np.concatenate([[0, 1e-9, LIMIT], 10 ** rng.uniform(-4, 2, 1500), rng.uniform(0, 8, 1500)])
+    return np.concatenate([[0, 1e-9, LARGEST_TABLE_LAI], 10 ** rng.uniform(-4, 2, 1500), rng.uniform(0, 8, 1500)])
 
 
 def parameters(scene):
@@ -124,23 +123,21 @@ def test_directions_of_each_cell_are_those_of_the_whole_scene_at_them():
     lai, background = rng.gamma(2, 0.5, 12), rng.uniform(0.05, 0.4, (12, 2))
     sza, vza, raa = rng.uniform(0, [[85], [85], [360]], (3, 12))
     vza[5] = np.nan
-    leaf, sky = {"leaf_reflectance": [0.07, 0.45], "leaf_transmittance": [0.04, 0.42]}, np.array([0.2, 0.1])
+    leaf, sky = ([0.07, 0.45], [0.04, 0.42]), np.array([0.2, 0.1])
     shape = {"leaf_angles": "planophile", "hotspot": 0.1}
     angles = {"sza": sza, "vza": vza, "raa": raa}
-    found = directional_reflectance(lai, background=background, diffuse_fraction=sky, **angles, **leaf, **shape)
+    found = directional_reflectance(lai, leaf, background, sky, (sza, vza, raa), **shape)
     for cell in range(12):
         if cell == 5:
             assert np.isnan(found[:, cell]).all()
             continue
         here = {name: angle[cell] for name, angle in angles.items()}
         alone = canopy_reflectance(
-            lai[cell], background=background[cell], diffuse_fraction=sky, exact=True, **here, **leaf, **shape
+            lai[cell], *leaf, background[cell], diffuse_fraction=sky, exact=True, **here, **shape
         )
         np.testing.assert_allclose(found[:, cell], alone, rtol=1e-13)
     with pytest.raises(ValueError, match=r"sza must be in \[0, 90\) degrees in every cell, got 90"):
-        directional_reflectance(
-            lai, background=background, diffuse_fraction=sky, **(angles | {"sza": 90.0}), **leaf, **shape
-        )
+        directional_reflectance(lai, leaf, background, sky, (90.0, vza, raa), **shape)
 
 
 def test_dead_leaves_are_mixed_evenly_unless_said_otherwise():
@@ -157,9 +154,13 @@ def test_dead_leaves_are_mixed_evenly_unless_said_otherwise():
         canopy_reflectance(lai, sza=40.0, vza=20.0, raa=60.0, exact=True, **options, **more)
         for more in ({}, {"dissociation": 0.0})
     )
-    angles = {name: np.full(3, angle) for name, angle in (("sza", 40.0), ("vza", 20.0), ("raa", 60.0))}
     np.testing.assert_array_equal(whole, mixed)
-    np.testing.assert_allclose(directional_reflectance(lai, **angles, **options), whole, rtol=0, atol=1e-12)
+    pairs, dead = (RHO[:2], TAU[:2]), (options["brown_reflectance"], options["brown_transmittance"])
+    towards = [np.full(3, angle) for angle in (40.0, 20.0, 60.0)]
+    found = directional_reflectance(
+        lai, pairs, GROUND[:2], SKY[:2], towards, "spherical", 0.05, dead, shares=(0.4, 0.0, 1.0)
+    )
+    np.testing.assert_allclose(found, whole, rtol=0, atol=1e-12)
 
 
 BOTH_LEAVES = {
@@ -210,7 +211,7 @@ def test_tables_are_within_the_bound_at_the_horizon_and_overhead(varied_cells, v
 
 def test_canopies_beyond_the_table_are_the_models_themselves(varied_cells):
     lai, brown, cover, ground = (each[..., :6].copy() for each in varied_cells)
-    lai[2:4], cover[3] = foliage_table.LIMIT + 1, 1
+    lai[2:4], cover[3] = interpolation.LARGEST_FOLIAGE_LAI + 1, 1
     given = varied_scene(28.5, 0, 0, 0, "spherical", brown=brown, dissociation=0.9, crown_cover=np.maximum(cover, 0.7))
     found, exact = varied_reflectance(lai, ground, given), cell_by_cell(lai, ground, given)
     np.testing.assert_array_equal(found[:, 2:4], exact[:, 2:4])
@@ -227,16 +228,16 @@ LAI, BROWN = np.array([0.5, 2.0, 4.0]), np.array([0.1, 0.4, 0.9])
 
 def test_models_are_those_that_a_scene_needs():
     light = ANGLES | {"hotspot": 0.1}
-    np.testing.assert_array_equal(canopy_of(LAI, PLAIN).rso, sail(LAI, *BY_BAND[:2], **light).rso)
+    np.testing.assert_array_equal(cell_canopy(LAI, PLAIN).rso, sail(LAI, *BY_BAND[:2], **light).rso)
     both = PLAIN._replace(brown_reflectance=DEAD[0], brown_transmittance=DEAD[1], brown=BROWN, dissociation=0.3)
     expected = two_layers(LAI / 0.5, *BY_BAND, brown=BROWN, dissociation=0.3, **light)
     crowns = both._replace(crown_cover=0.5, crown_shape=2.0)
     np.testing.assert_array_equal(leaves_of(LAI / 0.5, both).rso, expected.rso)
     expected = clumped(expected, crown_shares(0.5, 2.0, *ANGLES.values()))
-    np.testing.assert_array_equal(canopy_of(LAI, crowns).rso, expected.rso)
+    np.testing.assert_array_equal(cell_canopy(LAI, crowns).rso, expected.rso)
     surface = with_background(expected, 0.2)
     expected = reflectance_factor(surface.rso, surface.rdo, np.array([[0.2], [0.1]]))
-    np.testing.assert_array_equal(reflectance_of(LAI, np.full((2, 1), 0.2), crowns), expected)
+    np.testing.assert_array_equal(model_reflectance(LAI, np.full((2, 1), 0.2), crowns), expected)
     np.testing.assert_array_equal(cell_by_cell(LAI, np.full((2, 1), 0.2), crowns), expected)
     assert crowns.varies() and not PLAIN.varies()
 

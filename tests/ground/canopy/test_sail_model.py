@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from oracles_canopy import four_streams, sunlit_and_seen, turned_leaves
 
-from fifesim.ground.canopy.background import with_background
 from fifesim.ground.canopy.leaf_angles import LeafAngles, leaf_angle_classes, leaf_projection
-from fifesim.ground.canopy.sail_model import sail, volume_scattering
+from fifesim.ground.canopy.sail_model import sail, volume_scattering, with_background
 
 SHAPES = ["spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform", "90: 1", "0: 1"]
 LAI = np.array([0, 1e-6, 0.01, 0.5, 2, 8, 20, 100])[:, None, None, None]

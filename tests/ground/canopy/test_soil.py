@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.base.bands import Band
 from fifesim.ground.canopy.soil import brightened, soil_line
 
@@ -17,7 +17,7 @@ def narrow(wavelength):
 
 def test_line_leads_from_the_wet_soil_to_the_dry():
     """Of any bands: a walk of one length reaches the dry soil from the wet one in all of them."""
-    table = datasets.table("ground_spectra.csv").set_index("wavelength")
+    table = files.table("ground_spectra.csv").set_index("wavelength")
     places = [0.45, 0.55, 0.66, 0.86, 1.65, 2.2]
     line = soil_line([narrow(place) for place in places])
     steps = (table["soil_dry"] - table["soil_wet"]).loc[places].to_numpy() / line

@@ -5,12 +5,18 @@ import pytest
 from scipy import stats
 
 import fifesim
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.base.bands import Band
-from fifesim.ground.canopy.soil_water import FILM, WaterFilms, grains_in_water, moistened, water_films, wet_soil
+from fifesim.ground.canopy.soil import FILM, WaterFilms, below_film, grains_in_water, moistened, water_films
 
 TM = tuple(band.response for band in fifesim.instrument("TM").select(None))
 DRY = np.linspace(0.02, 0.9, 12)
+
+
+def wet_soil(below, passed, surface, inside):
+    """Reflectance of a soil below one film of water."""
+    up, kept = below_film(below, passed, inside)
+    return surface + (1 - surface) * (1 - inside) * up / kept
 
 
 def narrow(wavelength):
@@ -55,7 +61,7 @@ def test_films_lie_by_chance():
     """The sum over twenty films of Poisson's law in scipy, with the absorption of one wavelength."""
     place = 1.65
     films = water_films((narrow(place),))
-    table = datasets.table("prospect_d.csv")
+    table = files.table("prospect_d.csv")
     absorption = float(np.interp(place, table["wavelength"], table["water"]))
     for moisture in (0.1, 0.5, 1.0):
         counts = np.arange(20)

@@ -47,42 +47,44 @@ def test_default_spectra_meet_the_calibrated_bands():
     """The one leaf and soil that the table of TM bands was modelled with: within .001 and .0006, README.md of data."""
     wavelength, *leaf = leaf_spectrum(fifesim.Leaf())
     means = spectra.band_means(TM, wavelength, leaf)
-    np.testing.assert_allclose(means, optics.leaf_optics(NAMES), rtol=0, atol=1e-3)
-    soil = optics.background(TM, {"soil_dry": 0.475, "shade": 0.525})
-    np.testing.assert_allclose(soil, optics.background(NAMES), rtol=0, atol=6e-4)
+    np.testing.assert_allclose(means, optics.band_leaf_optics(NAMES), rtol=0, atol=1e-3)
+    soil = optics.band_background(TM, {"soil_dry": 0.475, "shade": 0.525})
+    np.testing.assert_allclose(soil, optics.band_background(NAMES), rtol=0, atol=6e-4)
 
 
 def test_tm_keeps_its_table_and_other_bands_have_spectra():
     red = [fifesim.instrument("OLI").bands[3].response]
-    np.testing.assert_array_equal(optics.leaf_optics(TM), optics.leaf_optics(NAMES))
-    np.testing.assert_array_equal(optics.background(TM), optics.background(NAMES))
-    np.testing.assert_array_equal(optics.leaf_optics(red), optics.leaf_optics(red, fifesim.Leaf()))
-    assert 0.05 < optics.leaf_optics(red)[0][0] < 0.08
+    np.testing.assert_array_equal(optics.band_leaf_optics(TM), optics.band_leaf_optics(NAMES))
+    np.testing.assert_array_equal(optics.band_background(TM), optics.band_background(NAMES))
+    np.testing.assert_array_equal(optics.band_leaf_optics(red), optics.band_leaf_optics(red, fifesim.Leaf()))
+    assert 0.05 < optics.band_leaf_optics(red)[0][0] < 0.08
 
 
 def test_mixture_is_linear_in_its_parts():
     parts = {"soil_dry": 0.2, "soil_wet": 0.3, "dead_grass": 0.4, "shade": 0.1}
-    pure = {name: optics.background(TM, {name: 1.0}) for name in parts}
+    pure = {name: optics.band_background(TM, {name: 1.0}) for name in parts}
     expected = sum(share * pure[name] for name, share in parts.items())
-    np.testing.assert_allclose(optics.background(TM, fifesim.Background(parts)), expected, rtol=1e-14)
+    np.testing.assert_allclose(optics.band_background(TM, fifesim.Background(parts)), expected, rtol=1e-14)
     np.testing.assert_array_equal(pure["shade"], 0)
 
 
 def test_a_mapping_of_spectra_is_a_mixture_and_one_of_bands_is_not():
     mixture = {"soil_dry": 0.5, "dead_grass": 0.5}
-    np.testing.assert_array_equal(optics.background(TM, mixture), optics.background(TM, fifesim.Background(mixture)))
-    np.testing.assert_array_equal(optics.background(TM[2:4], {"TM3": 0.1, "TM4": 0.2}), [0.1, 0.2])
+    np.testing.assert_array_equal(
+        optics.band_background(TM, mixture), optics.band_background(TM, fifesim.Background(mixture))
+    )
+    np.testing.assert_array_equal(optics.band_background(TM[2:4], {"TM3": 0.1, "TM4": 0.2}), [0.1, 0.2])
 
 
 def test_names_of_bands_are_bands_although_spectra_have_them_too():
     """Shares of a mixture add up to 1 and reflectances of bands do not: .2 and .3 are no mixture."""
     given = {"soil_dry": 0.2, "dead_grass": 0.3}
-    np.testing.assert_array_equal(optics.background(list(given), given), [0.2, 0.3])
+    np.testing.assert_array_equal(optics.band_background(list(given), given), [0.2, 0.3])
     with pytest.raises(ValueError, match="no background for band 'soil_dry'"):
-        optics.background(["soil_dry", "shade"], {"shade": 0.3})
+        optics.band_background(["soil_dry", "shade"], {"shade": 0.3})
     dry = dataclasses.replace(TM[2], name="soil_dry")
     mixture = {"soil_dry": 0.5, "dead_grass": 0.5}
-    np.testing.assert_array_equal(optics.background([dry], mixture), optics.background(TM[2:3], mixture))
+    np.testing.assert_array_equal(optics.band_background([dry], mixture), optics.band_background(TM[2:3], mixture))
 
 
 def test_own_spectrum_is_a_file_or_a_dataset(tmp_path, lai):
@@ -94,7 +96,7 @@ def test_own_spectrum_is_a_file_or_a_dataset(tmp_path, lai):
     )
     xr.testing.assert_identical(by_file, by_data)
     xr.testing.assert_identical(by_file, by_mixture)
-    red, nir = optics.background(TM[2:4], path)
+    red, nir = optics.band_background(TM[2:4], path)
     # The spectrum is a straight line there: its mean is its value at the sun-weighted wavelength, inside the band.
     assert 0.1 + 0.5 * (0.63 - 0.4) < red < 0.1 + 0.5 * (0.69 - 0.4)
     assert 0.1 + 0.5 * (0.76 - 0.4) < nir < 0.1 + 0.5 * (0.9 - 0.4)
@@ -119,7 +121,7 @@ def test_a_chosen_leaf_reaches_the_canopy(lai):
 )
 def test_impossible_mixture_is_refused(given, message):
     with pytest.raises(ValueError, match=message):
-        optics.background(TM, fifesim.Background(given))
+        optics.band_background(TM, fifesim.Background(given))
 
 
 @pytest.mark.parametrize(
@@ -134,12 +136,12 @@ def test_impossible_mixture_is_refused(given, message):
 )
 def test_unusable_spectrum_is_refused(tmp_path, text, message):
     with pytest.raises(ValueError, match=message):
-        optics.background(TM, written(tmp_path, text))
+        optics.band_background(TM, written(tmp_path, text))
 
 
 def test_spectra_need_responses():
     with pytest.raises(TypeError, match="a Leaf is a spectrum, it needs the bands' responses"):
-        optics.leaf_optics(["TM3"], fifesim.Leaf())
+        optics.band_leaf_optics(["TM3"], fifesim.Leaf())
     with pytest.raises(TypeError, match="Background takes"):
         fifesim.Background(0.2)
 

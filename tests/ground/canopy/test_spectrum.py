@@ -44,7 +44,7 @@ def test_leaf_spectra_are_a_file_or_a_dataset(tmp_path, lai):
         ]
         for other in made[1:]:
             xr.testing.assert_allclose(made[0], other, rtol=1e-12)
-    reflectance, transmittance = optics.leaf_optics(TM[2:4], path)
+    reflectance, transmittance = optics.band_leaf_optics(TM[2:4], path)
     # The spectra are straight lines within the red band: the means are values inside the band.
     assert 0.05 + 0.05 * (0.63 - 0.4) / 0.3 < reflectance[0] < 0.05 + 0.05 * (0.69 - 0.4) / 0.3
     assert 0.01 + 0.04 * (0.63 - 0.4) / 0.3 < transmittance[0] < 0.01 + 0.04 * (0.69 - 0.4) / 0.3

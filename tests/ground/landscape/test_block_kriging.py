@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from oracles_field import covariances
 
-from fifesim.ground.landscape.block_kriging import (
-    block_means,
+from fifesim.ground.landscape.downscaling import (
     by_pixel,
-    densities,
     densities_of_means,
     kriged,
+    kriging_block_means,
     kriging_filter,
     of_means,
+    spectral_densities,
     weighed,
 )
 
@@ -50,10 +50,10 @@ def weights(arp, trend, ratio, shape):
 
 def test_pixels_are_means_of_their_cells():
     pixels = np.arange(6.0).reshape(2, 3)
-    np.testing.assert_array_equal(block_means(by_pixel(pixels, (4, 2)), (4, 2)), pixels)
+    np.testing.assert_array_equal(kriging_block_means(by_pixel(pixels, (4, 2)), (4, 2)), pixels)
     cells = np.arange(24.0).reshape(4, 6)
     np.testing.assert_array_equal(
-        block_means(cells, (2, 3))[0], [(0 + 1 + 2 + 6 + 7 + 8) / 6, (3 + 4 + 5 + 9 + 10 + 11) / 6]
+        kriging_block_means(cells, (2, 3))[0], [(0 + 1 + 2 + 6 + 7 + 8) / 6, (3 + 4 + 5 + 9 + 10 + 11) / 6]
     )
 
 
@@ -79,7 +79,7 @@ def process(arp, cells):
 
 @pytest.mark.parametrize("ratio", [(3, 3), (2, 5), (4, 1)])
 def test_densities_of_means_are_sums_over_those_of_cells(ratio):
-    *both, mean = densities(0.2, ratio, (12, 10))
+    *both, mean = spectral_densities(0.2, ratio, (12, 10))
     for each, found in zip(both, densities_of_means(0.2, ratio, (12, 10)), strict=True):
         np.testing.assert_allclose(found, of_means(each, mean, ratio), rtol=1e-13)
 
@@ -95,7 +95,7 @@ def test_means_of_the_cells_are_the_pixels():
     ratio, shape = (3, 3), (24, 20)
     pixels = np.random.default_rng(1).standard_normal(shape)
     cells = kriged(pixels, kriging_filter(0.15, 0.3, ratio, shape), ratio)
-    np.testing.assert_allclose(block_means(cells, ratio), pixels, rtol=0, atol=2e-6)
+    np.testing.assert_allclose(kriging_block_means(cells, ratio), pixels, rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize("arp", [0.05, 0.15, 0.24])
@@ -120,7 +120,7 @@ def test_slow_waves_have_no_steps_at_borders(arp, trend):
     ratio, shape = (3, 3), (4, 64)
     centres = (np.arange(64 * 3) + 0.5) / 3
     wave = np.broadcast_to(np.sin(2 * np.pi * centres / 32), (12, 192))
-    cells = kriged(block_means(wave, ratio), kriging_filter(arp, trend, ratio, shape), ratio)
+    cells = kriged(kriging_block_means(wave, ratio), kriging_filter(arp, trend, ratio, shape), ratio)
     np.testing.assert_allclose(cells, wave, rtol=0, atol=4e-3)
     steps = np.diff(cells[0], append=cells[0, :1]).reshape(-1, 3)
     inside, across = (steps[:, :2] ** 2).mean(), (steps[:, 2] ** 2).mean()

@@ -10,10 +10,8 @@ from scipy import stats
 from fifesim.ground.canopy.description import Canopy
 from fifesim.ground.canopy.properties import PROPERTIES
 from fifesim.ground.canopy.prospect import Leaf
-from fifesim.ground.canopy.spectra import Background
-from fifesim.ground.canopy.spectrum import Spectrum
-from fifesim.ground.landscape.class_text import read_table, table_text
-from fifesim.ground.landscape.classes import CoverClass
+from fifesim.ground.canopy.spectra import Background, Spectrum
+from fifesim.ground.landscape.classes import CoverClass, read_table, table_text
 from fifesim.ground.landscape.distribution import kernel_density
 
 FULL = CoverClass(

@@ -5,14 +5,14 @@ import pytest
 from oracles_field import covariances
 from scipy import interpolate, stats
 
-from fifesim.ground.landscape.coarse_lattice import TILE, coarse_field, spline_weights
-from fifesim.ground.landscape.field import mixed_field, streaming_field
+from fifesim.ground.landscape.autoregression import mixed_field, streaming_field
+from fifesim.ground.landscape.coarse_lattice import COARSE_TILE, coarse_field, spline_weights
 
 
 @pytest.mark.parametrize("coarser", [2, 3, 4])
 def test_cells_are_splines_of_the_lattice(coarser):
     """scipy's B-splines over the centres of the lattice's cells, scaled."""
-    lattice = mixed_field({7: 1.0}, 0.1, -5, -5, (16, 16), tile=TILE)
+    lattice = mixed_field({7: 1.0}, 0.1, -5, -5, (16, 16), tile=COARSE_TILE)
     place = (np.arange(4 * coarser) + 0.5) / coarser - 0.5
     # Knots lie so that spline k is centred on the cell k - 5.
     basis = interpolate.BSpline(np.arange(-7.0, 13.0), np.eye(16), 3)(place)
@@ -53,7 +53,7 @@ def test_lattice_of_the_ground_is_the_streaming_field():
 
 @pytest.mark.parametrize("coarser", [2, 3, 5])
 def test_windows_are_slices_of_the_whole_across_tiles(coarser):
-    first = TILE * coarser - 31
+    first = COARSE_TILE * coarser - 31
     whole = coarse_field(7, 0.15, coarser, -23, first, (60, 70))
     for row, column, shape in ((0, 0, (1, 1)), (17, 5, (20, 63)), (59, 69, (1, 1)), (22, 28, (8, 9))):
         part = coarse_field(7, 0.15, coarser, row - 23, column + first, shape)
@@ -63,7 +63,7 @@ def test_windows_are_slices_of_the_whole_across_tiles(coarser):
 
 def test_tiles_meet_without_a_seam():
     """Second differences across the border of two tiles are as small as beside it."""
-    edge = TILE * 4 - 2
+    edge = COARSE_TILE * 4 - 2
     field = coarse_field(3, 0.1, 4, 0, edge - 40, (3000, 84))
     bends = np.abs(np.diff(field, 2, axis=1)).mean(axis=0)
     assert bends[36:44].max() < 1.1 * bends.max()

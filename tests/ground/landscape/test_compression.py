@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.landscape.compression import cells_by_class, check_codes, numbers_of
+from fifesim.grids.classes import cells_by_class, check_codes, numbers_of
 
 TABLE = (40, 0, 32764)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fifesim.ground.landscape.correlations import Impossible, largest_share, pairs_of, refused
+from fifesim.ground.landscape.covariance import Impossible, largest_share, pairs_of, refused
 
 FIELDS, GROUND = ["lai", "soil", "moisture"], ["elevation", "wetness"]
 

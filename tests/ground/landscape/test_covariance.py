@@ -10,8 +10,9 @@ from fifesim.ground.landscape.covariance import (
     correlated,
     cross_correlation,
     field_seed,
+    normal_scores,
+    score_table,
 )
-from fifesim.ground.landscape.scores import normal_scores, score_table
 
 ARPS = {"lai": 0.15, "soil": 0.24, "moisture": 0.05}
 

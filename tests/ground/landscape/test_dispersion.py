@@ -5,16 +5,15 @@ import pytest
 from oracles_field import covariances
 from scipy import stats
 
-from fifesim.ground.landscape.block_kriging import block_means
-from fifesim.ground.landscape.dispersion import (
+from fifesim.ground.landscape.autoregression import streaming_field
+from fifesim.ground.landscape.coarse_lattice import (
     deviation_table,
     kept_variance,
     level_deviations,
     pair_correlations,
     pixel_sample,
 )
-from fifesim.ground.landscape.downscaling import LogNormal, Marginal
-from fifesim.ground.landscape.field import streaming_field
+from fifesim.ground.landscape.downscaling import LogNormal, Marginal, kriging_block_means
 
 
 @pytest.mark.parametrize("arp, ratio", [(0.0, (3, 3)), (0.15, (3, 3)), (0.24, (2, 5))])
@@ -28,7 +27,7 @@ def test_means_over_pixels_keep_the_mean_correlation_of_all_pairs(arp, ratio):
 
 def test_means_over_pixels_of_a_field_keep_this_share():
     field = streaming_field(3, 0.15, 0, 0, (1008, 1008))
-    kept = block_means(field, (3, 3)).var() / field.var()
+    kept = kriging_block_means(field, (3, 3)).var() / field.var()
     # 113000 pixels, hardly correlated.
     assert kept == pytest.approx(kept_variance(0.15, (3, 3)), rel=4 * np.sqrt(2 * 1.2 / 113000))
 

@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 from scipy import integrate, stats
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.ground.landscape.distribution import kernel_density, lai_distribution, truncated_normal
 
 SAMPLES = np.random.default_rng(4).gamma(2.0, 0.5, 60)
-ROWS = [pytest.param(row, id=row.treatment) for row in datasets.table("lai_distributions.csv").itertuples()]
+ROWS = [pytest.param(row, id=row.treatment) for row in files.table("lai_distributions.csv").itertuples()]
 
 
 @pytest.mark.parametrize("row", ROWS)

@@ -7,14 +7,19 @@ import pytest
 from oracles_field import covariances
 from scipy import stats
 
-from fifesim.ground.landscape.block_kriging import block_means, by_pixel
-from fifesim.ground.landscape.dispersion import deviation_table, kept_variance, level_deviations
-from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.ground.landscape.downscaling import LogNormal, Marginal, downscaled, fife_variation
-from fifesim.ground.landscape.field import periodic_field
-from fifesim.ground.landscape.map_trends import map_trend
-from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
-from fifesim.ground.landscape.skewed_residuals import Kriging
+from fifesim.ground.landscape.autoregression import periodic_field
+from fifesim.ground.landscape.coarse_lattice import deviation_table, kept_variance, level_deviations
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
+from fifesim.ground.landscape.downscaling import (
+    Kriging,
+    LogNormal,
+    Marginal,
+    by_pixel,
+    downscaled,
+    fife_variation,
+    kriging_block_means,
+    map_trend,
+)
 
 RATIO, SHAPE = (3, 3), (60, 60)
 CELLS = (180, 180)
@@ -90,11 +95,11 @@ def test_cells_of_a_map_of_the_model_vary_as_it_does_inside_of_pixels_and_across
     ground, found = [], []
     for seed in range(20):
         truth = model(periodic_field(100 + seed, arp, cells))
-        pixels = block_means(truth, RATIO)
+        pixels = kriging_block_means(truth, RATIO)
         trend = map_trend(transform.level(pixels), pixels > 0, of_levels, arp, RATIO)
         field = periodic_field(seed, arp, cells).astype(np.float32)
         drawn = downscaled(pixels, field, Kriging.of(arp, trend, RATIO, shape), transform, deviation)
-        np.testing.assert_allclose(block_means(drawn, RATIO), pixels, rtol=1e-12)
+        np.testing.assert_allclose(kriging_block_means(drawn, RATIO), pixels, rtol=1e-12)
         ground.append(semivariances(truth))
         found.append(semivariances(drawn) - ground[-1])
     expected = theory(model, arp)
@@ -108,9 +113,9 @@ def test_variation_within_pixels_is_as_asked():
     kriging, transform, deviation = log_normal(0.15, 0.3)
     model, pixels = model_of_variation(0.15, 0.3), []
     for seed in range(6):
-        means = block_means(model(periodic_field(100 + seed, 0.15, CELLS)), RATIO)
+        means = kriging_block_means(model(periodic_field(100 + seed, 0.15, CELLS)), RATIO)
         cells = downscaled(means, periodic_field(seed, 0.15, CELLS), kriging, transform, deviation)
-        pixels.append(np.ravel(block_means(cells**2, RATIO) / means**2 - 1))
+        pixels.append(np.ravel(kriging_block_means(cells**2, RATIO) / means**2 - 1))
     squared = np.concatenate(pixels)
     error = squared.std() / np.sqrt(squared.size)
     assert abs(squared.mean() - 0.3**2) < 0.005 * 0.3**2 + 3 * error
@@ -123,7 +128,7 @@ def test_map_beside_the_model_keeps_its_means_and_has_no_seams():
     trend = map_trend(np.log(pixels), pixels > 0, log_normal(0.05, 0.1)[2], 0.05, RATIO)
     kriging, transform, deviation = log_normal(0.05, 0.1, trend)
     cells = downscaled(pixels, periodic_field(1, 0.05, CELLS), kriging, transform, deviation)
-    np.testing.assert_allclose(block_means(cells, RATIO), pixels, rtol=1e-12)
+    np.testing.assert_allclose(kriging_block_means(cells, RATIO), pixels, rtol=1e-12)
     logarithm = np.log(cells)
     for axis in (0, 1):
         squared = np.moveaxis((np.roll(logarithm, -1, axis) - logarithm) ** 2, axis, 0)
@@ -142,7 +147,7 @@ def test_no_variation_is_a_smooth_map_of_the_same_means():
 
 def test_pixels_without_leaves_or_data_have_such_cells_and_disturb_few():
     kriging, transform, deviation = log_normal(0.15, 0.3)
-    pixels = block_means(np.exp(0.35 * periodic_field(9, 0.15, CELLS)), RATIO)
+    pixels = kriging_block_means(np.exp(0.35 * periodic_field(9, 0.15, CELLS)), RATIO)
     field = periodic_field(2, 0.15, CELLS)
     whole = downscaled(pixels, field, kriging, transform, deviation)
     holed = pixels.copy()
@@ -151,7 +156,7 @@ def test_pixels_without_leaves_or_data_have_such_cells_and_disturb_few():
     assert np.all(cells[by_pixel(holed == 0, RATIO)] == 0)
     np.testing.assert_array_equal(np.isnan(cells), np.isnan(by_pixel(holed, RATIO)))
     known = holed > 0
-    np.testing.assert_allclose(block_means(np.nan_to_num(cells), RATIO)[known], pixels[known], rtol=1e-12)
+    np.testing.assert_allclose(kriging_block_means(np.nan_to_num(cells), RATIO)[known], pixels[known], rtol=1e-12)
     changed = np.abs(np.log(cells / np.where(cells > 0, whole, np.nan)))
     rows, columns = np.nonzero(changed > 1e-3)
     far = [np.min(np.hypot(*(np.argwhere(~known) - (r // 3, c // 3)).T)) for r, c in zip(rows, columns, strict=True)]
@@ -205,7 +210,7 @@ def test_means_near_the_ends_of_a_distribution_are_met():
     kriging, transform, deviation = of_distribution(0.15, "burned-grazed")
     pixels = np.random.default_rng(1).choice([0.01, 0.7, 2.17], SHAPE)
     cells = downscaled(pixels, periodic_field(1, 0.15, CELLS), kriging, transform, deviation)
-    np.testing.assert_allclose(block_means(cells, RATIO), pixels, rtol=1e-12)
+    np.testing.assert_allclose(kriging_block_means(cells, RATIO), pixels, rtol=1e-12)
     assert cells.min() >= 0 and cells.max() < 2.2 * 1.0015
 
 

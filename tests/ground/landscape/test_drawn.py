@@ -5,7 +5,7 @@ import pytest
 from scipy import integrate
 
 import fifesim
-from fifesim.ground.landscape.drawn import SHARES, Field
+from fifesim.ground.landscape.classes import SHARES, Field
 
 
 @pytest.mark.parametrize("name", SHARES)

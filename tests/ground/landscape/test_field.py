@@ -9,19 +9,22 @@ from scipy.sparse.linalg import spsolve
 import fifesim
 from fifesim.ground.canopy.reflectance_table import canopy_reflectance
 from fifesim.ground.landscape.autoregression import (
+    FIELD_TILE,
     LARGEST_STREAMING_ARP,
     autocorrelation,
     field_variance,
     margin,
+    mixed_field,
+    periodic_field,
     response,
+    streaming_field,
+    white_noise,
+    window_field,
 )
-from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.ground.landscape.field import TILE, mixed_field, periodic_field, streaming_field, window_field
-from fifesim.ground.landscape.noise import white_noise
-from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
 
 ARPS = [0.05, 0.1, 0.15, 0.2, 0.24]
-SIZE = 4 * TILE
+SIZE = 4 * FIELD_TILE
 
 
 def standard_error(arp, cells):
@@ -96,7 +99,7 @@ def test_seams_of_tiles_solve_the_equation(arp):
     cells at arp 0.24. Single precision leaves 3e-7 of the standard deviation rms, 2e-6 at most.
     """
     half, reach = 110, 70
-    first, size = TILE - half, 2 * half
+    first, size = FIELD_TILE - half, 2 * half
     noise = streaming_field(11, 0.0, first, -half, (size, size))
     path = sparse.diags_array([np.ones(size - 1)] * 2, offsets=[-1, 1])
     neighbours = sparse.kronsum(path, path)
@@ -111,11 +114,14 @@ def test_seams_of_tiles_solve_the_equation(arp):
 def test_single_precision_moves_cells_and_reflectances_by_as_little_as_is_said(arp):
     """The same noise on the same torus, filtered in double precision."""
     around = margin(arp)
-    size = fft.next_fast_len(TILE + 2 * around, real=True)
+    size = fft.next_fast_len(FIELD_TILE + 2 * around, real=True)
     noise = white_noise(3, -around, -around, (size, size)).astype(float)
     u = 2 * np.pi * np.fft.fftfreq(size)
     double = np.fft.ifft2(np.fft.fft2(noise) * response(arp, u[:, None], u)).real / np.sqrt(field_variance(arp))
-    double, single = double[around : around + TILE, around : around + TILE], streaming_field(3, arp, 0, 0, (TILE, TILE))
+    double, single = (
+        double[around : around + FIELD_TILE, around : around + FIELD_TILE],
+        streaming_field(3, arp, 0, 0, (FIELD_TILE, FIELD_TILE)),
+    )
     assert np.sqrt(np.mean((single - double) ** 2)) < 3e-7
     np.testing.assert_allclose(single, double, rtol=0, atol=2e-6)
     table = quantile_table(lai_distribution("burned-grazed"))
@@ -129,7 +135,7 @@ def test_single_precision_moves_cells_and_reflectances_by_as_little_as_is_said(a
 @pytest.mark.parametrize("arp", [0.15, LARGEST_STREAMING_ARP])
 def test_window_is_a_slice_of_the_whole(arp):
     """Across tile seams, on both sides of the lattice's origin."""
-    whole = streaming_field(7, arp, -40, TILE - 60, (100, 130))
+    whole = streaming_field(7, arp, -40, FIELD_TILE - 60, (100, 130))
     for row, column, height, width in [
         (0, 0, 100, 130),
         (39, 59, 3, 3),
@@ -137,7 +143,7 @@ def test_window_is_a_slice_of_the_whole(arp):
         (99, 0, 1, 130),
         (7, 11, 60, 90),
     ]:
-        part = streaming_field(7, arp, row - 40, column + TILE - 60, (height, width))
+        part = streaming_field(7, arp, row - 40, column + FIELD_TILE - 60, (height, width))
         np.testing.assert_array_equal(part, whole[row : row + height, column : column + width])
 
 
@@ -187,7 +193,7 @@ def test_streaming_stops_before_its_margin_grows_without_bound():
 
 def test_field_of_mixed_noise_is_the_mixture_of_fields():
     """The filter is linear; single precision rounds each by 3e-7 rms."""
-    window = 0.15, TILE - 20, -30, (50, 60)
+    window = 0.15, FIELD_TILE - 20, -30, (50, 60)
     one, other = (streaming_field(seed, *window) for seed in (7, 8))
     found = mixed_field({7: 0.6, 8: -0.8}, *window)
     np.testing.assert_allclose(found, 0.6 * one - 0.8 * other, rtol=0, atol=5e-6)
@@ -197,5 +203,5 @@ def test_field_of_mixed_noise_is_the_mixture_of_fields():
 @pytest.mark.parametrize("arp", [0.0, 0.15, 0.24])
 def test_window_filtered_by_itself_has_the_cells_of_the_tiles(arp):
     """Across the corner of four tiles."""
-    found = window_field(20, arp, -50, TILE - 40, (90, 70))
-    np.testing.assert_allclose(found, streaming_field(20, arp, -50, TILE - 40, (90, 70)), rtol=0, atol=1e-5)
+    found = window_field(20, arp, -50, FIELD_TILE - 40, (90, 70))
+    np.testing.assert_allclose(found, streaming_field(20, arp, -50, FIELD_TILE - 40, (90, 70)), rtol=0, atol=1e-5)

@@ -5,9 +5,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from fifesim.ground.landscape.block_kriging import block_means
-from fifesim.ground.landscape.field import periodic_field
-from fifesim.ground.landscape.map_trends import map_trend
+from fifesim.ground.landscape.autoregression import periodic_field
+from fifesim.ground.landscape.downscaling import kriging_block_means, map_trend
 
 RATIO, CELLS = (3, 3), (180, 180)
 
@@ -29,7 +28,7 @@ def known(levels):
 def test_map_of_the_process_has_hardly_a_trend(arp):
     """A trend of one half adds 3 % to the variance of second differences, their standard error."""
     for seed in range(5):
-        levels = block_means(0.2 * periodic_field(seed, arp, CELLS), RATIO)
+        levels = kriging_block_means(0.2 * periodic_field(seed, arp, CELLS), RATIO)
         assert map_trend(levels, known(levels), 0.2, arp, RATIO) <= 1.0
 
 
@@ -37,26 +36,26 @@ def test_map_of_the_process_has_hardly_a_trend(arp):
 @pytest.mark.parametrize("strength", [4.0, 16.0])
 def test_trend_is_found_beside_the_process(strength, ratio):
     for seed in range(4):
-        levels = block_means(0.2 * (periodic_field(seed, 0.15, CELLS) + strength * trend(seed, ratio)), ratio)
+        levels = kriging_block_means(0.2 * (periodic_field(seed, 0.15, CELLS) + strength * trend(seed, ratio)), ratio)
         assert map_trend(levels, known(levels), 0.2, 0.15, ratio) == strength
 
 
 def test_gentle_hills_are_known_by_their_wide_differences():
     """Over one pixel they bend by a hundredth of the process."""
-    hills = block_means(np.broadcast_to(np.sin(2 * np.pi * np.arange(180) / 180), CELLS), RATIO)
-    levels = hills + block_means(0.2 * periodic_field(1, 0.15, CELLS), RATIO)
+    hills = kriging_block_means(np.broadcast_to(np.sin(2 * np.pi * np.arange(180) / 180), CELLS), RATIO)
+    levels = hills + kriging_block_means(0.2 * periodic_field(1, 0.15, CELLS), RATIO)
     assert map_trend(levels, known(levels), 0.2, 0.15, RATIO) >= 0.5
     assert map_trend(levels - hills, known(levels), 0.2, 0.15, RATIO) <= 0.25
 
 
 def test_deviations_of_pixels_count_by_their_mean_square():
-    levels = block_means(periodic_field(1, 0.15, CELLS) + 4.0 * trend(1), RATIO)
+    levels = kriging_block_means(periodic_field(1, 0.15, CELLS) + 4.0 * trend(1), RATIO)
     deviation = np.where(np.arange(60) < 30, 0.2, np.sqrt(2 - 0.04)) * known(levels)
     assert map_trend(levels, known(levels), deviation, 0.15, RATIO) == 4.0
 
 
 def test_fences_and_pixels_without_leaves_leave_it_alone():
-    levels = block_means(0.2 * (periodic_field(3, 0.15, CELLS) + 4.0 * trend(3)), RATIO)
+    levels = kriging_block_means(0.2 * (periodic_field(3, 0.15, CELLS) + 4.0 * trend(3)), RATIO)
     fenced = levels + np.where(np.arange(60) < 23, 0.0, 5.0)
     holed = known(levels)
     fenced[20:30, 40:50], holed[20:30, 40:50] = -50.0, False

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fifesim.ground.landscape.noise import _box_muller, philox, white_noise
+from fifesim.ground.landscape.autoregression import _box_muller, philox, white_noise
 
 # kat_vectors of Random123 1.14: counter, key, answer.
 KNOWN = [

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.stats import norm
 
-from fifesim.ground.landscape.patterns import _blocks, _drawn, _fenced, _nearest, pastures, smooth_field, voronoi
+from fifesim.ground.landscape.cover import _blocks, _drawn, _fenced, _nearest, pastures, smooth_field, voronoi
 
 
 @pytest.mark.parametrize("make", [voronoi, pastures])

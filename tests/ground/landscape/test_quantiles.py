@@ -6,9 +6,9 @@ from scipy import stats
 
 import fifesim
 from fifesim.ground.landscape.autoregression import field_variance, response
-from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.ground.landscape.quantiles import (
-    NODES,
+from fifesim.ground.landscape.distribution import (
+    QUANTILE_NODES,
+    lai_distribution,
     quantile_map,
     quantile_map_of_classes,
     quantile_table,
@@ -77,7 +77,11 @@ def test_each_class_has_the_bits_of_its_own_map():
     field, numbers = rng.normal(size=(60, 70)), rng.integers(0, 3, (60, 70)).astype(np.int16)
     field[::7, ::5] = np.nan
     tables = np.stack(
-        [quantile_table(lai_distribution("burned-grazed")), np.full(NODES, 1.1), quantile_table(stats.uniform())]
+        [
+            quantile_table(lai_distribution("burned-grazed")),
+            np.full(QUANTILE_NODES, 1.1),
+            quantile_table(stats.uniform()),
+        ]
     )
     out = quantile_map_of_classes(field, numbers, tables)
     for number in (0, 2):

@@ -11,11 +11,10 @@ from elevations import write
 from lazy import ODD_CHUNKS, check_place, no_compute
 
 import fifesim
-from fifesim.ground.landscape.distribution import lai_distribution
-from fifesim.ground.landscape.field import streaming_field
-from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
-from fifesim.rasters import cf
-from fifesim.rasters import grid as grids
+from fifesim.grids import cf
+from fifesim.grids import grid as grids
+from fifesim.ground.landscape.autoregression import streaming_field
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table
 
 
 def test_scene_is_the_field_mapped_to_the_distribution(site):
@@ -165,7 +164,8 @@ def test_a_map_that_is_named_as_another_quantity_is_refused(tmp_path, name, attr
 @pytest.mark.parametrize("name", ["lai", "Lai_500m", "Leaf area index", "b1", "MOD15A2H Fpar and Lai", None])
 def test_a_map_that_is_named_as_leaf_area_or_not_at_all_is_taken(name):
     with warnings.catch_warnings(action="error", category=UserWarning):
-        fifesim.open_lai(own_map(long_name=str(name), units="m2 m-2").rename(name), WEST)
+        found = fifesim.open_lai(own_map(long_name=str(name), units="m2 m-2").rename(name), WEST)
+    assert found.name == "lai" and found.notnull().any()
 
 
 def test_integers_without_a_scale_are_a_warning(tmp_path):

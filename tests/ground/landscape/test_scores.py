@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fifesim.ground.landscape.scores import add_scores, normal_scores, score_table
+from fifesim.ground.landscape.covariance import add_scores, normal_scores, score_table
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fifesim.ground.landscape.block_kriging import block_means, by_pixel, kriged
-from fifesim.ground.landscape.downscaling import LogNormal, Marginal
-from fifesim.ground.landscape.skewed_residuals import Kriging, residual_shift
+from fifesim.ground.landscape.downscaling import (
+    Kriging,
+    LogNormal,
+    Marginal,
+    by_pixel,
+    kriged,
+    kriging_block_means,
+    residual_shift,
+)
 
 RATIO, SHAPE = (1, 2), (60, 60)
 
@@ -44,7 +50,7 @@ def test_residuals_have_the_density_that_a_known_mean_leaves_them(level, ratio):
     for _ in range(2):
         known = sign * level + offset - np.log(np.cosh(inside))
         shift = residual_shift(cells, known, shift, kriging, LogNormal(), deviation)
-        inside = (cells + shift - by_pixel(block_means(cells + shift, RATIO), RATIO))[:, ::2]
+        inside = (cells + shift - by_pixel(kriging_block_means(cells + shift, RATIO), RATIO))[:, ::2]
     found = np.mean(inside[sign == 1] ** 2) / np.mean(own[sign == 1] ** 2)
     # Of third order in the bend; one shift alone is 0.03 off for the lower level.
     assert found == pytest.approx(expected, abs=0.004)
@@ -56,7 +62,7 @@ def test_shift_is_the_gradient_of_the_density_by_matrices(arp, trend):
     ratio, shape, bend, step = (2, 2), (6, 6), 0.02, 1e-4
     kriging, cells = Kriging.of(arp, trend, ratio, shape), (12, 12)
     estimate = matrix(lambda pixels: kriged(pixels, kriging.response, ratio), shape).astype(float)
-    mean = matrix(lambda field: block_means(field, ratio), cells)
+    mean = matrix(lambda field: kriging_block_means(field, ratio), cells)
     precision = matrix(lambda pixels: np.fft.irfft2(np.fft.rfft2(pixels) * kriging.precision, s=shape), shape)
     covariance = matrix(lambda field: np.fft.irfft2(np.fft.rfft2(field) * kriging.process, s=cells), cells)
     rng = np.random.default_rng(2)
@@ -96,7 +102,7 @@ def test_shift_is_the_gradient_of_the_density_by_matrices(arp, trend):
 def test_straight_functions_need_no_shift():
     """Means of a normal distribution say nothing of residuals; nor is there anything to shift without variation."""
     kriging, field = Kriging.of(0.15, 0.0, (3, 3), (20, 20)), np.random.default_rng(1).standard_normal((60, 60))
-    known = block_means(field, (3, 3))
+    known = kriging_block_means(field, (3, 3))
     normal = Marginal.of(stats.norm(10.0, 0.5), 0.3)
     assert np.abs(residual_shift(field, known, np.float32(0.0), kriging, normal, 1.0)).max() < 1e-3
     skewed = Marginal.of(stats.gamma(2.0), 0.3)
@@ -117,7 +123,7 @@ def test_shift_is_one_standard_deviation_at_most():
 def test_what_lies_far_off_says_nothing():
     """The level of a pixel beyond the margin of a tile moves residuals by less than a thousandth."""
     kriging, field = Kriging.of(0.2, 0.0, (3, 3), (60, 60)), np.random.default_rng(1).standard_normal((180, 180))
-    known = block_means(field, (3, 3))
+    known = kriging_block_means(field, (3, 3))
     moved = known + np.where(np.arange(60) < 12, 1.0, 0.0)
     here, there = (
         residual_shift(0.3 * field, 0.3 * each, np.float32(0.0), kriging, LogNormal(), 0.3) for each in (known, moved)
@@ -130,7 +136,7 @@ def test_shift_where_the_deviation_differs_is_that_of_each():
     """Well inside of two halves, what it is where the deviation is the same in all."""
     kriging, field = Kriging.of(0.1, 0.0, (3, 3), (40, 40)), np.random.default_rng(1).standard_normal((120, 120))
     deviation = np.where(np.arange(120) < 60, 0.2, 0.5) * np.ones((120, 120))
-    known = block_means(deviation * np.random.default_rng(2).standard_normal((120, 120)), (3, 3))
+    known = kriging_block_means(deviation * np.random.default_rng(2).standard_normal((120, 120)), (3, 3))
     both = residual_shift(deviation * field, known, np.float32(0.0), kriging, LogNormal(), deviation)
     for each, inside in ((0.2, slice(24, 36)), (0.5, slice(84, 96))):
         alone = residual_shift(each * field, known, np.float32(0.0), kriging, LogNormal(), each)

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from fifesim.ground.terrain.between_places import bilinear
+from fifesim.ground.terrain.slope import bilinear
 
 
 def test_values_are_those_of_a_linear_interpolation():

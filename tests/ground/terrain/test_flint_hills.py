@@ -15,7 +15,7 @@ SEEDS = range(1, 13)
 def landscapes():
     """Twelve landscapes of 27 km2 at 10 m, one for each seed."""
     northing, easting = 4.33e6 - CELL * np.arange(SIZE), 7.1e5 + CELL * np.arange(SIZE)
-    return [flint_hills.elevation(seed, northing, easting) for seed in SEEDS]
+    return [flint_hills.hills_elevation(seed, northing, easting) for seed in SEEDS]
 
 
 def means_30m(values):
@@ -110,7 +110,7 @@ def test_water_finds_its_way(landscapes):
 
 def test_surface_is_smooth_at_the_scale_of_fine_cells():
     """Where cells halve, second differences fall to a quarter."""
-    fine = flint_hills.elevation(3, 4.3e6 - 1.0 * np.arange(400), 7e5 + 1.0 * np.arange(400))
+    fine = flint_hills.hills_elevation(3, 4.3e6 - 1.0 * np.arange(400), 7e5 + 1.0 * np.arange(400))
     coarse, half = (np.abs(np.diff(fine[::step, ::step], 2, axis=0)).mean() for step in (2, 1))
     assert half == pytest.approx(coarse / 4, rel=0.02)
 
@@ -119,32 +119,32 @@ def test_window_is_a_slice_of_the_whole():
     """Across tiles of the lattice, uplands, and the origin of the reference system."""
     for north, east in ((4.3e6, 7e5), (200.0, -300.0)):
         northing, easting = north - 10 / 3 * np.arange(150), east + 10 / 3 * np.arange(170)
-        whole = flint_hills.elevation(7, northing, easting)
+        whole = flint_hills.hills_elevation(7, northing, easting)
         for rows, columns in (
             (slice(0, 1), slice(0, 1)),
             (slice(60, 150), slice(3, 99)),
             (slice(149, 150), slice(40, 170)),
         ):
             np.testing.assert_array_equal(
-                flint_hills.elevation(7, northing[rows], easting[columns]), whole[rows, columns]
+                flint_hills.hills_elevation(7, northing[rows], easting[columns]), whole[rows, columns]
             )
 
 
 def test_tiles_and_uplands_meet_without_a_seam():
     """A kilometre across the edge of a tile, every metre; and 20 km across many uplands: no step in slope."""
-    seam = flint_hills.TILE * flint_hills.STEP
-    profile = flint_hills.elevation(5, np.array([40.0]), seam - 500 + np.arange(1000.0))[0]
+    seam = flint_hills.HILLS_TILE * flint_hills.HILLS_STEP
+    profile = flint_hills.hills_elevation(5, np.array([40.0]), seam - 500 + np.arange(1000.0))[0]
     curvature = np.abs(np.diff(profile, 2))
     assert curvature[480:520].max() <= curvature.max()
     assert curvature.max() < 0.05
-    long = flint_hills.elevation(5, np.array([40.0]), np.arange(0, 20000, 5.0))[0]
+    long = flint_hills.hills_elevation(5, np.array([40.0]), np.arange(0, 20000, 5.0))[0]
     assert np.abs(np.diff(long)).max() < 5 * np.tan(np.radians(35))
 
 
 def test_seeds_give_unrelated_hills():
     """A square of 6 km holds few independent elevations; the same hills would correlate by 1."""
     northing, easting = 4.3e6 - 100.0 * np.arange(60), 7e5 + 100.0 * np.arange(60)
-    fields = [flint_hills.elevation(seed, northing, easting).ravel() for seed in (0, 1, 2**63 - 1)]
+    fields = [flint_hills.hills_elevation(seed, northing, easting).ravel() for seed in (0, 1, 2**63 - 1)]
     assert np.abs(np.corrcoef(fields) - np.eye(3)).max() < 0.7
 
 
@@ -185,4 +185,4 @@ def test_the_land_around_has_the_elevation_of_its_cells():
     row, column = 28 * (rows[0] // 28) - 7, 28 * (columns[0] // 28) - 11
     found = flint_hills.elevation_around(5, (30.0, 29.6), row, column, (20, 30))
     northing, easting = -30.0 * (row + np.arange(20) + 0.5), 29.6 * (column + np.arange(30) + 0.5)
-    np.testing.assert_array_equal(found, flint_hills.elevation(5, northing, easting))
+    np.testing.assert_array_equal(found, flint_hills.hills_elevation(5, northing, easting))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fifesim.ground.terrain import gaps
+from fifesim.ground.terrain import spline
 
 
 def plane(shape=(80, 90)):
@@ -14,24 +14,24 @@ def test_plane_goes_on_past_its_edge():
     values = plane()
     known = values.copy()
     known[:, 60:], known[:12], known[60:, 20:40] = np.nan, np.nan, np.nan
-    out = gaps.extend(known, 20, rest=False)
+    out = spline.extend(known, 20, rest=False)
     found = np.isfinite(out)
     assert found[:, :79].all()
     np.testing.assert_allclose(out[found], values[found], rtol=0, atol=1e-9)
-    assert np.isfinite(gaps.extend(known, 2)).all()
+    assert np.isfinite(spline.extend(known, 2)).all()
 
 
 def test_nothing_known_stays_unknown():
     nothing = np.full((5, 5), np.nan)
-    assert np.isnan(gaps.extend(nothing, 3)).all()
-    assert np.isnan(gaps.fill_gaps(nothing, (3, 3))).all()
+    assert np.isnan(spline.extend(nothing, 3)).all()
+    assert np.isnan(spline.fill_gaps(nothing, (3, 3))).all()
 
 
 def test_holes_in_a_plane_are_filled_by_the_plane():
     values = plane()
     known = values.copy()
     known[20:27, 30:33], known[40, 50], known[43:47, 47:53] = np.nan, np.nan, np.nan
-    np.testing.assert_allclose(gaps.fill_gaps(known, (4, 4)), values, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(spline.fill_gaps(known, (4, 4)), values, rtol=0, atol=1e-8)
 
 
 def test_least_bending_is_smooth_across_a_hole():
@@ -40,7 +40,7 @@ def test_least_bending_is_smooth_across_a_hole():
     values = np.sin(2 * np.pi * columns / 28) * np.cos(2 * np.pi * rows / 40)
     known = values.copy()
     known[26:33, 26:33] = np.nan
-    np.testing.assert_allclose(gaps.fill_gaps(known, (4, 4)), values, rtol=0, atol=0.02)
+    np.testing.assert_allclose(spline.fill_gaps(known, (4, 4)), values, rtol=0, atol=0.02)
 
 
 def test_a_hole_is_a_hole_wherever_it_lies():
@@ -52,22 +52,22 @@ def test_a_hole_is_a_hole_wherever_it_lies():
         known[corner[0] : corner[0] + 3, corner[1] : corner[1] + 3] = np.nan
         by_bending = values.copy()
         hole = np.isnan(known)
-        by_bending[hole] = gaps._least_bending(known, hole)
-        np.testing.assert_allclose(gaps.fill_gaps(known, (2, 2)), by_bending, rtol=0, atol=1e-9)
+        by_bending[hole] = spline._least_bending(known, hole)
+        np.testing.assert_allclose(spline.fill_gaps(known, (2, 2)), by_bending, rtol=0, atol=1e-9)
         for axis in (0, 1):
-            turned = np.flip(gaps.fill_gaps(np.flip(known, axis), (2, 2)), axis)
+            turned = np.flip(spline.fill_gaps(np.flip(known, axis), (2, 2)), axis)
             np.testing.assert_allclose(turned, by_bending, rtol=0, atol=1e-9)
 
 
 def test_larger_holes_are_left_but_for_their_edge():
     known = plane()
     known[20:60, 20:60] = np.nan
-    out = gaps.fill_gaps(known, (3, 3))
+    out = spline.fill_gaps(known, (3, 3))
     assert np.isnan(out[23:57, 23:57]).all()
     assert np.isfinite(out[20:23, 20:60]).all()
 
 
 def test_block_means_of_a_plane_are_its_middles():
-    means = gaps.block_means(plane((12, 9)), 4, 3)
+    means = spline.block_means(plane((12, 9)), 4, 3)
     np.testing.assert_allclose(means, [[403 + 9 * j - 3 - 8 * i for j in range(3)] for i in range(3)], rtol=1e-12)
-    assert np.isnan(gaps.block_means(np.where(plane((4, 4)) == 400, np.nan, 1.0), 2, 2)[0, 0])
+    assert np.isnan(spline.block_means(np.where(plane((4, 4)) == 400, np.nan, 1.0), 2, 2)[0, 0])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fifesim.ground.terrain import light as lights
+from fifesim.ground.terrain import slope as lights
 
 
 def test_directions_point_where_angles_say():

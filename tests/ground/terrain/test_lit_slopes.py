@@ -7,9 +7,8 @@ from oracles_terrain import hills, plane, plane_gradient
 from fifesim.base.geometry import Geometry
 from fifesim.ground.terrain import horizon as horizons
 from fifesim.ground.terrain import lit_slopes as lights
-from fifesim.ground.terrain.light import topographic_factor
-from fifesim.ground.terrain.sky import sky_vector, sky_view, terrain_view
-from fifesim.ground.terrain.slope import gradient
+from fifesim.ground.terrain.horizon import horizon_sky_view, horizon_terrain_view, sky_vector
+from fifesim.ground.terrain.slope import gradient, topographic_factor
 
 AZIMUTHS = horizons.azimuths(32)
 
@@ -31,7 +30,7 @@ def light_of(dem, cell, geometry, reach=500.0):
 
 
 def kt_of(light, rho, geometry, direct=0.7, total=0.9):
-    ct = terrain_view(light.sky_view, light.cosine)
+    ct = horizon_terrain_view(light.sky_view, light.cosine)
     return topographic_factor(light.sky_view, ct, rho, light.mu_s_local, geometry.mu_s, direct, total)
 
 
@@ -46,7 +45,7 @@ def test_kernel_on_planes_is_the_formulas():
     for slope, aspect in ((0, 0), (15, 80), (40, 250), (60, 300)):
         light = light_of(plane((12, 14), 10.0, 10.0, slope, aspect), 10.0, geometry)
         mu_s, mu_v = (max(cosine(slope, aspect, *toward), 0.0) for toward in ((50.0, 110.0), (20.0, 300.0)))
-        sky = sky_view(np.zeros(32), AZIMUTHS, *plane_gradient(slope, aspect))
+        sky = horizon_sky_view(np.zeros(32), AZIMUTHS, *plane_gradient(slope, aspect))
         wanted = [np.cos(np.radians(slope)), sky, mu_s, mu_v / np.cos(np.radians(20.0))]
         for found, value, tolerance in zip(light, wanted, (1e-12, 2e-4, 1e-12, 1e-12), strict=True):
             np.testing.assert_allclose(found, value, rtol=0, atol=tolerance)

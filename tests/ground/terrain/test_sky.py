@@ -5,14 +5,14 @@ import pytest
 from oracles_terrain import dozier, hills, plane, plane_gradient
 
 from fifesim.ground.terrain import horizon as horizons
-from fifesim.ground.terrain.sky import sky_factor, sky_vector, sky_view, terrain_view
+from fifesim.ground.terrain.horizon import horizon_sky_view, horizon_terrain_view, sky_factor, sky_vector
 from fifesim.ground.terrain.slope import Vector, slope_aspect
 
 
 def sky_of(slope, aspect, horizon):
     """Sky factor of slopes under a horizon of zenith angles [degree]."""
     directions = np.arange(len(horizon)) * (360 / len(horizon))
-    return sky_view(horizons.tangent(horizon), directions, *plane_gradient(slope, aspect))
+    return horizon_sky_view(horizons.tangent(horizon), directions, *plane_gradient(slope, aspect))
 
 
 @pytest.mark.parametrize("count", [16, 17, 32])
@@ -107,7 +107,7 @@ def test_spherical_pit_on_a_raster(depth):
     # The rim is cut by cells, which single directions see.
     np.testing.assert_allclose(found[inside], 1 - depth / 2, rtol=0.012)
     # What the land takes: in the pit as much as it hides of the sky above its own plane.
-    view = terrain_view(found, np.cos(np.radians(slope)))
+    view = horizon_terrain_view(found, np.cos(np.radians(slope)))
     np.testing.assert_allclose(view[inside], ((1 + np.cos(np.radians(slope))) / 2)[inside] - 1 + depth / 2, atol=0.012)
 
 

@@ -65,4 +65,4 @@ def test_component_along_the_normal_is_that_of_vectors():
 
 def test_angles_and_gradient_are_inverse():
     slope, aspect = np.array([0.5, 45.0, 80.0]), np.array([359.0, 180.0, 37.0])
-    np.testing.assert_allclose(terrain.angles(*plane_gradient(slope, aspect)), [slope, aspect], rtol=1e-12)
+    np.testing.assert_allclose(terrain.slope_angles(*plane_gradient(slope, aspect)), [slope, aspect], rtol=1e-12)

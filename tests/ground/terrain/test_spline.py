@@ -39,7 +39,7 @@ def test_margin_hides_what_lies_beyond():
     values = np.random.default_rng(1).standard_normal((200, 200))
     whole = spline.spline_coefficients(values)
     part = spline.spline_coefficients(values[50:150, 50:150])
-    inside = slice(spline.MARGIN, -spline.MARGIN)
+    inside = slice(spline.SPLINE_MARGIN, -spline.SPLINE_MARGIN)
     np.testing.assert_allclose(part[inside, inside], whole[50:150, 50:150][inside, inside], rtol=0, atol=1e-10)
 
 

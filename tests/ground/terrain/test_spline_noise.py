@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.terrain.spline_noise import noise_square, smooth_noise
+from fifesim.ground.terrain.spline import noise_square, smooth_noise
 
 
 def test_noise_has_unit_variance_between_nodes_too():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.terrain.streams import StreamPower, erode, least_ways
+from fifesim.ground.terrain.flint_hills import StreamPower, erode, least_ways
 
 LAW = StreamPower(steps=50, area_exponent=0.5, uplift=30.0, creep=0.0, node=25.0)
 

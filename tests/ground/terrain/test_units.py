@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.terrain import units
+from fifesim.ground.terrain import slope
 
 
 def plane(shape=(80, 90)):
@@ -13,21 +13,21 @@ def plane(shape=(80, 90)):
 
 def test_terraces_are_known_by_their_step():
     gentle = plane() / 20
-    assert units.terrace_step(np.rint(gentle)) == 1
-    assert units.terrace_step(np.rint(gentle / 5) * 5) == 5
-    assert units.terrace_step(gentle) is None
-    assert units.terrace_step(np.full((9, 9), 400.0)) is None
-    assert units.terrace_step(np.rint(plane())) is None
-    assert units.terrace_step(np.full((9, 9), np.nan)) is None
+    assert slope.terrace_step(np.rint(gentle)) == 1
+    assert slope.terrace_step(np.rint(gentle / 5) * 5) == 5
+    assert slope.terrace_step(gentle) is None
+    assert slope.terrace_step(np.full((9, 9), 400.0)) is None
+    assert slope.terrace_step(np.rint(plane())) is None
+    assert slope.terrace_step(np.full((9, 9), np.nan)) is None
 
 
 @pytest.mark.parametrize(
     ("name", "metres"), [("m", 1), ("Foot", 0.3048), ("US survey foot", 1200 / 3937), ("ft", 0.3048), ("metre", 1)]
 )
 def test_units_by_the_names_that_files_use(name, metres):
-    assert units.metres_per_unit(name) == metres
+    assert slope.metres_per_unit(name) == metres
 
 
 def test_unknown_unit_is_refused():
     with pytest.raises(ValueError, match="vertical units must be one of m, ft, us-ft"):
-        units.metres_per_unit("furlong")
+        slope.metres_per_unit("furlong")

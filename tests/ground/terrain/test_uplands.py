@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fifesim.ground.terrain.spline import REACH, spline_points
-from fifesim.ground.terrain.uplands import BASE, NODES, SADDLE, upland
+from fifesim.ground.terrain.flint_hills import BASE, NODES, SADDLE, upland
+from fifesim.ground.terrain.spline import SPLINE_REACH, spline_points
 
 
 @pytest.fixture(scope="module")
 def nodes():
     """Elevation at the nodes of one upland."""
-    at = np.indices((NODES, NODES), float) + REACH
+    at = np.indices((NODES, NODES), float) + SPLINE_REACH
     return spline_points(upland(3, 5, -2), *at)
 
 
@@ -30,4 +30,4 @@ def test_place_and_seed_decide_the_upland():
     one = upland(3, 5, -2)
     assert upland(3, 5, -2) is one
     assert not np.array_equal(upland(3, 6, -2), one)
-    assert one.shape == (NODES + 2 * REACH,) * 2
+    assert one.shape == (NODES + 2 * SPLINE_REACH,) * 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fifesim
-from fifesim.output.chips.arrays import chip_arrays, layout_of
+from fifesim.output.chips.store import chip_arrays, layout_of
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study
@@ -42,7 +42,7 @@ def test_a_chip_has_the_bits_of_its_scenario(chip, chips, arrays):
 
 def test_reflectance_is_that_of_the_image(chips, arrays):
     image = fifesim.simulate(chips.scenario(3), complete=True)["image"]["dn"]
-    expected = fifesim.sensor.raster.to_reflectance(image).values
+    expected = fifesim.sensor.labels.to_reflectance(image).values
     np.testing.assert_array_equal(arrays["toa_reflectance"][1], expected.astype(np.float32))
 
 

@@ -90,9 +90,3 @@ def test_page_says_why_a_part_has_no_chips(count, said, dataset):
 def test_page_is_self_contained_and_has_the_study(page, chips):
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
     assert chips.study.to_toml() in html.unescape(page)
-
-
-def test_a_latin_hypercube_says_that_it_depends_on_their_number(dataset):
-    chips = chips_of(Study(parse_scenario(SMALL), DRAWS, landscapes=3, sequence="latin-hypercube"), COUNT)
-    page = datasheet.datasheet_page(dataset, chips, datasheet.ranges_of(dataset, shards_of_four()), b"")
-    assert "Another number of chips makes all of them others" in page

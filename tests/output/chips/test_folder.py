@@ -17,7 +17,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import fifesim
-from fifesim.output.chips import arrays, datasheet, store
+from fifesim.output.chips import datasheet, store
 from fifesim.output.chips import folder as chips_folder
 from fifesim.output.chips.folder import CONTACT_SHEET, DATASHEET, STUDY, dataset_to_folder, study_to_resume
 from fifesim.output.folders import UNFINISHED
@@ -57,7 +57,7 @@ def contents(folder):
 
 def stopping(monkeypatch, after, error=KeyboardInterrupt):
     """Have the making of chips end with an error."""
-    made, realise = [], arrays.realise_arrays
+    made, realise = [], store.realise_arrays
 
     def stop(*arguments, **options):
         made.append(1)
@@ -65,7 +65,7 @@ def stopping(monkeypatch, after, error=KeyboardInterrupt):
             raise error
         return realise(*arguments, **options)
 
-    monkeypatch.setattr(arrays, "realise_arrays", stop)
+    monkeypatch.setattr(store, "realise_arrays", stop)
     return made
 
 

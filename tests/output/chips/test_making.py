@@ -1,23 +1,65 @@
 """Shards are whole when they come, whoever makes their chips and in whatever order."""
 
-from types import SimpleNamespace
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+from concurrent.futures import Executor, Future
+from contextlib import suppress
 
 import numpy as np
+import psutil
 import pytest
 
-from fifesim.output.chips.arrays import chip_arrays, layout_of
-from fifesim.output.chips.making import made_shards
-from fifesim.output.chips.store import Shards
+from fifesim.output.chips.makers import Makers, jobs_of, made_shards, processes
+from fifesim.output.chips.store import Shards, chip_arrays, layout_of
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study
 
 SMALL = {"grid": {"width": 180.0, "height": 180.0}, "terrain": {"dem": "flat"}}
+DRAWS = {"visibility": {"uniform": [10, 60]}}
+
+
+def chips_on(dem="flat", count=30, landscapes=6):
+    return chips_of(Study(parse_scenario(SMALL | {"terrain": {"dem": dem}}), DRAWS, landscapes=landscapes), count)
+
+
+def shards_of(length, count=30):
+    shards = Shards(count, 1, length)
+    shards.length = length
+    return shards
+
+
+@pytest.mark.parametrize("dem", ["flat", "flint-hills"])
+@pytest.mark.parametrize("wanted", [range(5), [1, 4]])
+def test_each_chip_that_is_wanted_is_in_one_job(dem, wanted):
+    chips, shards = chips_on(dem), shards_of(6)
+    found = np.concatenate(jobs_of(chips, shards, wanted, 2))
+    expected = np.concatenate([np.arange(*shards.range_of(shard)) for shard in wanted])
+    np.testing.assert_array_equal(np.sort(found), expected)
+
+
+def test_flat_ground_is_made_shard_by_shard_so_that_each_is_soon_whole():
+    jobs = jobs_of(chips_on(), shards_of(6), range(5), 2)
+    shards = np.concatenate(jobs) // 6
+    assert (np.diff(shards) >= 0).all()
+    assert all(len(set(job // 6)) == 1 for job in jobs)
+
+
+def test_hills_of_a_landscape_are_made_once_for_several_shards():
+    chips = chips_on("flint-hills")
+    jobs = jobs_of(chips, shards_of(6), range(5), 2)
+    for job in jobs:
+        assert len(set(chips.landscape[job])) == 1
+    assert [len(job) for job in jobs] == [4] * 6 + [1] * 6
 
 
 @pytest.fixture(scope="module")
 def chips():
-    return chips_of(Study(parse_scenario(SMALL), {"visibility": {"uniform": [10, 60]}}, landscapes=3), 7)
+    return chips_on(count=7, landscapes=3)
 
 
 @pytest.fixture(scope="module")
@@ -26,34 +68,97 @@ def layout(chips):
 
 
 @pytest.fixture(scope="module")
-def shards(layout):
-    found = Shards(7, layout.size, 3)
-    found.length = 3
-    return found
+def shards():
+    return shards_of(3, 7)
 
 
-def others(chips, seed):
-    """Processes that answer in a drawn order."""
+class Shuffled(Executor):
+    """Does two things in a drawn order when the second is submitted, and the last one by itself."""
 
-    def made(jobs, layout):
-        for at in np.random.default_rng(seed).permutation(len(jobs)):
-            yield jobs[at], chip_arrays(chips, jobs[at].chips, layout)
+    def __init__(self, seed, number):
+        self.random, self.waiting, self.left = random.Random(seed), [], number
 
-    return SimpleNamespace(number=2, made=made)
+    def submit(self, function, *arguments):
+        future = Future()
+        self.waiting.append((future, function, arguments))
+        self.left -= 1
+        if len(self.waiting) == 2 or not self.left:
+            self.random.shuffle(self.waiting)
+            for each, call, given in self.waiting:
+                each.set_result(call(*given))
+            self.waiting.clear()
+        return future
 
 
-@pytest.mark.parametrize("seed", [None, 0, 1, 2])
-def test_shards_are_those_of_the_chips_one_after_the_other(seed, chips, layout, shards):
-    told = []
-    makers = None if seed is None else others(chips, seed)
-    found = dict(made_shards(chips, layout, shards, [0, 1, 2], told.append, makers=makers))
+def check_all(made, told, chips, layout, shards):
+    found = dict(made)
     assert sum(told) == 7 and set(found) == {0, 1, 2}
     for shard, arrays in found.items():
         for name, values in chip_arrays(chips, range(*shards.range_of(shard)), layout).items():
             np.testing.assert_array_equal(arrays[name], values)
 
 
+@pytest.mark.parametrize("seed", [None, 0, 1, 2])
+def test_shards_are_those_of_the_chips_one_after_the_other(seed, chips, layout, shards):
+    number = len(jobs_of(chips, shards, [0, 1, 2], 1))
+    told, makers = [], None if seed is None else Makers(Shuffled(seed, number), 1, ())
+    check_all(made_shards(chips, layout, shards, [0, 1, 2], told.append, makers), told, chips, layout, shards)
+
+
 def test_only_shards_that_are_wanted_are_made(chips, layout, shards):
     told = []
     found = dict(made_shards(chips, layout, shards, [2], told.append))
     assert set(found) == {2} and told and len(found[2]["dn"]) == 1
+
+
+def test_processes_make_the_same_bits_and_end(chips, layout, shards):
+    told = []
+    with processes(2) as makers:
+        made = made_shards(chips, layout, shards, [0, 1, 2], told.append, makers)
+        check_all(made, told, chips, layout, shards)
+        begun = multiprocessing.active_children()
+        assert 1 <= len(begun) <= 2
+    assert not any(process.is_alive() for process in begun)
+
+
+def test_processes_end_at_once_where_nobody_waits_for_them(chips, layout, shards):
+    with pytest.raises(KeyboardInterrupt), processes(1) as makers:
+        for _ in range(3):
+            makers.executor.submit(signal.pause)
+        (process,) = multiprocessing.active_children()
+        raise KeyboardInterrupt
+    assert not process.is_alive()
+
+
+def test_a_process_says_what_it_could_not_make(chips, layout, shards):
+    other = layout._replace(truth=())
+    with (
+        pytest.raises(ValueError, match=r"chip \d: has a truth that others have not, fpar, lai"),
+        processes(1) as makers,
+    ):
+        list(made_shards(chips, other, shards, [0, 1, 2], [].append, makers))
+
+
+def test_a_process_that_is_killed_is_told(chips, layout, shards):
+    with pytest.raises(RuntimeError, match="ended by itself: is there too little memory"), processes(1) as makers:
+        for _ in made_shards(chips, layout, shards, [0, 1, 2], [].append, makers):
+            (process,) = multiprocessing.active_children()
+            os.kill(process.pid, signal.SIGKILL)
+
+
+def test_processes_end_with_the_one_that_started_them(tmp_path):
+    code = (
+        "import os, signal\n"
+        "from fifesim.output.chips.makers import processes\n"
+        "if __name__ == '__main__':\n"
+        "    with processes(1) as makers:\n"
+        "        print(makers.executor.submit(os.getpid).result(), flush=True)\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    (tmp_path / "main.py").write_text(code)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    command = [sys.executable, tmp_path / "main.py"]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment)
+    with suppress(psutil.NoSuchProcess):
+        psutil.Process(int(done.stdout)).wait(timeout=30)
+    assert not psutil.pid_exists(int(done.stdout))

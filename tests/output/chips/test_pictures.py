@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from fifesim.output.chips.pictures import contact_sheet
+from fifesim.output.chips.datasheet import contact_sheet
 from fifesim.output.colours import dark_and_bright
 
 

@@ -9,8 +9,7 @@ import pytest
 import xarray as xr
 import zarr
 
-from fifesim.output.chips.arrays import chip_arrays, layout_of
-from fifesim.output.chips.store import Shards, checksums, make_store, stored_names, write_shard
+from fifesim.output.chips.store import Shards, checksums, chip_arrays, layout_of, make_store, stored_names, write_shard
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study

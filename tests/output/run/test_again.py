@@ -8,16 +8,16 @@ import pytest
 import rasterio
 
 import fifesim
-from fifesim.output import pages
-from fifesim.output.run.again import Rerun, in_words, read_origin, rerun
+from fifesim.output import report
+from fifesim.output.run.again import Rerun, outcome_in_words, read_origin, rerun
 from fifesim.output.run.folder import simulate_to_folder
-from fifesim.output.run.origin import PRODUCT, SCENARIO, VERSIONS
+from fifesim.output.run.identity import PRODUCT, SCENARIO_TAG, VERSIONS
 from fifesim.scenario.scenario import parse_scenario
 
 
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
 
 
 def test_an_image_alone_is_made_again_to_the_byte(travelled, tmp_path):
@@ -25,7 +25,7 @@ def test_an_image_alone_is_made_again_to_the_byte(travelled, tmp_path):
     found = rerun(alone, tmp_path / "again.tif")
     assert found == Rerun(3 * 20 * 30, 0, 0.0, {})
     assert (tmp_path / "again.tif").read_bytes() == (travelled / "image.tif").read_bytes()
-    assert in_words("sent.tif", found) == "sent.tif made again: the same bits in all of 1800 values"
+    assert outcome_in_words("sent.tif", found) == "sent.tif made again: the same bits in all of 1800 values"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["again.tif", "sent.tif"]
 
 
@@ -40,7 +40,7 @@ def test_what_differs_is_counted_and_versions_are_named(travelled, tmp_path):
     found = rerun(path)
     assert (found.cells, found.differing, found.versions) == (1200, 2, {"numpy": ("1.0", np.__version__)})
     assert found.largest == pytest.approx(0.25, rel=1e-6)
-    said = in_words("truth.tif", found)
+    said = outcome_in_words("truth.tif", found)
     assert "2 of 1200 values differ, by 0.25 at most; it was made with numpy 1.0, here" in said
     assert [each.name for each in tmp_path.iterdir()] == ["truth.tif"]
 
@@ -63,7 +63,7 @@ def test_inputs_move_with_the_file(tmp_path):
 def test_an_image_that_left_its_inputs_behind_says_where_they_would_lie(tmp_path):
     """A path is told as it is seen from the image, and where that leads, without steps up and down."""
     scenario = '[ground]\nlai_file = "../../maps/lai.tif"\n'
-    tags = {SCENARIO: scenario, PRODUCT: "image.tif", VERSIONS: "{}"}
+    tags = {SCENARIO_TAG: scenario, PRODUCT: "image.tif", VERSIONS: "{}"}
     (tmp_path / "away" / "further").mkdir(parents=True)
     sent = tmp_path / "away" / "further" / "sent.tif"
     place = rasterio.transform.from_origin(704970, 4334220, 30, 30)

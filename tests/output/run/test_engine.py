@@ -3,9 +3,9 @@
 import pytest
 from typer.testing import CliRunner
 
-from fifesim.atmosphere.schemes import engines, six_s
+from fifesim.atmosphere import engines, six_s
 from fifesim.cli import app
-from fifesim.output.run.engine import run_engine
+from fifesim.output.run.folder import run_engine
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -16,7 +16,7 @@ def test_all_that_a_simulation_asks_of_the_engine_is_known_before(monkeypatch):
     scenario = parse_scenario(SMALL | {"atmosphere": {"visibility": 17.0}}).complete()
     run_engine(scenario)
     monkeypatch.setitem(engines.SCATTERING, "5S", None)
-    simulate(scenario)
+    assert "image" in simulate(scenario).children
 
 
 @pytest.mark.parametrize("command", ["simulate", "budget"])

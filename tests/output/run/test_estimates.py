@@ -8,17 +8,17 @@ import time
 import numpy as np
 import pytest
 
-from fifesim.output import pages
-from fifesim.output.run import estimates
-from fifesim.output.run.estimates import estimate, estimate_in_words
-from fifesim.output.run.folder import simulate_to_folder
+from fifesim.output import report
+from fifesim.output.run import folder as estimates
+from fifesim.output.run import workers
+from fifesim.output.run.folder import estimate, estimate_in_words, simulate_to_folder
 from fifesim.scenario.scenario import parse_scenario
 
 FOUND = {"cells": 72900, "pixels": 900, "tasks": 12, "threads": 2, "memory": 2**30, "disk": 2**20, "seconds": 90.0}
 
 
 def test_cells_and_pixels_are_those_of_the_scenario(monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     scenario = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}})
     found, with_scene = estimate(scenario, threads=1), estimate(scenario, threads=1, scene=True)
     assert found["cells"] == 90 * 90 and found["pixels"] == 100
@@ -39,7 +39,7 @@ def test_piece_that_is_timed_is_part_of_the_scene():
 def test_pace_is_that_of_making_all_blocks(monkeypatch):
     scenario, made = parse_scenario({"grid": {"width": 300, "height": 300}, "terrain": {"dem": "flat"}}).complete(), []
     monkeypatch.setattr(estimates, "simulate_to_folder", lambda *given, **options: None)
-    monkeypatch.setattr(estimates, "run_on_threads", lambda *given: made.append(given) or time.sleep(0.2))
+    monkeypatch.setattr(workers, "run_on_threads", lambda *given: made.append(given) or time.sleep(0.2))
     _, cells, pace, _ = estimates._calibrate(scenario, 1)
     ((graph, outputs, _, threads),) = made
     assert {name for name, _ in outputs.values()} >= {"image", "lai"} and set(outputs) <= set(graph) and threads == 1

@@ -13,7 +13,7 @@ import xarray as xr
 import zarr
 
 import fifesim
-from fifesim.output import pages
+from fifesim.output import report
 from fifesim.output.folders import UNFINISHED
 from fifesim.output.run import folder as run_folder
 from fifesim.output.run.folder import FILES, simulate_to_folder
@@ -143,7 +143,7 @@ def hills(tmp_path_factory):
     """A scene of several chunks on terrain, with its cells; nobody looks at its pictures."""
     folder = tmp_path_factory.mktemp("hills") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pages, "png", lambda figure, dpi: b"")
+        patch.setattr(report, "png", lambda figure, dpi: b"")
         simulate_to_folder(parse_scenario(HILLS), folder, scene=True, threads=2)
     return folder
 
@@ -175,7 +175,7 @@ def test_nothing_unfinished_stays(hills):
 
 def test_pixels_at_their_own_interval_pair_with_the_truth_by_row_and_column(tmp_path, monkeypatch):
     """The image lies 30.315 m apart and the truth 30 m, so that no coordinate of one is in the other."""
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     scenario = parse_scenario(SMALL | {"sensor": {"interval": "native"}, "terrain": {"dem": "flat"}})
     simulate_to_folder(scenario, tmp_path / "own")
     assert "What NDVI tells" in (tmp_path / "own" / "report.html").read_text(encoding="utf-8")
@@ -215,7 +215,7 @@ def test_an_image_without_a_valid_pixel_is_an_error_that_says_why(tmp_path, valu
 
 
 def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     scenario = parse_scenario(lai_map(tmp_path / "lai.tif", 2.0))
     write_files = run_folder._write_files
 
@@ -230,7 +230,7 @@ def test_an_input_that_changes_during_a_run_ends_it(tmp_path, monkeypatch):
 
 
 def test_cells_of_an_earlier_run_do_not_stay_beside_a_new_image(tmp_path, monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "out", scene=True)
     (tmp_path / "out" / "notes.txt").touch()
     simulate_to_folder(parse_scenario(SMALL | {"ground": {"seed": 4}}), tmp_path / "out", overwrite=True)
@@ -249,7 +249,7 @@ def test_a_finished_run_is_resumed_without_work(folder, tmp_path, monkeypatch):
 
 
 def test_a_finished_run_with_a_newer_input_is_not_taken_for_the_same(tmp_path, monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     scenario = parse_scenario(lai_map(tmp_path / "lai.tif", 2.0))
     simulate_to_folder(scenario, tmp_path / "out")
     simulate_to_folder(scenario, tmp_path / "out", resume=True)
@@ -259,7 +259,7 @@ def test_a_finished_run_with_a_newer_input_is_not_taken_for_the_same(tmp_path, m
 
 
 def test_a_chunk_that_changed_is_made_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     simulate_to_folder(parse_scenario(SMALL), tmp_path / "whole", scene=True)
 
     def full(*given):

@@ -9,7 +9,7 @@ import pytest
 import rasterio
 import rasterio.shutil
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.output.folders import BEGUN
 from fifesim.output.run import identity as run_identity
 from fifesim.output.run.identity import (
@@ -18,12 +18,13 @@ from fifesim.output.run.identity import (
     changed_inputs,
     check_finished,
     check_inputs,
-    identity_of,
     inputs_of,
     scenario_to_resume,
+    state_of,
     with_checksums,
 )
 from fifesim.scenario.scenario import parse_scenario
+from fifesim.scenario.toml import write_scenario
 
 SMALL = {"grid": {"width": 90, "height": 90}, "terrain": {"dem": "flat"}}
 
@@ -42,9 +43,9 @@ def lai_file(tmp_path):
 
 
 def test_files_that_others_name_are_inputs(lai_file, tmp_path):
-    text = datasets.path("instruments/avhrr9.toml").read_text(encoding="utf-8").replace('"AVHRR"', '"MINE"', 1)
+    text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8").replace('"AVHRR"', '"MINE"', 1)
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
-    (tmp_path / "avhrr_response.csv").write_bytes(datasets.path("avhrr_response.csv").read_bytes())
+    (tmp_path / "avhrr_response.csv").write_bytes(files.path("avhrr_response.csv").read_bytes())
     (tmp_path / "samples.csv").write_text("lai\n" + "\n".join(map(str, np.linspace(0.5, 3, 50))), encoding="utf-8")
     ground = {"lai_file": str(lai_file), "distribution": str(tmp_path / "samples.csv")}
     sensor = {"instrument": str(tmp_path / "mine.toml"), "bands": ["AVHRR1"], "pixel": 30}
@@ -63,6 +64,10 @@ def test_a_table_of_bands_is_an_input(tmp_path):
 
 def scenario_of(lai_file):
     return parse_scenario(SMALL | {"ground": {"lai_file": str(lai_file)}}).complete()
+
+
+def identity_of(scenario, scene):
+    return state_of(inputs_of(scenario), write_scenario(scenario), scene=scene)
 
 
 def test_a_source_that_changed_is_told_at_resume_and_at_the_end(lai_file, tmp_path):

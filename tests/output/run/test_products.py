@@ -6,7 +6,6 @@ import xarray as xr
 import zarr
 
 from fifesim.output.run.products import chunk_checksum, make_scene_store, products_of, wanted_blocks
-from fifesim.rasters import grid as grids
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -19,7 +18,7 @@ def tree():
 
 def test_every_block_is_wanted_once(tree):
     found, lai = products_of(tree), tree["scene"]["lai"]
-    wanted = wanted_blocks(found, lai.chunks, grids.geobox(lai))
+    wanted = wanted_blocks(found, lai)
     assert len(wanted) == len(set(wanted)) == sum(array.npartitions for array in found.arrays.values())
     assert {name for name, _ in wanted} == set(found.rasters) == {"image", "lai", "fpar", "detail"}
 
@@ -28,7 +27,7 @@ def test_blocks_are_wanted_by_the_chunk_of_the_scene_below_them(tree):
     """Chunk after chunk of the scene, each found by the coordinates of the middles of blocks and cells."""
     found, lai = products_of(tree), tree["scene"]["lai"]
     places = []
-    for name, index in wanted_blocks(found, lai.chunks, grids.geobox(lai)):
+    for name, index in wanted_blocks(found, lai):
         raster, place = found.rasters[name], []
         for axis, cells, north_up in (("y", lai.chunks[0], -1), ("x", lai.chunks[1], 1)):
             sizes = raster.chunksizes[axis]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fifesim.output.run.identity import NotThisRun
-from fifesim.output.run.saved import has_blocks, save_block, saved_array, saved_blocks
+from fifesim.output.run.products import has_blocks, save_block, saved_array, saved_blocks
 
 CELLS = np.random.default_rng(2).random((2, 7, 9))
 

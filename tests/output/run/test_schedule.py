@@ -10,13 +10,12 @@ import xarray as xr
 from fifesim import fife_site
 from fifesim.base.footprints import axis_operator
 from fifesim.base.line_spread import Boxcar
-from fifesim.output.run import schedule
-from fifesim.output.run.schedule import run_on_threads, tasks_of
-from fifesim.rasters import grid as grids
-from fifesim.rasters.chunks import neighbourhood
-from fifesim.rasters.places import tiles
-from fifesim.rasters.regularization import resample
-from fifesim.rasters.windows import array_from_windows
+from fifesim.grids import grid as grids
+from fifesim.grids.chunks import neighbourhood
+from fifesim.grids.reductions import resample
+from fifesim.grids.windows import array_from_windows, tiles
+from fifesim.output.run import workers
+from fifesim.output.run.workers import run_on_threads, tasks_of
 
 
 def places(row, column, shape):
@@ -33,7 +32,7 @@ def means(side, chunk):
         Boxcar(3.3 * cell), cell_origin=0, cell_size=cell, n_cells=side, pixel_origin=0, pixel_size=3.1 * cell,
         n_pixels=side // 4,
     )  # fmt: skip
-    return resample(axis, axis, array, grids.aligned(grid, 4 * cell)).data
+    return resample(axis, axis, array, grids.aligned_grid(grid, 4 * cell)).data
 
 
 def wanted(array, name="means"):
@@ -55,7 +54,7 @@ def test_blocks_are_those_of_dask(threads):
 
 @pytest.mark.parametrize("piece", [1, 5])
 def test_what_waits_for_later_pieces_is_made_once(monkeypatch, piece):
-    monkeypatch.setattr(schedule, "_PIECE", piece)
+    monkeypatch.setattr(workers, "_PIECE", piece)
     made, found = [], {}
 
     def source(row, column, shape):
@@ -105,7 +104,7 @@ def chunks_at_once(rows, columns):
     truth = da.ones(shape, chunks=10).map_blocks(watched, **options)
     image = truth.map_blocks(np.sqrt).map_blocks(watched, **options)
     grid = fife_site(30 / 9, window=((0, rows * 10), (0, columns * 10)))
-    pixels = grids.aligned(grid, 10.0)
+    pixels = grids.aligned_grid(grid, 10.0)
     axes = [
         axis_operator(
             Boxcar(3.5), cell_origin=0, cell_size=1, n_cells=size, pixel_origin=0, pixel_size=3, n_pixels=size // 3
@@ -124,7 +123,7 @@ def chunks_at_once(rows, columns):
 @pytest.mark.parametrize("piece", [7, 600])
 def test_no_chunk_waits_for_those_that_need_its_rims_only(monkeypatch, piece):
     """Blocks that read a row and a column before them too: the row of blocks above waits as rims."""
-    monkeypatch.setattr(schedule, "_PIECE", piece)
+    monkeypatch.setattr(workers, "_PIECE", piece)
 
     def ask(*place):
         return (), [tuple(slice(part.start - 1, part.stop) for part in place)]

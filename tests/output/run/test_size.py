@@ -5,8 +5,8 @@ from collections import namedtuple
 
 import pytest
 
-from fifesim.output.run import size
-from fifesim.output.run.size import check_cells, check_size, disk_of
+from fifesim.output.run import workers
+from fifesim.output.run.workers import check_memory_of_cells, check_size, disk_of
 from fifesim.scenario.scenario import parse_scenario
 
 FLAT = {"terrain": {"dem": "flat"}}
@@ -38,7 +38,7 @@ def test_a_disk_that_is_too_small_is_named(tmp_path, monkeypatch, free, refused)
     scenario = complete()
     least, most = disk_of(scenario)
     assert least == pytest.approx(500**2 * (2 + 16), rel=0.01) and most == 3.4 * least
-    monkeypatch.setattr(size.shutil, "disk_usage", lambda path: namedtuple("Usage", "free")(int(free)))
+    monkeypatch.setattr(workers.shutil, "disk_usage", lambda path: namedtuple("Usage", "free")(int(free)))
     if refused:
         with pytest.raises(OSError, match=r"space.*fits"):
             check_size(scenario, tmp_path)
@@ -48,7 +48,7 @@ def test_a_disk_that_is_too_small_is_named(tmp_path, monkeypatch, free, refused)
 
 def test_a_place_without_any_space_is_named(tmp_path, monkeypatch):
     """No scene fits there, however small."""
-    monkeypatch.setattr(size.shutil, "disk_usage", lambda path: namedtuple("Usage", "free")(0))
+    monkeypatch.setattr(workers.shutil, "disk_usage", lambda path: namedtuple("Usage", "free")(0))
     with pytest.raises(OSError, match=f"No space left on device in {tmp_path}: name another output folder with -o"):
         check_size(complete(), tmp_path / "out")
 
@@ -59,6 +59,6 @@ def test_the_cells_of_a_scene_are_on_the_disk_too(tmp_path):
 
 
 def test_scenes_in_memory_are_judged_by_their_edge():
-    check_cells(333)
+    check_memory_of_cells(333)
     with pytest.raises(ValueError, match=r"cells = 1000000: .* cells = \S+ fits"):
-        check_cells(1_000_000)
+        check_memory_of_cells(1_000_000)

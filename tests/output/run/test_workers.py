@@ -16,10 +16,9 @@ import xarray as xr
 from distributed import Client, KilledWorker, LocalCluster
 
 import fifesim
-from fifesim.output import pages
+from fifesim.output import report
 from fifesim.output.run.folder import simulate_to_folder
-from fifesim.output.run.schedule import run_on_client, tasks_of
-from fifesim.output.run.workers import cluster, results_of
+from fifesim.output.run.workers import cluster, run_on_client, tasks_of
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import simulate
 
@@ -71,7 +70,7 @@ def test_workers_write_a_file_together(client, lai_file, tmp_path):
 
 
 def test_a_run_on_workers_gives_the_same_files(client, tmp_path, monkeypatch):
-    monkeypatch.setattr(pages, "png", lambda figure, dpi: b"")
+    monkeypatch.setattr(report, "png", lambda figure, dpi: b"")
     scenario = parse_scenario({"grid": {"width": 900, "height": 600}, "ground": {"seed": 3}})
     simulate_to_folder(scenario, tmp_path / "workers")
     expected = simulate(scenario)["image"]["dn"].compute(scheduler="threads")
@@ -161,10 +160,10 @@ class Stub:
 def test_a_task_that_ends_its_workers_is_told_and_the_others_are_cancelled(monkeypatch):
     error = KilledWorker("task", SimpleNamespace(address="tcp://here"), 3)
     stub, found = Stub(monkeypatch, error), []
+    tasks, outputs = tasks_of({"ones": da.ones(3, chunks=1)}, [("ones", (n,)) for n in range(3)])
     with pytest.raises(RuntimeError, match="has a worker too little memory"):
-        for item in results_of(stub, {future: n for n, future in enumerate(stub.futures)}):
-            found.append(item)
-    assert found == [(0, "first")] and stub.released == stub.futures[:1]
+        run_on_client(tasks, outputs, lambda *output: found.append(output), stub)
+    assert found == [("ones", (0,), "first")] and stub.released == stub.futures[:1]
     assert stub.cancelled == stub.futures[1:]
 
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.sensor.description.instruments import read_instrument
 
-TM_FILE = datasets.path("instruments/tm.toml")
+TM_FILE = files.path("instruments/tm.toml")
 
 
 @pytest.fixture

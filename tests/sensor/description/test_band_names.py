@@ -2,7 +2,7 @@
 
 import pytest
 
-from fifesim.sensor.description.band_names import band_called
+from fifesim.sensor.description.fields import band_called
 from fifesim.sensor.description.instruments import instrument
 
 

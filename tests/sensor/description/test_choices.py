@@ -3,7 +3,7 @@
 import pytest
 
 from fifesim.base.bands import GREEN
-from fifesim.sensor.description.choices import false_colour_bands
+from fifesim.sensor.description.fields import false_colour_bands
 from fifesim.sensor.description.instruments import instrument, instrument_names
 
 

@@ -9,10 +9,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from fifesim.base import datasets
-from fifesim.sensor.description.instruments import Instrument, instrument, instrument_names
+from fifesim.base import files
+from fifesim.sensor.description.instrument_file import Instrument
+from fifesim.sensor.description.instruments import instrument, instrument_names
 
-TM_FILE = datasets.path("instruments/tm.toml")
+TM_FILE = files.path("instruments/tm.toml")
 
 
 def test_names_are_found_in_any_case_and_instruments_pass_through():
@@ -94,9 +95,9 @@ def test_a_suffix_tells_a_file_from_a_name():
 
 def test_tables_of_a_file_are_found_from_wherever_it_was_named(tmp_path, monkeypatch):
     """A relative path means another file once Python is elsewhere."""
-    text = datasets.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
+    text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text.replace("avhrr_response.csv", "own.csv"), encoding="utf-8")
-    shutil.copy(datasets.path("avhrr_response.csv"), tmp_path / "own.csv")
+    shutil.copy(files.path("avhrr_response.csv"), tmp_path / "own.csv")
     monkeypatch.chdir(tmp_path)
     mine = instrument("mine.toml")
     (tmp_path / "elsewhere").mkdir()

@@ -7,7 +7,7 @@ import pytest
 from fifesim.sensor.description.fields import Angles
 from fifesim.sensor.description.instruments import instrument, instrument_names
 from fifesim.sensor.description.listing import blur_in_words, instrument_in_words, list_instruments, noise_in_words
-from fifesim.sensor.description.responses import knows_blur
+from fifesim.sensor.description.spatial_response import knows_blur
 
 
 def test_thematic_mapper_in_words():

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import pytest
 
+from fifesim.sensor.description.fields import lookup
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.names import lookup
 
 
 class Named(NamedTuple):

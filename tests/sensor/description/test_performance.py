@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.sensor.description.performance import Gain, Noise, Scan
+from fifesim.sensor.description.instrument_file import Gain, Noise, Scan
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,9 @@
 
 import pytest
 
-from fifesim.base import datasets
+from fifesim.base import files
 from fifesim.sensor.description.instruments import instrument, instrument_names, read_instrument
-from fifesim.sensor.description.plausibility import check_units
+from fifesim.sensor.description.plausibility import check_instrument_units
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_every_radiance_in_milliwatts_is_found_out(changed):
 )
 def test_a_scan_without_a_swath_is_compared_with_its_samples_and_the_horizon(tmp_path, angle, message):
     """2048 samples of 0.95 mrad are 55.7 degrees to either side; the horizon from 833 km is at 62.2."""
-    text = datasets.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
+    text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
     path = tmp_path / "mine.toml"
     path.write_text(text.replace("max_angle = 55.4", f"max_angle = {angle}"), encoding="utf-8")
     with pytest.raises(ValueError, match=f"mine.toml: scan.max_angle = {message}"):
@@ -91,4 +91,4 @@ def test_noise_of_another_radiance_is_found_out(changed, replacements, message):
 
 @pytest.mark.parametrize("name", instrument_names())
 def test_instruments_that_are_shipped_are_plausible(name):
-    check_units(instrument(name))
+    check_instrument_units(instrument(name))

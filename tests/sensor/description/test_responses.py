@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.responses import knows_blur, with_response
+from fifesim.sensor.description.spatial_response import knows_blur, with_response
 
 
 def test_responses_that_can_be_asked_for():

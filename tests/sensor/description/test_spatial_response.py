@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fifesim.base import datasets
+from fifesim.base import files
 
-TM_TEXT = datasets.path("instruments/tm.toml").read_text(encoding="utf-8")
+TM_TEXT = files.path("instruments/tm.toml").read_text(encoding="utf-8")
 LSF = TM_TEXT[TM_TEXT.index('kind = "cosine"') : TM_TEXT.index("[scan]")]
 IFOV = ("bits = 8 ", "ifov = 43.0e-6\nbits = 8 ", 'bits = "Friedl1995"', 'bits = "Friedl1995"\nifov = "Friedl1995"')
 

@@ -3,7 +3,7 @@
 import products
 import pytest
 
-from fifesim.sensor.products.landsat_files import metadata_file, read_groups
+from fifesim.sensor.products.landsat import landsat_metadata_file, read_groups
 
 
 def written(folder, groups, form="txt", root="LANDSAT_METADATA_FILE", name="LT05_L1TP_058014_20110312_20200823_02_T1"):
@@ -53,29 +53,29 @@ def test_the_file_is_found_in_its_folder(tmp_path):
     for form in ("json", "xml"):
         written(tmp_path, groups, form)
     (tmp_path / "LT05_ANG.txt").write_text("")
-    assert metadata_file(tmp_path) == metadata_file(expected) == expected
+    assert landsat_metadata_file(tmp_path) == landsat_metadata_file(expected) == expected
 
 
 def test_not_one_product_is_an_error(tmp_path):
     with pytest.raises(ValueError, match=r"there is no file or folder .*none"):
-        metadata_file(tmp_path / "none")
+        landsat_metadata_file(tmp_path / "none")
     with pytest.raises(ValueError, match=r"has no \*_MTL.txt, .json or .xml: give the folder"):
-        metadata_file(tmp_path)
+        landsat_metadata_file(tmp_path)
     (tmp_path / "scene.tar").write_text("")
     with pytest.raises(ValueError, match=r"scene.tar is no metadata of a Landsat product: .*unpacked"):
-        metadata_file(tmp_path / "scene.tar")
+        landsat_metadata_file(tmp_path / "scene.tar")
     for name in ("LT05_a", "LT05_b"):
         written(tmp_path, {}, name=name)
     with pytest.raises(ValueError, match=r"holds 2 products: give the file of one, LT05_a_MTL.txt, LT05_b_MTL.txt"):
-        metadata_file(tmp_path)
+        landsat_metadata_file(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["LT05_a_MTL.TXT", "LT05_a_mtl.Json", "LT05_a_MTL.XML"])
 def test_the_file_is_found_in_upper_or_lower_case(tmp_path, name):
     (tmp_path / name).write_text("")
-    assert metadata_file(tmp_path) == tmp_path / name
+    assert landsat_metadata_file(tmp_path) == tmp_path / name
     (tmp_path / "lt05_a_mtl.xml").write_text("")
-    assert metadata_file(tmp_path).stem.lower() == "lt05_a_mtl"
+    assert landsat_metadata_file(tmp_path).stem.lower() == "lt05_a_mtl"
 
 
 REPEATED = {

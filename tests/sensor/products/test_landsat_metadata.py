@@ -5,8 +5,7 @@ import products
 import pytest
 
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.products.landsat_metadata import _centre, landsat_scene, read_scene
-from fifesim.sensor.products.landsat_view import view_of_roll
+from fifesim.sensor.products.landsat import _centre, landsat_scene, read_scene, view_of_roll
 
 
 def test_scale_sun_and_time_are_those_of_the_metadata():

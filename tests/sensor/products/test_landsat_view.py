@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fifesim.sensor.products.landsat_view import view_of_roll
-from fifesim.sensor.scan.track import Track, place_beside, view_components, view_from_scan
+from fifesim.sensor.products.landsat import view_of_roll
+from fifesim.sensor.response.scan import Track, place_beside, view_components, view_from_scan
 
 
 @pytest.mark.parametrize(

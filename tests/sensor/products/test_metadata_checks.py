@@ -5,8 +5,8 @@ import pytest
 
 from fifesim.base.geometry import earth_sun_distance, sun_positions
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.products import metadata_checks as checks
-from fifesim.sensor.products.scaling import ProductBand
+from fifesim.sensor.products import metadata as checks
+from fifesim.sensor.response.calibration import ProductBand
 
 TIME = np.datetime64("2020-06-06T17:00:00", "ns")
 
@@ -25,25 +25,25 @@ TIME = np.datetime64("2020-06-06T17:00:00", "ns")
 def test_scales_agree_within_the_rounding_of_metadata(gain, offset, good):
     arguments = "KEY = 1", gain, offset, (1, 65535), (-0.09998, 1.2107)
     if good:
-        checks.check_scale(*arguments)
+        checks.check_product_scale(*arguments)
     else:
         with pytest.raises(ValueError, match=r"KEY = 1 give values from .* states -0.09998 to 1.2107: .*fetch"):
-            checks.check_scale(*arguments)
+            checks.check_product_scale(*arguments)
 
 
 @pytest.mark.parametrize("offset", [-0.26, 0.11])
 def test_reflectance_begins_near_0(offset):
     with pytest.raises(ValueError, match=r"must begin in \[-0.25, 0.1\]"):
-        checks.check_scale("K", 1e-4, offset, (1, 65534), brightest=1.0)
+        checks.check_product_scale("K", 1e-4, offset, (1, 65534), brightest=1.0)
 
 
 @pytest.mark.parametrize(("largest", "good"), [(9999, False), (10000, True), (100_000, True), (100_001, False)])
 def test_reflectance_ends_above_its_limit_and_below_10(largest, good):
     if good:
-        checks.check_scale("K", 1e-4, 0.0, (1, largest), brightest=1.0)
+        checks.check_product_scale("K", 1e-4, 0.0, (1, largest), brightest=1.0)
     else:
         with pytest.raises(ValueError, match=r"end in \[1, 10\]"):
-            checks.check_scale("K", 1e-4, 0.0, (1, largest), brightest=1.0)
+            checks.check_product_scale("K", 1e-4, 0.0, (1, largest), brightest=1.0)
 
 
 def test_radiance_agrees_with_its_range():

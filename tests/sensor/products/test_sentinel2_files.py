@@ -4,8 +4,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from fifesim.sensor.products import sentinel2_files as files
-from fifesim.sensor.products.sentinel2_files import metadata_file
+from fifesim.sensor.products import sentinel2 as files
+from fifesim.sensor.products.sentinel2 import sentinel2_metadata_file
 
 
 def written(folder, text, name="MTD_MSIL1C.xml"):
@@ -16,17 +16,17 @@ def written(folder, text, name="MTD_MSIL1C.xml"):
 
 def test_the_file_is_found_in_its_folder(tmp_path):
     with pytest.raises(ValueError, match=r"has no MTD_MSIL1C.xml nor MTD_MSIL2A.xml: give the .SAFE folder"):
-        metadata_file(tmp_path)
+        sentinel2_metadata_file(tmp_path)
     path = written(tmp_path, "<a/>", "MTD_MSIL2A.xml")
-    assert metadata_file(tmp_path) == metadata_file(path) == path
+    assert sentinel2_metadata_file(tmp_path) == sentinel2_metadata_file(path) == path
     written(tmp_path, "<a/>")
     with pytest.raises(ValueError, match="has both"):
-        metadata_file(tmp_path)
+        sentinel2_metadata_file(tmp_path)
     with pytest.raises(ValueError, match="there is no file or folder"):
-        metadata_file(tmp_path / "none.SAFE")
+        sentinel2_metadata_file(tmp_path / "none.SAFE")
     (tmp_path / "S2A.zip").write_text("")
     with pytest.raises(ValueError, match=r"S2A.zip is no .SAFE folder .*unpack"):
-        metadata_file(tmp_path / "S2A.zip")
+        sentinel2_metadata_file(tmp_path / "S2A.zip")
 
 
 @pytest.mark.parametrize(
@@ -47,14 +47,14 @@ def test_the_layout_of_the_aws_buckets_is_named(tmp_path, names):
         with pytest.raises(
             ValueError, match=r"layout of the AWS buckets .*dataspace\.copernicus\.eu\), unpack it"
         ) as error:
-            metadata_file(path)
+            sentinel2_metadata_file(path)
         assert "2016" not in str(error.value)
 
 
 def test_the_form_of_before_december_2016_is_named(tmp_path):
     (tmp_path / "S2A_OPER_MTD_SAFL1C_PDMC_20151206T093912_R090_V20151206T043239.xml").write_text("")
     with pytest.raises(ValueError, match="form of before December 2016, so take the reprocessed product"):
-        metadata_file(tmp_path)
+        sentinel2_metadata_file(tmp_path)
 
 
 XML = ElementTree.fromstring("<a><b>1</b><b> 1 </b><c>1</c><c>2</c><d k='x'>3</d><d k='y'>4</d><e>inf</e></a>")
@@ -62,9 +62,9 @@ XML = ElementTree.fromstring("<a><b>1</b><b> 1 </b><c>1</c><c>2</c><d k='x'>3</d
 
 def test_values_of_elements():
     assert files.text_of(XML, "b") == "1" and files.number_of(XML, "b") == 1.0
-    assert files.by_band(XML, "d", "k") == {"x": 3.0, "y": 4.0}
+    assert files.numbers_by_band(XML, "d", "k") == {"x": 3.0, "y": 4.0}
     for path, said in (("c", "c stands 2 times with different values, 1, 2"), ("e", "must be a number"), ("f", "no f")):
         with pytest.raises(ValueError, match=said):
             files.number_of(XML, path)
     with pytest.raises(ValueError, match="d stands twice for None"):
-        files.by_band(XML, "d", "other")
+        files.numbers_by_band(XML, "d", "other")

@@ -5,7 +5,7 @@ import re
 import products
 import pytest
 
-from fifesim.sensor.products.sentinel2_metadata import sentinel2_product
+from fifesim.sensor.products.sentinel2 import sentinel2_product
 
 
 def written(folder, text, name="MTD_MSIL1C.xml"):

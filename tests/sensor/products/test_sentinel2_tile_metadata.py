@@ -4,7 +4,7 @@ import numpy as np
 import products
 import pytest
 
-from fifesim.sensor.products.sentinel2_tile_metadata import sentinel2_tile
+from fifesim.sensor.products.sentinel2 import sentinel2_tile
 
 
 def written(folder, text, name="MTD_MSIL1C.xml"):

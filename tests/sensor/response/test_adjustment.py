@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.sensor.response.adjustment import (
+from fifesim.sensor.response.spectral import (
     CORRELATION,
     DEVIATION,
     GREY,

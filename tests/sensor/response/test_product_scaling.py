@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.sensor.response.product_scaling import product_gain_offset
+from fifesim.sensor.response.calibration import product_gain_offset
 
 
 def test_both_scales_of_a_landsat_8_scene_agree():

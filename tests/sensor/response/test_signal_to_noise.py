@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.response.signal_to_noise import noise_equivalent_radiance, snr
+from fifesim.sensor.instrument_labels import noise_equivalent_radiance, snr
 
 
 def test_ratio_is_that_of_the_specification_and_follows_the_share_of_shot_noise():

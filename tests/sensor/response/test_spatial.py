@@ -8,9 +8,8 @@ from scipy.integrate import quad
 
 from fifesim.base.footprints import axis_operator, regularize
 from fifesim.base.line_spread import Boxcar
-from fifesim.ground.landscape.field import streaming_field
-from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread, TableSpread
-from fifesim.sensor.response.transfer import SystemSpread
+from fifesim.ground.landscape.autoregression import streaming_field
+from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread, SystemSpread, TableSpread
 
 # A measured table: not symmetric, with a dark lobe.
 POSITIONS = (-31.0, -19.0, -12.5, -3.0, 4.0, 11.0, 17.0, 26.0, 38.0)

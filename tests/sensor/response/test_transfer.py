@@ -7,8 +7,7 @@ from scipy.signal import butter, freqs
 from scipy.special import k0
 
 from fifesim.base.line_spread import Boxcar
-from fifesim.sensor.response.spatial import GaussianSpread
-from fifesim.sensor.response.transfer import Diffraction, LowPass, SystemSpread
+from fifesim.sensor.response.spatial import Diffraction, GaussianSpread, LowPass, SystemSpread
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.8, 1.0, 1.7])

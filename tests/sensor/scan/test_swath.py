@@ -5,8 +5,8 @@ import pytest
 
 from fifesim.base.footprints import axis_operator
 from fifesim.base.line_spread import Boxcar
+from fifesim.sensor.response.scan import Footprints, apply_operator, footprint_operator
 from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
-from fifesim.sensor.scan.swath import Footprints, apply_operator, footprint_operator
 
 N = 60
 CELL = 10 / 3

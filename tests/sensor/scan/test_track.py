@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fifesim.sensor.scan.track import (
+from fifesim.sensor.response.scan import (
     EARTH_RADIUS,
     Track,
     growth,

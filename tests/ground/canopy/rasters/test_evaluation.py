@@ -10,8 +10,7 @@ from lazy import check_raster_function
 import fifesim
 from fifesim import Canopy
 from fifesim.base.geometry import Geometry
-from fifesim.ground.canopy.raster import level_reflectance
-from fifesim.ground.canopy.rasters.evaluation import BandCanopy, Light, canopy_kernel, in_words, shares_of
+from fifesim.ground.canopy.labels import BandCanopy, Light, canopy_kernel, level_reflectance, shares_in_words, shares_of
 
 BANDS = ["red", "nir"]
 LABELS = [SimpleNamespace(name="red", wavelength=0.66), SimpleNamespace(name="nir", wavelength=0.84)]
@@ -149,5 +148,5 @@ def test_numbers_stay_numbers_and_rasters_become_arguments(lai, rasters):
     assert numbers == {"dissociation": 0.25, "crown_cover": 1.0}
     assert list(varying) == ["brown"] and set(varying["brown"].coords) == {"y", "x", "spatial_ref"}
     np.testing.assert_array_equal(varying["brown"], brown)
-    assert in_words(canopy) == "brown by cell, dissociation 0.25, "
-    assert in_words(canopy, ("crown_cover",)) == in_words(Canopy(crown_cover=1.0)) == ""
+    assert shares_in_words(canopy) == "brown by cell, dissociation 0.25, "
+    assert shares_in_words(canopy, ("crown_cover",)) == shares_in_words(Canopy(crown_cover=1.0)) == ""

@@ -7,7 +7,7 @@ import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
-from fifesim.ground.canopy.rasters.soils import soil_kernel
+from fifesim.ground.canopy.optics_labels import soil_kernel
 from fifesim.ground.canopy.soil import soil_line
 
 TM34 = ["TM3", "TM4"]

@@ -12,11 +12,11 @@ from elevations import write
 from lazy import ODD_CHUNKS, check_place, no_compute
 
 import fifesim
+from fifesim.grids import cf
+from fifesim.grids import grid as grids
 from fifesim.ground.landscape.classes import CoverClass, class_table
 from fifesim.ground.landscape.cover import Patches, patch_classes
-from fifesim.ground.landscape.rasters.cover import classes_of, cover_map, drawn_cover
-from fifesim.rasters import cf
-from fifesim.rasters import grid as grids
+from fifesim.ground.landscape.labels import classes_of, cover_map, drawn_cover
 
 TABLE = class_table([CoverClass("grass", code=10), CoverClass("wood", code=20), CoverClass("water", code=80)])
 CODES = (10, 20, 80)

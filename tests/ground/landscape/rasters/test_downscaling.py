@@ -10,11 +10,10 @@ from lazy import ODD_CHUNKS, check_place, no_compute
 from scipy import stats
 
 import fifesim
-from fifesim.ground.landscape.block_kriging import block_means
-from fifesim.ground.landscape.map_trends import map_trend
-from fifesim.ground.landscape.rasters import downscaling
-from fifesim.rasters import cf
-from fifesim.rasters import grid as grids
+from fifesim.grids import cf
+from fifesim.grids import grid as grids
+from fifesim.ground.landscape import downscaling
+from fifesim.ground.landscape.downscaling import kriging_block_means, map_trend
 
 # Across the edge of two tiles of 504 cells.
 SOURCE = fifesim.grid_at("EPSG:32614", 1680 * 400 - 300, 1680 * 2600 - 200, 700, 500, 10)
@@ -43,7 +42,7 @@ def scene(lai_map):
 
 
 def means(cells):
-    return block_means(np.asarray(cells), (3, 3))
+    return kriging_block_means(np.asarray(cells), (3, 3))
 
 
 def test_means_of_the_cells_are_the_map(scene, map_values):

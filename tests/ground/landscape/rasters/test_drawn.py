@@ -7,12 +7,12 @@ from lazy import check_place, in_chunks, no_compute
 from scipy import stats
 
 import fifesim
+from fifesim.grids import cf
+from fifesim.ground.landscape import field_labels
 from fifesim.ground.landscape.autoregression import response
-from fifesim.ground.landscape.drawn import Field
-from fifesim.ground.landscape.quantiles import quantile_map, quantile_table
-from fifesim.ground.landscape.rasters import drawn
-from fifesim.ground.landscape.rasters.drawn import drawn_fields
-from fifesim.rasters import cf
+from fifesim.ground.landscape.classes import Field
+from fifesim.ground.landscape.distribution import quantile_map, quantile_table
+from fifesim.ground.landscape.field_labels import drawn_fields
 
 DRAWN = {
     "soil": Field(sd=0.04, arp=0.2),
@@ -109,9 +109,11 @@ def test_properties_are_made_of_the_scores_of_their_names(grid):
 
 
 def test_properties_and_what_the_elevation_tells_are_made_once_for_all_arps(grid, hills, monkeypatch):
-    asked, told, fields, tell = [], [], drawn.landscape_fields, drawn.of_elevation
-    monkeypatch.setattr(drawn, "landscape_fields", lambda *a, **k: asked.append(fields(*a, **k)) or asked[-1])
-    monkeypatch.setattr(drawn, "of_elevation", lambda dem, names, **k: told.append(names) or tell(dem, names, **k))
+    asked, told, fields, tell = [], [], field_labels.landscape_fields, field_labels.of_elevation
+    monkeypatch.setattr(field_labels, "landscape_fields", lambda *a, **k: asked.append(fields(*a, **k)) or asked[-1])
+    monkeypatch.setattr(
+        field_labels, "of_elevation", lambda dem, names, **k: told.append(names) or tell(dem, names, **k)
+    )
     leaf_area, _ = drawn_fields(grid, DRAWN, COVARY, (0.1, 0.2), seed=7, dem=hills)
     assert list(leaf_area) == [0.1, 0.2] and told == [["elevation"]]
     assert [list(each) for each in asked] == [[*DRAWN, "lai"], ["lai"]]

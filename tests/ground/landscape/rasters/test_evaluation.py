@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 
-from fifesim.ground.landscape.rasters import evaluation
-from fifesim.ground.landscape.rasters.evaluation import _identity, by_class
+from fifesim.grids import classes
+from fifesim.grids.classes import _identity, by_class
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def kernels(lai):
 @pytest.mark.parametrize("at_once", [7, 2**17])
 @pytest.mark.parametrize("chunks", [None, CHUNKS, ODD_CHUNKS], ids=str)
 def test_each_class_has_what_its_kernel_gives(monkeypatch, lai, cover, kernels, chunks, at_once):
-    monkeypatch.setattr(evaluation, "_AT_ONCE", at_once)
+    monkeypatch.setattr(classes, "_AT_ONCE", at_once)
     expected = np.full((2, *lai.shape), np.nan)
     values, rows = lai.values, np.broadcast_to(np.arange(lai.sizes["y"])[:, None], lai.shape)
     expected[:, cover == 1] = [values[cover == 1], 2 * values[cover == 1]]

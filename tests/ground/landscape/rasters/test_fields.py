@@ -8,15 +8,11 @@ from lazy import check_place, in_chunks, no_compute
 from scipy import stats
 
 import fifesim
+from fifesim.grids import cf
+from fifesim.grids import chunks as chunking
 from fifesim.ground.landscape.autoregression import response
-from fifesim.ground.landscape.rasters.fields import (
-    correlated_fields,
-    landscape_fields,
-    of_elevation,
-)
-from fifesim.ground.landscape.scores import normal_scores, score_table
-from fifesim.rasters import cf
-from fifesim.rasters import chunks as chunking
+from fifesim.ground.landscape.covariance import normal_scores, score_table
+from fifesim.ground.landscape.field_labels import correlated_fields, landscape_fields, of_elevation
 
 ARPS = {"lai": 0.15, "soil": 0.24, "moisture": 0.05}
 PAIRS = {("lai", "soil"): -0.4, ("lai", "moisture"): 0.3, ("soil", "moisture"): 0.2}

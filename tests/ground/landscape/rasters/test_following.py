@@ -5,7 +5,7 @@ from lazy import in_chunks, no_compute
 
 import fifesim
 from fifesim.ground.landscape.covariance import Copula, copula
-from fifesim.ground.landscape.rasters.following import copulas
+from fifesim.ground.landscape.field_labels import copulas
 
 ARPS = {"soil": 0.05, "moisture": 0.1, "lai": 0.15, "brown": 0.2}
 PAIRS = {("lai", "elevation"): 0.3, ("lai", "soil"): -0.3, ("soil", "moisture"): -0.5, ("brown", "lai"): 0.2}

@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 
 import fifesim
-from fifesim.ground.landscape.rasters.pixels import MARGIN, PixelReads, pixel_lattice
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
+from fifesim.ground.landscape.downscaling_labels import PIXEL_MARGIN, PixelReads, pixel_lattice
 
 
 def raster(grid):
@@ -24,7 +24,10 @@ def test_tiles_hold_whole_pixels_and_are_counted_from_the_origin_of_the_crs():
     tiles = lattice.tiles(slice(0, 240), 0)
     assert tiles.start * 504 <= -440004 * 3 and tiles.stop * 504 >= -440004 * 3 + 240 and len(tiles) <= 2
     window = PixelReads(np.ones(SOURCE.shape), lattice).window(slice(0, 240), slice(0, 300))[0]
-    assert window.start == tiles.start * 168 - MARGIN + 440004 and window.stop == tiles.stop * 168 + MARGIN + 440004
+    assert (
+        window.start == tiles.start * 168 - PIXEL_MARGIN + 440004
+        and window.stop == tiles.stop * 168 + PIXEL_MARGIN + 440004
+    )
 
 
 def test_windows_of_map_and_grid_lie_on_the_same_tiles():

@@ -11,8 +11,8 @@ from odc.geo.geobox import GeoBox
 from scipy import stats
 
 import fifesim
-from fifesim.ground.landscape.rasters.cover import classes_of
-from fifesim.rasters import cf
+from fifesim.grids import cf
+from fifesim.ground.landscape.labels import classes_of
 
 CLASSES = {
     "bare": fifesim.CoverClass(lai=0.0, canopy=fifesim.Canopy(background=0.2)),

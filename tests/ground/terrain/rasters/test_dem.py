@@ -9,8 +9,8 @@ import xarray as xr
 from lazy import no_compute
 
 import fifesim
-from fifesim.ground.terrain.rasters.dem import beside_altitude, source_resolution
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
+from fifesim.ground.terrain.source_labels import beside_altitude, source_resolution
 
 
 @pytest.mark.parametrize("units", ["ft", "US survey foot", "km"])

@@ -11,8 +11,8 @@ from elevations import AMPLITUDE, CRS, NORTH, WEST, grid, model, surface, tilted
 from lazy import check_place, no_compute
 
 import fifesim
-from fifesim.ground.terrain.rasters.cover import _mean_slope
-from fifesim.rasters import cf
+from fifesim.grids import cf
+from fifesim.ground.terrain.elevation_labels import _mean_slope
 
 
 def slopes(values, cell):

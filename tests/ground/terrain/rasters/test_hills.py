@@ -6,8 +6,8 @@ import xarray as xr
 from lazy import check_place, no_compute
 
 import fifesim
+from fifesim.grids import cf
 from fifesim.ground.terrain import flint_hills
-from fifesim.rasters import cf
 
 
 def test_raster_has_its_labels_and_place():
@@ -16,7 +16,7 @@ def test_raster_has_its_labels_and_place():
     check_place(dem, "EPSG:26914")
     assert cf.attributes("dem").items() <= dem.attrs.items()
     assert dem.attrs["rng_seed"] == "7"
-    np.testing.assert_array_equal(dem, flint_hills.elevation(7, dem["y"].values, dem["x"].values))
+    np.testing.assert_array_equal(dem, flint_hills.hills_elevation(7, dem["y"].values, dem["x"].values))
     for chunks in ({"y": 33, "x": 100}, "auto", 7):
         with no_compute():
             lazy = fifesim.flint_hills(grid, 7, chunks=chunks)

@@ -5,13 +5,13 @@ import pytest
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.ground.terrain.rasters import hills_light, slopes
-from fifesim.ground.terrain.rasters.dem import beside_altitude
-from fifesim.ground.terrain.rasters.hills import flint_hills
-from fifesim.ground.terrain.rasters.lit_slopes import light_on_slopes
-from fifesim.ground.terrain.rasters.sky import horizon
-from fifesim.rasters import grid as grids
-from fifesim.rasters.carried_grid import as_carried
+from fifesim.grids import grid as grids
+from fifesim.grids.grid import as_carried
+from fifesim.ground.terrain import labels as terrain_labels
+from fifesim.ground.terrain.elevation_labels import flint_hills
+from fifesim.ground.terrain.labels import light_on_slopes
+from fifesim.ground.terrain.sky_labels import horizon
+from fifesim.ground.terrain.source_labels import beside_altitude
 
 SUN = Geometry(60.0, 110.0, 25.0, 280.0)
 
@@ -31,7 +31,7 @@ def test_light_is_that_of_the_labelled_hills(cell, coarse, reach):
     dem = flint_hills(grid.pad(1), 4)
     above = horizon(flint_hills(around, 4, chunks=50), reach=reach, beside=dem).compute()
     expected = light_on_slopes(dem, as_carried(grid), SUN, above)
-    found = hills_light.light_on_hills(grid, around, 4, reach, SUN, 0.4)
+    found = terrain_labels.light_on_hills(grid, around, 4, reach, SUN, 0.4)
     data, sky, size, sun = found
     np.testing.assert_array_equal(data, expected[0])
     for one, other in zip(sky, expected[1], strict=True):
@@ -42,12 +42,12 @@ def test_light_is_that_of_the_labelled_hills(cell, coarse, reach):
 
 def test_steepest_is_the_largest_slope():
     _, around = grids_of(10 / 3, 30.0, 600.0)
-    assert hills_light.steepest(around, 4) == float(slopes.slope(flint_hills(around, 4)).max())
+    assert terrain_labels.steepest(around, 4) == float(terrain_labels.slope(flint_hills(around, 4)).max())
 
 
 def test_an_altitude_far_from_the_hills_is_told():
     grid, around = grids_of(10 / 3, 30.0, 300.0)
     with pytest.warns(UserWarning, match="beside an altitude of the atmosphere of 3 km"):
-        hills_light.light_on_hills(grid, around, 4, 300.0, SUN, 3.0)
+        terrain_labels.light_on_hills(grid, around, 4, 300.0, SUN, 3.0)
     with pytest.warns(UserWarning, match="beside an altitude of the atmosphere of 3 km"):
         beside_altitude(fifesim.flint_hills(grid, seed=4), 3.0)

@@ -8,8 +8,8 @@ from oracles_terrain import plane
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.ground.terrain.rasters import light as terrain_raster
-from fifesim.rasters import projection
+from fifesim.grids import projection
+from fifesim.ground.terrain import labels as terrain_raster
 
 SUN = Geometry(70.0, 117.0, 20.0, 40.0)
 

@@ -8,13 +8,16 @@ from lazy import check_raster_function, in_chunks, no_compute
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.ground.terrain.rasters import lit_slopes
+from fifesim.grids import grid as grids
+from fifesim.grids import projection
+from fifesim.ground.terrain import labels as terrain_labels
 from fifesim.ground.terrain.slope import slope_aspect
-from fifesim.rasters import grid as grids
-from fifesim.rasters import projection
 
 SUN = Geometry(70.0, 117.0, 20.0, 40.0)
-LIGHT = {"direct_transmittance": [0.7, 0.8], "transmittance_down": [0.9, 0.95], "geometry": SUN}
+
+
+def sunlight(dem):
+    return terrain_labels.Sunlight(dem, SUN, [0.7, 0.8], [0.9, 0.95])
 
 
 @pytest.fixture
@@ -23,9 +26,9 @@ def level(lai):
 
 
 def test_kt_and_reflectance_keep_the_promises_of_rasters(level, dem):
-    check_raster_function(lambda rho, z: lit_slopes.kt_on_slopes(rho, z, **LIGHT), level, dem, quantity="kt")
+    check_raster_function(lambda rho, z: terrain_labels.kt_on_slopes(rho, sunlight(z)), level, dem, quantity="kt")
     check_raster_function(
-        lambda rho, z: lit_slopes.terrain_reflectance(rho, z, **LIGHT), level, dem, quantity="surface_reflectance"
+        lambda rho, z: terrain_labels.terrain_reflectance(rho, sunlight(z)), level, dem, quantity="surface_reflectance"
     )
 
 
@@ -34,10 +37,10 @@ def test_kt_and_reflectance_keep_the_promises_of_rasters(level, dem):
 def test_one_pass_gives_both(level, dem, lazy, upwelling):
     ground = [in_chunks(each, {"y": 20, "x": 11}) for each in (level, dem)] if lazy else (level, dem)
     with no_compute():
-        found = lit_slopes.kt_and_reflectance(*ground, **LIGHT, upwelling=upwelling)
+        found = terrain_labels.slope_kt_and_reflectance(ground[0], sunlight(ground[1]), upwelling=upwelling)
     expected = (
-        lit_slopes.kt_on_slopes(level, dem, **LIGHT),
-        lit_slopes.terrain_reflectance(level, dem, **LIGHT, upwelling=upwelling),
+        terrain_labels.kt_on_slopes(level, sunlight(dem)),
+        terrain_labels.terrain_reflectance(level, sunlight(dem), upwelling=upwelling),
     )
     for one, other in zip(found, expected, strict=True):
         assert (one.chunks is not None) == lazy

@@ -7,8 +7,8 @@ from affine import Affine
 from elevations import AMPLITUDE, CRS, NORTH, WEST, grid, model, truth, with_hole, write
 
 import fifesim
-from fifesim.ground.terrain.rasters.model import TILE, looked_up, model_under
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
+from fifesim.ground.terrain.source_labels import ELEVATION_TILE, looked_up, model_under
 
 
 @pytest.mark.parametrize("fill", [True, 0, -3])
@@ -26,7 +26,7 @@ def test_fill_goes_at_most_250_cells_of_the_source(path):
 
 def test_a_window_too_fine_to_read_is_refused(path, monkeypatch):
     fifesim.fine_dem(path, grid())
-    monkeypatch.setattr("fifesim.ground.terrain.rasters.source._MOST_CELLS", 100)
+    monkeypatch.setattr("fifesim.ground.terrain.source_labels._MOST_CELLS", 100)
     with pytest.raises(ValueError, match=r"far finer than the cells.*gdalwarp -r average"):
         fifesim.fine_dem(path, grid(size=600.0))
 
@@ -73,8 +73,11 @@ def test_window_of_a_part_holds_what_its_tiles_read(path, crs):
     rows, columns = slice(20, 60), slice(100, 101)
     window = under.tile_window(rows, columns)
     origin = grids.lattice_position(under.place.grid)
-    first = [(start + part.start) // TILE * TILE - start for start, part in zip(origin, (rows, columns), strict=True)]
-    top, left, height, width = under.window(*under.place.positions(*(at + np.arange(TILE) for at in first)))
+    first = [
+        (start + part.start) // ELEVATION_TILE * ELEVATION_TILE - start
+        for start, part in zip(origin, (rows, columns), strict=True)
+    ]
+    top, left, height, width = under.window(*under.place.positions(*(at + np.arange(ELEVATION_TILE) for at in first)))
     for part, start, length, size in zip(window, (top, left), (height, width), under.source.shape, strict=True):
         assert part.start <= max(start, 0) and part.stop >= min(start + length, size)
 

@@ -5,8 +5,8 @@ import pytest
 from elevations import labelled
 
 import fifesim
-from fifesim.ground.terrain.rasters.places import places_of
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
+from fifesim.ground.terrain.sky_labels import places_of
 
 
 def test_horizon_that_does_not_cover_is_refused(lai, dem, around):

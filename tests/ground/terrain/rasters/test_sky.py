@@ -8,7 +8,7 @@ from oracles_terrain import hills, plane
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.ground.terrain.rasters import sky as sky_raster
+from fifesim.ground.terrain import sky_labels as sky_raster
 
 SUN = Geometry(70.0, 117.0, 20.0, 40.0)
 

@@ -8,15 +8,15 @@ from oracles_terrain import plane
 from pyproj import Transformer
 
 import fifesim
-from fifesim.ground.terrain.rasters import slopes
-from fifesim.rasters import grid as grids
-from fifesim.rasters import projection
+from fifesim.grids import grid as grids
+from fifesim.grids import projection
+from fifesim.ground.terrain import labels as terrain_labels
 
 
 @pytest.mark.parametrize("name", ["slope", "aspect"])
 def test_slopes_keep_the_promises_of_rasters(dem, name):
     dem[20:23, 30] = np.nan
-    found = check_raster_function(getattr(slopes, name), dem, quantity=name)
+    found = check_raster_function(getattr(terrain_labels, name), dem, quantity=name)
     np.testing.assert_array_equal(np.isnan(found), np.isnan(dem))
 
 

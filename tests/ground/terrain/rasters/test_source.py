@@ -13,10 +13,10 @@ from elevations import AMPLITUDE, CRS, NORTH, WEST, grid, model, surface, truth,
 from lazy import no_compute
 
 import fifesim
-from fifesim.ground.terrain.rasters import source as sources
-from fifesim.ground.terrain.rasters.elevation import source_dem
-from fifesim.ground.terrain.rasters.source import open_source
-from fifesim.rasters import projection
+from fifesim.grids import projection
+from fifesim.ground.terrain import source_labels as sources
+from fifesim.ground.terrain.elevation_labels import source_dem
+from fifesim.ground.terrain.source_labels import open_source
 
 
 @pytest.mark.parametrize("unit", ["ft", "US survey foot", "fathom"])

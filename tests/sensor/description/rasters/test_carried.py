@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from fifesim.sensor.description.instruments import instrument, instrument_names
-from fifesim.sensor.description.rasters.carried import attributes_of, carried_instrument, given_instrument
+from fifesim.sensor.instrument_labels import attributes_of, carried_instrument, given_instrument
 
 
 def raster(**attrs):

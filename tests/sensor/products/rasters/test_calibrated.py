@@ -8,7 +8,7 @@ from lazy import check_raster_function, in_chunks
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import grid as grids
+from fifesim.grids import grid as grids
 
 SUN = Geometry(35.0, 130.0, earth_sun_distance=1.0148)
 GRID = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 240.0, 180.0, 30.0)

@@ -9,8 +9,8 @@ import rasterio
 from lazy import check_place, no_compute
 
 import fifesim
-from fifesim.atmosphere.schemes import engines
-from fifesim.rasters import cf
+from fifesim.atmosphere import engines
+from fifesim.grids import cf
 
 KINDS = {"TM": products.TM, "OLI": products.OLI}
 

@@ -7,8 +7,8 @@ import rasterio
 from lazy import check_place, no_compute
 
 import fifesim
-from fifesim.atmosphere.schemes import engines
-from fifesim.rasters import cf
+from fifesim.atmosphere import engines
+from fifesim.grids import cf
 
 BASELINES = {"03.01": 0.0, "04.00": -1000.0}
 

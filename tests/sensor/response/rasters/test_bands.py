@@ -6,8 +6,8 @@ import xarray as xr
 from lazy import check_raster_function
 
 import fifesim
+from fifesim.grids import grid as grids
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
-from fifesim.rasters import grid as grids
 from fifesim.sensor.response.spectral import band_weights, covered_steps
 
 

@@ -7,9 +7,9 @@ from lazy import in_chunks, no_compute
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import directions
-from fifesim.rasters import grid as grids
-from fifesim.sensor.response.rasters.digital_numbers import check_scaling, scale
+from fifesim.grids import directions
+from fifesim.grids import grid as grids
+from fifesim.sensor.labels import check_scaling, scale
 
 SUN = Geometry(50.0, 120.0, 7.0, 280.0, earth_sun_distance=1.0148)
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from fifesim.base.line_spread import Boxcar
-from fifesim.rasters.sites import fife_site
-from fifesim.sensor.response.rasters.footprints import check_scene, shifts_of
+from fifesim.grids.sites import fife_site
+from fifesim.sensor.pixel_labels import check_scene, shifts_of
 
 PIXELS = fife_site(30.0, ((0, 4), (0, 5)))
 

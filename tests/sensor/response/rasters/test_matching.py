@@ -7,8 +7,7 @@ import pytest
 import xarray as xr
 
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.rasters.carried import attributes_of
-from fifesim.sensor.response.rasters.matching import check_wavelengths, matching_bands
+from fifesim.sensor.instrument_labels import attributes_of, check_wavelengths, matching_bands
 
 TM = instrument("TM")
 

@@ -9,12 +9,12 @@ from lazy import check_raster_function
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import directions
-from fifesim.rasters import grid as grids
+from fifesim.grids import directions
+from fifesim.grids import grid as grids
+from fifesim.sensor.description.instrument_file import Noise
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.performance import Noise
+from fifesim.sensor.labels import noisy
 from fifesim.sensor.response.noise import NoiseModel, add_noise
-from fifesim.sensor.response.rasters.noise import noisy
 
 TM = instrument("TM")
 # Figures of a test, of no real instrument.

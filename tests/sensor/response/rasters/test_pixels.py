@@ -9,8 +9,8 @@ from lazy import check_raster_function
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import directions
-from fifesim.rasters import grid as grids
+from fifesim.grids import directions
+from fifesim.grids import grid as grids
 from fifesim.sensor.description.instruments import instrument
 from fifesim.sensor.description.spatial_response import (
     BoxcarResponse,
@@ -18,7 +18,7 @@ from fifesim.sensor.description.spatial_response import (
     GaussianResponse,
     TwoAxesResponse,
 )
-from fifesim.sensor.response.rasters.pixels import bands_by_grid, pixel_grid
+from fifesim.sensor.pixel_labels import bands_by_grid, pixel_grid
 
 TM = instrument("TM")
 INTERVAL = 43e-6 * 705e3

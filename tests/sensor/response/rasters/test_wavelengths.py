@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from fifesim.sensor.response.rasters.wavelengths import spectral_axis
+from fifesim.sensor.band_labels import spectral_axis
 
 
 def spectra(wavelength, units=None, dim="band", **coords):

@@ -8,14 +8,14 @@ from lazy import no_compute
 
 import fifesim
 from fifesim.base.geometry import Geometry
-from fifesim.sensor.scan.rasters.light import at_pixels, seen_alike
+from fifesim.sensor.scan_labels import at_pixels, seen_alike
 
 AWAY = {"nadir_offset": -60e3, "heading": 193.6}
 
 
 def light(site, geometry):
     lai = xr.DataArray(np.full(site.shape, 2.0), dims=("y", "x")).odc.assign_crs(site.crs)
-    lai = lai.assign_coords(fifesim.rasters.grid.coordinates(site))
+    lai = lai.assign_coords(fifesim.grids.grid.coordinates(site))
     air = fifesim.Atmosphere()
     return lai.fifesim.surface_reflectance("TM", bands=["TM3"], geometry=geometry, atmosphere=air).fifesim.to_toa()
 

@@ -10,13 +10,13 @@ from lazy import CHUNKS, ODD_CHUNKS, in_chunks, no_compute
 import fifesim
 from fifesim.analysis.regression import Regression
 from fifesim.base.geometry import Geometry
-from fifesim.rasters import cf, directions, projection
-from fifesim.rasters import grid as grids
+from fifesim.grids import cf, directions, projection
+from fifesim.grids import grid as grids
+from fifesim.sensor.description.instrument_file import Noise, Scan
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.performance import Noise, Scan
 from fifesim.sensor.description.spatial_response import BoxcarResponse
-from fifesim.sensor.scan.rasters.view import degrees
-from fifesim.sensor.scan.track import growth, place_beside, view_from_ground
+from fifesim.sensor.response.scan import growth, place_beside, view_from_ground
+from fifesim.sensor.scan_labels import latitude_longitude
 
 TM = instrument("TM")
 VIEW = {"nadir_offset": -36e3, "heading": 193.6, "view_tolerance": 180}
@@ -72,7 +72,7 @@ def test_constant_scene_stays_constant_and_its_labels_are_whole():
 
 @pytest.mark.parametrize("chunks", [CHUNKS, ODD_CHUNKS, ODD_CHUNKS | {"band": 1}])
 def test_a_scan_is_the_same_in_any_chunks(chunks, monkeypatch):
-    monkeypatch.setattr("fifesim.sensor.scan.rasters.swath._BLOCK", 7)
+    monkeypatch.setattr("fifesim.sensor.scan_labels._SWATH_BLOCK", 7)
     whole = fifesim.sense_swath(scene(), TM, **VIEW)
     with no_compute():
         lazy = fifesim.sense_swath(in_chunks(scene(), chunks), TM, **VIEW)
@@ -135,7 +135,7 @@ def test_lines_and_samples_are_all_those_whose_centres_lie_in_the_scene():
     plane = scene()
     image = fifesim.sense_swath(plane, TM, track, quantise=False, view_tolerance=180)
     rows, columns = np.meshgrid([0, plane.sizes["y"]], [0, plane.sizes["x"]])
-    distance, aside = place_beside(track, *degrees(grids.geobox(plane), rows, columns))
+    distance, aside = place_beside(track, *latitude_longitude(grids.geobox(plane), rows, columns))
     theta = np.radians(view_from_ground(aside, 705e3)[1])
     for name, place, step in (("line", distance, 30.315), ("sample", theta, 43e-6)):
         centres = (np.arange(-10_000, 10_000) + 0.5) * step
@@ -230,7 +230,7 @@ def test_a_map_is_what_a_geotiff_holds(tmp_path):
     with pytest.raises(ValueError, match=r"put it onto one with .grid_swath\(grid\)"):
         image.fifesim.to_geotiff(tmp_path / "scan.tif")
     with pytest.warns(UserWarning, match="leaves out vza, vaa"):
-        image.fifesim.grid_swath(grids.aligned(grids.geobox(toa), 30.0)).fifesim.to_geotiff(tmp_path / "map.tif")
+        image.fifesim.grid_swath(grids.aligned_grid(grids.geobox(toa), 30.0)).fifesim.to_geotiff(tmp_path / "map.tif")
     assert fifesim.open_image(tmp_path / "map.tif").dtype == np.uint8
 
 

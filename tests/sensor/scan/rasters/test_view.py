@@ -8,11 +8,11 @@ import xarray as xr
 from lazy import check_place, no_compute
 
 import fifesim
-from fifesim.rasters import cf
+from fifesim.grids import cf
+from fifesim.sensor.description.instrument_file import Scan
 from fifesim.sensor.description.instruments import instrument
-from fifesim.sensor.description.performance import Scan
-from fifesim.sensor.scan.rasters.view import degrees
-from fifesim.sensor.scan.track import view_components
+from fifesim.sensor.response.scan import view_components
+from fifesim.sensor.scan_labels import latitude_longitude
 
 TM = instrument("TM")
 WIDE = replace(
@@ -29,7 +29,7 @@ def test_angles_are_those_of_each_cell():
     view = fifesim.scan_geometry(TM, SITE, nadir_offset=3e3, heading=193.0)
     rows, columns = np.meshgrid(*(np.arange(size) + 0.5 for size in SITE.shape), indexing="ij")
     track = fifesim.Track(view.attrs["track_latitude"], view.attrs["track_longitude"], view.attrs["track_heading"])
-    east, north = view_components(track, *degrees(SITE, rows, columns), 705e3)
+    east, north = view_components(track, *latitude_longitude(SITE, rows, columns), 705e3)
     vza, vaa = np.radians(view["vza"].values), np.radians(view["vaa"].values)
     np.testing.assert_allclose(np.sin(vza) * np.sin(vaa), east, rtol=0, atol=1e-9)
     np.testing.assert_allclose(np.sin(vza) * np.cos(vaa), north, rtol=0, atol=1e-9)
@@ -65,7 +65,7 @@ def test_a_wide_swath_ends():
     np.testing.assert_array_equal(seen, np.isfinite(view["vaa"].values))
     assert float(view["vza"].max()) == pytest.approx(68.55, abs=0.3)
     rows, columns = np.meshgrid(*(np.arange(size) + 0.5 for size in grid.shape), indexing="ij")
-    east, north = view_components(fifesim.Track(39.5, -96.0, 190.0), *degrees(grid, rows, columns), 833e3)
+    east, north = view_components(fifesim.Track(39.5, -96.0, 190.0), *latitude_longitude(grid, rows, columns), 833e3)
     sine = np.sin(np.radians(view["vza"].values))
     np.testing.assert_allclose(sine[seen], np.hypot(east, north)[seen], rtol=0, atol=1e-5)
 

@@ -1,0 +1,208 @@
+"""Spectral indices and composites of labelled images."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis import indices
+from fifesim.analysis.indices import date_of_maximum, values_of_date
+from fifesim.base.bands import BLUE, COMMON_NAMES, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED, nearest_band
+from fifesim.base.geometry import ANGLES
+from fifesim.grids import cf, chunks, swaths
+from fifesim.grids import grid as grids
+from fifesim.grids.grid import with_crs_of
+
+# The kernel of each index, and the bands that it takes. Names are those of the spyndex catalogue.
+INDICES = {
+    "NDVI": (indices.normalized_difference, (NEAR_INFRARED, RED)),
+    "EVI": (indices.enhanced, (NEAR_INFRARED, RED, BLUE)),
+    "EVI2": (indices.enhanced_of_two_bands, (NEAR_INFRARED, RED)),
+    "SAVI": (indices.soil_adjusted, (NEAR_INFRARED, RED)),
+    "MSAVI": (indices.modified_soil_adjusted, (NEAR_INFRARED, RED)),
+    "NDWI": (indices.normalized_difference, (GREEN, NEAR_INFRARED)),
+    "NDMI": (indices.normalized_difference, (NEAR_INFRARED, SHORTWAVE_INFRARED)),
+    "NIRv": (indices.near_infrared_of_vegetation, (NEAR_INFRARED, RED)),
+}
+
+
+def reflectance_index(reflectance, name, source=None, history=""):
+    """Spectral index of a labelled reflectance, dims (y, x). [1]"""
+    known = {index.lower(): index for index in INDICES}
+    if str(name).lower() not in known:
+        raise ValueError(f"there is no index {name!r}: type one of {', '.join(INDICES)}")
+    name = known[name.lower()]
+    kernel, windows = INDICES[name]
+    out = swaths.placed_as(chunks.pointwise(kernel, *_bands(reflectance, windows, name)), reflectance)
+    steps = "\n".join(filter(None, [history, name.lower()]))
+    return cf.label(out, name.lower(), source=reflectance if source is None else source, history=steps)
+
+
+def reflectance_ndvi(reflectance):
+    """Labelled NDVI of a reflectance, dims (y, x) [Rouse1974]_ [Friedl1995]_. [1]"""
+    return reflectance_index(reflectance, "NDVI")
+
+
+def red_and_nir(reflectance):
+    """Red and near infrared band of a reflectance, without the coordinates along band."""
+    return _bands(reflectance, (RED, NEAR_INFRARED), "ndvi")
+
+
+def _bands(reflectance, windows, what):
+    """Bands nearest to some spectral windows, without the coordinates along band."""
+    cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
+    if "band" not in reflectance.dims:
+        raise ValueError(f"{what} needs a {windows[0].name} and other bands along band, got a raster of one band")
+    wavelengths = _wavelengths(reflectance)
+    numbers = [nearest_band(wavelengths, window) for window in windows]
+    for window, number in zip(windows, numbers, strict=True):
+        if number is None:
+            found = ", ".join(f"{value:.3f}" for value in wavelengths)
+            raise ValueError(
+                f"no {window.name} band between {window.low:g} and {window.high:g} um: the raster has {found} um"
+            )
+    per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
+    return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
+
+
+def _wavelengths(reflectance):
+    """Wavelengths of the bands, or the usual wavelengths of common band names. [um]"""
+    if "wavelength" in reflectance.coords:
+        return np.atleast_1d(reflectance["wavelength"].values)
+    names = [str(name).lower() for name in reflectance["band"].values] if "band" in reflectance.coords else []
+    if names and set(names) <= set(COMMON_NAMES):
+        return np.array([COMMON_NAMES[name].best for name in names])
+    raise ValueError(
+        "the raster has no coordinate 'wavelength' [um] along band: assign it with .assign_coords, or call its bands "
+        "'red', 'nir' and the like"
+    )
+
+
+_METHODS = {"maximum-value": date_of_maximum}
+_REFERENCE = "Holben (1986), doi:10.1080/01431168608948945"
+
+
+def composite(
+    images: xr.DataArray, method: Literal["maximum-value"] = "maximum-value", *, by: xr.DataArray | None = None
+) -> xr.DataArray:
+    """
+    One image of many dates: at each cell that of the date with the largest NDVI, which clouds and haze lower.
+
+    Parameters
+    ----------
+    images : xarray.DataArray, dims (time, y, x) or (time, band, y, x)
+        NDVI, or reflectance in bands with a coordinate ``wavelength``.
+    method : {"maximum-value"}, optional
+    by : xarray.DataArray, dims (time, y, x), optional
+        What is largest on the date that is kept; by default the images themselves where they have no bands, else their
+        NDVI. Images of anything else than reflectance need it.
+
+    Returns
+    -------
+    composite : xarray.DataArray, dims (y, x) or (band, y, x)
+        With ``date``, that of each cell, as coordinate over (y, x), and so the angles of sun and view where they differ
+        among the dates. The distance of the sun is none of a composite. NaN where no date has data. Lazy where the
+        images are.
+
+    Raises
+    ------
+    ValueError
+        If there is no dimension time, no such method, or ``by`` has other dates or cells.
+
+    Notes
+    -----
+    The largest of many values with errors is too large: see `fifesim.analysis.indices.date_of_maximum`.
+
+    References
+    ----------
+    [Holben1986]_
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> clear = image.fifesim.to_reflectance()
+    >>> dates = np.array(["1987-06-06T16:35", "1987-06-22T16:35"], "datetime64[ns]")
+    >>> time = xr.DataArray(dates, dims="time", name="time")
+    >>> stack = xr.concat([0.5 * clear + 0.1, clear], time)
+    >>> best = stack.fifesim.composite()
+    >>> bool((best.date == dates[1]).all())
+    True
+    """
+    if method not in _METHODS:
+        raise ValueError(f"method must be one of {', '.join(_METHODS)}, got {method!r}")
+    if images.dtype.kind != "f" or cf.QUANTITIES["toa_radiance"].units == images.attrs.get("units"):
+        raise ValueError(
+            "a composite is made of reflectance or NDVI: digital numbers and radiance have another sun at each date, "
+            "take .fifesim.to_reflectance() of them first"
+        )
+    if "time" not in images.dims:
+        raise ValueError(
+            f"a composite is made of images along time, got dimensions {images.dims}: join dates with "
+            "xarray.concat([...], dim='time')"
+        )
+    grid = grids.geobox(images.isel(time=0))
+    index = _index(images) if by is None else _checked(by, images)
+    chosen = _along_time(_METHODS[method], index.drop_vars(list(index.coords)), dtype=np.int64)
+    plain = images.drop_vars(list(images.coords))
+    out = _along_time(values_of_date, plain, chosen, dtype=images.dtype, missing=np.nan)
+    out = out.transpose(*(name for name in images.dims if name != "time"))
+    kept = {name: value for name, value in images.coords.items() if not {"time", "y", "x"} & set(value.dims)}
+    out = grids.place(out.assign_coords(kept), grid).assign_coords(_of_date(images, chosen))
+    history = f"composite: {method} of {images.sizes['time']} dates"
+    out.attrs = dict(images.attrs) | {"composite": method, "references": _REFERENCE}
+    out.attrs["history"] = "\n".join(filter(None, [images.attrs.get("history", ""), history]))
+    return out.rename(images.name)
+
+
+def _index(images):
+    """Index whose maximum selects the date: NDVI of the images, or the images themselves if they have no bands."""
+    if "band" not in images.dims:
+        cf.check_quantity(images, "ndvi")
+        return images.transpose("time", "y", "x")
+    dates = [reflectance_ndvi(images.isel(time=number, drop=True)) for number in range(images.sizes["time"])]
+    # The angles of each date would have to agree.
+    return xr.concat([each.drop_vars(list(each.coords)) for each in dates], "time")
+
+
+def _checked(by, images):
+    """Check that `by` has the dates and cells of the images, and align it."""
+    if by.dims != ("time", "y", "x") or by.sizes["time"] != images.sizes["time"]:
+        raise ValueError(f"by has dimensions (time, y, x) with the dates of the images, got {dict(by.sizes)}")
+    if {"time"} <= set(by.coords) & set(images.coords) and not np.array_equal(by["time"], images["time"]):
+        raise ValueError("by has other dates than the images, or in another order: sort both with .sortby('time')")
+    one = images.isel(time=0, drop=True)
+    chunks.aligned([one, with_crs_of(by.isel(time=0, drop=True), one).rename("by")])
+    return by
+
+
+def _of_date(images, chosen):
+    """Coordinates of the chosen date in each cell."""
+    angles = {name: images[name] for name in ANGLES if name in images.coords and "time" in images[name].dims}
+    found = {}
+    for name, values in ({"date": images["time"]} | angles).items():
+        plain, missing = xr.DataArray(values.variable.to_base_variable()), np.nan
+        if plain.dtype.kind == "M":
+            missing = np.datetime64("NaT")
+        elif plain.ndim == 1:
+            plain = plain.astype(float)
+        found[name] = _along_time(values_of_date, plain, chosen, dtype=plain.dtype, missing=missing)
+        # xarray may keep the attributes of the index here.
+        found[name].attrs = cf.attributes(name) if name in ANGLES else {"long_name": "date of the image that is kept"}
+    return found
+
+
+def _along_time(kernel, *arrays, dtype, **parameters):
+    """Apply a kernel to arrays whose last axis is time."""
+    core = [["time"] if "time" in each.dims else [] for each in arrays]
+    return xr.apply_ufunc(
+        kernel, *arrays, input_core_dims=core, join="exact", dask="parallelized", output_dtypes=[dtype],
+        kwargs=parameters, dask_gufunc_kwargs={"allow_rechunk": True},
+    )  # fmt: skip

@@ -1,0 +1,427 @@
+"""Regression of labelled rasters: pairs of pixels, uncertainty, and maps inverted from images."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis import regression
+from fifesim.analysis.regression import Regression, totals
+from fifesim.base.annotations import Pairing
+from fifesim.grids import cf, chunks, swaths
+from fifesim.grids import grid as grids
+from fifesim.grids.grid import with_crs_of
+from fifesim.grids.inputs import RasterOrDataset
+from fifesim.grids.reductions import computed, extremes, sums_by_row
+
+# Numbers by which files mark missing data and which no quantity here takes, and a bound that all of them keep.
+_FILLS = (-999.0, -9999.0, -99999.0, -32768.0, 65535.0)
+_LARGEST = 1e15
+
+# Pixels that count as one size: those of scanners drift against a grid by some percent, and may be oblong.
+_SAME_PIXEL = 2.0
+
+
+def matched(y, x, pair="coordinates"):
+    """Cut two rasters so that their pixels pair, by coordinates or by row and column."""
+    if pair not in ("coordinates", "index"):
+        raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
+    y, x = sound_cells(y), sound_cells(x)
+    for array in (y, x):
+        if set(array.dims) != {"y", "x"}:
+            cure = "select one band" if "time" not in array.dims else "select one date with .isel(time=0)"
+            cure = "put a scan onto a map with .fifesim.grid_swath(grid)" if "line" in array.dims else cure
+            raise ValueError(f"pairs are of rasters over (y, x), got {array.dims}: {cure} first")
+    return (_common_index if pair == "index" else _common_place)(y.transpose("y", "x"), x.transpose("y", "x"))
+
+
+def sound_cells(array):
+    """Check that the cells of a raster are physical values; a lazy raster is checked when it computes."""
+    # A digital number of 0 is no data and would count as dark ground.
+    if "gain" in array.coords:
+        raise ValueError(
+            f"{array.name or 'the array'} holds digital numbers, whose 0 is no data: convert it with "
+            ".fifesim.to_reflectance() or .fifesim.to_radiance() first"
+        )
+    if array.dtype.kind != "f" or not array.size:
+        return array
+    return array.copy(data=array.data.map_blocks(_no_fill, dtype=array.dtype) if array.chunks else _no_fill(array.data))
+
+
+def _no_fill(values):
+    """Check that neither the smallest nor the largest value of a block is a fill value."""
+    if not values.size:
+        return values
+    ends = values.min(), values.max()
+    # minimum and maximum are twice as fast as fmin and fmax, which skip NaN.
+    if np.isnan(ends[0]):
+        ends = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
+    for end in ends:
+        if np.isinf(end) or float(end) in _FILLS or abs(end) > _LARGEST:
+            raise ValueError(
+                f"a value of {end:g} marks missing data and would count as a measurement: set it to NaN, such as "
+                f"raster.where(raster != {end:g})"
+            )
+    return values
+
+
+def check_same_quantity(one, other, names):
+    """Raise ValueError if two rasters are different quantities, by standard names."""
+    says = [array.attrs.get("standard_name") for array in (one, other)]
+    if None not in says and says[0] != says[1]:
+        raise ValueError(
+            f"{names[0]} and {names[1]} must be the same quantity, got {says[0]} and {says[1]}: give both of one"
+        )
+
+
+def origins(*arrays):
+    """Offsets near the means, so that sums keep their digits: means of the first rows, or 0 where these are empty."""
+    rows = computed(*(array.isel(y=slice(1)).data for array in arrays))
+    return tuple(float(np.nan_to_num(row[np.isfinite(row)].mean())) if np.isfinite(row).any() else 0.0 for row in rows)
+
+
+def _common_index(y, x):
+    coordinates = [raster[axis].values for axis in ("y", "x") for raster in (y, x) if axis in raster.coords]
+    sizes = [abs(values[1] - values[0]) for values in coordinates if values.size > 1]
+    if sizes and max(sizes) > _SAME_PIXEL * min(sizes):
+        raise ValueError(
+            f"pair='index' needs pixels of about one size, got {min(sizes):g} and {max(sizes):g} m: bring one raster "
+            "onto the other's grid first, for instance with .fifesim.aggregate"
+        )
+    rows, columns = min(y.sizes["y"], x.sizes["y"]), min(y.sizes["x"], x.sizes["x"])
+    return y.isel(y=slice(rows), x=slice(columns)), x.isel(y=slice(rows), x=slice(columns))
+
+
+def _common_place(y, x):
+    """Cut both rasters to their common area."""
+    y, x = with_crs_of(y, x), with_crs_of(x, y)
+    one, two = grids.geobox(y), grids.geobox(x)
+    try:
+        rows, columns = grids.lattice_offset(one, two)
+    except ValueError as error:
+        raise ValueError(f'{error}, or use pair="index"') from None
+    cut_y, cut_x = {}, {}
+    for axis, shift in (("y", rows), ("x", columns)):
+        start, stop = max(0, shift), min(y.sizes[axis], shift + x.sizes[axis])
+        if stop <= start:
+            raise ValueError("the rasters do not overlap")
+        cut_y[axis], cut_x[axis] = slice(start, stop), slice(start - shift, stop - shift)
+    return y.isel(cut_y), x.isel(cut_x)
+
+
+def regress(y: xr.DataArray, x: xr.DataArray, *, pair: Pairing = "coordinates") -> Regression:
+    """
+    Least-squares line of one raster on another; computes.
+
+    Parameters
+    ----------
+    y, x : xarray.DataArray, dims (y, x)
+        The dependent and the independent variable; pairs with NaN are left out.
+    pair : {"coordinates", "index"}, optional
+        Match pixels that lie in the same place, or that have the same row and column.
+
+    Returns
+    -------
+    regression : fifesim.analysis.regression.Regression
+        The same to the bit under any chunking.
+
+    Raises
+    ------
+    ValueError
+        If the rasters do not match, or fewer than three pairs are left.
+
+    See Also
+    --------
+    fifesim.analysis.regression.fit
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> fit = fifesim.regress(lai.fifesim.aggregate(30), image.fifesim.ndvi())
+    >>> fit.n, round(fit.r2, 2)
+    (100, 0.95)
+    """
+    y, x = matched(y, x, pair)
+    y_origin, x_origin = origins(y, x)
+    sums = sums_by_row(regression.row_sums, y, x, count=6, y_origin=y_origin, x_origin=x_origin)
+    names = [array.attrs.get("standard_name", "") for array in (y, x)]
+    return replace(regression.fit(sums, y_origin, x_origin), y_name=names[0], x_name=names[1])
+
+
+# More increments than this are a width in other units than the variable.
+_MOST_INCREMENTS = 10_000
+
+
+def relative_equivalent_noise(
+    variable: xr.DataArray,
+    ndvi: xr.DataArray,
+    increment: float = 0.1,
+    *,
+    slope: float | None = None,
+    min_count: int = 3,
+    pair: Pairing = "coordinates",
+) -> xr.Dataset:
+    """
+    Relative equivalent noise by increments of a variable; computes.
+
+    Parameters
+    ----------
+    variable, ndvi : xarray.DataArray, dims (y, x)
+        The truth, such as LAI or FPAR, and the index that it is inferred from; pairs with NaN are left out.
+    increment : float, optional
+        Width of an increment, in units of the variable. NDVI varies within it by the slope too, which alone makes a
+        relative noise of ``increment / (sqrt(12) variable)``.
+    slope : float, optional
+        Of NDVI on the variable; by default that of its least-squares line.
+    min_count : int, optional
+        Pairs that an increment needs, at least 2; with fewer its noise is NaN.
+    pair : {"coordinates", "index"}, optional
+        As in `regress`.
+
+    Returns
+    -------
+    noise : xarray.Dataset, dims (increment,)
+        ``ren`` at the mean of the variable in each increment, that ``mean``, the ``deviation`` of NDVI and the
+        ``count`` of pairs, with the middle of the increments as coordinate. The same to the bit under any chunking.
+
+    Raises
+    ------
+    ValueError
+        If the rasters do not match, the increment is not positive, or nothing is left.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 7 and Fig. 7
+
+    See Also
+    --------
+    fifesim.analysis.regression.equivalent_noise
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 270), (0, 270)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
+    >>> noise = truth.fifesim.relative_equivalent_noise(ndvi, increment=0.2)
+    >>> int(noise["count"].sum())
+    900
+    """
+    if not 0 < increment < np.inf:
+        raise ValueError(f"increment must be positive, got {increment:g}: it is a width in units of the variable")
+    if min_count < 2:
+        raise ValueError(f"min_count must be at least 2, got {min_count}: one value has no deviation")
+    variable, ndvi = matched(variable, ndvi, pair)
+    if slope is None:
+        slope = regress(ndvi, variable, pair="index").slope
+    low, high = extremes(variable)
+    if not (np.isfinite(low) and np.isfinite(high)):
+        raise ValueError(f"the variable goes from {low:g} to {high:g}: relative noise needs finite values")
+    first, last = int(np.floor(low / increment)), int(np.floor(high / increment))
+    if last - first >= _MOST_INCREMENTS:
+        raise ValueError(
+            f"increment {increment:g} cuts {low:g} to {high:g} into {last - first + 1} parts: "
+            f"take a larger one, at most {_MOST_INCREMENTS} parts"
+        )
+    increments = last - first + 1
+    (origin,) = origins(ndvi)
+    kernel = partial(regression.increment_sums, first=first, width=increment, increments=increments, ndvi_origin=origin)
+    sums = sums_by_row(kernel, variable, ndvi, count=regression.NOISE_SUMS * increments)
+    count, mean, deviation = regression.increment_moments(sums)
+    ren = np.where(count >= min_count, regression.equivalent_noise(deviation, slope, mean), np.nan)
+    middle = (first + 0.5 + np.arange(increments)) * increment
+    found = {"ren": ren, "mean": mean, "deviation": deviation, "count": count}
+    out = xr.Dataset({name: ("increment", values) for name, values in found.items()})
+    out["ren"].attrs = cf.attributes("ren")
+    attrs = {"long_name": f"middle of increments of {variable.name}"}
+    out = out.assign_coords(increment=("increment", middle, attrs))
+    return out.assign_attrs(slope=float(slope), width=float(increment))
+
+
+_LIMITS = ("low", "high")
+
+# Physical range by quantity; maps above an LAI of 20 are refused elsewhere as wrongly scaled.
+_RANGES = {"lai": (0.0, 20.0), "fpar": (0.0, 1.0)}
+
+# Meanings of the flag by value.
+_FLAGS = {-1: "no_data", 0: "as_fitted", 1: "extrapolated", 2: "clipped_to_minimum", 3: "clipped_to_maximum"}
+
+
+def invert(
+    ndvi: xr.DataArray, fit: Regression, quantity: Literal["lai", "fpar"] = "lai", *, level: float = 0.95
+) -> xr.Dataset:
+    """
+    Map of a variable from an index by a regression, with its prediction interval.
+
+    The line may leave the physical range, 0 to 20 for LAI and 0 to 1 for FPAR. Such values and the ends of their
+    interval are clipped to it and flagged.
+
+    Parameters
+    ----------
+    ndvi : xarray.DataArray, dims (y, x)
+        What the variable was regressed on.
+    fit : fifesim.analysis.regression.Regression
+        From `regress`, of the variable on the index.
+    quantity : {"lai", "fpar"}, optional
+        The variable.
+    level : float, optional
+        Share of new values that the interval holds. [1]
+
+    Returns
+    -------
+    estimate : xarray.Dataset, dims (y, x)
+        The variable, ``low`` and ``high``, the ends of its interval, and ``flag``. Lazy where ``ndvi`` is. The flag is
+        2 or 3 where the variable was clipped to its minimum or maximum, 1 where the index is more than 3 standard
+        deviations from the mean of the fitted data, -1 without data, else 0; its attributes are CF's ``flag_values``
+        and ``flag_meanings``.
+
+    Raises
+    ------
+    ValueError
+        If the quantity or the level is not one allowed, or the fit is of another quantity or on another index.
+
+    See Also
+    --------
+    fifesim.analysis.regression.Regression.prediction_interval,
+    fifesim.analysis.regression.Regression.extrapolates
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
+    >>> estimate = ndvi.fifesim.invert(fifesim.regress(truth, ndvi))
+    >>> sorted(estimate.data_vars)
+    ['flag', 'high', 'lai', 'low']
+    >>> clear = estimate["lai"].where(estimate["flag"] == 0)  # without clipped and extrapolated pixels
+    """
+    if quantity not in _RANGES:
+        raise ValueError(f"quantity must be 'lai' or 'fpar', got {quantity!r}")
+    _check_names(ndvi, fit, quantity)
+    if not 0 < level < 1:
+        raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")
+    line = f"invert: {fit.intercept:.6g} + {fit.slope:.6g} x {ndvi.name or 'index'}"
+    allowed = _RANGES[quantity]
+    found = {quantity: chunks.pointwise(_clipped, ndvi, fit=fit, allowed=allowed)}
+    for end, name in enumerate(_LIMITS):
+        found[name] = chunks.pointwise(_limit, ndvi, fit=fit, allowed=allowed, end=end, level=level)
+    for name, values in found.items():
+        found[name] = cf.label(swaths.placed_as(values, ndvi), quantity, source=ndvi, history=line).rename(name)
+        # A standard name says that the values are the quantity, which the ends of an interval are not.
+        if name in _LIMITS:
+            found[name].attrs.pop("standard_name", None)
+            found[name].attrs["long_name"] += f", {name} end of the {100 * level:g} % prediction interval"
+    flag = swaths.placed_as(chunks.pointwise(_flag, ndvi, dtype=np.int8, fit=fit, allowed=allowed), ndvi).rename("flag")
+    flag.attrs = {
+        "standard_name": f"{found[quantity].attrs['standard_name']} status_flag",
+        "long_name": f"flag of the {found[quantity].attrs['long_name']}",
+        "flag_values": np.array(list(_FLAGS), np.int8),
+        "flag_meanings": " ".join(_FLAGS.values()),
+        "history": found[quantity].attrs["history"],
+    }
+    found[quantity].attrs["ancillary_variables"] = "flag"
+    return xr.Dataset(found | {"flag": flag})
+
+
+def inversion_error(estimate: RasterOrDataset, truth: xr.DataArray, *, pair: Pairing = "coordinates") -> xr.Dataset:
+    """
+    Error of an estimated map against the truth; computes.
+
+    Parameters
+    ----------
+    estimate : xarray.Dataset or xarray.DataArray, dims (y, x)
+        From `invert`, or a map alone.
+    truth : xarray.DataArray, dims (y, x)
+    pair : {"coordinates", "index"}, optional
+        As in `regress`.
+
+    Returns
+    -------
+    error : xarray.Dataset
+        ``bias``, mean of estimate less truth; ``rmse``, the root of its mean square; ``n``, the pixels; of a Dataset
+        ``coverage`` also, the share of true values within the interval. The same to the bit under any chunking.
+
+    Raises
+    ------
+    ValueError
+        If the rasters do not match, no pixel has both, or a Dataset is not as `invert` gives it.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> ndvi, truth = image.fifesim.ndvi(), lai.fifesim.aggregate(30)
+    >>> estimate = ndvi.fifesim.invert(fifesim.regress(truth, ndvi))
+    >>> error = estimate.fifesim.inversion_error(truth)
+    >>> abs(round(float(error.bias), 6)), round(float(error.coverage), 2)
+    (0.0, 0.96)
+    """
+    value, low, high = [estimate] * 3 if isinstance(estimate, xr.DataArray) else _map_and_limits(estimate)
+    check_same_quantity(value, truth, ("estimate", "truth"))
+    value, true = matched(value, truth, pair)
+    low, _ = matched(low, truth, pair)
+    high, _ = matched(high, truth, pair)
+    n, total, squares, inside = totals(sums_by_row(regression.error_sums, true, value, low, high, count=4))
+    if n == 0:
+        raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
+    found = {"bias": total / n, "rmse": math.sqrt(squares / n), "n": int(n)}
+    if isinstance(estimate, xr.Dataset):
+        found["coverage"] = inside / n
+    return xr.Dataset(found)
+
+
+def _check_names(ndvi, fit, quantity):
+    """Raise ValueError if a regression does not relate the quantity to the index, by standard names."""
+    wanted, given = cf.QUANTITIES[quantity].standard_name, ndvi.attrs.get("standard_name", "")
+    if fit.y_name and fit.y_name != wanted:
+        raise ValueError(
+            f"fit must be of {wanted}, got one of {fit.y_name} on {fit.x_name or 'an index'}: exchange the arguments "
+            "of regress, or name the quantity"
+        )
+    if fit.x_name and given and fit.x_name != given:
+        raise ValueError(f"ndvi must be {fit.x_name}, as in the fit, got {given}: give the raster of the index")
+
+
+def _map_and_limits(estimate):
+    """Variable of an estimate, and the limits of its interval."""
+    variables = [name for name in estimate.data_vars if name not in (*_LIMITS, "flag")]
+    if len(variables) != 1 or not set(_LIMITS) <= set(estimate.data_vars):
+        raise ValueError(
+            f"an estimate has one variable with low and high, as invert gives it, got {list(estimate.data_vars)}: "
+            "give a single map as a DataArray"
+        )
+    return [estimate[name] for name in (*variables, *_LIMITS)]
+
+
+def _clipped(index, fit, allowed):
+    """Prediction of the line, clipped to its physical range."""
+    return np.clip(fit.predict(index), *allowed)
+
+
+def _limit(index, fit, allowed, end, level):
+    """One end of the prediction interval, clipped to the physical range."""
+    return np.clip(fit.prediction_interval(index, level)[end], *allowed)
+
+
+def _flag(index, fit, allowed):
+    """Flag of each pixel, a key of `_FLAGS`."""
+    line, (lowest, highest) = fit.predict(index), allowed
+    reasons = [np.isnan(line), line < lowest, line > highest, fit.extrapolates(index)]
+    return np.select(reasons, [-1, 2, 3, 1], 0)

@@ -1,0 +1,222 @@
+"""Radiative transfer engines behind one function, and the successive-orders engine of mixed air."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.linalg import eigvalsh_tridiagonal
+
+from fifesim.atmosphere import aerosols, six_s
+from fifesim.atmosphere.column import matrix_moments
+from fifesim.atmosphere.coupling import BandTerms, Scattering, band_mean_terms, nodes_of
+from fifesim.atmosphere.five_s import five_s_scattering
+from fifesim.atmosphere.successive_orders import flux_transmittance, path_reflectance
+from fifesim.base.caches import cached
+from fifesim.base.geometry import scattering_angle_cosine
+
+_MOMENTS = 48  # of the aerosol's scattering matrix: the solver uses the first 33
+_COSINES = 500  # of a quadrature fine enough for the forward peak of coarse particles
+
+
+class WholeScattering(NamedTuple):
+    """Joint scattering by molecules and aerosol, with wavelength as the last axis. [1]"""
+
+    reflectance: np.ndarray  # over black ground, shape (V, R, n)
+    transmittance_down: np.ndarray  # shape (n,)
+    transmittance_up: np.ndarray  # shape (V, 1, n)
+    spherical_albedo: np.ndarray  # shape (n,)
+
+
+def mixed_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
+    """Scattering by wavelength, by successive orders, in a mixture of molecules and aerosol."""
+    return _by_wavelength(_at_wavelength, atmosphere, wavelength, sza, vza, raa, polarized)
+
+
+def whole_scattering(atmosphere, wavelength, sza, vza, raa, *, polarized=True):
+    """Joint scattering by molecules and aerosol as in `mixed_scattering`, in less than half of the time."""
+    return _by_wavelength(_whole, atmosphere, wavelength, sza, vza, raa, polarized)
+
+
+def _by_wavelength(function, atmosphere, wavelength, sza, vza, raa, polarized):
+    """Results of a function for each wavelength, stacked along a last axis."""
+    views = tuple(np.asarray(vza, float).tolist()), tuple(np.asarray(raa, float).tolist())
+    found = [function(atmosphere, float(w), float(sza), *views, polarized) for w in wavelength]
+    return type(found[0])(*(np.stack(values, axis=-1) for values in zip(*found, strict=True)))
+
+
+@cached(1024, "reflectance and transmittance by successive orders")
+def _whole(atmosphere, wavelength, sza, vza, raa, polarized):
+    tau_r, tau_a, reflectance, flux = _light(atmosphere, wavelength, sza, vza, raa, polarized)
+    total, spherical_albedo = flux(tau_r, tau_a)
+    return WholeScattering(reflectance(tau_a), total[0], total[1:, None], spherical_albedo)
+
+
+def _light(atmosphere, wavelength, sza, vza, raa, polarized):
+    """Optical depths of molecules and aerosol, and functions for the reflectance and transmittance of given depths."""
+    at = np.array([wavelength])
+    tau_r, tau_a = float(atmosphere.rayleigh_optical_depth(at)[0]), float(atmosphere.aerosol_optical_depth(at)[0])
+    cosine = scattering_angle_cosine(sza, np.array(vza)[:, None], np.array(raa))
+    albedo, moments, phase = _aerosol(atmosphere, at, cosine, polarized)
+
+    options = {"polarized": polarized, "vertical": aerosols.vertical(atmosphere.aerosol)}
+
+    def reflectance(tau_aerosol):
+        return path_reflectance(tau_r, tau_aerosol, albedo, moments, phase, sza, vza, raa, **options)
+
+    def flux(tau_molecules, tau_aerosol):
+        return flux_transmittance(tau_molecules, tau_aerosol, albedo, moments, (sza, *vza), **options)
+
+    return tau_r, tau_a, reflectance, flux
+
+
+@cached(1024, "scattering by successive orders")
+def _at_wavelength(atmosphere, wavelength, sza, vza, raa, polarized):
+    whole = _whole(atmosphere, wavelength, sza, vza, raa, polarized)
+    tau_r, tau_a, reflectance, flux = _light(atmosphere, wavelength, sza, vza, raa, polarized)
+    molecules, _ = flux(tau_r, 0.0)
+    aerosol, _ = flux(0.0, tau_a)
+    mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))[:, None]
+    tau = tau_r + tau_a
+    return Scattering(
+        **whole._asdict(),
+        molecules_reflectance=reflectance(0.0),
+        optical_depth=tau,
+        direct_transmittance_down=np.exp(-tau / mu_s),
+        direct_transmittance_up=np.exp(-tau / mu_v),
+        diffuse_up_molecules=molecules[1:, None] - np.exp(-tau_r / mu_v),
+        diffuse_up_aerosol=aerosol[1:, None] - np.exp(-tau_a / mu_v),
+    )
+
+
+def _aerosol(atmosphere, wavelength, cosine, polarized):
+    """Single scattering albedo, moments of the scattering matrix, and phase function of the aerosol."""
+    if atmosphere.aot == 0:
+        return 0.0, np.eye(1, _MOMENTS)[0], np.zeros(cosine.shape)
+    _, albedo, _ = aerosols.aerosol_optics(atmosphere.aerosol, wavelength)
+    phase = aerosols.aerosol_phase(atmosphere.aerosol, cosine, wavelength[0])
+    return float(albedo[0]), _moments(atmosphere.aerosol, float(wavelength[0]), polarized), phase
+
+
+@cached(128, "quadrature of phase functions")
+def _quadrature():
+    """Gauss-Legendre points and weights, identical to the bit to `numpy.polynomial.legendre.leggauss`."""
+    # numpy computes the eigenvalues of a full matrix, which takes longer than all other work at a wavelength.
+    last = np.append(np.zeros(_COSINES), 1)
+    beside = np.diag(legendre.legcompanion(last), 1)
+    cosines = eigvalsh_tridiagonal(np.zeros(_COSINES), beside)
+    rise = legendre.legval(cosines, legendre.legder(last))
+    cosines -= legendre.legval(cosines, last) / rise
+    before = legendre.legval(cosines, last[1:])
+    weights = 1 / ((before / np.abs(before).max()) * (rise / np.abs(rise).max()))
+    cosines, weights = (cosines - cosines[::-1]) / 2, (weights + weights[::-1]) / 2
+    return cosines, weights * (2 / weights.sum())
+
+
+@cached(256, "moments of the scattering matrix of an aerosol")
+def _moments(aerosol, wavelength, polarized):
+    if not polarized:
+        return aerosols.phase_moments(aerosol, np.array([wavelength]), _MOMENTS)[0]
+    cosines, weights = _quadrature()
+    phase = aerosols.aerosol_phase(aerosol, cosines, wavelength)
+    polarization = aerosols.aerosol_polarization(aerosol, cosines, wavelength)
+    return matrix_moments(phase, polarization, cosines, weights, _MOMENTS)
+
+
+LARGEST_ZENITH = 75.0  # the plane-parallel atmosphere holds to here [degree]
+
+SCATTERING = {
+    "5S": five_s_scattering,
+    "successive-orders": mixed_scattering,
+}
+
+
+def band_terms(atmosphere, bands, sza, vza, raa, *, each=iter):
+    """
+    Terms of the coupling equation in each band, by the engine of the atmosphere.
+
+    Parameters
+    ----------
+    atmosphere : models.Atmosphere
+    bands : sequence of Band, length (band,)
+        Within 0.4 to 2.5 um.
+    sza, vza : float
+        0 to 75. [degree]
+    raa : float
+        0 has sun and sensor on the same side. [degree]
+    each : callable, optional
+        Goes through the runs of 6S, one for each band, such as with a progress bar.
+
+    Returns
+    -------
+    terms : BandTerms
+        Read-only arrays of shape (band,). [1]
+
+    Raises
+    ------
+    ImportError
+        If the engine is 6S and not installed.
+    ValueError
+        If a zenith angle is out of range, or a band reaches beyond the gas table or the aerosol's own.
+
+    References
+    ----------
+    [Tanre1990]_
+
+    Examples
+    --------
+    >>> from fifesim.atmosphere.models import Atmosphere
+    >>> from fifesim.base.bands import Band
+    >>> blue, red = Band("blue", (0.45, 0.5), (1, 1)), Band("red", (0.62, 0.67), (1, 1))
+    >>> terms = band_terms(Atmosphere(), (blue, red), 30.0, 0.0, 0.0)
+    >>> bool(terms.path_reflectance[0] > terms.path_reflectance[1])
+    True
+    """
+    check_zenith("sza", sza)
+    check_zenith("vza", vza)
+    if atmosphere.engine == "6S":
+        return six_s.sixs_band_terms(atmosphere, bands, sza, vza, raa, each=each)
+    return _band_terms(atmosphere, tuple(bands), float(sza), float(vza), float(raa))
+
+
+def check_zenith(name, angle):
+    """Raise ValueError if a zenith angle is outside of the range of all engines."""
+    if not 0 <= angle <= LARGEST_ZENITH:
+        raise ValueError(
+            f"{name} must be from 0 to {LARGEST_ZENITH:g} degrees, got {angle:g}: "
+            "the plane-parallel atmosphere does not hold below"
+        )
+
+
+def check_aerosol(atmosphere, what, low, high):
+    """Raise ValueError if the tables of a user-defined aerosol do not cover some wavelengths."""
+    own = atmosphere.aot > 0 and not isinstance(atmosphere.aerosol, str)
+    if own and not aerosols.covers(atmosphere.aerosol, low, high):
+        first, last = aerosols.wavelength_limits(atmosphere.aerosol)
+        raise ValueError(
+            f"{what} must lie within the wavelengths of the aerosol {atmosphere.aerosol}, {first:g} to {last:g} um, "
+            f"got {low:g} to {high:g} um: add wavelengths to its tables, or choose other bands"
+        )
+
+
+def terms_at(atmosphere, bands, sza, vza, raa):
+    """Terms of the coupling equation in each band for one sun and several views, shape (V or 1, R or 1, band). [1]"""
+    for band in bands:
+        check_aerosol(atmosphere, f"band {band.name}", *band.limits)
+    nodes = nodes_of(bands)
+    return band_mean_terms(scattering(atmosphere, nodes, sza, vza, raa), nodes, atmosphere, bands, sza, vza)
+
+
+def scattering(atmosphere, wavelength, sza, vza, raa):
+    """Scattering at some wavelengths, by the engine of the atmosphere; views of shape (V,) and (R,). [1]"""
+    if atmosphere.engine not in SCATTERING:
+        raise ValueError(f"engine must be one of {', '.join(SCATTERING)} here, got {atmosphere.engine!r}")
+    return SCATTERING[atmosphere.engine](atmosphere, wavelength, sza, vza, raa)
+
+
+@cached(256, "terms of the atmosphere for a geometry")
+def _band_terms(atmosphere, bands, sza, vza, raa):
+    found = terms_at(atmosphere, bands, sza, np.array([vza]), np.array([raa]))
+    terms = BandTerms(*(values.squeeze((0, 1)) for values in found))
+    for values in terms:
+        values.flags.writeable = False
+    return terms

@@ -1,1 +1,0 @@
-"""How light goes through the air: 5S, successive orders, 6S."""

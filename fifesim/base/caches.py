@@ -1,0 +1,50 @@
+"""Caches of intermediate results, with their contents and sizes, and a function that clears all of them."""
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple
+
+
+class Cache(NamedTuple):
+    """Contents of a cache, its maximum number of results (None for no limit), and its function."""
+
+    what: str
+    size: int | None
+    function: Callable
+
+
+CACHES: list[Cache] = []
+"""Caches of the modules that are imported."""
+
+
+def cached(size, what):
+    """Decorator of a function that keeps its latest results, by its arguments."""
+
+    def decorate(function):
+        kept = lru_cache(maxsize=size)(function)
+        CACHES.append(Cache(what, size, kept))
+        return kept
+
+    return decorate
+
+
+def clear_caches() -> None:
+    """
+    Free the memory of intermediate results that fifesim keeps between calls.
+
+    These are tables of reflectance, terms of the atmosphere, tiles of random fields and of hills, warped tiles of files
+    and parsed data files. Each kind has a bound, so a long process does not grow; results do not depend on them. Clear
+    them to measure times, or to make room for something else in the same process.
+
+    Notes
+    -----
+    Worker processes have separate caches: ``client.run(fifesim.clear_caches)``.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> air = fifesim.Atmosphere()
+    >>> fifesim.clear_caches()
+    """
+    for cache in CACHES:
+        cache.function.cache_clear()

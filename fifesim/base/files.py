@@ -1,0 +1,123 @@
+"""Files: safe opening of the user's files, and the tables of the data folder."""
+
+import os
+import re
+import reprlib
+import stat
+import tomllib
+import warnings
+from pathlib import Path
+
+import pandas as pd
+
+from fifesim.base.caches import cached
+
+# Larger than any scenario or instrument file, and read in a second. [byte]
+_LARGEST = 1_000_000
+# Tables within tables in one dotted key, for which tomllib takes the square of their number in time. The dots of a path
+# lie beside slashes.
+_DEEPEST = 100
+_DOT_OF_KEY = re.compile(r"[\w\"'-][ \t]*\.(?=[ \t]*[\w\"'-])")
+
+_KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+
+# The longest that a message repeats of one value, and what a line of it may have.
+_SHOWN = 60
+_LINE = 400
+
+
+def check_regular(path):
+    """Raise ValueError if a path is not a regular file, because opening a pipe or a device may block."""
+    mode = os.stat(path).st_mode
+    if not stat.S_ISREG(mode):
+        raise ValueError(f"{in_a_line(str(path), 200)} is {_KINDS.get(stat.S_IFMT(mode), 'a device')}: name a file")
+
+
+def read_csv(path, what):
+    """Read a CSV table, in which ``#`` starts a comment, with the file name in every message."""
+    name = in_a_line(str(path), 200)
+    if "://" in str(path):
+        raise ValueError(f"cannot read {what} {name}: it is an address; download the file and give its path")
+    try:
+        check_regular(path)
+        with warnings.catch_warnings():
+            # Without index_col, pandas takes surplus values for an index.
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            return pd.read_csv(path, comment="#", skipinitialspace=True, index_col=False)
+    except FileNotFoundError:
+        raise ValueError(f"cannot read {what} {name}: there is no such file") from None
+    except pd.errors.ParserWarning:
+        raise ValueError(
+            f"cannot read {what} {name}: rows have more values than the first line has names; name all columns, and "
+            "write decimals with a point"
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ValueError(f"cannot read {what} {name}: {in_a_line(reason, 150)}; it must be CSV in UTF-8") from None
+
+
+def read_bounded(path, largest, what):
+    """Read a regular file of bounded size."""
+    path = Path(path)
+    check_regular(path)
+    size = path.stat().st_size
+    if size > largest:
+        name = in_a_line(path.name)
+        raise ValueError(f"{name} has {size} bytes: {what} has at most {largest}; is it another file?")
+    return path.read_bytes()
+
+
+def read_toml(path):
+    """Read a TOML file."""
+    content, name = read_bounded(path, _LARGEST, "a file of keys"), in_a_line(Path(path).name)
+    try:
+        text = content.decode("utf-8")
+        if any(len(_DOT_OF_KEY.findall(part)) > _DEEPEST for part in re.split(r"[=,\n]", text)):
+            raise RecursionError
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError(f"{name} nests its tables too deeply: a key lies in a section, section.key") from None
+    except ValueError as error:
+        raise ValueError(in_a_line(f"{name} is not valid TOML: {error}")) from None
+
+
+def shown(value):
+    """Short printable text of a value, for messages."""
+    brief = reprlib.Repr()
+    brief.maxstring = brief.maxother = brief.maxlong = _SHOWN
+    brief.maxlevel = 3
+    try:
+        return in_a_line(brief.repr(value), _SHOWN)
+    except ValueError:
+        # Python writes no whole number of more than 4300 digits.
+        return "a number of thousands of digits"
+
+
+def in_a_line(text, length=_LINE):
+    """Text in one line: unprintable characters are escaped, and the middle of a long text is left out."""
+    line = "".join(character if character.isprintable() else repr(character)[1:-1] for character in str(text))
+    if len(line) <= length:
+        return line
+    half = (length - 3) // 2
+    return f"{line[:half]}...{line[-half:]}"
+
+
+_PACKAGE = Path(__file__).parents[1]
+
+
+def path(name):
+    """Path of a file of the data folder, in the wheel or in a checkout."""
+    for folder in (_PACKAGE / "data", _PACKAGE.parent / "data"):
+        if (folder / name).exists():
+            return folder / name
+    raise FileNotFoundError(f"the data file {name!r} is missing from this installation: reinstall fifesim")
+
+
+@cached(128, "data files")
+def _read(name):
+    return pd.read_csv(path(name), comment="#")
+
+
+def table(name):
+    """Copy of a CSV table of the data folder, whose header comments give source, units and columns."""
+    return _read(name).copy()

@@ -1,0 +1,118 @@
+"""Text of messages: nearest names, validation errors, warnings at the user's line and log lines."""
+
+import inspect
+import logging
+import sys
+import warnings
+from contextlib import contextmanager
+from contextvars import ContextVar
+from difflib import get_close_matches
+from functools import wraps
+from pathlib import Path
+
+PARTS = {}
+"""Names of a description and of its fields by the argument that takes it, for messages."""
+
+
+def closest(value, allowed):
+    """Name that a misspelt one probably stands for, ignoring case; empty if none is close."""
+    names = {str(name).lower(): str(name) for name in allowed}
+    return next((names[found] for found in get_close_matches(str(value).lower(), names, n=1)), "")
+
+
+def nearest(value, allowed):
+    """Beginning of a message that suggests the nearest allowed name; empty if none is near."""
+    near = closest(value, allowed)
+    return f"did you mean {near!r}? " if near else ""
+
+
+def unknown_argument(name, signature, options):
+    """Message about unknown argument names; empty if there are none."""
+    known = [each for each in signature.parameters if each != "self"]
+    unknown = next((each for each in options if each not in known), None)
+    if unknown is None:
+        return ""
+    for argument, (description, fields) in PARTS.items():
+        near = unknown if unknown in fields else "" if closest(unknown, known) else closest(unknown, fields)
+        if argument in known and near:
+            return f"{name} has no argument {unknown!r}: type {argument}={description}({near}=...)"
+    return f"{name} has no argument {unknown!r}: {nearest(unknown, known)}There are {', '.join(known)}"
+
+
+def spelled(described):
+    """Wrap the initialization of a class so that it suggests the nearest name for a misspelt argument."""
+    make = described.__init__
+    signature = inspect.signature(make)
+
+    @wraps(make)
+    def making(self, *args, **options):
+        if wrong := unknown_argument(described.__name__, signature, options):
+            raise TypeError(wrong)
+        make(self, *args, **options)
+
+    described.__init__ = making
+    return described
+
+
+_WORDS = {
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "dict_type": "must be a table of keys",
+    "finite_number": "must be a finite number",
+    "float_parsing": "must be a number",
+    "float_type": "must be a number",
+    "greater_than": "must be above {gt:.12g}",
+    "greater_than_equal": "must be at least {ge:.12g}",
+    "int_from_float": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "int_type": "must be a whole number",
+    "less_than": "must be below {lt:.12g}",
+    "less_than_equal": "must be at most {le:.12g}",
+    "list_type": "must be a list, in brackets",
+    "literal_error": "must be {expected}",
+    "model_type": "must be a table of keys",
+    "string_too_long": "must have at most {max_length} characters",
+    "string_too_short": "must have at least {min_length} characters",
+    "string_type": "must be text, in quotes",
+    "too_long": "takes {max_length} of them at most",
+    "too_short": "needs {min_length} of them or more",
+    "tuple_type": "must be a list, in brackets",
+}
+
+
+def in_own_words(error):
+    """Message for an error of pydantic."""
+    known = _WORDS.get(error["type"])
+    return known.format(**error.get("ctx", {})) if known else error["msg"]
+
+
+_PACKAGE = str(Path(__file__).parents[1])
+
+
+def warn(message):
+    """Warn that a result may be wrong, at the first line outside of the package."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back and frame.f_code.co_filename.startswith(_PACKAGE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, stacklevel=level)
+
+
+LOG = logging.getLogger("fifesim")
+"""Logger: steps of long work at INFO, their parts at DEBUG. It has no handlers; the application adds its own."""
+
+_QUIET = ContextVar("fifesim_quiet", default=False)
+
+
+@contextmanager
+def quiet(wanted=True):
+    """Context in which long work shows no progress."""
+    token = _QUIET.set(wanted)
+    try:
+        yield
+    finally:
+        _QUIET.reset(token)
+
+
+def is_quiet():
+    """Whether progress is hidden."""
+    return _QUIET.get()

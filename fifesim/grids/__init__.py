@@ -1,0 +1,1 @@
+"""Labelled rasters: grids, CF metadata, files, and kernels on dask. No physics."""

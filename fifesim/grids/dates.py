@@ -1,0 +1,117 @@
+"""Rasters over time: steps for one date, applied to each date separately."""
+
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass, replace
+from functools import wraps
+from hashlib import blake2b
+from inspect import signature
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+import xarray as xr
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def by_date(step: Callable[P, R]) -> Callable[P, R]:
+    """Extend a step for rasters of one date to rasters with a dimension time."""
+    # Each date is processed with the same date of every other raster that has the dimension.
+
+    parameters = list(signature(step).parameters)
+    first = parameters[0]
+
+    @wraps(step)
+    def each_date(*args, **options):
+        if not args and first in options:
+            args = (options.pop(first),)
+        if not args or "time" not in getattr(args[0], "dims", ()):
+            _check_no_dates(step, dict(zip(parameters, args, strict=False)) | options)
+            return step(*args, **options)
+        raster, *args = args
+        if "time" not in raster.coords:
+            raise ValueError(
+                "the raster's dimension time has no coordinate: type .assign_coords(time=['2022-06-03T17:10', ...])"
+            )
+        if options.get("time") is not None:
+            raise ValueError("the raster has dates of its own: leave time= out, or select one date with .isel(time=0)")
+        dates = []
+        for number in range(raster.sizes["time"]):
+            others = [_at(each, number, raster) for each in args]
+            named = {name: _at(each, number, raster) for name, each in options.items()}
+            dates.append(step(raster.isel(time=number), *others, **named))
+        return joined(dates)
+
+    return each_date
+
+
+def joined(dates):
+    """Join rasters of several dates, dims (time, ...), lazily; coordinates that differ get the dimension time."""
+    first = dates[0]
+    if isinstance(first, xr.DataTree):
+        nodes = {node.path: next(iter(node.data_vars)) for node in first.leaves}
+        rasters = {path: joined([date[path][name] for date in dates]) for path, name in nodes.items()}
+        return xr.DataTree.from_dict({path: raster.to_dataset() for path, raster in rasters.items()})
+    bare = [date.drop_vars(set(date.coords) - set(date.dims)) for date in dates]
+    raster = xr.concat(bare, dim="time", join="override", combine_attrs="override").transpose("time", ...)
+    for name in ("time", *(name for name in first.coords if name not in (*first.dims, "time"))):
+        known, *others = variables = [date.coords[name].variable for date in dates]
+        # Coordinates by cell are taken to differ, because a comparison would compute them.
+        differs = {"y", "x"} <= set(known.dims) or not all(known.identical(other) for other in others)
+        along_time = xr.Variable.concat(variables, dim="time") if differs or name == "time" else known
+        raster = raster.assign_coords({name: along_time})
+    return raster
+
+
+def epoch(raster):
+    """Number of the noise realization of a date: seconds from the year 1 to its time, 0 without a time."""
+    time = raster.coords.get("time")
+    if time is None or time.ndim:
+        return 0
+    if time.dtype.kind != "M":
+        # Dates of another calendar, and what else tells images apart.
+        return int.from_bytes(blake2b(str(time.item()).encode(), digest_size=7).digest(), "big") + 1
+    # In nanoseconds the year 1 is out of reach.
+    return int((time.values.astype("M8[s]") - np.datetime64("0001-01-01", "s")).astype(int))
+
+
+def _check_no_dates(step, options):
+    """Raise ValueError for arguments with dates if the raster has one date."""
+    for name, other in options.items():
+        if isinstance(other, dict | tuple | list) or is_dataclass(other):
+            _check_no_dates(step, _parts(other))
+        elif isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
+            raise ValueError(
+                f"{name} has dates and the raster of {step.__name__} has none: give the raster a dimension time, or "
+                "select one date with .isel(time=0)"
+            )
+
+
+def _parts(other):
+    """Parts of a mapping, a sequence or a description, by name."""
+    if isinstance(other, dict):
+        return other
+    if isinstance(other, tuple | list):
+        return dict(enumerate(other))
+    return {field.name: getattr(other, field.name) for field in fields(other) if field.init}
+
+
+def _at(other, number, raster):
+    """Select a date in an argument with the dimension time, or in its parts."""
+    if isinstance(other, dict | tuple | list) or is_dataclass(other):
+        parts = _parts(other)
+        found = {name: _at(each, number, raster) for name, each in parts.items()}
+        changed = {name: each for name, each in found.items() if each is not parts[name]}
+        if not changed:
+            return other
+        if isinstance(other, dict):
+            return found
+        if isinstance(other, tuple | list):
+            return type(other)._make(found.values()) if hasattr(other, "_make") else type(other)(found.values())
+        # A Canopy keeps which of its fields were given.
+        return other.replace(**changed) if hasattr(other, "replace") else replace(other, **changed)
+    if isinstance(other, xr.DataArray | xr.Dataset) and "time" in other.dims:
+        if not np.array_equal(other["time"].values, raster["time"].values):
+            raise ValueError(f"the times of {getattr(other, 'name', None) or 'a Dataset'} are not those of the raster")
+        return other.isel(time=number)
+    return other

@@ -1,0 +1,413 @@
+"""GeoTIFF files that a GIS opens in the right place, and that are read back unchanged."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import dask.array as da
+import numpy as np
+import rasterio
+import rasterio.errors
+import rasterio.shutil
+import xarray as xr
+from dask.utils import SerializableLock
+from rasterio.enums import ColorInterp
+from rasterio.windows import Window
+
+from fifesim.base.annotations import Chunks, FilePath
+from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, nearest_band
+from fifesim.base.files import in_a_line
+from fifesim.base.geometry import ANGLES
+from fifesim.base.messages import warn
+from fifesim.grids import cf
+from fifesim.grids import grid as grids
+from fifesim.grids.chunks import found_client
+from fifesim.grids.inputs import RasterOrDataset, no_data_of
+from fifesim.grids.opening import ErrorsOfGdal, check_memory, check_raster, horizontal_crs, raster_file, stored_cells
+from fifesim.grids.tags import (
+    DAYS,
+    TAG,
+    band_names,
+    band_units,
+    fingerprint_of,
+    read_tag,
+    restored,
+    tag_of,
+    with_layers,
+)
+
+
+def physical(array, storage):
+    """Values of a file of another program in their unit, NaN for no data; digital numbers of radiance stay."""
+    scales, offsets, nodata = storage["scales"], storage["offsets"], storage["nodata"]
+    missing = xr.zeros_like(array, dtype=bool) if nodata is None else array == nodata
+    if scales is None:
+        return array.where(~missing, array.dtype.type(0))
+    if nodata is None and all(scale == 1 for scale in scales) and not any(offsets):
+        return array
+    gain, offset = (xr.DataArray(list(values), dims="band") for values in (scales, offsets))
+    return array.where(~missing) * gain + offset
+
+
+def gdal_description(source, file_name):
+    """Names, calibration and wavelengths of a file that fifesim did not write, and its scales, offsets and nodata."""
+    names = [name or f"band{number}" for number, name in enumerate(source.descriptions, 1)]
+    values = {"wavelength": _wavelengths(source, file_name)}
+    counts = np.dtype(source.dtypes[0]).kind == "u" and set(source.units) == {cf.QUANTITIES["toa_radiance"].units}
+    if counts and set(zip(source.scales, source.offsets, strict=True)) == {(1.0, 0.0)}:
+        raise ValueError(
+            f"the bands of {file_name} have units of radiance and no scale, so that their digital numbers have no "
+            "calibration: give them one (rasterio: scales, offsets), or convert radiance to fractions with "
+            "gdal_translate -ot Float32"
+        )
+    if counts:
+        values |= {"gain": list(source.scales), "offset": list(source.offsets)}
+    coords = {"band": xr.DataArray(names, dims="band")}
+    coords |= {
+        name: xr.DataArray(value, dims="band", attrs=cf.attributes(name)) for name, value in values.items() if value
+    }
+    shared = source.units[0] if len(set(source.units)) == 1 else None
+    units = {} if counts or not shared else {"units": shared}
+    storage = {"scales": None if counts else source.scales, "offsets": source.offsets, "nodata": source.nodata}
+    return {"name": "image", "dims": ["band", "y", "x"], "attrs": units, "coords": coords}, storage
+
+
+def _wavelengths(source, file_name):
+    """Wavelengths of all bands [um], or None."""
+    texts = [source.tags(number, ns="IMAGERY").get("CENTRAL_WAVELENGTH_UM") for number in source.indexes]
+    try:
+        return [float(text) for text in texts] if all(texts) else None
+    except ValueError:
+        raise ValueError(
+            f"{file_name} has wavelengths such as {in_a_line(texts[0], 40)!r}, not all numbers: open it with "
+            "rioxarray.open_rasterio"
+        ) from None
+
+
+# By the names that rasterio has for GDAL's; the near infrared has one since GDAL 3.10.
+_COLOURS = {
+    ColorInterp.red: RED,
+    ColorInterp.green: GREEN,
+    ColorInterp.blue: BLUE,
+    getattr(ColorInterp, "nir", ColorInterp.undefined): NEAR_INFRARED,
+}
+
+# Tags as the metadata of Landsat spells them. The sun's elevation is counted from the horizon.
+_TAGS = {"saa": "SUN_AZIMUTH", "vza": "VIEW_ZENITH", "vaa": "VIEW_AZIMUTH", "earth_sun_distance": "EARTH_SUN_DISTANCE"}
+
+
+def colours(array):
+    """Colour interpretation of bands by their wavelengths; red, green, blue and near infrared go to one band each."""
+    found = [ColorInterp.undefined] * array.sizes["band"]
+    if "wavelength" in array.coords:
+        wavelengths = np.atleast_1d(array["wavelength"].values)
+        for colour, window in _COLOURS.items():
+            if (number := nearest_band(wavelengths, window)) is not None:
+                found[number] = colour
+    return [ColorInterp.gray] if found == [ColorInterp.undefined] else found
+
+
+def tags_of(array):
+    """Tags of sun, view and time that readers of satellite images expect, of the file and of the domain ``IMAGERY``."""
+    scalars = {name: value.values[()] for name, value in array.coords.items() if not value.dims}
+    tags = {tag: f"{float(scalars[name]):.9g}" for name, tag in _TAGS.items() if name in scalars}
+    if "sza" in scalars:
+        tags["SUN_ELEVATION"] = f"{90 - float(scalars['sza']):.9g}"
+    imagery = {}
+    time = scalars.get("time")
+    if isinstance(time, np.datetime64) and not np.isnat(time):
+        date, clock = np.datetime_as_string(time, unit="s").split("T")
+        tags["TIFFTAG_DATETIME"] = f"{date.replace('-', ':')} {clock}"
+        imagery["ACQUISITIONDATETIME"] = f"{date} {clock}"
+    return tags, imagery
+
+
+# GDAL's own block size for cloud-optimised files.
+_BLOCK = 512
+
+# Blocks of single bands are written together where they are no more than that. [byte]
+_AT_ONCE = 16 * 2**20
+
+_TILED = {"driver": "GTiff", "tiled": True, "blockxsize": _BLOCK, "blockysize": _BLOCK, "bigtiff": "if_safer"}
+# Of numbers that vary from cell to cell zlib finds little: its least effort takes three fifths of the time, for 2 %
+# more bytes of floats and 5 % of digital numbers.
+_COG = {"driver": "COG", "compress": "deflate", "level": 1, "predictor": "yes", "overview_resampling": "average"}
+# Without it GDAL leaves behind what the whole file has in IMAGERY.
+_COG |= {"copy_src_mdd": "yes"}
+
+
+def to_geotiff(
+    raster: RasterOrDataset, path: FilePath, *, overwrite: bool = False, tags: Mapping[str, str] | None = None
+) -> Path:
+    """
+    Write a raster as a cloud-optimised GeoTIFF.
+
+    The file appears under its name only when it is whole. Lazy data are computed and written chunk by chunk.
+
+    Parameters
+    ----------
+    raster : xarray.DataArray, dims ([band], y, x), or xarray.Dataset of variables over (y, x)
+        The variables of a dataset become bands.
+    path : str or path
+    overwrite : bool, optional
+        Replace a file of that name.
+    tags : mapping of str to str, optional
+        Further tags of the file, which `open_image` leaves there.
+
+    Returns
+    -------
+    path : pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        If the raster has no projected grid or other dimensions.
+    FileExistsError
+        If there is such a file, and ``overwrite`` is not given.
+    OSError
+        If the file cannot be written.
+
+    Notes
+    -----
+    Bands have names, units, scale and offset, and ``CENTRAL_WAVELENGTH_UM`` in the ``IMAGERY`` domain where there is a
+    wavelength; attributes and the sun are tags, the latter also as Landsat's metadata spell them (``SUN_ELEVATION``), a
+    coordinate ``time`` is ``TIFFTAG_DATETIME`` and ``ACQUISITIONDATETIME``. Red, green, blue and near infrared are
+    what the wavelengths say, not the order of the bands. Angles that vary over the cells are not written, which is a
+    warning. Dates of cells, as of a composite, become a band in days since 1970-01-01. The tag ``FIFESIM`` has the
+    values of up to 64 cells per band, with which `open_image` compares the file.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> path = lai.fifesim.to_geotiff(f"{mkdtemp()}/lai.tif")
+    >>> fifesim.open_image(path).shape
+    (90, 90)
+    """
+    path = Path(path)
+    if path.exists() and not overwrite:
+        raise FileExistsError(
+            f"there is a file {in_a_line(path, 150)}: type overwrite=True to replace it, or another name"
+        )
+    array = _stacked(raster) if isinstance(raster, xr.Dataset) else raster
+    if "line" in array.dims:
+        raise ValueError(
+            "a GeoTIFF holds a map, and this is by line and sample: put it onto one with .grid_swath(grid)"
+        )
+    if not set(array.dims) <= {"band", "y", "x"}:
+        raise ValueError(f"a GeoTIFF holds dimensions (band, y, x), got {array.dims}: select or rename")
+    array = array if "band" in array.dims else array.expand_dims("band")
+    array = array.transpose("band", "y", "x")
+    grid = grids.geobox(array)
+    dates = [name for name, value in array.coords.items() if value.dtype.kind == "M" and {"y", "x"} <= set(value.dims)]
+    layers = dates if array.dtype.kind == "f" else []
+    varying = [name for name in ANGLES if name in array.coords and array.coords[name].ndim]
+    varying += [name for name in dates if name not in layers]
+    cells = with_layers(array, layers)
+    _check_room(cells, path)
+    if varying:
+        warn(
+            f"{path.name} leaves out {', '.join(varying)}, which vary over the cells, and another geometry would be "
+            "taken for them: give geometry= when you read it, or write a netCDF with .to_netcdf()"
+        )
+    with _whole(path) as (streamed, finished), ErrorsOfGdal(f"cannot write {path}"):
+        _stream(array, cells, layers, grid, streamed, raster, tags or {})
+        rasterio.shutil.copy(streamed, finished, blocksize=_BLOCK, **_COG)
+        _check_written(streamed, finished, cells)
+    return path
+
+
+def open_image(path: FilePath, chunks: Chunks | None = None, *, allow_remote: bool = False) -> xr.DataArray:
+    """
+    Open a GeoTIFF with its bands, wavelengths, sun and calibration.
+
+    Parameters
+    ----------
+    path : str or path
+        Written by `to_geotiff`; of other files, what GDAL knows of the bands is read.
+    chunks : mapping or int, optional
+        Makes the result lazy.
+    allow_remote : bool, optional
+        Take addresses, and formats that lead to other files: only for what you trust.
+
+    Returns
+    -------
+    raster : xarray.DataArray, dims ([band], y, x)
+        As it was written, with the bands that the file has, in its order: each keeps its name and calibration. Digital
+        numbers are not masked: 0 is no data. For other files, values in their physical unit, NaN where there are no
+        data; digital numbers only where the file says that they scale to radiance.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read as a raster, is of a format that is not opened, has no north-up grid in metres, or
+        takes more memory than there is; if another program changed its values, or it is not certain which band is
+        which. Values of a lazy result are checked when they are computed.
+    OSError
+        If its cells cannot be read.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> path = image.fifesim.to_geotiff(f"{mkdtemp()}/tm.tif")
+    >>> fifesim.open_image(path).identical(image)
+    True
+    """
+    file = raster_file(path, allow_remote)
+    with ErrorsOfGdal(f"cannot read {file.name}"):
+        with file.opened() as source:
+            check_raster(source, file.name, north_up=True)
+            crs = horizontal_crs(source, file.name)
+            if chunks is None:
+                cells = source.count * source.height * source.width
+                size = np.dtype(source.dtypes[0]).itemsize
+                check_memory(cells, size, f"all of {file.name}", "give chunks='auto', which reads it by parts")
+            description = read_tag(source, file.name)
+            written_here = description is not None
+            if not written_here:
+                description, storage = gdal_description(source, file.name)
+        plain = stored_cells(file, crs, chunks)
+    try:
+        grid = grids.geobox(plain)
+    except ValueError as error:
+        raise ValueError(f"cannot place {file.name}: {in_a_line(error, 250)}") from None
+    array = xr.DataArray(plain.data, dims=("band", "y", "x"), name=description["name"])
+    array = restored(array, description) if written_here else physical(array, storage)
+    array = grids.place(array.assign_coords(description["coords"]), grid)
+    array.attrs = dict(description["attrs"]) | array.attrs
+    if "gain" in array.coords:
+        array.attrs["_FillValue"] = array.dtype.type(0)
+    return array if "band" in description["dims"] else array.isel(band=0, drop=True)
+
+
+def _stacked(dataset):
+    """Variables of a dataset as bands."""
+    names = [str(name) for name in dataset.data_vars]
+    bands = [dataset[name].drop_vars(["band"], errors="ignore") for name in names]
+    dim = xr.DataArray(names, dims="band", name="band")
+    array = xr.concat(bands, dim, combine_attrs="drop", coords="minimal", compat="override")
+    array.attrs = {"history": bands[0].attrs.get("history", "")}
+    return array.rename(None)
+
+
+def _streamed_bytes(array):
+    """Size of the cells of a tiled file, all of whose tiles are complete. [byte]"""
+    rows, columns = (-(-size // _BLOCK) * _BLOCK for size in array.shape[-2:])
+    return array.sizes["band"] * rows * columns * array.dtype.itemsize
+
+
+def _check_room(array, path):
+    """Raise OSError if the disk is too full, for which GDAL prints many lines."""
+    if not path.parent.is_dir():
+        return
+    # The stream, and at worst as much again with overviews.
+    needed, free = _streamed_bytes(array) + 1.4 * array.nbytes, shutil.disk_usage(path.parent).free
+    if free < needed:
+        message = f"{os.strerror(errno.ENOSPC)}: {needed / 1e6:.1f} MB are needed, {free / 1e6:.1f} MB are free"
+        raise OSError(errno.ENOSPC, message, str(path))
+
+
+def _check_written(streamed, finished, array):
+    """Compare a finished file with its stream: GDAL does not report a disk that is full when files are closed."""
+    with rasterio.open(streamed) as one, rasterio.open(finished) as other:
+        if os.path.getsize(streamed) < _streamed_bytes(array):
+            raise rasterio.errors.RasterioIOError("the disk did not take all of it")
+        for _, window in other.block_windows(1):
+            blocks = one.read(window=window), other.read(window=window)
+            if not np.array_equal(*blocks, equal_nan=array.dtype.kind == "f"):
+                raise rasterio.errors.RasterioIOError("what was written is not what is read")
+
+
+@contextmanager
+def _whole(path):
+    """Context with temporary file names, the second of which becomes the file if there is no error."""
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"there is no folder {str(path.parent)!r} to write {path.name} into")
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        streamed, finished = Path(folder) / "streamed.tif", Path(folder) / "finished.tif"
+        yield streamed, finished
+        os.replace(finished, path)
+        # Statistics that GDAL or a GIS kept of the replaced file would be taken for those of the new one.
+        path.with_name(f"{path.name}.aux.xml").unlink(missing_ok=True)
+
+
+def _stream(array, cells, layers, grid, path, described, further):
+    """Write a tiled GeoTIFF block by block, with all metadata of an array."""
+    rows, columns, crs = grid.shape.y, grid.shape.x, rasterio.crs.CRS.from_wkt(grid.crs.to_wkt())
+    # Three bytes a pixel would be red, green and blue without `photometric`.
+    with rasterio.open(
+        path, "w", dtype=cells.dtype.name, count=cells.sizes["band"], height=rows, width=columns, crs=crs,
+        transform=grid.affine, photometric="minisblack", nodata=no_data_of(array), **_TILED,
+    ) as sink:  # fmt: skip
+        kept = tag_of(array, described.dims if isinstance(described, xr.DataArray) else array.dims, layers)
+        _describe(sink, array, kept)
+        sink.update_tags(**{name: str(text) for name, text in further.items()})
+        if not isinstance(cells.data, da.Array):
+            sink.write(cells.values)
+    if isinstance(cells.data, da.Array):
+        # The file is opened for each block, which takes longer than to write a small one.
+        largest = cells.dtype.itemsize * max(cells.chunks[-2]) * max(cells.chunks[-1])
+        together = cells.sizes["band"] * largest <= _AT_ONCE
+        data = cells.data.rechunk({0: -1}) if together else cells.data
+        da.store(data, _Sink(str(path)), lock=_lock(str(path)), compute=True)
+    with rasterio.open(path, "r+") as sink:
+        sink.update_tags(**{TAG: json.dumps(kept | {"cells": fingerprint_of(sink)})})
+
+
+class _Sink:
+    """Raster file that accepts assignments to slices from dask, in any process."""
+
+    def __init__(self, path):
+        self._path = path
+
+    def __setitem__(self, index, block):
+        bands, rows, columns = index
+        window = Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
+        with rasterio.open(self._path, "r+") as sink:
+            sink.write(block, indexes=list(range(bands.start + 1, bands.stop + 1)), window=window)
+
+
+def _lock(name):
+    """Lock for one writer at a time, among the workers of a cluster or among threads."""
+    if found_client() is None:
+        return SerializableLock()
+    from distributed import Lock
+
+    return Lock(name)
+
+
+def _describe(sink, array, kept):
+    scalars = {name: item["values"] for name, item in kept["coords"].items() if not item["dims"]}
+    readable = {key: str(value) for key, value in (kept["attrs"] | scalars).items()}
+    tags, imagery = tags_of(array)
+    sink.update_tags(**tags | readable, AREA_OR_POINT="Area")
+    sink.update_tags(ns="IMAGERY", **imagery)
+    names, count, further = band_names(array), array.sizes["band"], list(kept["layers"])
+    sink.colorinterp = colours(array) + [ColorInterp.undefined] * len(further)
+    for number, name in enumerate([*names, *further], 1):
+        sink.set_band_description(number, name)
+    for number in range(1, count + 1):
+        band = array.isel(band=number - 1)
+        tags = {name: f"{float(band[name]):.9g}" for name in ("wavelength", "solar_irradiance") if name in band.coords}
+        sink.update_tags(number, **tags)
+        if "wavelength" in tags:
+            sink.update_tags(number, ns="IMAGERY", CENTRAL_WAVELENGTH_UM=tags["wavelength"])
+    sink.units = band_units(names, array.coords, array.attrs) + [DAYS] * len(further)
+    # A GIS has no scale of square roots.
+    if "gain" in array.coords and "compression" not in array.coords:
+        one, none = [1.0] * len(further), [0.0] * len(further)
+        sink.scales, sink.offsets = array["gain"].values.tolist() + one, array["offset"].values.tolist() + none

@@ -1,0 +1,176 @@
+"""Study sites with their grids, and the position of the sun there."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+import numpy as np
+import xarray as xr
+from affine import Affine
+from odc.geo.geobox import GeoBox
+
+from fifesim.base import geometry, times
+from fifesim.base.annotations import Numbers, Times
+from fifesim.base.arguments import UNCHECKED, described
+from fifesim.base.caches import cached
+from fifesim.grids import cf, projection
+from fifesim.grids import grid as grids
+
+_NAME = "FIFE"
+_FAR = 1.0  # from the site a scene is another place [degree]
+
+# First and last-plus-one row, and column.
+CellWindow: TypeAlias = Annotated[tuple[tuple[int, int], tuple[int, int]], UNCHECKED]
+
+
+def fife_site(
+    cell: float,
+    window: CellWindow | None = None,
+    datum: Literal["NAD83", "NAD27"] = "NAD83",
+) -> GeoBox:
+    """
+    Grid of the FIFE site, 15 km x 15 km in UTM zone 14.
+
+    Parameters
+    ----------
+    cell : float
+        Cell size. [m]
+    window : ((int, int), (int, int)), optional
+        First and last-plus-one row, and column, of a part of the site. [cell]
+    datum : {"NAD83", "NAD27"}, optional
+        NAD83 has its corner at 704970 E 4334220 N, on the 30 m lattice of today's elevation models;
+        NAD27 is FIFE's own, with its corner at 705000 E 4334000 N, about 9 m from there.
+
+    Returns
+    -------
+    grid : odc.geo.geobox.GeoBox
+        As many whole cells as fit.
+
+    Raises
+    ------
+    ValueError
+        If cell, window or datum make no grid.
+
+    Examples
+    --------
+    >>> from fifesim import fife_site
+    >>> fife_site(30).shape
+    Shape2d(x=500, y=500)
+    """
+    if datum not in times.CORNERS:
+        raise ValueError(f"datum must be one of {', '.join(times.CORNERS)}, got {datum!r}")
+    if not 0 < cell <= times.SIZE:
+        raise ValueError(f"cell must be in (0, {times.SIZE:g}] m, got {cell:g}")
+    crs, west, north = times.CORNERS[datum]
+    size = int(times.SIZE / cell + 1e-6)
+    site = GeoBox((size, size), Affine(cell, 0.0, west, 0.0, -cell, north), crs)
+    return site if window is None else _window(site, window)
+
+
+def on_fife_site(grid):
+    """Whether the middle of a grid is on the FIFE site, where sun and atmosphere of the paper are valid."""
+    return _within(*projection.middle(grid))
+
+
+def made_on_site(grid):
+    """Attributes of a scene made on a grid: ``site`` on the FIFE site, where the sun of the paper is the default."""
+    return {"site": _NAME} if on_fife_site(grid) else {}
+
+
+def is_fife(array):
+    """Whether a raster originates from a scene made on the FIFE site."""
+    if array.attrs.get("site") != _NAME or not {"y", "x"} <= set(array.dims):
+        return False
+    # Arithmetic spreads attributes, so that the place counts too.
+    longitude, latitude = projection.middle(grids.geobox(array))
+    return max(abs(longitude - times.LONGITUDE), abs(latitude - times.LATITUDE)) < _FAR
+
+
+def _window(site, window):
+    try:
+        (top, bottom), (left, right) = window
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"window must be ((first row, last row), (first column, last column)), got {described(window)}"
+        ) from None
+    rows, columns = site.shape
+    if not (0 <= top < bottom <= rows and 0 <= left < right <= columns):
+        raise ValueError(f"window must lie within {rows} rows and {columns} columns, got {window!r}")
+    return site[top:bottom, left:right]
+
+
+@cached(256, "places on the FIFE site")
+def _within(longitude, latitude):
+    """Whether a place is on the site, cached because grids are checked often and a transformer takes milliseconds."""
+    if max(abs(longitude - times.LONGITUDE), abs(latitude - times.LATITUDE)) > 1:
+        return False
+    crs, west, north = times.CORNERS["NAD83"]
+    x, y = projection.transformer(4326, crs).transform(longitude, latitude)
+    # The corner of one datum is 9 m from that of the other.
+    return max(abs(x - west - times.SIZE / 2), abs(y - north + times.SIZE / 2)) <= times.SIZE / 2 + 10
+
+
+def sun_position(
+    time: Times, latitude: Numbers, longitude: Numbers, altitude: Numbers = 0.0
+) -> geometry.Geometry | xr.Dataset:
+    """
+    Sun at a time and place, or at many.
+
+    Parameters
+    ----------
+    time : str, datetime, or sequence of them
+        Taken as UTC where it names no time zone.
+    latitude, longitude : float, or sequence of float
+        One place, or one for each time. [degree north, degree east]
+    altitude : float, or sequence of float, optional
+        [m]
+
+    Returns
+    -------
+    sun : Geometry, or xarray.Dataset, dims (time,)
+        Of one time the geometry with a nadir view. Of a sequence ``sza``, ``saa`` and ``earth_sun_distance`` along
+        ``time``; a zenith beyond 90 is a sun below the horizon. [degree, degree, astronomical unit]
+
+    Raises
+    ------
+    ValueError
+        If it is no time, there is not one place for each, or the sun of a single time is below the horizon.
+
+    References
+    ----------
+    NREL solar position algorithm, as implemented in pvlib; true (not refracted) zenith
+
+    See Also
+    --------
+    fifesim.base.geometry.sun_geometry, fifesim.base.geometry.sun_positions
+
+    Examples
+    --------
+    >>> from fifesim import sun_position
+    >>> season = sun_position(["1987-06-06T16:35Z", "1987-12-06T16:35Z"], 39.06, -96.54)
+    >>> season["sza"].round(1).values.tolist()
+    [28.5, 66.0]
+    """
+    values = time.values if isinstance(time, xr.DataArray) else time
+    if isinstance(values, xr.Dataset) or np.ndim(values) > 1 or (np.ndim(values) and not len(values)):
+        raise ValueError(f"time must be one time, or a list such as ['1987-06-06T16:35Z'], got {described(time)}")
+    if not np.ndim(values) and not any(np.ndim(each) for each in (latitude, longitude, altitude)):
+        return geometry.sun_geometry(values, latitude, longitude, altitude)
+    places = [np.asarray(each, float) for each in (latitude, longitude, altitude)]
+    times = list(values) if np.ndim(values) else [values] * max(each.size for each in places)
+    utc, *found = geometry.sun_positions(times, *places)
+    names = "sza", "saa", "earth_sun_distance"
+    data = {name: ("time", each, cf.attributes(name)) for name, each in zip(names, found, strict=True)}
+    return xr.Dataset(data, {"time": ("time", utc, cf.TIME_ATTRIBUTES)})
+
+
+def check_same_sun(geometry, array):
+    """Raise ValueError for a solar zenith angle that differs from the one with which fifesim made a raster."""
+    if geometry is None or "atmosphere" not in array.attrs or "sza" not in array.coords:
+        return
+    carried, given = array["sza"], geometry.sza
+    if carried.ndim == 0 and np.ndim(given) == 0 and abs(float(carried) - float(given)) > 0.01:
+        raise ValueError(
+            f"{array.name or 'the raster'} was made for sza={float(carried):.2f}, got geometry with "
+            f"sza={float(given):.2f}: leave geometry out, or drop the coordinate with .drop_vars('sza')"
+        )

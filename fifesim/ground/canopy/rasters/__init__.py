@@ -1,1 +1,0 @@
-"""The canopy on labelled rasters, where leaves and what lies below them differ from cell to cell."""

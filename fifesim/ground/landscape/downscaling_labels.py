@@ -1,0 +1,390 @@
+"""Downscaling of labelled maps of leaf area to the cells of a ground scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import lcm
+from typing import Annotated, NamedTuple, TypeAlias
+
+import dask.array as da
+import numpy as np
+import xarray as xr
+from odc.geo.geobox import GeoBox
+
+from fifesim.base.annotations import Chunks, LaiDistribution, WholeNumber
+from fifesim.base.arguments import Kind
+from fifesim.base.caches import cached
+from fifesim.base.lattice import assemble, check_seed
+from fifesim.base.messages import warn
+from fifesim.grids import cf, projection, windows
+from fifesim.grids import chunks as chunking
+from fifesim.grids import grid as grids
+from fifesim.grids.dates import by_date
+from fifesim.grids.grid import north_up
+from fifesim.grids.inputs import unpacked
+from fifesim.ground.canopy.leaf_area import check_map
+from fifesim.ground.landscape import downscaling
+from fifesim.ground.landscape.autoregression import LARGEST_STREAMING_ARP, check_arp, window_field
+from fifesim.ground.landscape.coarse_lattice import deviation_table, kept_variance, level_deviations
+from fifesim.ground.landscape.distribution import lai_distribution
+from fifesim.ground.landscape.lai_labels import distribution_name, one_layer
+
+# Cells along a fixed tile, and pixels at least.
+_TILE, _FEWEST_PIXELS = 504, 8
+
+PIXEL_MARGIN = 12
+"""Pixels read around a tile: the weight of one beyond them is below 3e-5."""
+
+# Largest distance between the corners of pixels and of cells. [cell]
+_OFF = 1e-2
+
+_CURE = "make the grid from the map: lai.odc.geobox.zoom_out(1 / 3) has 3 x 3 cells a pixel"
+
+
+class PixelLattice(NamedTuple):
+    """Pixels of a map among the cells of a grid; places count from the origin of the CRS, southward and eastward."""
+
+    ratio: tuple[int, int]  # cells in a pixel
+    pixel: tuple[int, int]  # place of the map's first pixel
+    cell: tuple[int, int]  # place of the grid's first cell, counted from the corner of the pixel at 0
+    shift: tuple[int, int]  # place of that corner among the cells
+
+    @property
+    def tile(self):
+        """Edge of a tile. [cell]"""
+        step = lcm(*self.ratio)
+        return max(_TILE // step, -(-_FEWEST_PIXELS * max(self.ratio) // step)) * step
+
+    @property
+    def pixels(self):
+        """Pixels in a tile, down and across."""
+        return tuple(self.tile // number for number in self.ratio)
+
+    def tiles(self, cells, axis):
+        """Tiles that a range of rows or columns of the grid touches."""
+        start, stop = (self.cell[axis] + end for end in (cells.start, cells.stop))
+        return range(start // self.tile, -(-stop // self.tile))
+
+    def window(self, tiles, axis):
+        """Pixels of the map that some tiles read; the slice may exceed the map."""
+        size, first = self.pixels[axis], self.pixel[axis]
+        return slice(tiles.start * size - PIXEL_MARGIN - first, tiles.stop * size + PIXEL_MARGIN - first)
+
+
+class PixelReads(NamedTuple):
+    """Pixels that each chunk of cells reads from a map: the pixels of its tiles and around them."""
+
+    array: np.ndarray | da.Array  # shape (y, x)
+    lattice: PixelLattice
+
+    def window(self, rows, columns):
+        """Slices of the pixels that some cells of the grid read."""
+        lattice = self.lattice
+        return tuple(lattice.window(lattice.tiles(each, axis), axis) for axis, each in enumerate((rows, columns)))
+
+
+def pixel_lattice(pixels, grid):
+    """Alignment of the pixels of a map with the cells of a grid."""
+    source = grids.geobox(pixels)
+    if source.crs != grid.crs:
+        raise ValueError(
+            f"the map is in {projection.name_of(source.crs.proj)} and the grid in {projection.name_of(grid.crs.proj)}: "
+            f"{_CURE}; or bring the map to pixels in the grid's CRS first, with .rio.reproject"
+        )
+    ratio = _cells_in_a_pixel(source, grid)
+    first = _corner(source, grid)
+    ends = tuple(start + size * number for start, size, number in zip(first, source.shape, ratio, strict=True))
+    if not all(start < cells and end > 0 for start, end, cells in zip(first, ends, grid.shape, strict=True)):
+        raise ValueError(
+            f"the map does not overlap the grid, which spans {grids.extent(grid)}: it spans {grids.extent(source)}; "
+            f"{_CURE}"
+        )
+    pixel = grids.lattice_position(source)
+    cell = tuple(place * number - start for place, number, start in zip(pixel, ratio, first, strict=True))
+    shift = tuple(place - start for place, start in zip(grids.lattice_position(grid), cell, strict=True))
+    return PixelLattice(ratio, pixel, cell, shift)
+
+
+def _cells_in_a_pixel(source, grid):
+    a, b = source.affine, grid.affine
+    ratio = a.e / b.e, a.a / b.a
+    whole = tuple(max(round(each), 1) for each in ratio)
+    drift = [abs(each - near) * size for each, near, size in zip(ratio, whole, source.shape, strict=True)]
+    if max(drift) > _OFF or whole == (1, 1):
+        raise ValueError(
+            f"the map has pixels of {-a.e:g} x {a.a:g} m and the grid cells of {-b.e:g} x {b.a:g} m: a pixel must be "
+            f"a whole number of cells, 2 or more; {_CURE}"
+        )
+    return whole
+
+
+def _corner(source, grid):
+    """Row and column of the grid at which the map begins."""
+    a, b = source.affine, grid.affine
+    corner = (a.f - b.f) / b.e, (a.c - b.c) / b.a
+    off = [abs(each - round(each)) for each in corner]
+    if max(off) > _OFF:
+        raise ValueError(
+            f"the corners of the map's pixels lie {off[0]:.2f} rows and {off[1]:.2f} columns of cells beside those of "
+            f"the grid's cells: {_CURE}"
+        )
+    return tuple(map(round, corner))
+
+
+_REFERENCES = (
+    "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5; Kyriakidis (2004), doi:10.1111/j.1538-4632.2004.tb01135.x"
+)
+
+
+Variation: TypeAlias = Annotated[
+    float | Callable[[np.ndarray], np.ndarray],
+    Kind("a number, or a function of the means of pixels, such as lambda mean: 0.5 / (1 + mean)"),
+]
+
+
+@by_date
+def downscale(
+    lai: xr.DataArray,
+    grid: GeoBox,
+    *,
+    arp: float = 0.15,
+    distribution: LaiDistribution | None = None,
+    cv: Variation | None = None,
+    seed: WholeNumber = 0,
+    chunks: Chunks | None = None,
+) -> xr.DataArray:
+    """
+    Leaf area index of the cells below the pixels of a map.
+
+    Parameters
+    ----------
+    lai : xarray.DataArray, dims ([time], y, x)
+        Means over pixels; NaN where unknown. [m2 m-2]
+    grid : odc.geo.geobox.GeoBox
+        Of cells in the map's CRS, of which a whole number fills a pixel: ``lai.odc.geobox.zoom_out(1 / 3)`` has 3 x 3.
+    arp : float, optional
+        Autoregressive parameter of the cells, in [0, 0.2498]. [1]
+    distribution : str, path or frozen scipy distribution, optional
+        Of the cells, as `fifesim.lai_distribution` takes it: what the map is a mean of is a scene of this distribution.
+    cv : float or callable, optional
+        Coefficient of variation of the cells within a pixel, or a function of an array of means of pixels. By default
+        that of FIFE's grass: a standard deviation of 0.4 within pixels, and at most 0.6 of the mean. [1]
+    seed : int, optional
+        In [0, 2**63).
+    chunks : mapping or int, optional
+        Makes the result lazy, as it is without where the map is.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims ([time], y, x)
+        NaN in pixels that are NaN and beyond the map, 0 in pixels of 0. A function of the map, the seed and the place:
+        a window is a slice of the whole, and chunks change nothing. The attribute ``cv_within_pixels`` has the realised
+        coefficient of variation [1]; a lazy result has none. [m2 m-2]
+
+    Warns
+    -----
+    UserWarning
+        If ``cv`` is a number, and the cells within pixels have one that is off by more than 5 % and by more than three
+        standard errors; by chunk, when it computes, if lazy.
+
+    Raises
+    ------
+    ValueError
+        If a pixel is no whole number of cells, the map lies elsewhere, both distribution and cv are given, or a number
+        is not allowed; when computed, if the map has values that are no leaf area or that the distribution cannot have.
+    TypeError
+        If the seed is no whole number, or cv neither a number nor a function.
+
+    Notes
+    -----
+    Exact: the mean of the cells of each pixel, within rounding (1e-12), and that none is negative. Approximate: where
+    the map holds the means of a scene of the model, semivariances over one and two cells are the model's within 0.3 %,
+    with a cv of 0.4 within 0.7 %, inside of pixels and across their borders alike; wider distributions leave more. The
+    model is a field whose logarithm is normal for `cv`, which is then the root of the mean of variance over squared
+    mean of its pixels, and quantiles of a normal field for `distribution`; cells may pass the end of a distribution by
+    0.1 %. What a map has beside that is a trend, as strong as second differences of its pixels say in the surroundings
+    of each tile, which is interpolated. A map that is smoother than the model leaves cells less room: of a uniform map,
+    in pixels of 3 x 3 cells of a cv of 0.1, neighbours across a border have 0.88, 0.80 and 0.53 times the model's
+    semivariance at arp 0, 0.15 and 0.24, those in a pixel 1.00, 0.97 and 0.72 times.
+
+    The field of cells is that of `fifesim.lai_scene`, whose seed gives the same ups and downs. A tile of cells holds at
+    least 8 pixels along an axis and reads 12 around: pixels of 150 x 150 cells take 1.7 GB, and many times the time
+    of a cell in a pixel of 3 x 3.
+
+    References
+    ----------
+    [Friedl1995]_, Fig. 2; [Kyriakidis2004]_; [KyriakidisYoo2005]_
+
+    See Also
+    --------
+    fifesim.ground.landscape.downscaling.downscaled, fifesim.ground.landscape.downscaling.kriging_filter,
+    fifesim.ground.landscape.downscaling.residual_shift, fifesim.ground.landscape.downscaling.map_trend
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> import numpy as np
+    >>> map_10m = fifesim.lai_scene(fifesim.fife_site(10, window=((0, 30), (0, 30))), seed=7)
+    >>> grid = fifesim.fife_site(10 / 3, window=((0, 90), (0, 90)))
+    >>> cells = map_10m.fifesim.downscale(grid, cv=0.4, seed=7)
+    >>> bool(np.allclose(cells.fifesim.aggregate(10), map_10m, atol=1e-6))
+    True
+    """
+    grid, seed = grids.check_grid(grid), check_seed(seed)
+    check_arp(arp)
+    if arp > LARGEST_STREAMING_ARP:
+        raise ValueError(
+            f"arp must be at most {LARGEST_STREAMING_ARP}, got {arp:g}: use larger cells for a longer range"
+        )
+    pixels = one_layer(unpacked(north_up(lai)))
+    cf.check_quantity(pixels, "lai")
+    lattice = pixel_lattice(pixels, grid)
+    model = _model(float(arp), distribution, cv, lattice.ratio)
+    reads = PixelReads(chunking.pointwise(check_map, pixels).transpose("y", "x").data, lattice)
+
+    number = None if callable(cv) else cv
+
+    def kernel(rows, columns, known):
+        made = _cells(model, seed, lattice, rows, columns, known)
+        _realised_variation(made, lattice, (rows.start, columns.start), number)
+        return made
+
+    lazy = chunks is not None or isinstance(reads.array, da.Array)
+    sizes = windows.chunk_sizes(grid, "auto" if chunks is None else chunks, tile=lattice.tile) if lazy else None
+    made = chunking.windows(kernel, [reads], tuple(grid.shape), sizes)
+    cells = xr.DataArray(made, dims=("y", "x"), coords=chunking.other_coordinates(pixels))
+    cells_in_a_pixel = f"{lattice.ratio[0]} x {lattice.ratio[1]} cells a pixel"
+    history = f"downscale: {cells_in_a_pixel}, {model.words}, arp {arp:g}, seed {seed}"
+    words = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": model.words, "method": "downscaled"}
+    if not lazy:
+        words["cv_within_pixels"] = _realised_variation(made, lattice, (0, 0))
+    return cf.label(grids.place(cells, grid), "lai", history=history, source=lai, **words, references=_REFERENCES)
+
+
+def _realised_variation(cells, lattice, first, wanted=None):
+    """Coefficient of variation of cells within whole pixels; a significant deviation from ``wanted`` is a warning."""
+    # The root of the mean of variance over squared mean. Significant: more than 5 % and more than three standard
+    # errors.
+    down, across = lattice.ratio
+    top, left = (-(place + at) % size for place, at, size in zip(lattice.cell, first, lattice.ratio, strict=True))
+    rows, columns = (cells.shape[0] - top) // down, (cells.shape[1] - left) // across
+    if min(rows, columns) < 1 or down * across < 2:
+        return np.nan
+    whole = cells[top : top + rows * down, left : left + columns * across].reshape(rows, down, columns, across)
+    means = whole.mean(axis=(1, 3))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        squares = (whole.var(axis=(1, 3)) / means**2)[means > 0]
+    if not squares.size:
+        return np.nan
+    found = float(np.sqrt(squares.mean()))
+    # By the delta method: half the standard error of the mean of the squares, over the root of that mean.
+    error = squares.std() / np.sqrt(squares.size) / (2 * found) if found else 0.0
+    if wanted and abs(found - wanted) > max(0.05 * wanted, 3 * error):
+        warn(
+            f"cv={wanted:g} was asked for, and the cells within pixels have {found:.3g}: at this arp, neighbours in a "
+            "pixel are too much alike for the texture of the map; use a smaller arp, or accept the lower cv"
+        )
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """Model of the variation of cells within pixels."""
+
+    arp: float
+    transform: downscaling.LogNormal | downscaling.Marginal
+    variation: object  # a function of the means of pixels, or None where deviations are the same in all
+    table: tuple | None  # from `_table`
+    same: tuple | None
+    words: str
+
+    def deviations(self, pixels):
+        """Deviations of the field of cells, in units of levels, and of a process whose means vary as the levels."""
+        if self.variation is None:
+            return self.same
+        found = np.asarray(self.variation(np.where(pixels > 0, pixels, 1.0)), float)
+        return _of_variation(np.broadcast_to(found, pixels.shape), self.table)
+
+
+def _model(arp, distribution, cv, ratio):
+    if distribution is not None and cv is not None:
+        raise ValueError(
+            "give distribution= of the cells over the scene or cv= within pixels, not both: each decides the other"
+        )
+    if distribution is not None:
+        transform = downscaling.Marginal.of(lai_distribution(distribution), kept_variance(arp, ratio))
+        same = 1.0, float(level_deviations(transform, [1.0], arp, ratio)[0])
+        return _Model(arp, transform, None, None, same, distribution_name(distribution))
+    table = _table(arp, ratio)
+    variation = downscaling.fife_variation if cv is None else cv
+    if callable(variation):
+        _of_variation(np.asarray(variation(np.ones((1, 1))), float), table)
+        words = "log-normal, cv of FIFE's grass" if cv is None else "log-normal, cv by the mean"
+        return _Model(arp, downscaling.LogNormal(), variation, table, None, words)
+    same = tuple(map(float, _of_variation(np.asarray(cv, float), table)))
+    return _Model(arp, downscaling.LogNormal(), None, None, same, f"log-normal, cv {cv:g}")
+
+
+@cached(4, "deviations of downscaled cells")
+def _table(arp, ratio):
+    """Coefficients of variation within pixels, and the deviations of log-normal cells and of levels for them."""
+    variations, deviations = deviation_table(arp, ratio)
+    return variations, deviations, level_deviations(downscaling.LogNormal(), deviations, arp, ratio)
+
+
+def _of_variation(values, table):
+    """Deviations of cells and of levels for coefficients of variation within pixels, which must be in the table."""
+    largest = float(table[0][-1])
+    wrong = ~((values >= 0) & (values <= largest))
+    if np.any(wrong):
+        raise ValueError(
+            f"cv must be in [0, {largest:.3g}] for this arp and these pixels, got {values[wrong].flat[0]:g}: it is the "
+            "standard deviation of the cells in a pixel over their mean, such as 0.3; bound a function by numpy.minimum"
+        )
+    return tuple(np.interp(values, table[0], deviations) for deviations in table[1:])
+
+
+def _cells(model, seed, lattice, rows, columns, known):
+    """Cells of a window, from the pixels that its tiles read."""
+    spans = [lattice.tiles(each, axis) for axis, each in enumerate((rows, columns))]
+    down, across = lattice.pixels
+
+    def make_tile(row, column):
+        top, left = (row - spans[0].start) * down, (column - spans[1].start) * across
+        part = known[top : top + down + 2 * PIXEL_MARGIN, left : left + across + 2 * PIXEL_MARGIN]
+        return _tile(model, seed, lattice, row, column, part.astype(float).tobytes())
+
+    shape = rows.stop - rows.start, columns.stop - columns.start
+    return assemble(make_tile, lattice.tile, lattice.cell[0] + rows.start, lattice.cell[1] + columns.start, shape)
+
+
+# Chunks smaller than tiles, or cut elsewhere, ask for a tile more than once. Eight tiles of 504 cells are 16 MB.
+@cached(8, "tiles of downscaled cells")
+def _tile(model, seed, lattice, row, column, pixels):
+    """One tile of cells, from the bytes of its pixels and the surrounding pixels."""
+    shape = tuple(size + 2 * PIXEL_MARGIN for size in lattice.pixels)
+    pixels = np.frombuffer(pixels).reshape(shape)
+    inside = tuple(slice(PIXEL_MARGIN, PIXEL_MARGIN + size) for size in lattice.pixels)
+    if not (pixels[inside] > 0).any():
+        return downscaling.by_pixel(np.where(pixels[inside] == 0, 0.0, np.nan), lattice.ratio)
+    first = [
+        place * lattice.tile - PIXEL_MARGIN * number + shift
+        for place, number, shift in zip((row, column), lattice.ratio, lattice.shift, strict=True)
+    ]
+    size = tuple(count * number for count, number in zip(shape, lattice.ratio, strict=True))
+    field = window_field(seed, model.arp, *first, size)
+    known, (deviations, of_levels) = pixels > 0, model.deviations(pixels)
+    # Pixels without leaves have no level and get that of the largest mean.
+    levels = model.transform.level(np.where(known, pixels, pixels[known].max()))
+    trend = downscaling.map_trend(levels, known, of_levels, model.arp, lattice.ratio)
+    cells = downscaling.downscaled(
+        pixels, field, _kriging(model.arp, trend, lattice.ratio, shape), model.transform, deviations
+    )
+    cut = tuple(slice(PIXEL_MARGIN * number, -PIXEL_MARGIN * number) for number in lattice.ratio)
+    tile = cells[cut].copy()
+    tile.flags.writeable = False
+    return tile
+
+
+_kriging = cached(8, "kriging weights")(downscaling.Kriging.of)

@@ -1,0 +1,339 @@
+"""Landscapes as labelled rasters: cover, leaf area and properties on one grid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from numbers import Number
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import numpy as np
+import xarray as xr
+from odc.geo.geobox import GeoBox
+
+from fifesim.base.annotations import Chunks, FilePath, WholeNumber
+from fifesim.base.arguments import ANYTHING, UNCHECKED, described, is_path
+from fifesim.base.files import in_a_line
+from fifesim.base.lattice import check_seed
+from fifesim.grids import cf, windows
+from fifesim.grids import chunks as chunking
+from fifesim.grids import grid as grids
+from fifesim.grids.classes import NO_CLASS, check_codes, numbers_of
+from fifesim.grids.directions import Directions
+from fifesim.grids.inputs import FileOrRaster, unpacked
+from fifesim.grids.sites import is_fife, made_on_site
+from fifesim.grids.warp import file_onto_grid, raster_onto_grid
+from fifesim.ground.canopy.soil import check_brightness
+from fifesim.ground.landscape import distribution
+from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, streaming_field
+from fifesim.ground.landscape.classes import CoverClass, Field, class_table, fife_classes, read_table, table_text
+from fifesim.ground.landscape.cover import Patches, patch_classes
+from fifesim.ground.landscape.field_labels import drawn_fields
+from fifesim.ground.landscape.lai_labels import lai_window, one_layer
+
+# Chunks of "auto" are of some of these. [cell]
+_TILE = 1008
+
+
+def drawn_cover(grid, patches, table, seed, chunks=None):
+    """Class codes of a landscape in patches, dims (y, x), int16."""
+    cell = min(grids.cell_size(grid))
+    if patches.size < cell:
+        raise ValueError(
+            f"the size of patches must be at least a cell of {cell:g} m, got {patches.size:g} m: "
+            "give it in metres, not km"
+        )
+    shares = patches.shares_of([each.name for each in table])
+    codes = np.array([each.code for each in table], np.int16)
+    northing, easting = (grids.coordinates(grid)[axis].values for axis in ("y", "x"))
+
+    def cells(row, column, shape):
+        place = northing[row : row + shape[0]], easting[column : column + shape[1]]
+        return patch_classes(patches, shares, seed, *place, codes)
+
+    history = f"landscape: {patches.pattern} of {patches.size:g} m, seed {seed}"
+    cover = windows.tiles(cells, grid, chunks, tile=_TILE, dtype=np.int16)
+    return _labelled(cover, table, history, rng_seed=str(seed), **made_on_site(grid))
+
+
+def cover_map(path_or_raster, grid, table, chunks=None, *, allow_remote=False):
+    """Class codes of a user-supplied map on a grid, dims (y, x), int16, -1 where the map has no data."""
+    if isinstance(path_or_raster, xr.DataArray):
+        name = in_a_line(str(path_or_raster.name or "raster"), 150)
+        found = raster_onto_grid(unpacked(one_layer(path_or_raster, "cover")), grid, chunks, classes=True)
+    else:
+        name = in_a_line(Path(path_or_raster).name, 150)
+        found = file_onto_grid(path_or_raster, grid, chunks, allow_remote, classes=True)
+    codes = tuple(each.code for each in table)
+    cover = grids.place(chunking.pointwise(check_codes, found, dtype=np.int16, table=codes), grid)
+    if cover.chunks is None and not (cover.values != NO_CLASS).any():
+        raise ValueError(
+            f"the map of cover {name} has no data on the grid, which spans {grids.extent(grid)}: look at its nodata "
+            "value with gdalinfo -stats"
+        )
+    return _labelled(cover, table, f"landscape: cover of {name}")
+
+
+def classes_of(cover):
+    """Table of the classes in the attributes of a raster of cover."""
+    if "classes" not in cover.attrs:
+        raise ValueError(
+            "the cover does not say what its classes are: make the landscape with fifesim.landscape(grid, "
+            "cover=raster, classes=...)"
+        )
+    return read_table(cover.attrs["classes"])
+
+
+def _labelled(cover, table, history, **provenance):
+    flags = {"flag_values": np.array([each.code for each in table], np.int16)}
+    flags |= {"flag_meanings": " ".join(each.name for each in table), "_FillValue": np.int16(NO_CLASS)}
+    return cf.label(cover, "cover", history=history, classes=table_text(table), **flags, **provenance)
+
+
+# The functions that take these name what they need in their own messages.
+GroundProperty: TypeAlias = Annotated[FilePath | xr.DataArray | Field | float, ANYTHING]
+Cover: TypeAlias = Annotated[Patches | FilePath | xr.DataArray, UNCHECKED]
+Classes: TypeAlias = Annotated[CoverClass | Sequence[CoverClass] | Mapping[str, CoverClass], UNCHECKED]
+
+FIFE_PASTURES = Patches("pastures", 1200.0)
+"""Of the default landscape: rectangles of 144 ha on average, as large as ranches of the Flint Hills fence them."""
+
+_REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
+
+
+def landscape(
+    grid: GeoBox,
+    *,
+    cover: Cover | None = None,
+    classes: Classes | None = None,
+    lai: FileOrRaster | None = None,
+    arp: float = 0.15,
+    brown: GroundProperty | None = None,
+    crown_cover: GroundProperty | None = None,
+    soil: GroundProperty | None = None,
+    moisture: GroundProperty | None = None,
+    covary: Mapping[str, float] | None = None,
+    dem: xr.DataArray | None = None,
+    reference: Mapping[str, xr.DataArray] | None = None,
+    geometry: Directions | None = None,
+    seed: WholeNumber = 0,
+    chunks: Chunks | None = None,
+    allow_remote: bool = False,
+) -> xr.Dataset:
+    """
+    A landscape: leaf area and classes of cover, and what else a ground scene is made of, on one grid.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells, in a projected CRS.
+    cover : Patches, str, path or xarray.DataArray, optional
+        How the classes lie: patches that are drawn, or a map of whole numbers, a raster file or what rioxarray has
+        opened, in any CRS; cells no larger than the map's have its nearest class, larger ones the most frequent. By
+        default one class is everywhere, and FIFE's three treatments lie in pastures.
+    classes : CoverClass, sequence of CoverClass, or mapping of str to CoverClass, optional
+        What the classes are; by default those that a raster of cover carries, or `fife_classes` of what is drawn.
+    lai : xarray.DataArray, str or path, optional
+        Your own leaf area, as `open_lai` takes it, in the place of the classes' distributions. [m2 m-2]
+    arp : float, optional
+        Autoregressive parameter of the classes that say none, in [0, 0.2498]. [1]
+    brown, crown_cover, soil, moisture : float, Field, xarray.DataArray, str or path, optional
+        Share of dead leaf area, share of the ground below crowns, brightness of the soil and its moisture, as
+        `surface_reflectance` takes them, in the place of the classes': a number, a `Field` that is drawn, or a map. [1]
+    covary : dict of str to float, optional
+        Correlations of leaf area with ``elevation``, ``wetness``, ``illumination`` and ``slope``, and with what is
+        drawn, such as ``{"wetness": 0.5, "soil": -0.4}``: those of standard normal scores at the same cell. [1]
+    dem : xarray.DataArray, dims (y, x), optional
+        Elevation on the grid, where ``covary`` names something of it. [m]
+    reference : dict of str to xarray.DataArray, optional
+        As in `correlated_fields`: the same of a larger ground, of which the grid is a window.
+    geometry : Geometry, optional
+        Of the sun, where ``covary`` names the illumination.
+    seed : int, optional
+        In [0, 2**63).
+    chunks : mapping or int or "auto", optional
+        Makes the landscape lazy.
+    allow_remote : bool, optional
+        Take addresses, and formats that lead to other files: only for what you trust.
+
+    Returns
+    -------
+    land : xarray.Dataset
+        ``lai`` [m2 m-2] and ``cover``, codes of classes by ``flag_values`` and ``flag_meanings`` with -1 for no data,
+        over (y, x), and the others where they are given. ``land.fifesim.surface_reflectance(instrument)`` takes it.
+
+    Raises
+    ------
+    ValueError
+        If the grid, arp, seed, a class or its share is not one allowed, correlations cannot be, a deviation is too
+        large, a map is not usable, or a class has no leaf area; of a lazy map when it computes, if it has a code
+        without a class.
+    TypeError
+        If an argument is of another kind.
+
+    Notes
+    -----
+    Every variable is a function of the seed and of place: a window is a slice of the whole, and chunks change nothing.
+    Leaf area of all classes comes from one white noise, filtered with each class's arp and mapped to its distribution.
+    A fence is so a change of density and of texture on ground that goes on: dense spots of one treatment are dense
+    spots of the other, as deep soil is on both sides of a fence, and landscapes of one seed differ by their classes
+    and not by chance.
+
+    References
+    ----------
+    [Friedl1995]_, Fig. 2
+
+    See Also
+    --------
+    fifesim.ground.landscape.cover.patch_classes, fifesim.ground.landscape.autoregression.streaming_field
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> land = fifesim.landscape(grid, soil=fifesim.Field(sd=0.03, arp=0.24), seed=7)
+    >>> sorted(land.data_vars)
+    ['cover', 'lai', 'soil']
+    >>> land.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).dims
+    ('band', 'y', 'x')
+    """
+    grid = grids.check_grid(grid)
+    check_arp(arp)
+    seed = check_seed(seed)
+    given = {"brown": brown, "crown_cover": crown_cover, "soil": soil, "moisture": moisture}
+    given = {name: each.mean if isinstance(each, Field) and not each.sd else each for name, each in given.items()}
+    drawn = {name: each for name, each in given.items() if isinstance(each, Field)}
+    if covary and lai is not None:
+        raise ValueError("lai is a map, which goes with the ground as it does: leave covary out, or the map")
+    variables = {
+        name: _property(name, each, grid, chunks, allow_remote)
+        for name, each in given.items()
+        if each is not None and name not in drawn
+    }
+    if classes is not None or cover is not None or lai is None:
+        table = class_table(_default_classes(cover) if classes is None else classes)
+        variables["cover"] = _cover(grid, cover, table, seed, chunks, allow_remote)
+    arps = [arp if lai is not None or each.arp is None else each.arp for each in (table if lai is None else [None])]
+    scores, made = drawn_fields(
+        grid, drawn, covary, arps, dem=dem, geometry=geometry, seed=seed, reference=reference, chunks=chunks
+    )
+    if lai is None:
+        variables["lai"] = _lai(grid, variables["cover"], table, arp, seed, scores)
+    else:
+        variables["lai"] = lai_window(lai, grid, chunks, allow_remote=allow_remote)
+        if isinstance(lai, xr.DataArray) and is_fife(lai):
+            variables["lai"] = variables["lai"].assign_attrs(made_on_site(grid))
+    variables |= made
+    order = [name for name in ("lai", "cover", *given) if name in variables]
+    site = {key: variables["lai"].attrs[key] for key in ("site",) if key in variables["lai"].attrs}
+    return xr.Dataset({name: variables[name] for name in order}, attrs=site)
+
+
+def _default_classes(cover):
+    """Default classes of a cover: from its attributes, or the classes of FIFE for patches."""
+    if cover is None or isinstance(cover, Patches):
+        return fife_classes()
+    if isinstance(cover, xr.DataArray) and "classes" in cover.attrs:
+        return classes_of(cover)
+    raise ValueError("a map of cover needs classes=, such as [fifesim.CoverClass('grass', lai=1.2, code=1), ...]")
+
+
+def _cover(grid, cover, table, seed, chunks, allow_remote):
+    """Codes of the classes."""
+    if cover is None:
+        if len(table) > 1 and [each.name for each in table] != list(fife_classes()):
+            raise ValueError(
+                f"nothing says how the {len(table)} classes lie: give cover= a map of their codes, or for instance "
+                'fifesim.Patches("voronoi", size=300)'
+            )
+        cover = FIFE_PASTURES
+    if isinstance(cover, Patches):
+        return drawn_cover(grid, cover, table, seed, chunks)
+    if not (isinstance(cover, xr.DataArray) or is_path(cover)):
+        raise TypeError(f"cover must be a fifesim.Patches, the path of a map or a raster, got {described(cover)}")
+    return cover_map(cover, grid, table, chunks, allow_remote=allow_remote)
+
+
+def _lai(grid, cover, table, arp, seed, scores):
+    """Leaf area of each class from its distribution and arp; from the scores by arp where it follows the ground."""
+    lacking = [each.name for each in table if each.lai is None]
+    if lacking:
+        raise ValueError(
+            f"class {', '.join(lacking[:8])} has no leaf area: type CoverClass(..., lai='burned-grazed'), or a number "
+            "where it is uniform, or give landscape(lai=) a raster"
+        )
+    codes = tuple(each.code for each in table)
+    # The last is of cells without a class.
+    tables = np.stack([*(_quantiles(each.lai) for each in table), np.full(distribution.QUANTILE_NODES, np.nan)])
+    arps = [arp if each.arp is None else each.arp for each in table]
+    # Errors of streaming_field are raised before anything lazy is built.
+    for of_class in arps:
+        streaming_field(seed, of_class, 0, 0, (0, 0))
+    plain = cover.copy(deep=False)
+    plain.attrs = {}
+    if scores:
+        kernel = partial(_leaf_area_of_scores, codes, tables, arps, tuple(scores))
+        lai = grids.place(chunking.pointwise(kernel, plain, *scores.values()), grid)
+    else:
+        kernel = partial(_leaf_area, codes, tables, arps, seed, grids.lattice_position(grid))
+        lai = grids.place(windows.located(kernel, plain, tile=FIELD_TILE), grid)
+    history = "\n".join([cover.attrs["history"], f"landscape: leaf area of {len(table)} classes, seed {seed}"])
+    made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": "by class"} | made_on_site(grid)
+    return cf.label(lai, "lai", history=history, **made, method="streaming", references=_REFERENCE)
+
+
+def _quantiles(lai):
+    """Quantiles of a distribution; a single number is repeated."""
+    if isinstance(lai, Number):
+        return np.full(distribution.QUANTILE_NODES, float(lai))
+    return distribution.quantile_table(distribution.lai_distribution(lai))
+
+
+def _leaf_area(codes, tables, arps, seed, lattice, cover, starts):
+    """Leaf area of a block of codes that begins at a row and column of the grid."""
+    row, column = (first + start for first, start in zip(lattice, starts, strict=True))
+    return _of_fields(codes, tables, arps, cover, lambda arp: streaming_field(seed, arp, row, column, cover.shape))
+
+
+def _leaf_area_of_scores(codes, tables, arps, scored, cover, *scores):
+    """Leaf area of cells from the standard normal scores of each arp."""
+    return _of_fields(codes, tables, arps, cover, dict(zip(scored, scores, strict=True)).__getitem__)
+
+
+def _of_fields(codes, tables, arps, cover, field_of):
+    """Leaf area of cells; ``field_of(arp)`` gives standard normal deviates, and is called only if needed."""
+    numbers, present = numbers_of(cover, codes)
+    varies = (tables[:-1, 0] != tables[:-1, -1]) & present[:-1]
+    needed = list(dict.fromkeys(arp for arp, each in zip(arps, varies, strict=True) if each))
+    field = field_of(needed[0]) if needed else np.zeros(cover.shape)
+    for other in needed[1:]:
+        mine = np.array([*(arp == other for arp in arps), False])
+        field = np.where(mine[numbers], field_of(other), field)
+    return distribution.quantile_map_of_classes(field, numbers, tables)
+
+
+def _property(name, given, grid, chunks, allow_remote):
+    """Property as a number or a raster on the grid."""
+    check = check_brightness if name == "soil" else partial(_check_share, name)
+    if isinstance(given, Number):
+        return cf.label(xr.DataArray(check(float(given))), name, history=f"landscape: {name} {given:g}")
+    if isinstance(given, xr.DataArray):
+        found = raster_onto_grid(unpacked(given), grid, chunks)
+    elif is_path(given):
+        found = file_onto_grid(given, grid, chunks, allow_remote)
+    else:
+        raise TypeError(
+            f"{name} must be a number, a fifesim.Field, the path of a raster or an xarray.DataArray, got "
+            f"{described(given)}"
+        )
+    shares = grids.place(chunking.pointwise(check, found), grid)
+    return cf.label(shares, name, history=f"landscape: {name} of a raster")
+
+
+def _check_share(name, values):
+    """Raise ValueError for values outside 0 to 1; NaN passes."""
+    wrong = (np.asarray(values) < 0) | (np.asarray(values) > 1)
+    if wrong.any():
+        raise ValueError(f"{name} must be in [0, 1], got {np.asarray(values)[wrong].flat[0]:g}: it is a share")
+    return values

@@ -1,0 +1,259 @@
+"""Leaf area of the ground scene on labelled rasters: simulated, or from the user's map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import psutil
+import pyproj
+import xarray as xr
+from odc.geo.geobox import GeoBox
+
+from fifesim.base.annotations import Chunks, LaiDistribution, WholeNumber
+from fifesim.base.files import in_a_line
+from fifesim.base.lattice import check_seed
+from fifesim.base.messages import warn
+from fifesim.grids import cf, windows
+from fifesim.grids import chunks as chunking
+from fifesim.grids import grid as grids
+from fifesim.grids.inputs import FileOrRaster, scale_and_offset, unpacked
+from fifesim.grids.opening import raster_file, sound_raster
+from fifesim.grids.sites import made_on_site
+from fifesim.grids.warp import file_onto_grid, raster_onto_grid
+from fifesim.ground.canopy.leaf_area import check_map, check_source, warn_of_large
+from fifesim.ground.landscape.autoregression import FIELD_TILE, check_arp, periodic_field, streaming_field
+from fifesim.ground.landscape.distribution import lai_distribution, quantile_map, quantile_table, rank_map
+
+FIELD_METHODS = ("streaming", "periodic")
+
+_REFERENCE = "Friedl et al. (1995), doi:10.1016/0034-4257(95)00156-5"
+
+
+def lai_scene(
+    grid: GeoBox,
+    distribution: LaiDistribution = "burned-grazed",
+    *,
+    arp: float = 0.15,
+    seed: WholeNumber = 0,
+    method: Literal["streaming", "periodic"] = "streaming",
+    chunks: Chunks | None = None,
+) -> xr.DataArray:
+    """
+    Leaf area index of a simulated landscape.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells, in a projected CRS.
+    distribution : str, path or frozen scipy distribution, optional
+        As `ground.landscape.distribution.lai_distribution` takes it.
+    arp : float, optional
+        Autoregressive parameter in [0, 0.25). [1]
+    seed : int, optional
+        In [0, 2**63).
+    method : {"streaming", "periodic"}, optional
+        ``streaming`` is a function of (seed, row, column): a window is a slice of the whole, and chunks change nothing.
+        ``periodic`` is the paper's: one Fourier transform of the whole scene and exact ranks, in memory.
+    chunks : mapping or int, optional
+        Makes the streaming scene lazy.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+        [m2 m-2]
+
+    Raises
+    ------
+    ValueError
+        If the grid, arp, seed, distribution or method is not one allowed.
+    TypeError
+        If the seed is no whole number.
+
+    References
+    ----------
+    [Friedl1995]_, Fig. 2
+
+    See Also
+    --------
+    fifesim.ground.landscape.autoregression.streaming_field, fifesim.ground.landscape.distribution.lai_distribution
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, "burned-grazed", arp=0.15, seed=7)
+    >>> lai.dims, lai.shape
+    (('y', 'x'), (90, 90))
+    >>> lai.isel(y=slice(2), x=slice(3)).round(2).values
+    array([[1.31, 0.57, 0.5 ],
+           [0.58, 0.28, 1.76]])
+    """
+    grids.check_grid(grid)
+    check_arp(arp)
+    seed = check_seed(seed)
+    density = lai_distribution(distribution)
+    if method not in FIELD_METHODS:
+        raise ValueError(f"method must be one of {', '.join(FIELD_METHODS)}, got {method!r}")
+    if method == "streaming":
+        cells = _streaming_cells(grid, density, arp, seed)
+        # A first window raises errors of streaming_field before anything lazy is built.
+        cells(0, 0, (0, 0))
+        lai = windows.tiles(cells, grid, chunks, tile=FIELD_TILE)
+    else:
+        field = xr.DataArray(_periodic_cells(grid, density, arp, seed), dims=("y", "x"))
+        lai = grids.place(field if chunks is None else field.chunk(chunks), grid)
+    history = f"lai_scene: {method} autoregressive field, arp {arp:g}, seed {seed}"
+    made = {"arp": float(arp), "rng_seed": str(seed), "lai_distribution": distribution_name(distribution)}
+    made |= made_on_site(grid)
+    return cf.label(lai, "lai", history=history, **made, method=method, references=_REFERENCE)
+
+
+def open_lai(
+    path_or_raster: FileOrRaster, grid: GeoBox, chunks: Chunks | None = None, *, allow_remote: bool = False
+) -> xr.DataArray:
+    """
+    A user's own map of leaf area index on a grid.
+
+    Parameters
+    ----------
+    path_or_raster : str, path or xarray.DataArray
+        A raster file, whose first band is LAI, or what rioxarray has opened, in any CRS and orientation. Whole numbers
+        with a scale, as of MODIS, are LAI by their ``scale_factor``. [m2 m-2]
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells. Cells no larger than the map's are interpolated bilinearly, larger ones hold means.
+    chunks : mapping or int, optional
+        Makes the result lazy.
+    allow_remote : bool, optional
+        Take addresses, and formats that lead to other files: only for what you trust.
+
+    Returns
+    -------
+    lai : xarray.DataArray, dims (y, x)
+        NaN where the map has no data. [m2 m-2]
+
+    Raises
+    ------
+    ValueError
+        If the file is missing or not of a format that is opened, has no CRS, does not overlap the grid, or needs a
+        change of datum whose accuracy is unknown; if it has no data on the grid, known at once where the result is in
+        memory; if its name, description or units are those of another quantity; and, when computed, if LAI on the grid
+        or next to it is negative or above 20.
+
+    Warns
+    -----
+    UserWarning
+        If the map holds integers without a scale; when computed, if the mean LAI of a chunk exceeds 8.
+
+    Examples
+    --------
+    A map of 10 m on cells of 5 m:
+
+    >>> import fifesim
+    >>> site = fifesim.fife_site(10, window=((0, 30), (0, 30)))
+    >>> map_10m = fifesim.lai_scene(site, seed=7)
+    >>> lai = fifesim.open_lai(map_10m, fifesim.fife_site(5, window=((0, 60), (0, 60))))
+    >>> lai.shape, bool(abs(lai.mean() - map_10m.mean()) < 1e-3)
+    ((60, 60), True)
+    """
+    lai = lai_window(path_or_raster, grid, chunks, allow_remote=allow_remote)
+    if lai.chunks is None and not np.isfinite(lai.values).any():
+        raise ValueError(
+            f"{lai.attrs['lai_distribution']} has no data on the grid, which spans {grids.extent(grid)}: all of it is "
+            "marked as no data; look at its nodata value with gdalinfo -stats"
+        )
+    return lai
+
+
+def lai_window(path_or_raster, grid, chunks=None, *, allow_remote=False):
+    """Map of leaf area index on a grid, where it may have no data, dims (y, x). [m2 m-2]"""
+    if isinstance(path_or_raster, xr.DataArray):
+        name = in_a_line(str(path_or_raster.name or "raster"), 150)
+        _check_array(path_or_raster)
+        found = raster_onto_grid(one_layer(unpacked(path_or_raster)), grid, chunks, check=check_source)
+    else:
+        name = in_a_line(Path(path_or_raster).name, 150)
+        _check_band(path_or_raster, name, allow_remote)
+        found = file_onto_grid(path_or_raster, grid, chunks, allow_remote, check=check_source)
+    lai = chunking.pointwise(_plausible, found)
+    return cf.label(grids.place(lai, grid), "lai", history=f"open_lai: {name}", lai_distribution=name)
+
+
+def _check_array(raster):
+    """Raise ValueError if an array is another quantity by name, and warn if it has integers without a scale."""
+    name, whole = str(raster.name or "the raster"), raster.dtype.kind in "iu"
+    words = [raster.name, *(raster.attrs.get(key) for key in ("long_name", "standard_name"))]
+    _check_metadata(name, words, raster.attrs.get("units"), whole and scale_and_offset(raster) == (1.0, 0.0))
+
+
+def _check_band(path, name, allow_remote):
+    """Check the first band of a file as `_check_array` does."""
+    with sound_raster(raster_file(path, allow_remote)) as (source, _):
+        tags = source.tags(1)
+        words = [source.descriptions[0], *(tags.get(key) for key in ("NETCDF_VARNAME", "long_name", "standard_name"))]
+        scaled = (source.scales[0], source.offsets[0]) != (1.0, 0.0)
+        counts = np.dtype(source.dtypes[0]).kind in "iu" and not scaled
+        # GDAL gives the unit of the heights of a compound CRS to bands without a unit.
+        units = None if len(pyproj.CRS(source.crs).axis_info) > 2 else source.units[0]
+        _check_metadata(name, words, units, counts)
+
+
+def _check_metadata(name, words, units, counts):
+    cf.check_words(name, [word for word in words if isinstance(word, str)], "lai", str(units or ""))
+    if counts:
+        warn(
+            f"{name} holds integers without a scale, which are taken as leaf area index: if they are counts, set their "
+            "scale (.assign_attrs(scale_factor=0.1), or gdal_edit.py -a_scale 0.1 for a file), else convert them with "
+            ".astype(float)"
+        )
+
+
+def _plausible(lai):
+    return warn_of_large(check_map(lai))
+
+
+def one_layer(raster, what="leaf area"):
+    """Map without its dimensions of length one, dims (y, x)."""
+    raster = raster.squeeze([name for name in raster.dims if raster.sizes[name] == 1 and name == "band"], drop=True)
+    if raster.ndim != 2:
+        raise ValueError(f"a map of {what} has rows and columns, got dimensions {raster.dims}: select one layer")
+    return raster
+
+
+def scene_cells(grid, distribution, arp, seed, method="streaming"):
+    """Cells of a scene in memory, without labels, shape (y, x). [m2 m-2]"""
+    density = lai_distribution(distribution)
+    if method == "periodic":
+        return _periodic_cells(grid, density, arp, seed)
+    return _streaming_cells(grid, density, arp, seed)(0, 0, tuple(grid.shape))
+
+
+def _streaming_cells(grid, density, arp, seed):
+    """Kernel that computes cells of a scene from their row and column."""
+    row, column = grids.lattice_position(grid)
+    table = quantile_table(density)
+
+    def cells(first_row, first_column, shape):
+        field = streaming_field(seed, arp, row + first_row, column + first_column, shape)
+        return quantile_map(field, table)
+
+    return cells
+
+
+def _periodic_cells(grid, density, arp, seed):
+    # Noise, spectrum, field, ranks, quantiles and result are in memory together.
+    needed, free = 48 * grid.shape.x * grid.shape.y, psutil.virtual_memory().available
+    if needed > free:
+        raise ValueError(
+            f"a periodic field of {grid.shape.y} x {grid.shape.x} cells needs {needed / 1e9:.1f} GB of memory, "
+            f'{free / 1e9:.1f} GB are free: use method="streaming", which needs no more for a larger scene'
+        )
+    return rank_map(periodic_field(seed, arp, tuple(grid.shape)), density)
+
+
+def distribution_name(source):
+    """Name of a distribution of leaf area for attributes."""
+    if hasattr(source, "dist"):
+        return f"{source.dist.name}({', '.join(f'{value:g}' for value in [*source.args, *source.kwds.values()])})"
+    return Path(source).name

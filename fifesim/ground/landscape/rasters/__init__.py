@@ -1,1 +1,0 @@
-"""Landscapes of several classes and properties, on labelled rasters."""

@@ -1,0 +1,481 @@
+"""Elevation on labelled rasters: models of any resolution and CRS, their coverage of a grid, and synthetic hills."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import dask.array as da
+import numpy as np
+import xarray as xr
+from affine import Affine
+from odc.geo.geobox import GeoBox
+from scipy import ndimage
+
+from fifesim.base.annotations import Chunks, WholeNumber
+from fifesim.base.lattice import check_seed
+from fifesim.base.messages import warn
+from fifesim.grids import cf, projection, windows
+from fifesim.grids import chunks as chunking
+from fifesim.grids import grid as grids
+from fifesim.grids.inputs import FileOrRaster
+from fifesim.grids.projection import lies_in_words
+from fifesim.grids.sites import made_on_site
+from fifesim.ground.terrain.flint_hills import hills_elevation
+from fifesim.ground.terrain.slope import terrace_step
+from fifesim.ground.terrain.source_labels import ELEVATION_TILE, Model, looked_up, model_under, placement
+from fifesim.ground.terrain.spline import block_means
+
+# Largest number of rows and columns of the grid at which coverage is checked, and rows that are checked together.
+_LOOKS = 2000
+_STRIP = 256
+
+# Rows and columns that are checked together where every cell is checked.
+_PART = 512
+
+# Relief with a larger mean slope, of cells of about this size, is rare. [degree], [m]
+_STEEP, _SLOPE_SCALE = 20.0, 30.0
+
+# A model that ends farther inside the grid than this should be replaced, not extrapolated. [m]
+_NEAR = 150
+
+
+def known_elevation(model, make_tile, first_row, first_column, shape):
+    """Elevation of a part of a grid, which the model must cover, shape (rows, columns). [m]"""
+    values = model.elevation(make_tile, first_row, first_column, shape)
+    unknown = ~np.isfinite(values)
+    if unknown.any():
+        grid = model.place.grid[first_row : first_row + shape[0], first_column : first_column + shape[1]]
+        _raise_for_gaps(model, grid, unknown, np.arange(shape[0]), np.arange(shape[1]))
+    return values
+
+
+def known_cells(model, shape):
+    """Mask of the known elevations on the grid of a model, read by parts."""
+    known = np.empty(shape, bool)
+    for top in range(0, shape[0], _PART):
+        for left in range(0, shape[1], _PART):
+            part = known[top : top + _PART, left : left + _PART]
+            height, width = part.shape
+            part[:] = _looked_at(model, top + np.arange(height), left + np.arange(width))
+    return known
+
+
+def _looked_at(model, rows, columns):
+    """Mask of the known elevations at some rows and columns of the grid of a model."""
+    rows, columns = model.place.positions(rows, columns)
+    top, left, height, width = model.window(rows, columns)
+    return looked_up(np.isfinite(model.read(top, left, height, width)), rows - top, columns - left)
+
+
+def check_cover(model, grid):
+    """Raise ValueError if a model does not cover a grid, before it is used."""
+    step = max(0.5 * model.resolution / max(model.blocks) / min(grids.cell_size(grid)), 1.0)
+    looks = [
+        np.unique(np.linspace(0, size - 1, min(int(size / step) + 2, _LOOKS)).round().astype(int))
+        for size in grid.shape
+    ]
+    strips = [looks[0][first : first + _STRIP] for first in range(0, looks[0].size, _STRIP)]
+    unknown = ~np.concatenate([_looked_at(model, rows, looks[1]) for rows in strips])
+    if unknown.any():
+        _raise_for_gaps(model, grid, unknown, *looks)
+
+
+def _raise_for_gaps(model, grid, unknown, rows, columns):
+    """Raise ValueError that names the part of a grid which a model lacks."""
+    source, name = model.source, model.source.name
+    if unknown.all():
+        raise ValueError(
+            f"{name} holds no elevation on the grid, which spans {grids.extent(grid)} in "
+            f"{projection.name_of(grid.crs.proj)}; it spans {lies_in_words(source.affine, source.shape, source.crs)}"
+        )
+    down, across = grids.cell_size(grid)
+    height, width = np.gradient(rows.astype(float)) * down, np.gradient(columns.astype(float)) * across
+    words = [
+        *_short_sides(model, unknown, height, width),
+        *_covered(grid, unknown, rows, columns),
+        *_holes(grid, unknown, rows, columns, height, width),
+    ]
+    raise ValueError(f"{name} does not cover the grid, which spans {grids.extent(grid)}; " + "; ".join(words))
+
+
+def _short_sides(model, unknown, height, width):
+    """Text of the distances by which a model ends inside a grid."""
+    leads = {
+        "north": _lead(unknown, height),
+        "south": _lead(unknown[::-1], height[::-1]),
+        "west": _lead(unknown.T, width),
+        "east": _lead(unknown.T[::-1], width[::-1]),
+    }
+    if not any(leads.values()):
+        return
+    sides = ", ".join(f"{metres:.0f} m in the {side}" for side, metres in leads.items() if metres > 0)
+    filled = max(cells * size for cells, size in zip(model.fill, model.place.cell_size(), strict=True))
+    # Filling counts from the centre of the last known cell.
+    near = int(np.ceil((max(leads.values()) + model.resolution + filled) / 10 + 1)) * 10
+    carried = f", or fill={near} carries it on" if near <= _NEAR else ""
+    yield f"it lacks up to {sides}: take a smaller grid or a model that reaches farther{carried}"
+
+
+def _covered(grid, unknown, rows, columns):
+    """Text of the part of a grid that a model covers."""
+    edges = unknown[0].any(), unknown[-1].any(), unknown[:, 0].any(), unknown[:, -1].any()
+    first, last, start, stop = 0, rows.size, 0, columns.size
+    # Edge by edge, the one that lacks the larger share goes first, until the rest is known.
+    while any(edges) and last - first > 2 and stop - start > 2:
+        part = unknown[first:last, start:stop]
+        shares = [part[0].mean(), part[-1].mean(), part[:, 0].mean(), part[:, -1].mean()]
+        worst = int(np.argmax(shares))
+        if not shares[worst]:
+            break
+        first, last = first + (worst == 0), last - (worst == 1)
+        start, stop = start + (worst == 2), stop - (worst == 3)
+    if (first, last, start, stop) == (0, rows.size, 0, columns.size) or unknown[first:last, start:stop].any():
+        return
+    down, across = grids.cell_size(grid)
+    top, bottom = rows[first], rows[last - 1] + 1
+    left, right = columns[start], columns[stop - 1] + 1
+    west, north = projection.transform_points(grid.affine, left, top)
+    yield (
+        f"it covers west={west:.10g}, north={north:.10g}, width={(right - left) * across:.6g}, "
+        f"height={(bottom - top) * down:.6g}"
+    )
+
+
+def _lead(unknown, sizes):
+    """Longest run of unknown rows from the first on, apart from columns that are completely unknown."""
+    partly = unknown[:, ~unknown.all(axis=0)]
+    runs = np.cumsum(np.logical_and.accumulate(partly, axis=0) * sizes[:, None], axis=0)[-1]
+    return float(runs.max())
+
+
+def _holes(grid, unknown, rows, columns, height, width):
+    """Text of the location of the largest visible hole."""
+    labels, _ = ndimage.label(unknown, structure=np.ones((3, 3)))
+    holes = [
+        (height[down].sum(), width[across].sum(), down, across)
+        for down, across in ndimage.find_objects(labels)
+        if down.start > 0 and across.start > 0 and down.stop < rows.size and across.stop < columns.size
+    ]
+    if not holes:
+        return
+    tall, wide, down, across = max(holes, key=lambda hole: max(hole[:2]))
+    row, column = rows[(down.start + down.stop) // 2], columns[(across.start + across.stop) // 2]
+    east, north = projection.transform_points(grid.affine, column + 0.5, row + 0.5)
+    fill = int(np.ceil(max(tall, wide) / 20 + 1)) * 10
+    number = "a hole" if len(holes) == 1 else f"{len(holes)} holes, the largest"
+    yield f"it has {number} of {tall:.0f} x {wide:.0f} m at {east:.0f} E {north:.0f} N: fill={fill} interpolates it"
+
+
+def warn_of_relief(model, grid, unit_is_given):
+    """Warn of terraces of whole numbers, and of implausibly steep relief, in the middle of a grid."""
+    middle = [np.array([size // 2]) for size in grid.shape]
+    top, left, height, width = model.window(*model.place.positions(*middle))
+    around = 200
+    values = model.source.read(top - around, left - around, height + 2 * around, width + 2 * around)
+    step = terrace_step(values / model.source.metres)
+    if step is not None:
+        warn(
+            f"the elevations of {model.source.name} are whole numbers that lie in terraces, with a vertical resolution "
+            f"of {step * model.source.metres:g} m: slope and aspect will show the terraces' edges"
+        )
+    slope = _mean_slope(values, model.place.cell_size())
+    if slope > _STEEP and not unit_is_given:
+        warn(
+            f"the mean slope of {model.source.name} is {slope:.1f} degrees at {_SLOPE_SCALE:g} m, which only high "
+            "mountains have: if its elevations are feet or decimetres, give vertical_units='ft' or 'dm'; if they are "
+            "metres, give vertical_units='m'"
+        )
+
+
+def _mean_slope(values, sizes):
+    """Mean slope of elevations averaged to cells of about 30 m, NaN for too few cells. [degree]"""
+    counts = [max(1, round(_SLOPE_SCALE / size)) for size in sizes]
+    rows, columns = (size // count * count for size, count in zip(values.shape, counts, strict=True))
+    means = block_means(values[:rows, :columns], *counts)
+    if min(means.shape) < 2:
+        return np.nan
+    down, across = np.gradient(means, *(count * size for count, size in zip(counts, sizes, strict=True)))
+    slopes = np.degrees(np.arctan(np.hypot(down, across)))
+    known = np.isfinite(slopes)
+    return float(slopes[known].mean()) if known.any() else np.nan
+
+
+def fine_dem(
+    path_or_raster: FileOrRaster,
+    grid: GeoBox,
+    *,
+    fill: float | None = None,
+    vertical_units: str | None = None,
+    chunks: Chunks | None = None,
+    allow_remote: bool = False,
+) -> xr.DataArray:
+    """
+    Elevation model on a grid, by low-pass interpolation.
+
+    Parameters
+    ----------
+    path_or_raster : str, path or xarray.DataArray
+        A raster file, or what rioxarray has opened, in any CRS and orientation; its first band is elevation. It should
+        reach past the grid.
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells.
+    fill : float, optional
+        Distance from known elevation up to which holes are interpolated, and the model is carried on past its edge. [m]
+    vertical_units : str, optional
+        Of the elevations, where they are not metres: "ft", "us-ft" and others; wins over what the file says.
+    chunks : mapping or int or "auto", optional
+        Makes the result lazy, as it is without where the raster is.
+    allow_remote : bool, optional
+        Take addresses, and formats that lead to other files: only for what you trust.
+
+    Returns
+    -------
+    dem : xarray.DataArray, dims (y, x)
+        With the mean size of the model's cells, or of the blocks that they are averaged to, as attribute
+        ``source_resolution``. [m]
+
+    Raises
+    ------
+    ValueError
+        If the model does not cover the grid, has holes, no CRS, or other units than metres that are not given, or needs
+        a change of datum whose accuracy is unknown. If the part that is read, on the grid and around it, holds heights
+        below -500 m or above 9000 m, such as undeclared marks of missing data. For a lazy raster this is known when
+        computed.
+
+    Warns
+    -----
+    UserWarning
+        If elevations lie in terraces of whole numbers, are 0 m where all others are far from it, or have a mean slope
+        above 20 degrees at 30 m while ``vertical_units`` is not given. A lazy raster is checked for 0 m only.
+
+    Notes
+    -----
+    Wavelengths above five cells of the source are recovered within 1e-3 of their amplitude, planes exactly. Cells of
+    the source less than two thirds of the grid's are averaged first. Heights keep their vertical datum.
+
+    See Also
+    --------
+    fifesim.ground.terrain.spline.spline_coefficients, fifesim.ground.terrain.spline.spline_grid
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> coarse = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 40), (0, 40))), seed=7)
+    >>> grid = fifesim.fife_site(10, window=((30, 90), (30, 90)))
+    >>> dem = fifesim.fine_dem(coarse, grid)
+    >>> dem.shape, dem.attrs["units"]
+    ((60, 60), 'm')
+    """
+    model = model_under(grid, path_or_raster, fill, vertical_units, allow_remote)
+    if isinstance(model.source.cells, da.Array):
+        out = _from_lazy(model, grid, "auto" if chunks is None else chunks)
+    else:
+        check_cover(model, grid)
+        warn_of_relief(model, grid, vertical_units is not None)
+        out = windows.tiles(partial(known_elevation, model, model.tiles()), grid, chunks, tile=ELEVATION_TILE)
+    history = f"fine_dem: {model.source.name}, cells of {model.resolution:.4g} m, quintic spline"
+    return cf.label(out, "dem", history=history, source_resolution=model.resolution)
+
+
+def source_dem(
+    path_or_raster: FileOrRaster,
+    grid: GeoBox,
+    margin: float,
+    *,
+    fill: float | None = None,
+    vertical_units: str | None = None,
+    chunks: Chunks | None = None,
+    allow_remote: bool = False,
+) -> tuple[xr.DataArray, dict[str, float]]:
+    """
+    Elevation model around a grid, at about its own resolution; for horizons.
+
+    Parameters
+    ----------
+    path_or_raster, grid, fill, vertical_units, allow_remote
+        As in `fine_dem`.
+    margin : float
+        Distance from the grid that is wanted on each side. [m]
+    chunks : mapping or int or "auto", optional
+        Makes the result lazy; where the model ends is looked up at once.
+
+    Returns
+    -------
+    dem : xarray.DataArray, dims (y, x)
+        In memory without chunks. Its cells are whole multiples of the grid's, from the grid's corner; it reaches up to
+        the margin and as far as the model does. NaN where unknown. [m]
+    reach : dict of str to float
+        How far the elevation is known without a gap beside all of the ``north``, ``east``, ``south`` and ``west`` side
+        of the grid, up to the margin. [m]
+
+    Raises
+    ------
+    ValueError
+        As in `fine_dem`, but not for what the model lacks, unless that is all.
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> coarse = fifesim.flint_hills(fifesim.fife_site(30, window=((0, 40), (0, 40))), seed=7)
+    >>> grid = fifesim.fife_site(10, window=((30, 90), (30, 90)))
+    >>> around = fifesim.source_dem(coarse, grid, margin=300)
+    >>> around[0].shape
+    (40, 40)
+    """
+    model = model_under(grid, path_or_raster, fill, vertical_units, allow_remote)
+    coarse, around = _coarse_grid(grid, model.resolution, margin)
+    if isinstance(model.source.cells, da.Array):
+        model = model.reading(model.source.cells.compute())
+    model = replace(model, place=placement(model.source, coarse))
+    values = model.elevation(model.tiles(), 0, 0, tuple(coarse.shape)) if chunks is None else None
+    known = known_cells(model, coarse.shape) if values is None else np.isfinite(values)
+    if not known.any():
+        source = model.source
+        raise ValueError(
+            f"{source.name} does not reach the grid, which spans {grids.extent(grid)}: it spans "
+            f"{lies_in_words(source.affine, source.shape, source.crs)}"
+        )
+    reach = _reach(known, around, grids.cell_size(coarse))
+    kept = _with_data(known, around)
+    data = _in_chunks(model, coarse[kept], kept, chunks) if values is None else values[kept]
+    dem = grids.place(xr.DataArray(data, dims=("y", "x")), coarse[kept])
+    history = f"source_dem: {model.source.name}, cells of {model.resolution:.4g} m, {margin:g} m around the grid"
+    return cf.label(dem, "dem", history=history, source_resolution=model.resolution), reach
+
+
+def _in_chunks(model, grid, kept, chunks):
+    """Lazy elevation of a part of the grid of a model, in chunks that many horizons read."""
+    make_tile, (first_row, first_column) = model.tiles(), (part.start for part in kept)
+
+    def kernel(rows, columns):
+        shape = rows.stop - rows.start, columns.stop - columns.start
+        return model.elevation(make_tile, first_row + rows.start, first_column + columns.start, shape)
+
+    return chunking.windows(kernel, [], tuple(grid.shape), windows.chunk_sizes(grid, chunks, tile=ELEVATION_TILE))
+
+
+class _TileReads(NamedTuple):
+    """Window of a lazy source that the tiles of each chunk read."""
+
+    array: da.Array
+    model: Model
+
+    def window(self, rows, columns):
+        return self.model.tile_window(rows, columns)
+
+
+def _from_lazy(model, grid, chunks):
+    without = model.reading(None)
+
+    def kernel(rows, columns, cells):
+        down, across = without.tile_window(rows, columns)
+        known = without.reading(cells, (down.start, across.start))
+        shape = rows.stop - rows.start, columns.stop - columns.start
+        return known_elevation(known, known.tiles(), rows.start, columns.start, shape)
+
+    sizes = windows.chunk_sizes(grid, chunks, tile=ELEVATION_TILE)
+    out = chunking.windows(kernel, [_TileReads(model.source.cells, without)], tuple(grid.shape), sizes)
+    return grids.place(xr.DataArray(out, dims=("y", "x")), grid)
+
+
+def _coarse_grid(grid, resolution, margin):
+    """Grid of multiples of the cells of a grid that covers it and a margin, and rows and columns of the margin."""
+    if not margin >= 0:
+        raise ValueError(f"the margin must be 0 m or more, got {margin:g}")
+    sizes = grids.cell_size(grid)
+    counts = [max(1, round(resolution / size)) for size in sizes]
+    down, across = (count * size for count, size in zip(counts, sizes, strict=True))
+    rows, columns = int(np.ceil(margin / down)), int(np.ceil(margin / across))
+    inner = [-(-size // count) for size, count in zip(grid.shape, counts, strict=True)]
+    affine = Affine(across, 0, grid.affine.c - columns * across, 0, -down, grid.affine.f + rows * down)
+    return GeoBox((inner[0] + 2 * rows, inner[1] + 2 * columns), affine, grid.crs), (rows, columns)
+
+
+def _reach(known, around, sizes):
+    (rows, columns), (down, across) = around, sizes
+    inner = known[rows : known.shape[0] - rows, columns : known.shape[1] - columns]
+    sides = {
+        "north": (known[:rows, columns : columns + inner.shape[1]][::-1], down),
+        "east": (known[rows : rows + inner.shape[0], columns + inner.shape[1] :].T, across),
+        "south": (known[rows + inner.shape[0] :, columns : columns + inner.shape[1]], down),
+        "west": (known[rows : rows + inner.shape[0], :columns].T[::-1], across),
+    }
+    return {
+        side: float(np.logical_and.accumulate(strip.all(axis=1)).sum() * cell) for side, (strip, cell) in sides.items()
+    }
+
+
+def _with_data(known, around):
+    """Slices without the empty rows and columns of the margin."""
+    parts = []
+    for axis, margin in enumerate(around):
+        found = np.flatnonzero(known.any(axis=1 - axis))
+        size = known.shape[axis]
+        parts.append(slice(min(int(found[0]), margin), max(int(found[-1]) + 1, size - margin)))
+    return tuple(parts)
+
+
+# Chunks of "auto" are of some of these. [cell]
+_TILE = 504
+
+# Coarser cells lose the valleys. [m]
+_LARGEST_CELL = 100.0
+
+_REFERENCE = "terrain after the statistics of Kings Creek, Konza Prairie (USGS 3DEP)"
+
+
+def flint_hills(grid: GeoBox, seed: WholeNumber = 0, *, chunks: Chunks | None = None) -> xr.DataArray:
+    """
+    Synthetic elevation model of the dissected Flint Hills.
+
+    Parameters
+    ----------
+    grid : odc.geo.geobox.GeoBox
+        Of ground cells.
+    seed : int, optional
+        In [0, 2**63).
+    chunks : mapping or int or "auto", optional
+        Makes the result lazy.
+
+    Returns
+    -------
+    dem : xarray.DataArray, dims (y, x)
+        A function of the seed and of easting and northing: a window is a slice of the whole, chunks change nothing, and
+        other cells show the same hills. [m]
+
+    Raises
+    ------
+    ValueError
+        If the grid or the seed is not one allowed, or cells are larger than 100 m, which lose the valleys.
+    TypeError
+        If the seed is no whole number.
+
+    See Also
+    --------
+    fifesim.ground.terrain.flint_hills.hills_elevation
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> dem = fifesim.flint_hills(grid, seed=7)
+    >>> dem.shape, dem.attrs["units"]
+    ((90, 90), 'm')
+    """
+    grids.check_grid(grid)
+    seed = check_seed(seed)
+    if max(grids.cell_size(grid)) > _LARGEST_CELL:
+        raise ValueError(
+            f"cells must be at most {_LARGEST_CELL:g} m for the valleys to show, got "
+            f"{max(grids.cell_size(grid)):g} m: make the terrain on smaller cells and .coarsen() it"
+        )
+    northing, easting = (grids.coordinates(grid)[axis].values for axis in ("y", "x"))
+
+    def cells(row, column, shape):
+        return hills_elevation(seed, northing[row : row + shape[0]], easting[column : column + shape[1]])
+
+    dem = windows.tiles(cells, grid, chunks, tile=_TILE)
+    made = {"rng_seed": str(seed), "source_resolution": 30.0, "references": _REFERENCE} | made_on_site(grid)
+    return cf.label(dem, "dem", history=f"flint_hills: seed {seed}", **made)

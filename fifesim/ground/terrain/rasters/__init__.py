@@ -1,1 +1,0 @@
-"""Terrain on labelled rasters."""

@@ -1,0 +1,222 @@
+"""Hyperspectral images and field spectra as the bands of an instrument."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from fifesim.base.annotations import Names
+from fifesim.base.bands import LONGEST
+from fifesim.grids import cf
+from fifesim.grids.inputs import PER_MICROMETRE, AnyDimensions, check_reflectance, unpacked
+from fifesim.grids.reductions import combined
+from fifesim.sensor.description.instrument_file import InstrumentLike
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.instrument_labels import attributes_of, is_radiance
+from fifesim.sensor.response.spectral import band_weights, covered_steps
+
+
+class SpectralAxis(NamedTuple):
+    """Wavelengths and dimension of the samples of spectra."""
+
+    dim: str
+    wavelength: np.ndarray  # in the order of the array, shape (n,) [um]
+    fwhm: np.ndarray | None  # full width at half maximum of the samples, shape (n,) [um]
+
+
+def spectral_axis(array):
+    """Spectral axis of an array."""
+    if "wavelength" not in array.coords or array.coords["wavelength"].ndim != 1:
+        raise ValueError(
+            f"spectra need a coordinate 'wavelength' along one dimension, got dimensions {array.dims} and coordinates "
+            f"{', '.join(map(str, array.coords)) or 'none'}: assign it with .assign_coords(wavelength=('band', [...]))"
+        )
+    coordinate = array.coords["wavelength"]
+    (dim,) = coordinate.dims
+    scale = _per_micrometre(coordinate, "wavelength")
+    wavelength = _in_micrometres(coordinate, scale)
+    if wavelength.size < 2 or np.unique(wavelength).size < wavelength.size:
+        raise ValueError(
+            f"spectra need two different wavelengths or more, each once, got {wavelength.size}, of which "
+            f"{np.unique(wavelength).size} differ: select others with .isel({dim}=...)"
+        )
+    if "fwhm" not in array.coords or array.coords["fwhm"].dims != (dim,):
+        return SpectralAxis(dim, wavelength, None)
+    widths = array.coords["fwhm"]
+    own = _per_micrometre(widths, "fwhm") if widths.attrs.get("units") else scale
+    return SpectralAxis(dim, wavelength, _in_micrometres(widths, own))
+
+
+def _per_micrometre(coordinate, name):
+    """Number of units of a coordinate in a micrometre."""
+    unit = str(coordinate.attrs.get("units", "")).strip()
+    if unit and unit.lower() not in PER_MICROMETRE:
+        raise ValueError(f"{name} is in {unit!r}, it must be in 'um' or 'nm': convert it, then set .attrs['units']")
+    scale, largest = PER_MICROMETRE.get(unit.lower(), 1.0), float(np.max(coordinate.values))
+    if largest / scale > LONGEST:
+        raise ValueError(
+            f"{name} reaches {largest:g}{' ' + unit if unit else ' without a unit'}: if these are nanometres, "
+            f"set cube[{name!r}].attrs['units'] = 'nm'"
+        )
+    if name == "wavelength" and largest / scale < 0.1:
+        raise ValueError(
+            f"wavelength reaches only {largest:g} {unit}: if these are um, set its attribute units to 'um'"
+        )
+    return scale
+
+
+def _in_micrometres(coordinate, scale):
+    values = np.asarray(coordinate.values, float) / scale
+    if not np.all(values > 0):
+        raise ValueError(
+            f"{coordinate.name} must be positive throughout, got {values[~(values > 0)][0] * scale:g}: "
+            "select the samples that have one with .isel"
+        )
+    return values
+
+
+MIN_COVERAGE = 0.99
+"""Share of a band's weight that a spectrum must cover [1]."""
+
+# A message names so many bands, and refers to others by their number.
+_NAMED = 3
+
+
+def to_bands(
+    spectra: AnyDimensions,
+    instrument: InstrumentLike,
+    *,
+    bands: Names | None = None,
+    min_coverage: float = MIN_COVERAGE,
+) -> xr.DataArray:
+    """
+    Spectra as the bands of an instrument: a hyperspectral image, or field spectra.
+
+    Reflectance is weighted by spectral response times solar irradiance, for a band's reflectance is reflected over
+    incident light. Radiance is weighted by the response alone. `units` tells them apart.
+
+    Parameters
+    ----------
+    spectra : xarray.DataArray
+        Reflectance or radiance with a coordinate ``wavelength`` along one of its dimensions, in um, or in nm where its
+        attribute ``units`` says so; in any order, evenly spaced or not. Other dimensions are what they are: (y, x),
+        (sample), (time, y, x). A coordinate ``fwhm`` along the same dimension says how wide the samples are.
+        [1 or W m-2 sr-1 um-1]
+    instrument : str or Instrument
+        Whose bands.
+    bands : str or sequence of str, optional
+        Names of its bands; all by default.
+    min_coverage : float, optional
+        Share of a band's weight that must lie on wavelengths that the spectra cover. [1]
+
+    Returns
+    -------
+    image : xarray.DataArray
+        With a dimension ``band``, of the same dimensions otherwise, and the coordinates that are not along wavelength.
+        NaN where a sample that counts in the band is. Lazy where the spectra are. [1 or W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    ValueError
+        If a band is not covered; the message names the wavelengths that are missing. If wavelengths have no unit and
+        are not in um, or the spectra are whole numbers.
+
+    Notes
+    -----
+    The samples are taken as they are, as points of a spectrum that is straight between them: they are already means
+    over the response of the spectrometer, and that is not undone. A step is a gap, which covers nothing, where the
+    hole between two samples is wider than the mean of both ``fwhm``; without ``fwhm``, where the step is more than
+    2.5 times the median of those around it. What is missing within ``min_coverage`` has no weight: a flat spectrum
+    stays flat.
+
+    See Also
+    --------
+    fifesim.sensor.response.spectral.band_weights
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> wavelength = xr.Variable("wavelength", np.arange(0.4, 1.0, 0.005), {"units": "um"})
+    >>> grey = np.full((120, 2, 2), 0.3)
+    >>> spectra = xr.DataArray(grey, {"wavelength": wavelength}, ("wavelength", "y", "x"))
+    >>> spectra.fifesim.to_bands("OLI", bands=["OLI4", "OLI5"]).isel(y=0, x=0).round(6).values
+    array([0.3, 0.3])
+    """
+    cf.check_quantity(spectra, "surface_reflectance", "toa_reflectance", "toa_radiance")
+    spectra = unpacked(spectra)
+    if spectra.dtype.kind != "f":
+        raise ValueError(
+            f"spectra must be reflectance or radiance, got whole numbers ({spectra.dtype}) without a scale: type "
+            ".assign_attrs(scale_factor=0.0001) for what scales them"
+        )
+    if not 0 < min_coverage <= 1:
+        raise ValueError(f"min_coverage must be in (0, 1], got {min_coverage:g}: it is a share, such as 0.95")
+    description = find_instrument(instrument)
+    selected = description.select(bands)
+    quantity = _quantity(spectra)
+    axis = spectral_axis(spectra)
+    found = _weights(axis, selected, sun=quantity != "toa_radiance")
+    _check_coverage(found, selected, description, axis, min_coverage)
+    image = combined(spectra, axis.dim, [each.weights for each in found])
+    if quantity != "toa_radiance":
+        image = xr.apply_ufunc(
+            check_reflectance, image, dask="parallelized", output_dtypes=[image.dtype], keep_attrs=True
+        )
+    along_band = {"band": [band.name for band in selected], "wavelength": [band.wavelength for band in selected]}
+    if quantity == "toa_radiance":
+        along_band["solar_irradiance"] = [band.solar_irradiance for band in selected]
+    image = image.assign_coords(cf.band_coordinates(**along_band))
+    image.encoding = {"grid_mapping": "spatial_ref"} if "spatial_ref" in image.coords else {}
+    weighted = "response" if quantity == "toa_radiance" else "response and sun"
+    history = f"to_bands: {description.name}, {axis.wavelength.size} wavelengths weighted by {weighted}"
+    return cf.label(image, quantity, source=spectra, history=history, **attributes_of(description))
+
+
+def _quantity(spectra):
+    """Quantity of the spectra, by units and standard name."""
+    if is_radiance(spectra):
+        return "toa_radiance"
+    says = spectra.attrs.get("standard_name")
+    return "toa_reflectance" if says == cf.QUANTITIES["toa_reflectance"].standard_name else "surface_reflectance"
+
+
+def _weights(axis, bands, sun):
+    """Weights of the samples in each band, in the order of the array."""
+    order = np.argsort(axis.wavelength)
+    wavelength = axis.wavelength[order]
+    covered = covered_steps(wavelength, None if axis.fwhm is None else axis.fwhm[order])
+    back = np.argsort(order)
+    found = [band_weights(band.response, wavelength, covered, sun=sun) for band in bands]
+    return [each._replace(weights=each.weights[back]) for each in found]
+
+
+def _check_coverage(found, bands, description, axis, min_coverage):
+    """Raise ValueError for bands that the spectra do not cover."""
+    lacking = [(band, each) for band, each in zip(bands, found, strict=True) if each.coverage < min_coverage - 1e-12]
+    if not lacking:
+        return
+    reach = f"the spectra reach from {min(axis.wavelength):g} to {max(axis.wavelength):g} um"
+    none = [band.name for band, each in lacking if each.coverage == 0]
+    if none:
+        others = [band.name for band, each in zip(bands, found, strict=True) if each.coverage >= min_coverage]
+        raise ValueError(
+            f"{reach} and hold nothing of {_some(none)} of {description.name}: pick bands, bands={others or '[...]'}"
+        )
+    parts = [f"{band.name} {share.coverage:.1%}, without {_ranges(share.missing)} um" for band, share in lacking]
+    raise ValueError(
+        f"{reach}, and cover less than {min_coverage:g} of {_some(parts, '; ')}: pick others with bands=, interpolate "
+        "the spectra with .interp(wavelength=...), or lower min_coverage="
+    )
+
+
+def _some(parts, between=", "):
+    more = len(parts) - _NAMED
+    return between.join(parts[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _ranges(missing):
+    return _some([f"{low:.4g} to {high:.4g}" for low, high in missing])

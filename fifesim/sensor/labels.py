@@ -1,0 +1,445 @@
+"""Sensor on labelled rasters: from light at the top of the atmosphere to digital numbers, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from odc.geo.geobox import GeoBox
+
+from fifesim.base.annotations import Interval, NoiseKinds, Offset, Time, WholeNumber
+from fifesim.base.bands import check_counts
+from fifesim.base.geometry import ANGLES
+from fifesim.base.lattice import check_seed
+from fifesim.grids import cf, chunks, directions, swaths, windows
+from fifesim.grids import grid as grids
+from fifesim.grids.dates import by_date, epoch
+from fifesim.grids.directions import Directions
+from fifesim.grids.inputs import HIGHEST, LOWEST, SAMPLED_ROWS, Image, RasterOrDataset, incoming
+from fifesim.grids.sites import check_same_sun
+from fifesim.grids.windows import held
+from fifesim.sensor.description.instrument_file import InstrumentLike
+from fifesim.sensor.description.instruments import noise_of
+from fifesim.sensor.instrument_labels import (
+    attributes_of,
+    coordinates_of_bands,
+    given_instrument,
+    is_radiance,
+    matching_bands,
+    warn_of_others,
+)
+from fifesim.sensor.pixel_labels import bands_by_grid, directions_on, means_by_band, pixel_grid
+from fifesim.sensor.response import calibration
+from fifesim.sensor.response.calibration import dn_to_radiance, gain_offset, product_gain_offset, radiance_to_dn
+from fifesim.sensor.response.noise import ALL, NoiseModel, NoiseModels, add_noise, check_kinds
+
+_CALIBRATE_FIRST = (
+    "calibrate with .fifesim.to_radiance() or .fifesim.to_reflectance() before you compute or resample. If the values "
+    "are radiance already, type .drop_vars(['gain', 'offset']).assign_attrs(units='W m-2 sr-1 um-1')"
+)
+
+
+def check_scaling(scaling, description, quantise=True):
+    """Raise ValueError for an invalid scaling of digital numbers."""
+    if scaling not in ("detector", "product"):
+        raise ValueError(f"scaling must be 'detector' or 'product', got {scaling!r}")
+    if scaling == "product" and not quantise:
+        raise ValueError("scaling='product' is one of digital numbers: leave it out, or quantise=False")
+    if scaling == "product" and description.product is None:
+        raise ValueError(
+            f"the description of {description.name} has no product that is scaled by reflectance, as those of OLI, "
+            "OLI2, MSI and MSI-B have: leave scaling out, or give [product] in a file of your own"
+        )
+
+
+def scale(description, bands, product_geometry=None):
+    """Gain and offset of radiance, shape (band,) [W m-2 sr-1 um-1], and number of bits."""
+    if product_geometry is None:
+        full_scale, lowest = [band.full_scale_radiance for band in bands], [band.min_radiance for band in bands]
+        return *gain_offset(full_scale, lowest, description.bits), description.bits
+    product, mu_s = description.product, 1.0
+    if product.sun_corrected:
+        mu_s = directions.uniform_geometry(product_geometry, f"scaling='product' of {description.name}").mu_s
+    irradiance = [band.solar_irradiance for band in bands]
+    distance = float(product_geometry.earth_sun_distance)
+    return *product_gain_offset(product.gain, product.offset, irradiance, mu_s, distance), product.bits
+
+
+def recorded(radiance, description, bands, quantise, product_geometry=None):
+    """Values that an instrument records for a radiance, and the coordinates of its bands."""
+    scales = {}
+    if quantise:
+        gain, offset, bits = scale(description, bands, product_geometry)
+        # A product's numbers are linear, whatever the detector's are.
+        compression = [band.compressed_count(bits) if product_geometry is None else 0 for band in bands]
+        scales = {"gain": gain, "offset": offset} | ({"compression": compression} if any(compression) else {})
+        along_band = [xr.Variable("band", values) for values in (gain, offset, compression)]
+        dtype = np.uint8 if bits <= 8 else np.uint16
+        radiance = chunks.pointwise(_counts, radiance, *along_band, dtype=dtype, bits=bits)
+    return radiance, coordinates_of_bands(bands, scales)
+
+
+def _counts(radiance, gain, offset, compression, bits):
+    """Digital numbers of bands, some of which have a square-root scale."""
+    return radiance_to_dn(radiance, gain, offset, bits, compression)
+
+
+def radiance_kernel(image):
+    """Kernel of the radiance of digital numbers, which checks values if their type allows others. [W m-2 sr-1 um-1]"""
+    units = image.attrs.get("units", "1")
+    if units == cf.QUANTITIES["toa_radiance"].units:
+        raise ValueError(f"the image has the calibration of digital numbers and units {units!r}: {_CALIBRATE_FIRST}")
+    cf.check_units(image, "dn")
+    fill = image.attrs.get("_FillValue", image.encoding.get("_FillValue"))
+    # The fill value has the type in which the image was recorded.
+    recorded = fill.dtype if isinstance(fill, np.generic) and fill.dtype.kind == "u" else None
+    if image.dtype.kind == "u" and recorded in (None, image.dtype):
+        return dn_to_radiance
+    largest = int(np.iinfo(np.uint16 if recorded is None else recorded).max)
+    return partial(_checked_radiance, largest)
+
+
+def _checked_radiance(largest, dn, *scale):
+    check_counts(dn, largest, _CALIBRATE_FIRST)
+    return dn_to_radiance(dn, *scale)
+
+
+def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
+    """Radiance with the noise of an instrument, dims (band, y, x). [W m-2 sr-1 um-1]"""
+    if not check_kinds(kinds):
+        return radiance
+    check_seed(seed)
+    models = noise_models(instrument, bands, kinds, given)
+    numbers = [instrument.bands.index(band) for band in bands]
+    image = epoch(radiance)
+
+    def kernel(block, starts):
+        band, row, column = (start + origin for start, origin in zip(starts, (0, *first), strict=True))
+        noise = [
+            add_noise(values, *models[k], seed=seed, band=numbers[k], row=row, column=column, epoch=image)
+            for k, values in enumerate(block, band)
+        ]
+        return np.stack(noise)
+
+    return windows.located(kernel, radiance)
+
+
+def noise_models(instrument, bands, kinds, given=None):
+    """Noise model of each band, and the kinds of noise to draw from it."""
+    kinds = check_kinds(kinds)
+    if isinstance(given, Mapping):
+        given = {instrument.select(name)[0].name: model for name, model in given.items()}
+    models = []
+    for band in bands:
+        model = given if isinstance(given, NoiseModel) else (given or {}).get(band.name) or noise_of(instrument, band)
+        if kinds != (ALL,) and (absent := [kind for kind in kinds if kind not in model.kinds]):
+            known = " and ".join(model.kinds) or "none"
+            raise ValueError(
+                f"noise = {list(kinds)}: {instrument.name} has no {' and no '.join(absent)} noise for {band.name}, "
+                f"only {known}; type noise='all' for the kinds that each band has, or give "
+                f"noise_models={{{band.name!r}: fifesim.NoiseModel(...)}}, in a scenario [sensor.noise_model]"
+            )
+        models.append((model, model.kinds if kinds == (ALL,) else kinds))
+    return models
+
+
+# Share of its footprint's weight that a pixel needs on valid cells. The footprint of Table 1, 30.32 m, leaves a
+# scene of whole 30 m pixels by 0.16 m.
+MIN_VALID = 0.98
+
+# Coordinates that turn digital numbers into radiance.
+_SCALE = ("gain", "offset", "compression")
+
+
+@by_date
+def sense(
+    toa: RasterOrDataset,
+    instrument: InstrumentLike | None = None,
+    *,
+    onto: GeoBox | None = None,
+    interval: Interval | None = None,
+    offset: Offset = (0.0, 0.0),
+    noise: NoiseKinds = (),
+    seed: WholeNumber = 0,
+    noise_models: NoiseModels | None = None,
+    quantise: bool = True,
+    scaling: Literal["detector", "product"] = "detector",
+    min_valid: float = MIN_VALID,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+) -> Image:
+    """
+    Image that an instrument records: regularized onto its pixels, with its noise, and digitised.
+
+    Parameters
+    ----------
+    toa : xarray.DataArray, dims (band, y, x)
+        Reflectance or radiance at the top of the atmosphere, by cells. Bands are those of the instrument that have the
+        same name, or else whose response is there at their ``wavelength``. [1 or W m-2 sr-1 um-1]
+    instrument : str or fifesim.sensor.description.instruments.Instrument, optional
+        By default that whose bands the array carries.
+    onto : odc.geo.geobox.GeoBox, optional
+        North-up grid of pixels in the CRS of the scene, of any size and offset. By default the instrument's gridded
+        product, with the upper left corner of the scene.
+    interval : "native", float or (float, float), optional
+        Distance between pixels instead of that of the gridded product: the instrument's own at nadir, or metres, down
+        and across. The coordinates move with it; footprints stay. [m]
+    offset : (float or array, float or array), optional
+        Registration error southward and eastward, a number or a drift of one for each row and each column. The pixels
+        see the ground beside them; the coordinates stay nominal. [pixel]
+    noise : str or sequence of str, optional
+        Among "shot", "thermal" and "fixed-pattern", or "all" for the kinds that the instrument has. Its description
+        has their size; a kind that it lacks is refused.
+    seed : int, optional
+        Of the noise.
+    noise_models : fifesim.sensor.response.noise.NoiseModel, or mapping of str to NoiseModel, optional
+        Size of the noise for every band, or by name of a band, where the description lacks it or is not to count.
+    quantise : bool, optional
+        Whether to digitise; radiance otherwise.
+    scaling : "detector" or "product", optional
+        What a digital number is: a count of the instrument's own, spread over its radiances; or one of the agency's
+        Level-1 product, which is scaled by reflectance (OLI, OLI2; MSI and MSI-B with the offset of processing baseline
+        04.00). Those are finer than the detector's, whose steps are not in them.
+    min_valid : float, optional
+        Share of its footprint that a pixel needs on valid cells; below it is no data. [1]
+    geometry : fifesim.base.geometry.Geometry or xarray.Dataset, optional
+        By default that which the array carries, else of the sun at its time and place. A radiance needs none.
+    time : str or datetime, optional
+        In the place of ``geometry``: when the sun stood over the scene.
+
+    Returns
+    -------
+    image : xarray.DataArray of unsigned integers, dims (band, y, x)
+        Digital numbers from 1; 0 is no data. ``gain``, ``offset``, ``wavelength`` and ``solar_irradiance`` are
+        coordinates along band, and ``compression`` where a band has a scale of square roots. Without ``quantise``,
+        radiance with ``wavelength`` and ``solar_irradiance``. Of bands of several resolutions, an `xarray.DataTree`
+        with a node for each, such as ``/10m`` and ``/20m``, that holds its ``dn``, or ``toa_radiance``.
+        [1 or W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    ValueError
+        If the instrument is unknown, has none of the bands, no such noise or no such scaling, ``onto`` is no grid of
+        the scene's CRS or lies beside the scene, a point spread is wider than the scene, or `to_toa` made the raster
+        for another sun.
+
+    See Also
+    --------
+    fifesim.base.footprints.regularize, fifesim.sensor.response.noise.add_noise,
+    fifesim.sensor.response.calibration.radiance_to_dn, fifesim.sensor.response.calibration
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> image.shape, image.dtype
+    ((2, 10, 10), dtype('uint8'))
+    >>> image.mean(["y", "x"]).round(1).values
+    array([51.8, 73.4])
+    """
+    toa, description, bands = by_bands(toa, instrument)
+    check_scaling(scaling, description, quantise)
+    # A radiance is recorded whatever the sun.
+    needed = not is_radiance(toa) or scaling == "product"
+    geometry = (directions.given_geometry if needed else directions.known_geometry)(geometry, toa, time)
+    check_same_sun(geometry, toa)
+    toa = directions.dated(toa, time)
+    groups = bands_by_grid(description, bands, onto, interval)
+
+    def image_of(toa, bands):
+        pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
+        light = None if geometry is None else directions_on(pixels, geometry)
+        scene = toa.drop_vars(ANGLES, errors="ignore") if light is None else toa
+        means = means_by_band(scene, description, bands, pixels, offset=offset, min_valid=min_valid)
+        # Lines count from the origin of the CRS: a window of an image has the noise of the whole.
+        first = grids.lattice_position(pixels)
+        radiance = noisy(as_radiance(means, bands, light), description, bands, noise, seed, first, noise_models)
+        image, carried = recorded(radiance, description, bands, quantise, light if scaling == "product" else None)
+        carried |= {} if light is None else directions.coordinates_of(light)
+        image = grids.place(image, pixels, carried)
+        image.data = held(image.data)
+        history = _history(description, interval, offset, noise, seed, quantise, scaling)
+        return labelled(image, toa, description, history)
+
+    if len(groups) == 1:
+        return image_of(toa, bands)
+    images = {}
+    for size, numbers in groups.items():
+        images[f"/{size}"] = image_of(toa.isel(band=numbers), [bands[number] for number in numbers]).to_dataset()
+    return xr.DataTree.from_dict(images)
+
+
+def by_bands(toa, instrument):
+    """Input of an instrument with a band dimension, its description, and its bands."""
+    if "composite" in toa.attrs:
+        raise ValueError("a composite is of many dates, and nothing records it: sense each date, and composite those")
+    if not is_radiance(toa):
+        toa = incoming(toa, "toa_reflectance")
+    cf.check_quantity(toa, "toa_reflectance", "toa_radiance")
+    description = given_instrument(instrument, toa)
+    toa = toa if "band" in toa.dims else toa.expand_dims("band")
+    bands = matching_bands(toa, description)
+    warn_of_others(toa, description, bands)
+    return toa, description, bands
+
+
+def labelled(image, toa, description, history):
+    """Image with labels: digital numbers if it holds integers, else radiance."""
+    name = "dn" if image.dtype.kind == "u" else "toa_radiance"
+    image = cf.label(image, name, source=toa, history=history, **attributes_of(description))
+    if name == "dn":
+        image.attrs["_FillValue"] = image.dtype.type(0)
+    return image
+
+
+def _history(description, interval, offset, noise, seed, quantise, scaling):
+    """Text of the settings that differ from the defaults, for the history."""
+    kinds = check_kinds(noise)
+    bits = description.bits if scaling == "detector" else description.product.bits
+    parts = [
+        f"sense: {description.name}, {bits} bits" if quantise else f"sense: {description.name}, radiance",
+        f"scaling {scaling}" if scaling != "detector" else "",
+        f"interval {interval}" if interval is not None else "",
+        "offset" if any(np.any(np.asarray(each) != 0) for each in offset) else "",
+        f"noise {' '.join(kinds)}, seed {seed}" if kinds else "",
+    ]
+    return ", ".join(filter(None, parts))
+
+
+@by_date
+def to_radiance(image: xr.DataArray) -> xr.DataArray:
+    """
+    Radiance of an image of digital numbers.
+
+    Parameters
+    ----------
+    image : xarray.DataArray of unsigned integers, dims (band, y, x)
+        With coordinates ``gain`` and ``offset``, and ``compression`` where it has one, as `sense` makes it.
+
+    Returns
+    -------
+    radiance : xarray.DataArray, dims (band, y, x)
+        Within half a count of what was recorded, NaN where there are no data. [W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    ValueError
+        If the image carries no calibration, a gain is not above 0, its units are not those of digital numbers, or a
+        value is negative, fractional or above the largest digital number; for lazy data, when they are computed.
+
+    See Also
+    --------
+    fifesim.sensor.response.calibration.dn_to_radiance
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> image.fifesim.to_radiance().mean(["y", "x"]).round().values
+    array([41., 58.])
+    """
+    scale = _scale_of(image)
+    out = chunks.pointwise(radiance_kernel(image), image, *scale)
+    out = swaths.placed_as(out.drop_vars(_SCALE, errors="ignore"), image)
+    return cf.label(out, "toa_radiance", source=image, history="to_radiance")
+
+
+def _scale_of(image):
+    """Gain, offset and any compression of an image of digital numbers."""
+    known = image.coords.variables
+    missing = {"gain", "offset"} - set(known)
+    if missing:
+        raise ValueError(f"the image has no {' and '.join(sorted(missing))}: open it with fifesim.open_image")
+    if not np.all(known["gain"].values > 0):
+        raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.atleast_1d(known['gain'].values)}")
+    return [known[name] for name in _SCALE if name in known]
+
+
+@by_date
+def to_reflectance(image: xr.DataArray) -> xr.DataArray:
+    """
+    Planetary reflectance of an image.
+
+    Parameters
+    ----------
+    image : xarray.DataArray, dims (band, y, x)
+        Digital numbers or radiance, with the coordinates that `sense` gives.
+
+    Returns
+    -------
+    reflectance : xarray.DataArray, dims (band, y, x)
+        [1]
+
+    Raises
+    ------
+    ValueError
+        If the image carries no calibration, solar irradiance or solar zenith angle, they give impossible values, or a
+        value cannot be a digital number, as in `to_radiance`.
+
+    See Also
+    --------
+    fifesim.sensor.response.calibration.radiance_to_reflectance
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> image.fifesim.to_reflectance().mean(["y", "x"]).round(2).values
+    array([0.1 , 0.21])
+    """
+    out, history = planetary(image)
+    return cf.label(swaths.placed_as(out, image), "toa_reflectance", source=image, history=history)
+
+
+def planetary(image):
+    """Planetary reflectance of an image without attributes [1], and its history."""
+    counts = "gain" in image.coords
+    if not counts:
+        cf.check_quantity(image, "toa_radiance")
+    scale, radiance = (_scale_of(image), radiance_kernel(image)) if counts else ([], None)
+    # Only the sun counts, and the view of a scan is an array.
+    geometry = directions.geometry_of(image, ("sza", "saa", "earth_sun_distance"))
+    if geometry is None or "solar_irradiance" not in image.coords:
+        raise ValueError("the image carries no sza or no solar_irradiance: open it with fifesim.open_image")
+    below = image.coords.variables["solar_irradiance"], directions.mu_s(geometry)
+    distance = float(geometry.earth_sun_distance)
+    out = chunks.pointwise(_reflectance_of, image, *below, *scale, radiance=radiance, earth_sun_distance=distance)
+    out.attrs = {}
+    history = "to_radiance\nto_reflectance" if counts else "to_reflectance"
+    return out.drop_vars(_SCALE, errors="ignore"), history
+
+
+def _reflectance_of(values, solar_irradiance, mu_s, *scale, radiance, earth_sun_distance):
+    """Reflectance of radiance, or of digital numbers by the kernel of their radiance. [1]"""
+    light = values if radiance is None else radiance(values, *scale)
+    out = calibration.radiance_to_reflectance(light, solar_irradiance, mu_s, earth_sun_distance)
+    # Half of a sample of the block must be possible.
+    sample = out[..., ::SAMPLED_ROWS, :]
+    wrong = (sample > HIGHEST) | (sample < LOWEST)
+    if 2 * np.count_nonzero(wrong) > sample.size:
+        raise ValueError(
+            f"gain, offset and solar_irradiance give a reflectance of {sample[wrong].flat[0]:g}: check that radiance "
+            "is in W m-2 sr-1 um-1, solar_irradiance in W m-2 um-1 and sza in degrees"
+        )
+    return out
+
+
+def as_radiance(array, bands, geometry):
+    """Radiance of a reflectance, after regularization, when fewer numbers remain. [W m-2 sr-1 um-1]"""
+    if is_radiance(array):
+        return array
+    light = xr.Variable("band", [band.solar_irradiance for band in bands]), directions.mu_s(geometry)
+    distance = float(geometry.earth_sun_distance)
+    return chunks.pointwise(calibration.reflectance_to_radiance, array, *light, earth_sun_distance=distance)

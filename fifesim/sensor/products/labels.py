@@ -1,0 +1,253 @@
+"""Product files and plain digital numbers as calibrated, labelled images."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from functools import partial
+from typing import Annotated, Literal, TypeAlias
+
+import numpy as np
+import xarray as xr
+
+from fifesim.base.annotations import NumberByBand, Time
+from fifesim.base.arguments import UNCHECKED
+from fifesim.base.bands import counts
+from fifesim.base.files import in_a_line
+from fifesim.grids import cf, chunks, directions
+from fifesim.grids import grid as grids
+from fifesim.grids.dates import by_date
+from fifesim.grids.directions import Directions
+from fifesim.grids.grid import north_up
+from fifesim.grids.opening import ErrorsOfGdal, check_memory, check_raster, horizontal_crs, raster_file, stored_cells
+from fifesim.sensor import labels as sensor_labels
+from fifesim.sensor.description.instrument_file import InstrumentLike
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.instrument_labels import attributes_of, coordinates_of_bands, matching_bands
+from fifesim.sensor.response.calibration import product_reflectance
+
+# Edge of a chunk by default: whole blocks of the agencies' files. [pixel]
+CHUNK = 2048
+
+
+def layer_chunk_sizes(given):
+    """Chunks of a layer."""
+    return {"y": CHUNK, "x": CHUNK} if given == "auto" else given
+
+
+def open_layer(folder, name, chunks, cure, count=None):
+    """File of a product as a layer of integers, dims (y, x), or (band, y, x) with a count."""
+    path = folder / name
+    if not path.exists():
+        raise ValueError(f"{in_a_line(name, 150)} is missing in {in_a_line(folder, 120)}: {cure}")
+    file = raster_file(path)
+    with ErrorsOfGdal(f"cannot read {file.name}"):
+        with file.opened() as source:
+            check_raster(source, file.name, north_up=True)
+            crs = horizontal_crs(source, file.name)
+            if source.count != (count or 1) or np.dtype(source.dtypes[0]).kind not in "iu":
+                raise ValueError(
+                    f"{file.name} has {source.count} bands of {source.dtypes[0]}, where a product has {count or 1} of "
+                    "whole numbers: is it another file?"
+                )
+            if chunks is None:
+                size = source.count * source.height * source.width
+                check_memory(size, 12, f"all of {file.name}", "leave chunks out, which reads it by parts")
+        plain = stored_cells(file, crs, chunks)
+    layer = xr.DataArray(plain.data, dims=("band", "y", "x"), name=path.name)
+    layer = layer if count else layer.isel(band=0)
+    return grids.place(layer, grids.geobox(plain))
+
+
+def check_same_grid(layer, other):
+    """Raise ValueError if layers of one product are on different grids."""
+    one, two = grids.geobox(layer), grids.geobox(other)
+    if not grids.same_grid(one, two):
+        names = " and ".join(os.path.basename(each.name) for each in (layer, other))
+        raise ValueError(
+            f"{names} lie on different grids, {grids.in_words(one)} and {grids.in_words(two)}: "
+            "open them one at a time with bands="
+        )
+
+
+def reflectance(layers, bands, flags=None, mu_s=1.0):
+    """Reflectance of layers of digital numbers on one grid, dims (band, y, x), float32. [1]"""
+    for layer in layers[1:]:
+        check_same_grid(layer, layers[0])
+    grid = grids.geobox(layers[0])
+    bare = [layer.drop_vars(["y", "x", "spatial_ref"]).rename(None) for layer in layers]
+    stack = grids.place(xr.concat(bare, dim="band"), grid)
+    scale = [xr.Variable("band", [getattr(band, name) for band in bands]) for name in ("gain", "offset", "largest")]
+    flag = xr.Variable("band", np.array([band.flag for band in bands], np.uint16))
+    flags = xr.DataArray(np.uint16(0)) if flags is None else flags
+    out = chunks.pointwise(product_reflectance, stack, *scale, flag, flags, xr.DataArray(mu_s), dtype=np.float32)
+    return grids.place(out, grid)
+
+
+def as_image(array, bands, description, *, level, time, geometry, quality, history, reference):
+    """Reflectance of a product with the labels and coordinates of images from fifesim."""
+    own = description.select([band.name for band in bands])
+    irradiance = [
+        band.solar_irradiance if given.solar_irradiance is None else given.solar_irradiance
+        for band, given in zip(own, bands, strict=True)
+    ]
+    along_band = coordinates_of_bands(own, solar_irradiance=irradiance)
+    array = directions.with_geometry(array.assign_coords(along_band), geometry)
+    array = array.assign_coords(time=((), time, cf.TIME_ATTRIBUTES))
+    if quality is not None:
+        array = array.assign_coords(quality=(("y", "x"), quality.data, quality.attrs))
+    name = "toa_reflectance" if level == 1 else "surface_reflectance"
+    return cf.label(array, name, history=history, references=reference, **attributes_of(description))
+
+
+_CURE = (
+    "give nodata=, or gain= and offset= for scaled numbers; products of agencies open with fifesim.open_landsat and "
+    "fifesim.open_sentinel2"
+)
+
+# Reflectance under an overhead sun at which an imager saturates, with a wide margin: Landsat, Sentinel-2 and the
+# instruments of this package have 0.24 to 2.7.
+_DIMMEST, _BRIGHTEST = 0.02, 20.0
+
+# The digital number of saturated pixels; None where no number marks them.
+Saturation: TypeAlias = Annotated[int | Literal["largest"] | None, UNCHECKED]
+
+
+@by_date
+def calibrate(
+    dn: xr.DataArray,
+    instrument: InstrumentLike,
+    *,
+    time: Time | None = None,
+    geometry: Directions | None = None,
+    gain: NumberByBand | None = None,
+    offset: NumberByBand | None = None,
+    nodata: int = 0,
+    saturated: Saturation = "largest",
+) -> xr.DataArray:
+    """
+    Make an image of digital numbers, with calibration, wavelengths and sun, in the form that `sense` gives.
+
+    Parameters
+    ----------
+    dn : xarray.DataArray of whole numbers, dims ([band], y, x)
+        Has a coordinate ``band`` of the instrument's names, or ``wavelength`` [um]. NaN is no data. [1]
+    instrument : str or Instrument
+    time : str or datetime, optional
+        Time of the image, UTC without a time zone. The sun is that over the middle of the grid, and the view is from
+        nadir. By default the raster's coordinate ``time``.
+    geometry : Geometry or xarray.Dataset, optional
+        Sun and view, which replace the sun of the time. Without both, the raster's coordinates count.
+    gain, offset : float, sequence over the bands, or mapping of band name to float, optional
+        Radiance of one count, and of digital number 0: RADIANCE_MULT and RADIANCE_ADD of Landsat's metadata. By default
+        those of the instrument's description, with its scale of square roots if it has one. [W m-2 sr-1 um-1]
+    nodata : int, optional
+        Digital number of no data.
+    saturated : int, "largest" or None, optional
+        Digital number of saturated pixels, which become no data, as in `open_landsat`. By default the largest number
+        of the instrument's bits, such as 255 for TM; with `gain` and `offset`, 255 for instruments of up to 8 bits and
+        rasters of one byte, 65535 otherwise. None keeps saturated pixels: their radiance is a lower limit.
+
+    Returns
+    -------
+    image : xarray.DataArray of unsigned integers, dims (band, y, x)
+        Input of ``to_radiance``, ``to_reflectance``, ``to_surface`` and ``ndvi``, which give NaN for 0, the number of
+        no data and saturation. Lazy where the input is.
+
+    Raises
+    ------
+    ValueError
+        If the bands, the sun, or one of gain and offset are unknown, gain and offset are not those of radiance in W m-2
+        sr-1 um-1, or the instrument cannot record a number. On lazy data, numbers are checked when they compute.
+    TypeError
+        If `dn` is no DataArray.
+
+    See Also
+    --------
+    fifesim.base.bands.counts
+
+    Examples
+    --------
+    Counts of an image that has lost its calibration:
+
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(30 / 9, window=((0, 90), (0, 90)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> rho = lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"])
+    >>> image = rho.fifesim.to_toa().fifesim.sense("TM")
+    >>> counts = image.drop_vars(["gain", "offset"]).drop_attrs()
+    >>> counts = counts.rio.write_crs(grid.crs.to_wkt())
+    >>> again = counts.fifesim.calibrate("TM", time="1987-06-06T16:35Z")
+    >>> bool(abs(again.fifesim.ndvi() - image.fifesim.ndvi()).max() < 1e-3)
+    True
+    """
+    if not isinstance(dn, xr.DataArray):
+        raise TypeError(f"dn must be an xarray.DataArray of digital numbers, got {type(dn).__name__}")
+    if "gain" in dn.coords:
+        raise ValueError("the raster carries a calibration already: drop it with .drop_vars(['gain', 'offset'])")
+    description = find_instrument(instrument)
+    dn = north_up(dn if "band" in dn.dims else dn.expand_dims("band")).transpose("band", "y", "x")
+    bands = matching_bands(dn, description)
+    # A geometry that is given wins over the sun of a time that is given, which is the image's all the same.
+    geometry = directions.given_geometry(geometry, dn, time if geometry is None else None)
+    time = directions.dated(dn, time).coords.get("time")
+    if (gain is None) != (offset is None):
+        raise ValueError("gain and offset make radiance of a digital number together: give both, or neither")
+    compression = [0]
+    if gain is None:
+        gain, offset, bits = sensor_labels.scale(description, bands)
+        compression = [band.compressed_count(bits) for band in bands]
+        full = bits
+    else:
+        gain, offset = (_by_band(given, bands, name) for name, given in (("gain", gain), ("offset", offset)))
+        bits = 16 if dn.dtype.itemsize > 1 else 8
+        # Products of instruments of up to 8 bits have 8, also where they are stored in wider numbers.
+        full = 8 if description.bits <= 8 else bits
+        if not np.all(gain > 0):
+            raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")
+        _check_scale(gain * (2**full - 1) + offset, bands)
+    saturated = _saturation(saturated, 2**full - 1, 2**bits - 1)
+    kernel = partial(counts, nodata=nodata, largest=2**bits - 1, cure=_CURE, saturated=saturated)
+    plain = dn.drop_vars("band", errors="ignore")
+    out = chunks.pointwise(kernel, plain, dtype=np.uint8 if bits <= 8 else np.uint16)
+    scales = {"gain": gain, "offset": offset} | ({"compression": compression} if any(compression) else {})
+    out = directions.with_geometry(grids.place(out, grids.geobox(dn)), geometry)
+    out = out.assign_coords(coordinates_of_bands(bands, scales))
+    out = out if time is None or time.ndim else out.assign_coords(time=((), time.values, cf.TIME_ATTRIBUTES))
+    return sensor_labels.labelled(out, dn, description, f"calibrate: {description.name}")
+
+
+def _check_scale(radiance, bands):
+    """Raise ValueError if the radiance of the largest digital number is far from any possible one."""
+    for largest, band in zip(radiance, bands, strict=True):
+        reflectance = np.pi * largest / band.solar_irradiance
+        if not _DIMMEST <= reflectance <= _BRIGHTEST:
+            raise ValueError(
+                f"gain and offset give {band.name} a radiance of {largest:.3g} W m-2 sr-1 um-1 at the largest digital "
+                f"number, a reflectance of {reflectance:.2g} under an overhead sun: give those of radiance in this "
+                "unit. Convert scaled reflectance by dn * gain + offset instead, and do not calibrate it"
+            )
+
+
+def _saturation(given, full, largest):
+    """Digital number of saturated pixels, None if they are kept."""
+    if given is None:
+        return None
+    if isinstance(given, str) and given == "largest":
+        return full
+    if isinstance(given, bool | str) or not 0 < given <= largest:
+        raise ValueError(f"saturated must be 'largest', None, or a digital number from 1 to {largest}, got {given!r}")
+    return given
+
+
+def _by_band(given, bands, name):
+    """One number for each band."""
+    if isinstance(given, Mapping):
+        missing = [band.name for band in bands if band.name not in given]
+        if missing:
+            raise ValueError(f"{name} has no number for {', '.join(missing)}: it has {', '.join(map(str, given))}")
+        given = [given[band.name] for band in bands]
+    values = np.asarray(given, float)
+    if values.shape not in ((), (len(bands),)) or not np.isfinite(values).all():
+        raise ValueError(f"{name} must be a number, or one for each of {len(bands)} bands, got {given!r}")
+    return np.broadcast_to(values, (len(bands),))

@@ -1,1 +1,0 @@
-"""Images as agencies deliver them, on labelled rasters."""

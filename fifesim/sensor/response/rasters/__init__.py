@@ -1,1 +1,0 @@
-"""The response of an instrument on labelled rasters."""

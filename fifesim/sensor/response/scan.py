@@ -1,0 +1,507 @@
+"""
+Scans across the track: geometry on a sphere, and footprints turned against the grid of the ground.
+
+The track is a great circle, and a ground point is seen when the instrument is abeam of it. Scan angles are positive to
+the right of the flight direction. Geodetic latitudes are used as latitudes on the sphere, with an error of 0.3 % of a
+distance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+from numba import njit
+from scipy.sparse import csr_array
+
+from fifesim.base.arguments import check_fields
+
+# Mean radius of the earth [m].
+EARTH_RADIUS = 6.371e6
+
+# Gravitational parameter of the earth [m3 s-2] and its rotation [rad s-1], WGS 84.
+_GRAVITY = 3.986004418e14
+_ROTATION = 7.292115e-5
+
+
+@dataclass(frozen=True)
+class Track:
+    """
+    Ground track of an instrument: a point and a direction.
+
+    Parameters
+    ----------
+    latitude, longitude : float
+        Of a point on the track. [degree]
+    heading : float
+        Direction of flight there over the ground, clockwise from north. [degree]
+
+    Raises
+    ------
+    ValueError
+        If the latitude is out of range, or a number is not finite.
+
+    Examples
+    --------
+    >>> from fifesim import Track
+    >>> Track(latitude=39.1, longitude=-96.6, heading=190.0).heading
+    190.0
+    """
+
+    latitude: float
+    longitude: float
+    heading: float
+
+    def __post_init__(self):
+        check_fields(self)
+        if not -90 < self.latitude < 90:
+            raise ValueError(f"the latitude of a track must be in (-90, 90) degrees, got {self.latitude}")
+        if not np.all(np.isfinite([self.longitude, self.heading])):
+            raise ValueError(f"longitude and heading must be finite degrees, got {self.longitude} and {self.heading}")
+
+    @classmethod
+    def from_inclination(
+        cls, latitude: float, longitude: float, inclination: float, altitude: float, *, ascending: bool = False
+    ) -> Self:
+        r"""
+        The track of a circular orbit over the turning earth.
+
+        .. math::
+
+            \tan \alpha = \frac{\cos i - (\omega / n) \cos^2 \varphi}{\sqrt{\cos^2 \varphi - \cos^2 i}},
+            \qquad n = \sqrt{\mu / (R + h)^3}
+
+        for the ascending half; the descending one has :math:`\pi - \alpha`.
+
+        Parameters
+        ----------
+        latitude, longitude : float
+            Of a point on the track. [degree]
+        inclination : float
+            Of the orbit. [degree]
+        altitude : float
+            [m]
+        ascending : bool, optional
+            Whether it flies north.
+
+        Returns
+        -------
+        track : Track
+
+        Raises
+        ------
+        ValueError
+            If the orbit does not reach the latitude.
+
+        References
+        ----------
+        [Capderou2014]_, chapter 5
+
+        Examples
+        --------
+        Landsat descends west of south:
+
+        >>> round(Track.from_inclination(39.0, -96.5, 98.2, 705e3).heading, 1)
+        193.6
+        """
+        cos_i, cos_phi = np.cos(np.radians(inclination)), np.cos(np.radians(latitude))
+        if cos_phi <= abs(cos_i):
+            raise ValueError(f"an orbit of inclination {inclination:g} degrees does not reach latitude {latitude:g}")
+        mean_motion = np.sqrt(_GRAVITY / (EARTH_RADIUS + altitude) ** 3)
+        east = cos_i - _ROTATION / mean_motion * cos_phi**2
+        north = np.sqrt(cos_phi**2 - cos_i**2)
+        heading = np.degrees(np.arctan2(east, north if ascending else -north))
+        return cls(latitude, longitude, float(heading % 360))
+
+    def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Unit vectors to the point, along the flight and to its right, each of shape (3,)."""
+        point, east, north = frame(self.latitude, self.longitude)
+        along = np.cos(np.radians(self.heading)) * north + np.sin(np.radians(self.heading)) * east
+        return point, along, np.cross(along, point)
+
+
+def view_from_scan(scan_angle, altitude):
+    r"""
+    Intersection of a line of sight at a scan angle with the ground.
+
+    .. math:: \sin \theta_v = \frac{R + h}{R} \sin \theta, \qquad \gamma = \theta_v - \theta
+
+    Parameters
+    ----------
+    scan_angle : array
+        From nadir, at the instrument. [degree]
+    altitude : float
+        [m]
+
+    Returns
+    -------
+    vza : array
+        At the ground, with the sign of the scan angle; NaN where the line misses the earth. [degree]
+    central_angle : array
+        Between the point and the track, at the earth's centre, with the same sign. [degree]
+
+    Examples
+    --------
+    >>> [round(float(value), 1) for value in view_from_scan(40.0, 833e3)]
+    [46.6, 6.6]
+    """
+    sine = (EARTH_RADIUS + altitude) / EARTH_RADIUS * np.sin(np.radians(scan_angle))
+    vza = np.degrees(np.arcsin(np.where(np.abs(sine) < 1, sine, np.nan)))
+    return vza, vza - scan_angle
+
+
+def view_from_ground(central_angle, altitude):
+    r"""
+    View of a point at an angle from the track.
+
+    .. math:: \tan \theta = \frac{R \sin \gamma}{R + h - R \cos \gamma}, \qquad \theta_v = \theta + \gamma
+
+    Parameters
+    ----------
+    central_angle : array
+        Between the point and the track, at the earth's centre, positive to the right. [degree]
+    altitude : float
+        [m]
+
+    Returns
+    -------
+    vza, scan_angle : array
+        With the sign of the central angle; NaN beyond the instrument's horizon. [degree]
+
+    Examples
+    --------
+    >>> vza, scan_angle = view_from_ground(view_from_scan(40.0, 833e3)[1], 833e3)
+    >>> round(float(scan_angle), 9)
+    40.0
+    """
+    gamma = np.radians(central_angle)
+    orbit = EARTH_RADIUS + altitude
+    theta = np.arctan2(EARTH_RADIUS * np.sin(gamma), orbit - EARTH_RADIUS * np.cos(gamma))
+    visible = np.cos(gamma) > EARTH_RADIUS / orbit
+    scan_angle = np.where(visible, np.degrees(theta), np.nan)
+    return scan_angle + central_angle, scan_angle
+
+
+def growth(scan_angle, altitude):
+    r"""
+    Growth of a footprint relative to nadir.
+
+    .. math:: \frac{\rho}{h}, \quad \frac{\rho}{h \cos \theta_v}, \qquad \rho = R \, \frac{\sin \gamma}{\sin \theta}
+
+    Parameters
+    ----------
+    scan_angle : array
+        From nadir, at the instrument. [degree]
+    altitude : float
+        [m]
+
+    Returns
+    -------
+    along, across : array
+        Along and across the track. [1]
+
+    Examples
+    --------
+    >>> along, across = growth(0.0, 833e3)
+    >>> float(along), float(across)
+    (1.0, 1.0)
+    """
+    vza, _ = view_from_scan(scan_angle, altitude)
+    mu_v = np.cos(np.radians(vza))
+    orbit = EARTH_RADIUS + altitude
+    # The difference of two legs, which stays defined at nadir.
+    slant = orbit * np.cos(np.radians(scan_angle)) - EARTH_RADIUS * mu_v
+    return slant / altitude, slant / altitude / mu_v
+
+
+def swath_width(altitude, max_angle):
+    r"""
+    Width of the swath along the sphere.
+
+    .. math:: s = 2 R \gamma
+
+    Parameters
+    ----------
+    altitude : float
+        Altitude of the instrument. [m]
+    max_angle : float
+        Largest scan angle from nadir. [degree]
+
+    Returns
+    -------
+    width : float
+        NaN where the line of sight misses the earth. [m]
+
+    Examples
+    --------
+    A narrow swath is as wide as on a plane:
+
+    >>> round(float(swath_width(705e3, 0.1) / (2 * 705e3 * np.tan(np.radians(0.1)))), 5)
+    1.0
+    """
+    return float(2 * EARTH_RADIUS * np.radians(view_from_scan(max_angle, altitude)[1]))
+
+
+def place_beside(track, latitude, longitude):
+    """Distance along a track [m] and central angle from it, positive to the right [degree], of points."""
+    point, along, right = track.axes()
+    there = frame(latitude, longitude)[0]
+    distance = EARTH_RADIUS * np.arctan2(there @ along, there @ point)
+    return distance, np.degrees(np.arcsin(np.clip(there @ right, -1, 1)))
+
+
+def place_of(track, distance, central_angle):
+    """Latitude and longitude of points in the frame of a track, the inverse of `place_beside`. [degree]"""
+    point, along, right = track.axes()
+    turn, aside = np.asarray(distance)[..., None] / EARTH_RADIUS, np.radians(central_angle)[..., None]
+    there = np.cos(aside) * (np.cos(turn) * point + np.sin(turn) * along) + np.sin(aside) * right
+    x, y, z = np.moveaxis(there, -1, 0)
+    return np.degrees(np.arcsin(np.clip(z, -1, 1))), np.degrees(np.arctan2(y, x))
+
+
+def view_components(track, latitude, longitude, altitude):
+    r"""
+    Horizontal components of the unit vector from the ground to the sensor.
+
+    They are smooth where the track is crossed, while the azimuth turns round.
+
+    .. math:: e = \sin \theta_v \sin \varphi_v, \qquad n = \sin \theta_v \cos \varphi_v
+
+    Parameters
+    ----------
+    track : Track
+    latitude, longitude : array
+        [degree]
+    altitude : float
+        Altitude of the sensor. [m]
+
+    Returns
+    -------
+    east, north : array
+        NaN beyond the instrument's horizon. [1]
+
+    Examples
+    --------
+    East of a track that runs south, the sensor stands in the west:
+
+    >>> east, north = view_components(Track(39.0, -97.0, 180.0), 39.0, -96.0, 705e3)
+    >>> bool(east < 0), bool(abs(north) < 0.01)
+    (True, True)
+    """
+    _, _, right = track.axes()
+    there, to_east, to_north = frame(latitude, longitude)
+    sine = there @ right
+    vza, _ = view_from_ground(np.degrees(np.arcsin(np.clip(sine, -1, 1))), altitude)
+    # Of unit length on the ground: `right` without its part along the vertical.
+    length = np.sin(np.radians(vza)) / np.sqrt(1 - sine**2)
+    return -length * (to_east @ right), -length * (to_north @ right)
+
+
+def frame(latitude, longitude):
+    """Unit vectors up, east and north at points of the sphere, shape (..., 3)."""
+    phi, lam = np.radians(latitude), np.radians(longitude)
+    phi, lam = np.broadcast_arrays(phi, lam)
+    up = np.stack([np.cos(phi) * np.cos(lam), np.cos(phi) * np.sin(lam), np.sin(phi)], axis=-1)
+    east = np.stack([-np.sin(lam), np.cos(lam), np.zeros_like(lam)], axis=-1)
+    return up, east, np.cross(up, east)
+
+
+# A cell is cut until its pieces are this share of the narrower response.
+_PIECE = 1 / 16
+
+# Nodes of the tabulated responses.
+_NODES = 4097
+
+
+@dataclass(frozen=True, eq=False)
+class Footprints:
+    """
+    Pixels on a grid of cells: centres, and the steps of a cell in the frame of each.
+
+    Parameters
+    ----------
+    row, column : array, shape (..., n_pixels)
+        Centre, counted from the upper left corner of the grid. [cell]
+    frame : array, shape (..., n_pixels, 2, 2)
+        A step of a row and of a column (last axis) along and across the track, as it would be at nadir: divided by the
+        growth of the footprint. [m]
+    along, across : line spread function
+        At nadir, as `fifesim.base.footprints` takes them.
+    """
+
+    row: np.ndarray
+    column: np.ndarray
+    frame: np.ndarray
+    along: object
+    across: object
+
+    def reach(self):
+        """Half height and half width of the bounding box of each footprint, shape (n_pixels,). [cell]"""
+        back = np.linalg.inv(self.frame)
+        half = np.array([self.along.half_width, self.across.half_width])
+        # Pieces that touch the footprint from outside have a share, too.
+        return np.moveaxis(np.abs(back) @ half, -1, 0) + 1
+
+    def window(self, shape):
+        """Rows and columns of the cells that the footprints touch, at least one of each."""
+        half_row, half_column = self.reach()
+        return _touched(self.row, half_row, shape[0]), _touched(self.column, half_column, shape[1])
+
+    def __getitem__(self, pixels):
+        """Footprints of some of the pixels, flattened."""
+        frame = self.frame[pixels].reshape(-1, 2, 2)
+        return Footprints(self.row[pixels].ravel(), self.column[pixels].ravel(), frame, self.along, self.across)
+
+
+def footprint_operator(footprints, rows, columns):
+    r"""
+    Weights of the cells of a window in rotated footprints.
+
+    .. math::
+
+        w_{ij} \propto \sum_k
+            &\left[ C_\mathrm{along}(u + \tfrac{a}{2}) - C_\mathrm{along}(u - \tfrac{a}{2}) \right] \\
+            \cdot &\left[ C_\mathrm{across}(v + \tfrac{b}{2}) - C_\mathrm{across}(v - \tfrac{b}{2}) \right]
+
+    over pieces k of cell j, which lie at u along and v across the track from the centre of pixel i. A piece stands for
+    an upright rectangle of sides a and b with the second moments of the piece; on a grid along the track that is exact.
+
+    Parameters
+    ----------
+    footprints : Footprints
+        On one axis.
+    rows, columns : slice
+        Window of the grid; parts of footprints outside of it are lost.
+
+    Returns
+    -------
+    operator : scipy.sparse.csr_array, shape (n_pixels, n_cells)
+        Cells of the window row by row. A row sums to the share of the footprint that lies in the window.
+
+    References
+    ----------
+    [Friedl1995]_, Eq. 3, the sensor's part
+
+    Examples
+    --------
+    A footprint of 30 m turned by 45 degrees over cells of 5 m is whole:
+
+    >>> from fifesim.base.line_spread import Boxcar
+    >>> turn = 5 * np.array([[[1, 1], [-1, 1]]]) / np.sqrt(2)
+    >>> pixel = Footprints(np.array([10.0]), np.array([10.0]), turn, Boxcar(30.0), Boxcar(30.0))
+    >>> round(float(footprint_operator(pixel, slice(0, 20), slice(0, 20)).sum()), 12)
+    1.0
+    """
+    along, across = _table(footprints.along), _table(footprints.across)
+    step = np.sqrt(np.abs(np.linalg.det(footprints.frame)))
+    pieces = np.clip(np.ceil(step / (_PIECE * min(along.width, across.width))), 1, 64).astype(np.int64)
+    half_row, half_column = footprints.reach()
+    boxes = footprints.row, footprints.column, footprints.frame, half_row, half_column, pieces
+    limit = np.sum((2 * half_row + 3).astype(np.int64) * (2 * half_column + 3).astype(np.int64))
+    pointers = np.zeros(footprints.row.size + 1, np.int64)
+    indices, weights = np.empty(limit, np.int64), np.empty(limit)
+    window = np.array([rows.start, rows.stop, columns.start, columns.stop])
+    used = _fill(boxes, along, across, window, pointers, indices, weights)
+    shape = footprints.row.size, (rows.stop - rows.start) * (columns.stop - columns.start)
+    return csr_array((weights[:used].copy(), indices[:used].copy(), pointers), shape=shape)
+
+
+def apply_operator(operator, values, min_valid):
+    """Means over the valid cells of footprints, NaN below ``min_valid``, shape (..., n_pixels)."""
+    values = np.asarray(values, float)
+    flat = values.reshape(-1, values.shape[-1])
+    out = np.empty((flat.shape[0], operator.shape[0]))
+    for layer, cells in enumerate(flat):
+        valid = ~np.isnan(cells)
+        share = operator @ valid.astype(float)
+        total = operator @ np.where(valid, cells, 0.0)
+        enough = (share > 0) & (share >= min_valid - 1e-9)
+        out[layer] = np.where(enough, total / np.where(enough, share, 1.0), np.nan)
+    return out.reshape(*values.shape[:-1], operator.shape[0])
+
+
+def _touched(center, half, size):
+    """Range of cells along an axis that boxes touch."""
+    first = int(np.clip(np.floor(np.min(center - half)), 0, size - 1))
+    return slice(first, int(np.clip(np.ceil(np.max(center + half)), first + 1, size)))
+
+
+class _Table(NamedTuple):
+    """Cumulative line spread function at even nodes, their half width, and their number per metre."""
+
+    cumulative: np.ndarray
+    half: float
+    scale: float
+
+    @property
+    def width(self):
+        """Width of a boxcar with the peak of the response. [m]"""
+        return 2 * self.half / (self.cumulative.size - 1) / np.diff(self.cumulative).max()
+
+
+def _table(spread):
+    half = spread.half_width
+    return _Table(spread.cumulative(np.linspace(-half, half, _NODES)), half, (_NODES - 1) / (2 * half))
+
+
+@njit(nogil=True, cache=True)
+def _cumulative(table, x):
+    place = min(max((x + table.half) * table.scale, 0.0), table.cumulative.size - 1.0)
+    index = min(int(place), table.cumulative.size - 2)
+    share = place - index
+    return table.cumulative[index] * (1 - share) + table.cumulative[index + 1] * share
+
+
+@njit(nogil=True, cache=True)
+def _share(table, x, reach):
+    return _cumulative(table, x + reach) - _cumulative(table, x - reach)
+
+
+@njit(nogil=True, cache=True)
+def _in_frame(frame, down, right):
+    return frame[0, 0] * down + frame[0, 1] * right, frame[1, 0] * down + frame[1, 1] * right
+
+
+@njit(nogil=True, cache=True)
+def _cell_weight(i, j, row, column, frame, n, a, b, along, across):
+    # Most cells of the box lie beyond the footprint's turned sides.
+    u, v = _in_frame(frame, i + 0.5 - row, j + 0.5 - column)
+    if abs(u) > along.half + 2 * n * a or abs(v) > across.half + 2 * n * b:
+        return 0.0
+    piece = 1.0 / n
+    weight = 0.0
+    for k in range(n):
+        down = i + (k + 0.5) * piece - row
+        for m in range(n):
+            u, v = _in_frame(frame, down, j + (m + 0.5) * piece - column)
+            if abs(u) < along.half + a and abs(v) < across.half + b:
+                weight += _share(along, u, a) * _share(across, v, b)
+    return weight
+
+
+@njit(nogil=True, cache=True)
+def _fill(boxes, along, across, window, pointers, indices, weights):
+    used = 0
+    top, bottom, left, right = window
+    # Half the box around each pixel, and into how many pieces a side of a cell is cut.
+    rows, columns, frames, half_rows, half_columns, pieces = boxes
+    for pixel in range(rows.size):
+        start, total = used, 0.0
+        row, column, frame, n = rows[pixel], columns[pixel], frames[pixel], pieces[pixel]
+        half_row, half_column = half_rows[pixel], half_columns[pixel]
+        # Half sides of a piece.
+        a = np.hypot(frame[0, 0], frame[0, 1]) / (2 * n)
+        b = np.hypot(frame[1, 0], frame[1, 1]) / (2 * n)
+        for i in range(int(np.floor(row - half_row)), int(np.ceil(row + half_row))):
+            for j in range(int(np.floor(column - half_column)), int(np.ceil(column + half_column))):
+                weight = _cell_weight(i, j, row, column, frame, n, a, b, along, across)
+                total += weight
+                if weight != 0 and top <= i < bottom and left <= j < right:
+                    indices[used] = (i - top) * (right - left) + j - left
+                    weights[used] = weight
+                    used += 1
+        for k in range(start, used):
+            weights[k] /= total
+        pointers[pixel + 1] = used
+    return used

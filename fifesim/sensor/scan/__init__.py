@@ -1,1 +1,0 @@
-"""Where a scan looks, and what its pixels see."""

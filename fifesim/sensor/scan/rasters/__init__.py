@@ -1,1 +1,0 @@
-"""Scans over labelled rasters."""

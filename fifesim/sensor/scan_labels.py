@@ -1,0 +1,439 @@
+"""Scans over labelled scenes: view angles, directions of light, and the image by line and sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import dask.array as da
+import numpy as np
+import pyproj
+import xarray as xr
+from odc.geo.geobox import GeoBox
+from scipy.interpolate import RectBivariateSpline
+
+from fifesim.base.annotations import Chunks, NoiseKinds, Time, WholeNumber
+from fifesim.base.caches import cached
+from fifesim.base.geometry import angle_between
+from fifesim.grids import cf, chunks, directions, projection, windows
+from fifesim.grids import grid as grids
+from fifesim.grids.dates import by_date
+from fifesim.grids.directions import Directions
+from fifesim.sensor.description.instrument_file import InstrumentLike
+from fifesim.sensor.description.instruments import instrument as find_instrument
+from fifesim.sensor.labels import MIN_VALID, as_radiance, by_bands, labelled, noisy, recorded
+from fifesim.sensor.pixel_labels import by_line_spread, common_size
+from fifesim.sensor.response import scan
+from fifesim.sensor.response.noise import NoiseModels
+from fifesim.sensor.response.scan import Footprints, Track, apply_operator, footprint_operator
+
+# Nodes along each axis between which the direction to the sensor is a cubic spline.
+_NODES = 65
+
+_TILE = 512
+
+
+def scan_geometry(
+    instrument: InstrumentLike,
+    grid: GeoBox,
+    track: Track | None = None,
+    *,
+    nadir_offset: float = 0.0,
+    heading: float = 180.0,
+    chunks: Chunks | None = None,
+) -> xr.Dataset:
+    """
+    View zenith and azimuth of an instrument over a grid.
+
+    Parameters
+    ----------
+    instrument : str or fifesim.sensor.description.instruments.Instrument
+    grid : odc.geo.geobox.GeoBox
+        Of cells or of pixels.
+    track : fifesim.sensor.response.scan.Track, optional
+        Ground track. By default it passes beside the middle of the grid.
+    nadir_offset : float, optional
+        Distance of the middle of the grid from the track, to the right of the flight. [m]
+    heading : float, optional
+        Direction of flight that goes with ``nadir_offset``, clockwise from north; southward by default, so that the
+        right is the west. [degree]
+    chunks : mapping or int or "auto", optional
+        Makes the result lazy.
+
+    Returns
+    -------
+    view : xarray.Dataset of ``vza`` and ``vaa``, dims (y, x)
+        Azimuth toward the sensor, clockwise from true north; NaN where the instrument does not see the ground. Altitude
+        and track are attributes. [degree]
+
+    Raises
+    ------
+    ValueError
+        If the grid is no grid, both ways of giving the track are used, or all of the grid lies outside of the swath.
+
+    See Also
+    --------
+    fifesim.sensor.response.scan.view_components
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> view = fifesim.scan_geometry("MODIS", fifesim.fife_site(500), nadir_offset=300_000)
+    >>> view.vza.mean().round(0).item()
+    26.0
+    """
+    description = find_instrument(instrument)
+    grids.check_grid(grid)
+    track = find_track(grid, track, nadir_offset, heading)
+    _, aside, _, seen = scan_nodes(description, grid, track)
+    if not seen.any():
+        near = np.min(np.abs(aside)) * np.pi / 180 * scan.EARTH_RADIUS / 1000
+        raise ValueError(
+            f"{description.name} does not see the grid: it begins {near:.0f} km from the track, where the scan angle "
+            f"is beyond {description.max_angle:g} degrees; give a nearer track or a smaller nadir_offset"
+        )
+    attrs = {"instrument": description.name, "altitude": description.altitude}
+    attrs |= {f"track_{name}": value for name, value in vars(track).items()}
+    out = {}
+    for name in ("vza", "vaa"):
+        kernel = partial(_view, name, grid, track, description.altitude, description.max_angle)
+        array = windows.tiles(kernel, grid, chunks, tile=_TILE)
+        out[name] = cf.label(array, name, history=f"scan_geometry: {description.name}", instrument=description.name)
+    return xr.Dataset(out, attrs=attrs)
+
+
+def find_track(grid, track=None, nadir_offset=0.0, heading=180.0):
+    """Ground track, as given or at an offset from the middle of a grid."""
+    if track is not None:
+        if nadir_offset:
+            raise ValueError("track and nadir_offset both say where the instrument flies: give one of them")
+        if not isinstance(track, scan.Track):
+            raise TypeError(f"track must be a fifesim.Track(latitude, longitude, heading), got {track!r}")
+        return track
+    latitude, longitude = latitude_longitude(grid, grid.shape.y / 2, grid.shape.x / 2)
+    here = scan.Track(float(latitude), float(longitude), heading)
+    aside = np.degrees(nadir_offset / scan.EARTH_RADIUS)
+    # The great circle that keeps the distance there: its point is abeam to the left, its heading that of the parallel.
+    latitude, longitude = scan.place_of(here, 0.0, -aside)
+    _, along, _ = here.axes()
+    _, east, north = scan.frame(float(latitude), float(longitude))
+    heading = np.degrees(np.arctan2(along @ east, along @ north)) % 360
+    return scan.Track(float(latitude), float(longitude), float(heading))
+
+
+def latitude_longitude(grid, rows, columns):
+    """Latitude and longitude of places in a grid. [degree]"""
+    x, y = projection.transform_points(grid.affine, columns, rows)
+    longitude, latitude = geodetic_transformer(grid.crs.to_wkt()).transform(x, y)
+    return latitude, longitude
+
+
+@cached(8, "transformers to longitude and latitude")
+def geodetic_transformer(crs):
+    """Transformer from a CRS to its geographic coordinates."""
+    projected = pyproj.CRS.from_wkt(crs)
+    return pyproj.Transformer.from_crs(projected, projected.geodetic_crs, always_xy=True)
+
+
+def scan_nodes(instrument, grid, track):
+    """Position relative to the track, scan angle and visibility of nodes over a grid."""
+    distance, aside = scan.place_beside(track, *_nodes(grid)[2:])
+    _, scan_angle = scan.view_from_ground(aside, instrument.altitude)
+    return distance, aside, scan_angle, np.abs(scan_angle) <= instrument.max_angle
+
+
+def _nodes(grid):
+    """Rows and columns of nodes along the axes of a grid, and the latitudes and longitudes of all."""
+    rows, columns = np.linspace(0, grid.shape.y, _NODES), np.linspace(0, grid.shape.x, _NODES)
+    latitude, longitude = latitude_longitude(grid, *np.meshgrid(rows, columns, indexing="ij"))
+    return rows, columns, latitude, longitude
+
+
+@cached(4, "view directions of a track")
+def _splines(grid, track, altitude):
+    """Components of the direction to the sensor over a grid, as splines of row and column."""
+    rows, columns, latitude, longitude = _nodes(grid)
+    east, north = scan.view_components(track, latitude, longitude, altitude)
+    # Beyond the horizon, which a spline cannot hold: a direction that no limit passes.
+    to_east = RectBivariateSpline(rows, columns, np.nan_to_num(east, nan=2.0))
+    return to_east, RectBivariateSpline(rows, columns, np.nan_to_num(north, nan=2.0))
+
+
+def _view(name, grid, track, altitude, limit, row, column, shape):
+    """View zenith or azimuth of a block of cells. [degree]"""
+    rows, columns = row + np.arange(shape[0]) + 0.5, column + np.arange(shape[1]) + 0.5
+    to_east, to_north = _splines(grid, track, altitude)
+    east, north = to_east(rows, columns), to_north(rows, columns)
+    sine = np.hypot(east, north)
+    seen = sine < min(1.0, np.sin(np.radians(min(limit, 90.0))) * (1 + altitude / scan.EARTH_RADIUS) + 1e-12)
+    if name == "vza":
+        return np.where(seen, np.degrees(np.arcsin(np.minimum(sine, 1.0))), np.nan)
+    return np.where(seen, np.degrees(np.arctan2(east, north)) % 360, np.nan)
+
+
+# Rows and columns of pixels that are made at once.
+_BLOCK = 512
+
+
+def at_pixels(geometry, row, column):
+    """Directions of sun and sensor at pixels, from the cells that contain their centres."""
+    names = directions.varying(geometry)
+    if not names:
+        return geometry
+    rasters = {name: geometry[name].transpose("y", "x") for name in names}
+    return geometry.drop_dims(["y", "x"]).assign({name: _sampled(each, row, column) for name, each in rasters.items()})
+
+
+class _Centres(NamedTuple):
+    """Cells that contain the centres of pixels, as reads for `chunks.windows`."""
+
+    array: object
+    rows: np.ndarray
+    columns: np.ndarray
+
+    def window(self, lines, samples):
+        """Rows and columns of the cells of a block of pixels."""
+        numbers = self.rows[lines, samples], self.columns[lines, samples]
+        return tuple(slice(int(cells.min()), int(cells.max()) + 1) for cells in numbers)
+
+
+def _sampled(raster, row, column):
+    """Raster sampled at pixels."""
+    places = zip((row, column), raster.shape, strict=True)
+    cells = [np.clip(np.floor(place), 0, size - 1).astype(int) for place, size in places]
+    data = chunks.in_blocks(partial(_block, *cells), [_Centres(raster.data, *cells)], row.shape, _BLOCK)
+    return xr.DataArray(data, dims=("line", "sample"), attrs=raster.attrs)
+
+
+def _block(rows, columns, lines, samples, cells):
+    rows, columns = rows[lines, samples], columns[lines, samples]
+    return cells[rows - rows.min(), columns - columns.min()]
+
+
+def seen_alike(means, geometry, view, tolerance, arguments):
+    """Check that light was computed for the view of a scan within a tolerance, lazily where angles are lazy."""
+    if not 0 <= tolerance <= 180:
+        raise ValueError(f"view_tolerance must be in [0, 180] degrees, got {tolerance}")
+    scan = [xr.Variable(("line", "sample"), angle) for angle in view]
+    light = [xr.as_variable(getattr(geometry, name)) for name in ("vza", "vaa")]
+    check = partial(_checked, tolerance=tolerance, arguments=arguments)
+    if any(isinstance(angle.data, da.Array) for angle in light):
+        return chunks.pointwise(check, means, *light, *scan)
+    check(0.0, *(angle.values for angle in (*light, *scan)))
+    return means
+
+
+def _checked(means, vza, vaa, scan_vza, scan_vaa, tolerance, arguments):
+    apart = np.where(np.isnan(means), np.nan, angle_between(vza, vaa, scan_vza, scan_vaa))
+    if np.any(apart > tolerance):
+        raise ValueError(
+            f"the light was computed for another view, vza {_span(vza)}, than that of the scan, vza {_span(scan_vza)}: "
+            f"up to {np.nanmax(apart):.1f} degrees apart. Compute it with geometry=fifesim.scan_geometry({arguments})"
+            ".assign(sza=..., saa=...), or give view_tolerance=180 if it does not depend on the view"
+        )
+    return means
+
+
+def _span(values):
+    low, high = np.nanmin(values), np.nanmax(values)
+    return f"{low:.1f}" if high - low < 0.05 else f"{low:.1f} to {high:.1f}"
+
+
+# Pixels along each side of a block: the operator of a whole image would fill the memory.
+_SWATH_BLOCK = 128
+
+# Displacement on the ground by which the frame of a pixel is found. [m]
+_STEP = 100.0
+
+
+@by_date
+def sense_swath(
+    toa: xr.DataArray,
+    instrument: InstrumentLike | None = None,
+    track: Track | None = None,
+    *,
+    nadir_offset: float = 0.0,
+    heading: float = 180.0,
+    noise: NoiseKinds = (),
+    seed: WholeNumber = 0,
+    noise_models: NoiseModels | None = None,
+    quantise: bool = True,
+    min_valid: float = MIN_VALID,
+    geometry: Directions | None = None,
+    time: Time | None = None,
+    view_tolerance: float = 1.0,
+) -> xr.DataArray:
+    """
+    Image of a scan as the instrument takes it: by line and sample, at its own interval, and never resampled.
+
+    Each pixel has the footprint of its scan angle, turned as the track lies on the grid.
+
+    Parameters
+    ----------
+    toa : xarray.DataArray, dims (band, y, x)
+        As in `fifesim.sensor.labels.sense`. [1 or W m-2 sr-1 um-1]
+    instrument : str or fifesim.sensor.description.instruments.Instrument, optional
+        By default that whose bands the array carries.
+    track, nadir_offset, heading : optional
+        As in `fifesim.sensor.scan_labels.scan_geometry`.
+    noise, seed, noise_models, quantise, min_valid, geometry, time : optional
+        As in `fifesim.sensor.labels.sense`.
+    view_tolerance : float, optional
+        How far the view that the light was computed for may be from that of the scan; 180 takes light that does not
+        depend on it. [degree]
+
+    Returns
+    -------
+    image : xarray.DataArray, dims (band, line, sample)
+        Digital numbers or radiance. Lines follow the flight, samples go from its left to its right. ``latitude``,
+        ``longitude``, ``x``, ``y``, ``vza`` and ``vaa`` are coordinates of each pixel. [1 or W m-2 sr-1 um-1]
+
+    Raises
+    ------
+    ValueError
+        As in `fifesim.sensor.labels.sense`, if no pixel of the scan lies in the scene, and, where angles are lazy when
+        it computes, if the light was computed for another view.
+
+    Notes
+    -----
+    Each line is a sweep of its own. Lines follow each other by the interval at nadir, so that those of an instrument
+    that sweeps several at once do not overlap more at the ends.
+
+    See Also
+    --------
+    fifesim.sensor.response.scan.footprint_operator, fifesim.sensor.response.scan
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> grid = fifesim.fife_site(25, window=((0, 120), (0, 120)))
+    >>> lai = fifesim.lai_scene(grid, seed=7)
+    >>> toa = lai.fifesim.surface_reflectance("MODIS", bands=["MODIS1"]).fifesim.to_toa()
+    >>> toa.fifesim.sense_swath("MODIS").dims
+    ('band', 'line', 'sample')
+    """
+    toa, description, bands = by_bands(toa, instrument)
+    geometry = directions.given_geometry(geometry, toa, time)
+    scene = grids.geobox(toa)
+    track = find_track(scene, track, nadir_offset, heading)
+    pixels = _pixels(scene, description, bands, track)
+    coordinates = _coordinates(scene, pixels, description)
+    geometry = at_pixels(geometry, pixels.row, pixels.column)
+    means = _means(toa.transpose("band", "y", "x"), description, bands, pixels, min_valid)
+    view = coordinates["vza"][1], coordinates["vaa"][1]
+    words = f"fifesim.Track({track.latitude:.4f}, {track.longitude:.4f}, {track.heading:.2f})"
+    means = seen_alike(means, geometry, view, view_tolerance, f"{description.name!r}, grid, {words}")
+    radiance = noisy(as_radiance(means, bands, geometry), description, bands, noise, seed, pixels.first, noise_models)
+    image, along_band = recorded(radiance, description, bands, quantise)
+    image = grids.with_coordinates(image, along_band).assign_coords(coordinates)
+    history = f"sense_swath: {description.name}, track {track.heading:.2f} degrees"
+    image = directions.with_geometry(image, geometry, ("sza", "saa", "earth_sun_distance"))
+    image = labelled(image, toa, description, history)
+    image.encoding = {"grid_mapping": "spatial_ref"}
+    return image
+
+
+@dataclass(frozen=True, eq=False)
+class _Pixels:
+    """Lines and samples of a scan: first numbers, places, and the steps of a cell in the frame of each pixel."""
+
+    first: tuple
+    latitude: np.ndarray  # shape (line, sample)
+    longitude: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+    frame: np.ndarray  # shape (line, sample, 2, 2)
+    track: scan.Track
+
+
+def _pixels(scene, description, bands, track):
+    """Pixels with centres in the smallest box of lines and samples around a scene."""
+    spacing, across = common_size(description, bands, description.ground_intervals)
+    angle = np.degrees(across / description.altitude)
+    distance, _, scan_angle, seen = scan_nodes(description, scene, track)
+    if not seen.any():
+        raise ValueError(
+            f"{description.name} does not see the scene, whose scan angles are beyond {description.max_angle:g} degrees"
+        )
+    lines, samples = _inside(distance[seen] / spacing), _inside(scan_angle[seen] / angle)
+    if not (lines.size and samples.size):
+        raise ValueError(
+            f"no pixel of {description.name}, {spacing:g} m along the track, lies in the scene: simulate a larger one"
+        )
+    along, theta = np.meshgrid((lines + 0.5) * spacing, (samples + 0.5) * angle, indexing="ij")
+    _, aside = scan.view_from_scan(theta, description.altitude)
+    latitude, longitude = scan.place_of(track, along, aside)
+    row, column = _cells(scene, latitude, longitude)
+    parallel = np.cos(np.radians(aside))
+    forward = _cells(scene, *scan.place_of(track, along + _STEP / parallel, aside))
+    sideward = _cells(scene, *scan.place_of(track, along, aside + np.degrees(_STEP / scan.EARTH_RADIUS)))
+    # A metre along and across the track (last axis) in rows and columns. The inverse takes cells to metres.
+    here = np.stack([row, column], axis=-1)
+    steps = np.stack([np.stack(forward, axis=-1) - here, np.stack(sideward, axis=-1) - here], axis=-1)
+    frame = np.linalg.inv(steps / _STEP) / np.stack(scan.growth(theta, description.altitude), axis=-1)[..., None]
+    return _Pixels((int(lines[0]), int(samples[0])), latitude, longitude, row, column, frame, track)
+
+
+def _inside(places):
+    """Numbers of the lines or samples with centres between the outermost of some places."""
+    return np.arange(int(np.ceil(places.min() - 0.5)), int(np.floor(places.max() - 0.5)) + 1)
+
+
+def _cells(scene, latitude, longitude):
+    """Row and column of places, from the corner of a grid. [cell]"""
+    x, y = geodetic_transformer(scene.crs.to_wkt()).transform(longitude, latitude, direction="INVERSE")
+    return (y - scene.affine.f) / scene.affine.e, (x - scene.affine.c) / scene.affine.a
+
+
+class _Seen(NamedTuple):
+    """Cells in the footprints of pixels, as reads for `chunks.windows`."""
+
+    array: object
+    footprints: Footprints
+
+    def window(self, lines, samples):
+        """Rows and columns of the cells that a block of pixels touches."""
+        return self.footprints[lines, samples].window(self.array.shape[-2:])
+
+
+def _means(toa, description, bands, pixels, min_valid):
+    """Means over the footprints by band, lazy where the scene is."""
+    if not 0 <= min_valid <= 1:
+        raise ValueError(f"min_valid must be in [0, 1], got {min_valid}: it is a share of the footprint")
+
+    def means(part, spreads, names):
+        footprints = Footprints(pixels.row, pixels.column, pixels.frame, *spreads)
+        kernel = partial(_block_means, footprints, part.shape[-2:], min_valid)
+        shape = part.sizes["band"], *pixels.row.shape
+        data = chunks.in_blocks(kernel, [_Seen(part.data, footprints)], shape, _SWATH_BLOCK)
+        coords = chunks.other_coordinates(part)
+        return xr.DataArray(data, dims=("band", "line", "sample"), coords=coords, attrs=toa.attrs)
+
+    return by_line_spread(means, toa, description, bands)
+
+
+def _block_means(footprints, shape, min_valid, lines, samples, cells):
+    """Means over the footprints of a block of pixels, from the cells that they touch."""
+    seen = footprints[lines, samples]
+    operator = footprint_operator(seen, *seen.window(shape))
+    means = apply_operator(operator, cells.reshape(len(cells), -1), min_valid)
+    return means.reshape(len(cells), lines.stop - lines.start, samples.stop - samples.start)
+
+
+def _coordinates(scene, pixels, description):
+    """Positions of the pixels and their view directions, after CF."""
+    x, y = projection.transform_points(scene.affine, pixels.column, pixels.row)
+    east, north = scan.view_components(pixels.track, pixels.latitude, pixels.longitude, description.altitude)
+    values = {
+        "latitude": (pixels.latitude, {"standard_name": "latitude", "units": "degrees_north"}),
+        "longitude": (pixels.longitude, {"standard_name": "longitude", "units": "degrees_east"}),
+        "y": (y, {"standard_name": "projection_y_coordinate", "units": "m"}),
+        "x": (x, {"standard_name": "projection_x_coordinate", "units": "m"}),
+        "vza": (np.degrees(np.arcsin(np.hypot(east, north))), cf.attributes("vza")),
+        "vaa": (np.degrees(np.arctan2(east, north)) % 360, cf.attributes("vaa")),
+    }
+    out = {name: (("line", "sample"), value, attrs) for name, (value, attrs) in values.items()}
+    for axis, first, size in zip(("line", "sample"), pixels.first, pixels.row.shape, strict=True):
+        out[axis] = (axis, first + np.arange(size), {"long_name": f"{axis} of the scan, from the track's point"})
+    return out | {"spatial_ref": grids.coordinates(scene)["spatial_ref"]}

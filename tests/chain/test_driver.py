@@ -1,0 +1,106 @@
+"""The chain on plain arrays compared with the labelled steps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.base.line_spread import Boxcar
+from fifesim.chain.driver import Driver, cell_block_means, shared_operators, varying_parts
+from fifesim.chain.setup import image_of, reflectance_of
+from fifesim.grids import grid as grids
+from fifesim.ground.terrain.labels import light_on_slopes
+
+GRID = fifesim.fife_site(10.0, ((300, 348), (200, 254)))
+
+
+@pytest.fixture(scope="module")
+def lai():
+    return fifesim.lai_scene(GRID, arp=0.2, seed=3)
+
+
+@pytest.fixture(scope="module")
+def setup():
+    geometry = fifesim.Geometry(35.0, 120.0, 20.0, 80.0, earth_sun_distance=1.01)
+    return fifesim.Setup(
+        "TM", bands=("TM4", "TM3"), geometry=geometry, canopy=fifesim.Canopy(brown=0.1), atmosphere=fifesim.Atmosphere()
+    )
+
+
+def test_steps_are_the_labelled_steps_to_the_bit(lai, setup):
+    driver, labelled = Driver(setup), reflectance_of(setup, lai)
+    level = driver.reflectance(lai.values)
+    np.testing.assert_array_equal(level, labelled)
+    toa = labelled.fifesim.to_toa()
+    np.testing.assert_array_equal(driver.toa(level), toa)
+    np.testing.assert_array_equal(driver.ndvi(driver.toa(level)), fifesim.ndvi(toa))
+    for leaves in ("all", "green"):
+        expected = fifesim.fpar(lai, geometry=setup.geometry, canopy=fifesim.Canopy(brown=0.1), leaves=leaves)
+        np.testing.assert_array_equal(driver.fpar(lai.values, 0.94, leaves), expected)
+
+
+def test_slopes_are_those_of_the_labelled_steps(lai, setup):
+    dem = fifesim.flint_hills(GRID.pad(1), seed=2)
+    setup = replace(setup, upwelling=False)
+    light = light_on_slopes(dem, grids.geobox(lai), setup.geometry)
+    found = Driver(setup).on_slopes(Driver(setup).reflectance(lai.values), light)
+    np.testing.assert_array_equal(found, reflectance_of(replace(setup, dem=dem), lai))
+
+
+def test_digital_numbers_lead_back_to_their_reflectance(setup):
+    driver = Driver(setup)
+    reflectance = np.linspace(0.05, 0.3, 60).reshape(2, 5, 6)
+    dn = driver.recorded(driver.radiance(reflectance))
+    assert dn.dtype == np.uint8
+    step = driver.planetary(np.full((2, 1, 1), 2, np.uint8)) - driver.planetary(np.full((2, 1, 1), 1, np.uint8))
+    assert (np.abs(driver.planetary(dn) - reflectance) <= step / 2 * (1 + 1e-9)).all()
+    analogue = Driver(replace(setup, quantise=False))
+    np.testing.assert_allclose(analogue.planetary(analogue.recorded(analogue.radiance(reflectance))), reflectance)
+
+
+def test_varying_parts_are_named(lai, setup):
+    varying = Driver(replace(setup, dem=lai, adjacency=True, canopy=fifesim.Canopy(brown=lai)))
+    for step in (varying.reflectance, varying.toa, lambda values: varying.fpar(values, 0.94)):
+        with pytest.raises(ValueError, match="do not support relief, adjacency, brown: use"):
+            step(lai.values)
+    assert varying_parts(replace(setup, offset=(np.zeros(3), 0.0))) == ["a drifting offset"]
+    angles = xr.Dataset({"sza": 30.0, "saa": 120.0})
+    assert varying_parts(replace(setup, geometry=angles)) == ["angles by cell"]
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        {},
+        {"interval": "native", "offset": (0.4, -0.3)},
+        {"instrument": "OLI", "bands": ("B4", "B5"), "noise": ("thermal",), "seed": 5},
+        {"quantise": False, "interval": 45.0, "min_valid": 0.8},
+    ],
+)
+def test_an_image_is_the_labelled_one_to_the_bit(lai, own):
+    setup = fifesim.Setup(**{"bands": ("TM3", "TM4"), "geometry": fifesim.fife_geometry()} | own)
+    driver, level = Driver(setup), reflectance_of(setup, lai)
+    found, expected = driver.image(driver.toa(level.values), GRID), image_of(setup, level)
+    assert found.dtype == expected.dtype
+    np.testing.assert_array_equal(found, expected)
+    assert grids.same_grid(driver.pixels(GRID, setup)[0], grids.geobox(expected))
+    means = cell_block_means(lai.values, GRID, 35.0, setup.min_valid)
+    np.testing.assert_array_equal(means, fifesim.aggregate(lai, 35.0, min_valid=setup.min_valid))
+
+
+def test_a_shared_driver_draws_the_noise_of_each_seed(lai):
+    setup = fifesim.Setup("OLI", bands=("B4", "B5"), geometry=fifesim.fife_geometry(), noise=("thermal",))
+    driver = Driver(setup)
+    toa = driver.toa(driver.reflectance(lai.values))
+    images = [driver.image(toa, GRID, replace(setup, seed=seed)) for seed in (1, 2)]
+    assert (images[0] != images[1]).any()
+    np.testing.assert_array_equal(images[1], Driver(replace(setup, seed=2)).image(toa, GRID))
+
+
+def test_operators_are_kept_for_grids_of_one_place():
+    pixels = grids.aligned_grid(GRID, 30.0)
+    first = shared_operators((Boxcar(30.0), Boxcar(30.0)), GRID, pixels)
+    assert shared_operators((Boxcar(30.0), Boxcar(30.0)), GRID, pixels) is first
+    assert shared_operators((Boxcar(30.0), Boxcar(30.0)), GRID, pixels, (3.0, 0.0)) is not first

@@ -1,0 +1,104 @@
+"""Names, units and provenance."""
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fifesim
+from fifesim.grids import cf
+
+
+def raster(**attrs):
+    return xr.DataArray(np.ones((2, 3)), dims=("y", "x"), name="mine", attrs=attrs)
+
+
+@pytest.mark.parametrize("name", cf.QUANTITIES)
+def test_quantities_are_written_as_cf_writes_them(name):
+    quantity = cf.QUANTITIES[name]
+    assert re.fullmatch(r"[a-z_0-9]*", quantity.standard_name)
+    assert re.fullmatch(r"1|(W|[a-z_]+)( [a-z]+(-?\d)?)*", quantity.units)
+    assert quantity.long_name
+    assert set(cf.attributes(name)) <= {"standard_name", "long_name", "units", "comment"}
+    assert all(cf.attributes(name).values())
+
+
+def test_label_replaces_attributes():
+    before = raster(units="percent", valid_range="0 100", history="mine")
+    after = cf.label(before, "ndvi", history="ndvi")
+    assert after.name == "ndvi"
+    assert after.attrs == cf.attributes("ndvi") | {"history": "ndvi"}
+    assert before.name == "mine" and before.attrs["units"] == "percent"
+
+
+def test_provenance_and_history_carry_on():
+    source = raster(history="one", arp=0.15, references="Friedl", units="1", something="else")
+    after = cf.label(raster(), "fpar", source=source, history="two", references="Tanre", arp=0.2)
+    assert after.attrs["history"] == "one\ntwo"
+    assert after.attrs["references"] == "Friedl; Tanre"
+    assert after.attrs["arp"] == 0.2
+    assert "something" not in after.attrs
+
+
+def test_reference_is_not_said_twice():
+    source = raster(references="Friedl; Tanre")
+    after = cf.label(raster(), "toa_reflectance", source=source, history="to_toa", references="Tanre")
+    assert after.attrs["references"] == "Friedl; Tanre"
+
+
+@pytest.mark.parametrize("units", ["1", "", "m2 m-2", " 1 ", "dimensionless", None])
+def test_right_or_missing_units_pass(units):
+    cf.check_units(raster(**({} if units is None else {"units": units})), "lai")
+
+
+def test_wrong_units_are_named_with_the_right_ones():
+    with pytest.raises(ValueError, match=r"mine has units 'percent', toa_reflectance needs '1' or 'W m-2 sr-1 um-1'"):
+        cf.check_units(raster(units="percent"), "toa_reflectance", "toa_radiance")
+    with pytest.raises(ValueError, match="'1'"):
+        cf.check_units(raster(units="1"), "toa_radiance")
+
+
+def test_numbers_along_band_have_units():
+    coordinates = cf.band_coordinates(band=["TM3", "TM4"], wavelength=[0.66, 0.83], gain=[1, 2])
+    assert coordinates["band"].values.tolist() == ["TM3", "TM4"]
+    assert coordinates["wavelength"].attrs["units"] == "um"
+    assert coordinates["gain"].dtype == float and coordinates["gain"].dims == ("band",)
+
+
+@pytest.mark.parametrize(
+    ("step", "said", "cure"),
+    [
+        (
+            lambda rho: rho.fifesim.sense("TM"),
+            "surface reflectance factor by its standard_name",
+            r"take \.fifesim\.to_toa\(atmosphere\) of it first",
+        ),
+        (
+            lambda rho: rho.fifesim.to_toa().fifesim.to_toa(),
+            "apparent reflectance at the top",
+            r"take \.fifesim\.to_surf",
+        ),
+        (lambda rho: rho.fifesim.to_toa().fifesim.sense("TM").fifesim.sense("TM"), "digital numbers", "to_reflectance"),
+        (lambda rho: rho.isel(band=0, drop=True).fifesim.fpar(), "leaf area index is needed", "take the step between"),
+        (
+            lambda rho: rho.isel(band=0).assign_attrs(cf.attributes("lai")).fifesim.to_toa(),
+            "leaf area index by its standard_name",
+            r"take \.fifesim\.surface_reflectance\(instrument\) of it first",
+        ),
+    ],
+)
+def test_a_raster_of_another_quantity_is_refused(step, said, cure):
+    """All have units of 1: only the standard name tells that a step was left out or taken twice."""
+    lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((0, 45), (0, 45))))
+    with pytest.raises(ValueError, match=f"{said}.*{cure}") as caught:
+        step(lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]))
+    assert len(str(caught.value)) <= 500
+
+
+def test_units_listed_by_band_are_named_once():
+    """rioxarray gives the units of bands as a tuple."""
+    listed = xr.DataArray(np.zeros((3, 2, 2)), attrs={"units": ("W m-2 sr-1 um-1",) * 3})
+    with pytest.raises(ValueError, match=r"has units 'W m-2 sr-1 um-1', toa_reflectance needs '1'"):
+        cf.check_units(listed, "toa_reflectance")
+    cf.check_units(listed, "toa_radiance")

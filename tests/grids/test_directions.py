@@ -1,0 +1,161 @@
+"""Directions travel as coordinates: numbers, or rasters on the cells."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import in_chunks, no_compute
+
+import fifesim
+from fifesim.base.geometry import Geometry, fife_geometry
+from fifesim.grids import cf, directions
+from fifesim.grids import grid as grids
+
+SUN = Geometry(sza=28.5, saa=117.0, vza=3.0, vaa=-80.0, earth_sun_distance=1.0147)
+
+
+def raster(**attrs):
+    return xr.DataArray(np.ones((2, 3)), dims=("y", "x"), name="mine", attrs=attrs)
+
+
+def test_directions_travel_as_scalar_coordinates():
+    with no_compute():
+        carried = directions.with_geometry(in_chunks(raster(), {"y": 1}), SUN)
+    assert directions.geometry_of(carried) == SUN
+    assert carried["sza"].attrs == cf.attributes("sza")
+    assert directions.geometry_of(raster()) is None
+
+
+def test_azimuths_count_from_the_north_of_a_grid():
+    """East of the central meridian grid north lies east of true north, and toward the north pole more so."""
+    east, west = (grids.grid_at("EPSG:26914", x, 4.33e6, 900, 900, 30) for x in (708000, 292000))
+    turned = [directions.from_grid_north(SUN, grid) for grid in (east, west)]
+    assert 1 < SUN.saa - turned[0].saa < 2 and 1 < turned[1].saa - SUN.saa < 2
+    assert SUN.vaa - turned[0].vaa == pytest.approx(SUN.saa - turned[0].saa, abs=1e-12)
+    assert (turned[0].sza, turned[0].vza, turned[0].earth_sun_distance) == (28.5, 3.0, 1.0147)
+
+
+def test_a_sun_without_azimuth_is_refused():
+    """It would light the slopes from the north."""
+    for given in (raster().assign_coords(sza=30.0), raster().assign_coords(sza=(("y", "x"), np.full((2, 3), 30.0)))):
+        with pytest.raises(ValueError, match=r"zenith angle sza and no azimuth saa.*assign_coords\(saa="):
+            directions.geometry_of(given)
+
+
+def test_sun_alone_is_a_nadir_view():
+    assert directions.geometry_of(raster().assign_coords(sza=30.0, saa=20.0)) == Geometry(30.0, 20.0)
+
+
+def ramp(low, high):
+    """A raster on the cells that grows to the east."""
+    return raster().copy(data=np.broadcast_to(np.linspace(low, high, 3), (2, 3)))
+
+
+@pytest.fixture
+def scan():
+    return xr.Dataset({"sza": 40.0, "saa": 120.0, "vza": ramp(0.0, 30.0), "vaa": 280.0})
+
+
+def test_angles_by_cell_are_a_dataset_and_travel(scan):
+    found = directions.checked_geometry(scan)
+    assert directions.varying(found) == ("vza",) and float(found["earth_sun_distance"]) == 1.0
+    again = directions.geometry_of(directions.with_geometry(raster(), found))
+    xr.testing.assert_equal(again, found)
+    assert again["vza"].attrs["standard_name"] == "sensor_zenith_angle"
+
+
+def test_a_dataset_of_numbers_is_a_geometry():
+    numbers = xr.Dataset({"sza": 40.0, "saa": 10.0, "vza": 5.0})
+    assert directions.checked_geometry(numbers) == Geometry(40.0, 10.0, 5.0)
+
+
+def test_given_wins_over_carried_and_that_over_the_papers(lai):
+    carried = directions.with_geometry(lai, Geometry(30.0, 100.0))
+    assert directions.given_geometry(Geometry(50.0, 90.0), carried) == Geometry(50.0, 90.0)
+    assert directions.given_geometry(None, carried) == Geometry(30.0, 100.0)
+    assert directions.given_geometry(None, lai) == fife_geometry()
+
+
+CAPE = fifesim.grid_at("EPSG:32734", 261000.0, 6244000.0, 300.0, 300.0, 30.0)  # beside Cape Town
+NOON = "2022-12-21T10:45Z"
+
+
+def on_the_cape(**coordinates):
+    cells = xr.DataArray(np.ones(CAPE.shape), dims=("y", "x"), name="mine")
+    return grids.place(cells.assign_coords(coordinates), CAPE)
+
+
+def test_the_sun_is_that_of_time_and_place():
+    """Near noon of the solstice the sun stands as far from the zenith as the latitude and the tilt of the Earth."""
+    of_data = directions.given_geometry(None, on_the_cape(time=np.datetime64("2022-12-21T10:45")))
+    assert of_data.sza == pytest.approx(33.92 - 23.44, abs=0.15)
+    assert min(of_data.saa, 360 - of_data.saa) < 15, "the sun is in the north there"
+    assert of_data.earth_sun_distance == pytest.approx(0.9838, abs=2e-4)
+    assert directions.given_geometry(None, on_the_cape(), NOON) == of_data
+    assert directions.sun_over(CAPE, NOON) == of_data
+
+
+def test_a_time_that_is_given_wins_over_what_is_carried():
+    carried = directions.with_geometry(on_the_cape(time=np.datetime64("2022-06-01T10:45")), Geometry(30.0, 100.0))
+    assert directions.given_geometry(None, carried) == Geometry(30.0, 100.0)
+    assert directions.given_geometry(None, carried, NOON) == directions.sun_over(CAPE, NOON)
+    with pytest.raises(ValueError, match="geometry and time both say where the sun stands"):
+        directions.given_geometry(SUN, carried, NOON)
+
+
+def test_a_raster_of_ones_own_is_asked_for_its_sun():
+    with pytest.raises(ValueError, match=r"nothing says where the sun stands over mine.*time='2022.*or geometry="):
+        directions.given_geometry(None, on_the_cape())
+    with pytest.raises(ValueError, match="the sun is below the horizon"):
+        directions.given_geometry(None, on_the_cape(), "2022-12-21T22:00Z")
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "said"),
+    [
+        (30.0, TypeError, "must be a fifesim.Geometry, or an xarray.Dataset with sza"),
+        (xr.Dataset({"vza": 5.0}), TypeError, "xarray.Dataset with sza"),
+        (xr.Dataset({"sza": 95.0, "saa": 0.0}), ValueError, "the sun is below the horizon"),
+        (xr.Dataset({"sza": ramp(0.5, 0.6).assign_attrs(units="radian"), "saa": 1.0}), ValueError, "'radian'"),
+    ],
+)
+def test_what_is_no_direction_is_refused(given, kind, said):
+    with pytest.raises(kind, match=said):
+        directions.checked_geometry(given)
+
+
+def test_one_direction_is_asked_for_where_it_is_needed(scan):
+    with pytest.raises(ValueError, match="the test needs one direction of sun and sensor, got rasters of vza"):
+        directions.uniform_geometry(directions.checked_geometry(scan), "the test")
+    assert directions.uniform_geometry(Geometry(30.0, 0.0), "the test") == Geometry(30.0, 0.0)
+
+
+def test_cosine_of_the_sun_is_a_number_or_by_cell():
+    assert directions.mu_s(Geometry(60.0, 0.0)).item() == pytest.approx(0.5, abs=1e-15)
+    by_cell = directions.checked_geometry(xr.Dataset({"sza": ramp(0.0, 60.0), "saa": 0.0}))
+    np.testing.assert_allclose(directions.mu_s(by_cell)[0, [0, -1]], [1.0, 0.5], atol=1e-15)
+
+
+def test_a_time_that_is_given_stays_with_the_raster(lai):
+    """Else a file would say one date and the sun of another."""
+    then = np.datetime64("2022-07-03T17:00")
+    made = lai.assign_coords(time=np.datetime64("2022-01-03T17:00"))
+    rho = made.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"], time="2022-07-03T17:00Z")
+    images = rho, rho.fifesim.to_toa(), rho.fifesim.to_toa().fifesim.sense()
+    assert all(each["time"].values == then for each in images)
+    later = rho.fifesim.to_toa(time="2022-08-03T17:00Z")
+    assert later["time"].values == np.datetime64("2022-08-03T17:00") and later["sza"] > rho["sza"]
+    assert made["time"].values == np.datetime64("2022-01-03T17:00")
+
+
+def test_a_date_alone_is_no_time():
+    """Midnight in UTC is another sun."""
+    with pytest.raises(ValueError, match=r"'2022-12-21' is a date alone.*2022-12-21T17:10Z"):
+        directions.given_geometry(None, on_the_cape(), "2022-12-21")
+    with pytest.warns(UserWarning, match="midnight in UTC, 2022-12-21"), pytest.raises(ValueError, match="horizon"):
+        directions.given_geometry(None, on_the_cape(time=np.datetime64("2022-12-21T00:00")))
+
+
+def test_a_carried_sun_has_the_distance_of_its_time():
+    known = on_the_cape(sza=20.0, saa=30.0, time=np.datetime64("2022-01-04T10:00"))
+    assert directions.geometry_of(known).earth_sun_distance == pytest.approx(0.9833, abs=2e-4)
+    assert directions.geometry_of(known.drop_vars("time")).earth_sun_distance == 1.0

@@ -1,0 +1,313 @@
+"""Files: what GDAL and xarray read is what was written."""
+
+import json
+import math
+
+import dask.array as da
+import numpy as np
+import pytest
+import rasterio
+import xarray as xr
+from lazy import ODD_CHUNKS, in_chunks, no_compute
+
+import fifesim
+from fifesim.grids import cf, tags
+from fifesim.grids import files as export
+from fifesim.grids import grid as grids
+from fifesim.sensor.description.instruments import instrument
+
+
+@pytest.fixture(scope="module")
+def image(lai_values):
+    """An image with a hole."""
+    lai = lai_values.copy(deep=True)
+    lai[18:27, 27:36] = np.nan
+    return fifesim.surface_reflectance(lai, bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM")
+
+
+def test_geotiff_is_cloud_optimised(image, tmp_path):
+    path = fifesim.to_geotiff(image, tmp_path / "tm.tif")
+    with rasterio.open(path) as source:
+        assert source.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
+        assert source.tags(ns="IMAGE_STRUCTURE")["COMPRESSION"] == "DEFLATE"
+
+
+def test_large_geotiff_has_overviews(tmp_path):
+    grid = fifesim.fife_site(10.0, window=((0, 1100), (0, 1100)))
+    values = da.ones(tuple(grid.shape), chunks=400, dtype=np.float32)
+    raster = grids.place(xr.DataArray(values, dims=("y", "x"), name="lai"), grid)
+    with rasterio.open(fifesim.to_geotiff(raster, tmp_path / "lai.tif")) as source:
+        assert source.block_shapes == [(512, 512)]
+        assert source.overviews(1) == [2, 4]
+        assert source.dtypes == ("float32",)
+
+
+def test_gdal_reads_place_bands_and_calibration(image, tmp_path):
+    bands = instrument("TM").select(["TM3", "TM4"])
+    with rasterio.open(fifesim.to_geotiff(image, tmp_path / "tm.tif")) as source:
+        np.testing.assert_array_equal(source.read(), image)
+        assert source.crs.to_epsg() == 26914
+        np.testing.assert_allclose(source.transform, grids.geobox(image).affine, rtol=0, atol=1e-6)
+        assert source.descriptions == ("TM3", "TM4")
+        assert source.units == ("W m-2 sr-1 um-1",) * 2
+        assert source.nodatavals == (0, 0)
+        for number, band in enumerate(bands, 1):
+            gain = (band.full_scale_radiance - band.min_radiance) / 255
+            assert source.scales[number - 1] == pytest.approx(gain, rel=1e-15)
+            assert source.offsets[number - 1] == band.min_radiance
+            wavelength = float(source.tags(number, ns="IMAGERY")["CENTRAL_WAVELENGTH_UM"])
+            assert wavelength == pytest.approx(band.wavelength, rel=1e-8)
+        tags = source.tags()
+        assert float(tags["sza"]) == float(image["sza"])
+        assert tags["atmosphere"] == image.attrs["atmosphere"] and tags["instrument"] == "TM"
+        assert tags["history"].count("\n") == image.attrs["history"].count("\n")
+        assert tags["AREA_OR_POINT"] == "Area"
+
+
+@pytest.mark.parametrize("name", ["image", "radiance", "reflectance", "ndvi", "lai", "one-band", "single-precision"])
+@pytest.mark.parametrize("chunks", [None, {"y": 2, "x": 4}], ids=["eager", "chunked"])
+def test_raster_comes_back_as_it_was(image, lai, tmp_path, name, chunks):
+    raster = {
+        "image": image,
+        "radiance": fifesim.to_radiance(image),
+        "reflectance": fifesim.to_reflectance(image),
+        "ndvi": fifesim.ndvi(image),
+        "lai": lai,
+        "one-band": image.sel(band=["TM4"]),
+        "single-precision": fifesim.ndvi(image).astype(np.float32),
+    }[name]
+    if chunks and name == "lai":
+        # Of cells there are more than of pixels.
+        chunks = {"y": 20, "x": 17}
+    path = tmp_path / "raster.tif"
+    fifesim.to_geotiff(raster if chunks is None else in_chunks(raster, ODD_CHUNKS | {"band": 1}), path)
+    with no_compute():
+        again = fifesim.open_image(path, chunks=chunks)
+    assert (again.chunks is None) == (chunks is None)
+    xr.testing.assert_identical(again.compute(), raster)
+    assert again.dtype == raster.dtype
+    assert grids.same_grid(grids.geobox(again), grids.geobox(raster))
+
+
+def test_whole_site_at_full_digits_comes_back(tmp_path):
+    """Cells of 30/9 m: neither the transform nor the values lose a bit."""
+    lai = fifesim.lai_scene(fifesim.fife_site(30 / 9, window=((4400, 4500), (4300, 4500))), seed=1, chunks=64)
+    xr.testing.assert_identical(fifesim.open_image(fifesim.to_geotiff(lai, tmp_path / "lai.tif")), lai.compute())
+
+
+def test_image_from_a_file_goes_on_like_the_one_in_memory(image, tmp_path):
+    again = fifesim.open_image(fifesim.to_geotiff(image, tmp_path / "tm.tif"), chunks=3)
+    xr.testing.assert_identical(again.fifesim.ndvi().compute(), image.fifesim.ndvi())
+    xr.testing.assert_identical(again.fifesim.to_surface().compute(), image.fifesim.to_surface())
+
+
+def test_attributes_that_json_lacks_come_back(image, tmp_path):
+    odd = image.copy()
+    odd.attrs |= {"text": 'quotes " and\nlines, \N{MICRO SIGN}', "number": np.float32(0.5), "count": np.int64(3)}
+    again = fifesim.open_image(fifesim.to_geotiff(odd, tmp_path / "tm.tif"))
+    xr.testing.assert_identical(again, odd)
+
+
+def test_variables_of_a_dataset_become_bands(lai, tmp_path):
+    truth = xr.Dataset({"lai": fifesim.aggregate(lai), "fpar": fifesim.aggregate(fifesim.fpar(lai))})
+    path = truth.fifesim.to_geotiff(tmp_path / "truth.tif")
+    with rasterio.open(path) as source:
+        assert source.descriptions == ("lai", "fpar")
+        assert math.isnan(source.nodata)
+    again = fifesim.open_image(path)
+    assert again["band"].values.tolist() == ["lai", "fpar"]
+    for name in truth:
+        np.testing.assert_array_equal(again.sel(band=name), truth[name])
+
+
+def test_file_of_others_is_read_by_what_gdal_knows(image, tmp_path):
+    """Names, calibration and wavelengths that GDAL's own model holds; no attributes are made up."""
+    ours, plain = tmp_path / "tm.tif", tmp_path / "plain.tif"
+    fifesim.to_geotiff(image, ours)
+    with rasterio.open(ours) as source, rasterio.open(plain, "w", **(source.profile | {"driver": "GTiff"})) as sink:
+        sink.write(source.read())
+        sink.descriptions, sink.scales, sink.offsets = source.descriptions, source.scales, source.offsets
+        sink.units = source.units
+        for number in source.indexes:
+            sink.update_tags(number, ns="IMAGERY", **source.tags(number, ns="IMAGERY"))
+    again = fifesim.open_image(plain)
+    np.testing.assert_array_equal(again, image)
+    assert again["band"].values.tolist() == ["TM3", "TM4"]
+    np.testing.assert_allclose(fifesim.to_radiance(again), fifesim.to_radiance(image), rtol=1e-12)
+    np.testing.assert_allclose(again["wavelength"], image["wavelength"], rtol=1e-8)
+
+
+def test_existing_file_is_replaced(image, tmp_path):
+    path = tmp_path / "tm.tif"
+    path.write_text("old")
+    fifesim.to_geotiff(image, path, overwrite=True)
+    xr.testing.assert_identical(fifesim.open_image(path), image)
+    assert [each.name for each in tmp_path.iterdir()] == ["tm.tif"]
+
+
+def failing(image):
+    """Data that cannot be computed past their first chunk."""
+
+    def refuse(block, block_info=None):
+        if block_info[0]["chunk-location"] != (0, 0, 0):
+            raise RuntimeError("disk on fire")
+        return block
+
+    lazy = in_chunks(image, {"y": 2})
+    return lazy.copy(data=lazy.data.map_blocks(refuse, dtype=image.dtype))
+
+
+@pytest.mark.parametrize("before", [None, "kept"])
+def test_write_that_fails_leaves_things_as_they_were(image, tmp_path, before):
+    path = tmp_path / "tm.tif"
+    if before:
+        path.write_text(before)
+    with pytest.raises(RuntimeError, match="disk on fire"):
+        fifesim.to_geotiff(failing(image), path, overwrite=True)
+    assert [each.name for each in tmp_path.iterdir()] == (["tm.tif"] if before else [])
+    assert not before or path.read_text() == before
+
+
+def test_angles_that_a_geotiff_cannot_hold_are_said(image, tmp_path):
+    swath = image.assign_coords(vza=(("y", "x"), np.full(image.shape[1:], 20.0)))
+    with pytest.warns(UserWarning, match=r"swath.tif leaves out vza, which vary over the cells.* give geometry="):
+        export.to_geotiff(swath, tmp_path / "swath.tif")
+
+
+def test_what_is_no_raster_is_refused(image, lai, tmp_path):
+    with pytest.raises(ValueError, match="no CRS"):
+        fifesim.to_geotiff(lai.drop_vars("spatial_ref"), tmp_path / "lai.tif")
+    with pytest.raises(ValueError, match=r"holds dimensions \(band, y, x\), got"):
+        fifesim.to_geotiff(image.expand_dims(time=2), tmp_path / "tm.tif")
+    with pytest.raises(FileNotFoundError, match="there is no folder"):
+        fifesim.to_geotiff(image, tmp_path / "missing" / "tm.tif")
+    with pytest.raises(ValueError, match=r"cannot read .*missing\.tif as a raster"):
+        fifesim.open_image(tmp_path / "missing.tif")
+    assert list(tmp_path.iterdir()) == []
+
+
+def check_conventions(opened, raster):
+    """CRS and CF names as another program finds them."""
+    variable = opened[raster.name]
+    assert variable.encoding["grid_mapping"] == "spatial_ref"
+    assert variable.rio.crs == raster.rio.crs
+    assert cf.attributes(raster.name).items() <= variable.attrs.items()
+    assert grids.same_grid(grids.geobox(variable), grids.geobox(raster))
+
+
+@pytest.mark.parametrize("kind", ["netcdf", "zarr"])
+@pytest.mark.parametrize("name", ["image", "lai", "reflectance"])
+def test_netcdf_and_zarr_keep_crs_and_names(image, lai, tmp_path, kind, name):
+    raster = {"image": image, "lai": lai, "reflectance": fifesim.to_reflectance(image)}[name]
+    path = tmp_path / name
+    if kind == "netcdf":
+        raster.to_netcdf(path)
+        opened = xr.open_dataset(path, decode_coords="all", mask_and_scale=False)
+    else:
+        raster.to_dataset().to_zarr(path, consolidated=False)
+        opened = xr.open_zarr(path, decode_coords="all", mask_and_scale=False, consolidated=False)
+    with opened:
+        check_conventions(opened, raster)
+        again = opened[raster.name].load()
+    np.testing.assert_array_equal(again, raster)
+    for coordinate in raster.coords:
+        np.testing.assert_array_equal(again[coordinate], raster[coordinate])
+        assert raster[coordinate].attrs.items() <= again[coordinate].attrs.items()
+    if name == "image":
+        np.testing.assert_array_equal(again.fifesim.ndvi(), image.fifesim.ndvi())
+
+
+def test_chain_goes_on_from_a_masked_netcdf(image, tmp_path):
+    """xarray's default masks the fill value, and makes the counts floating point."""
+    image.to_netcdf(tmp_path / "tm.nc")
+    with xr.open_dataset(tmp_path / "tm.nc", decode_coords="all") as opened:
+        np.testing.assert_array_equal(opened["dn"].fifesim.ndvi(), image.fifesim.ndvi())
+
+
+def test_tag_is_json_that_others_can_read(image, tmp_path):
+    with rasterio.open(fifesim.to_geotiff(image, tmp_path / "tm.tif")) as source:
+        kept = json.loads(source.tags()[tags.TAG])
+    assert kept["dims"] == ["band", "y", "x"]
+    assert kept["coords"]["solar_irradiance"]["values"] == image["solar_irradiance"].values.tolist()
+
+
+@pytest.mark.parametrize(
+    ("dtype", "stored", "nodata", "scale", "value"),
+    [("float32", 0.25, -9999, 1.0, 0.25), ("uint16", 2500, 65535, 1e-4, 0.25), ("int16", 2500, None, 1e-4, 0.25)],
+)
+def test_values_of_others_are_masked_and_in_their_unit(tmp_path, dtype, stored, nodata, scale, value):
+    """Reflectance as agencies store it: taken as it is, -9999 or a count would go through the chain as reflectance."""
+    path = tmp_path / "theirs.tif"
+    profile = {"driver": "GTiff", "width": 4, "height": 3, "count": 1, "dtype": dtype, "crs": "EPSG:26914"}
+    transform = rasterio.transform.from_origin(705000, 4334100, 30, 30)
+    values = np.full((3, 4), stored, dtype)
+    if nodata is not None:
+        values[0, 0] = nodata
+    with rasterio.open(path, "w", **profile, nodata=nodata, transform=transform) as sink:
+        sink.write(values, 1)
+        sink.scales = [scale]
+    for chunks in (None, {}):
+        found = fifesim.open_image(path, chunks=chunks)
+        assert (found.chunks is not None) == (chunks is not None)
+        np.testing.assert_allclose(found[0, 1], value, rtol=1e-7)
+        assert np.isnan(found[0, 0, 0]) == (nodata is not None)
+        assert "gain" not in found.coords
+
+
+@pytest.mark.parametrize(
+    ("dtype", "attrs", "nodata"),
+    [
+        (np.uint8, {"_FillValue": 220, "scale_factor": 0.1}, 220),
+        (np.int16, {"nodata": -3}, -3),
+        (np.float32, {"_FillValue": -3.0}, -3),
+        (np.float32, {"_FillValue": np.nan}, None),
+        (np.uint8, {"_FillValue": -9999}, None),
+        (np.uint8, {}, None),
+    ],
+)
+def test_what_stands_for_no_data_is_what_the_raster_says(tmp_path, dtype, attrs, nodata):
+    """A mask of zeros and ones has no cell without data."""
+    grid = fifesim.grid_at("EPSG:32614", 705000.0, 4334000.0, 120.0, 90.0, 30.0)
+    values = np.arange(-3, 9).reshape(3, 4).astype(dtype)
+    raster = grids.place(xr.DataArray(values, dims=("y", "x"), name="own", attrs=attrs), grid)
+    path = fifesim.to_geotiff(raster, tmp_path / "own.tif")
+    with rasterio.open(path) as source:
+        # NaN is what fractions have without being asked.
+        assert source.nodata == nodata or np.isnan(attrs["_FillValue"])
+    again = fifesim.open_image(path)
+    assert again.equals(raster)
+    assert again.attrs == {key: value for key, value in attrs.items() if value == value}
+
+
+def test_a_time_comes_back_as_a_time(image, tmp_path):
+    dated = image.assign_coords(time=np.datetime64("1987-06-06T16:35:00", "ns"))
+    xr.testing.assert_identical(fifesim.open_image(fifesim.to_geotiff(dated, tmp_path / "dated.tif")), dated)
+
+
+def test_a_file_is_replaced_only_where_that_is_said(lai, tmp_path):
+    path = fifesim.to_geotiff(lai, tmp_path / "lai.tif")
+    before = path.read_bytes()
+    with pytest.raises(FileExistsError, match=r"there is a file .*lai.tif: type overwrite=True"):
+        fifesim.to_geotiff(lai + 1, path)
+    assert path.read_bytes() == before
+    fifesim.to_geotiff((lai + 1).rename("lai"), path, overwrite=True)
+    np.testing.assert_array_equal(fifesim.open_image(path), lai + 1)
+
+
+def test_tags_of_ones_own_are_written_and_stay_in_the_file(image, tmp_path):
+    path = fifesim.to_geotiff(image, tmp_path / "image.tif", tags={"PROJECT": "trial"})
+    with rasterio.open(path) as source:
+        assert source.tags()["PROJECT"] == "trial"
+    xr.testing.assert_identical(fifesim.open_image(path), image)
+
+
+def test_what_gdal_kept_of_a_replaced_file_goes_with_it(image, tmp_path):
+    """A GIS writes statistics and names of bands beside a file, which would hide those of the new one."""
+    path = fifesim.to_geotiff(image, tmp_path / "image.tif")
+    kept = "<PAMDataset><PAMRasterBand band='1'><Description>stale</Description></PAMRasterBand></PAMDataset>"
+    (tmp_path / "image.tif.aux.xml").write_text(kept)
+    with rasterio.open(path) as source:
+        assert source.descriptions[0] == "stale"
+    fifesim.to_geotiff(image, path, overwrite=True)
+    with rasterio.open(path) as source:
+        assert source.descriptions[0] == str(image["band"].values[0])

@@ -1,0 +1,222 @@
+"""Rasters as people have them, and what is not taken for a reflectance in silence."""
+
+import warnings
+
+import numpy as np
+import pytest
+import rasterio
+import rioxarray
+import xarray as xr
+from lazy import in_chunks, no_compute
+
+import fifesim
+from fifesim.grids import grid as grids
+from fifesim.grids.inputs import check_reflectance, in_micrometres, incoming
+
+AIR, TIME = fifesim.Atmosphere(), "2022-06-03T17:10Z"
+
+
+@pytest.fixture
+def fractions(site):
+    values = np.round(np.random.default_rng(2).uniform(0.02, 0.5, (2, *site.shape)), 4)
+    return grids.place(
+        xr.DataArray(values, dims=("band", "y", "x"), coords={"band": ["B04", "B08"]}, name="mine"), site
+    )
+
+
+def stored(fractions, **attrs):
+    """As an agency stores it: whole numbers, with one cell without data."""
+    whole = np.round(fractions * 10000).astype("int16")
+    whole[:, 3, 4] = -9999
+    return whole.drop_attrs(deep=False).assign_attrs(attrs)
+
+
+def with_hole(fractions):
+    fractions = fractions.copy()
+    fractions[:, 3, 4] = np.nan
+    return fractions
+
+
+@pytest.mark.parametrize("no_data", ["_FillValue", "nodata", "missing_value"])
+def test_whole_numbers_with_their_scale(fractions, no_data, array_type):
+    mine = array_type(stored(fractions, scale_factor=1e-4, add_offset=0.0, **{no_data: -9999}))
+    np.testing.assert_allclose(incoming(mine, "surface_reflectance"), with_hole(fractions), rtol=0, atol=1e-12)
+    surface = mine.fifesim.to_toa(AIR, time=TIME, instrument="Sentinel-2")
+    known = with_hole(fractions).fifesim.to_toa(AIR, time=TIME, instrument="Sentinel-2")
+    np.testing.assert_allclose(surface, known, rtol=0, atol=1e-12)
+    assert surface["band"].values.tolist() == ["MSI4", "MSI8"]
+
+
+def test_an_offset_is_added(site):
+    """As Landsat's Collection 2 stores surface reflectance: 7273 is 0, 43636 is 1."""
+    whole = xr.DataArray(np.full((1, *site.shape), 10909, "uint16"), dims=("band", "y", "x"))
+    mine = grids.place(whole, site).assign_attrs(scale_factor=2.75e-5, add_offset=-0.2)
+    np.testing.assert_allclose(incoming(mine, "surface_reflectance"), 0.0999975, rtol=0, atol=1e-9)
+
+
+def test_raw_digital_numbers_are_no_reflectance(fractions):
+    dn = (fractions * 400).astype("uint8")
+    for verb in (fifesim.to_surface, fifesim.to_toa):
+        with pytest.raises(ValueError, match=r"mine holds whole numbers \(uint8\) without a scale.*calibrate"):
+            verb(dn, AIR, time=TIME, instrument="MSI")
+    for verb in (fifesim.ndvi, fifesim.sense):
+        with pytest.raises(ValueError, match="whole numbers"):
+            verb(dn)
+    with pytest.raises(ValueError, match=r"reflectance of .* it is a fraction"):
+        dn.astype(float).fifesim.to_surface(AIR, time=TIME, instrument="MSI")
+    with pytest.raises(ValueError, match=r"reflectance of -0\.9999.*Mask no data"):
+        (stored(fractions) / 10000).fifesim.to_toa(AIR, time=TIME, instrument="MSI")
+
+
+def test_a_lazy_raster_is_looked_at_when_it_is_computed(fractions):
+    with no_compute():
+        toa = in_chunks(fractions * 100, {"y": 20}).fifesim.to_toa(AIR, time=TIME, instrument="MSI")
+    with pytest.raises(ValueError, match="it is a fraction"):
+        toa.compute()
+
+
+def test_what_can_be_a_reflectance():
+    edge = np.array([-0.5, 5.0, np.nan])
+    assert check_reflectance(edge) is edge
+    for wrong in (-0.51, 5.01, np.inf):
+        with pytest.raises(ValueError, match=r"-0\.5 to 5 is allowed"):
+            check_reflectance(np.array([0.2, wrong]))
+
+
+def test_a_dark_scene_in_percent_is_a_warning():
+    """Below 5 % everywhere, so that no value is impossible; a few bright cells are none."""
+    for percent in (np.linspace(0.9, 4.5, 100), np.append(np.full(40, 0.2), np.full(60, 1.2))):
+        with pytest.warns(UserWarning, match=r"reflectances above 1.*divide them by\s+100"):
+            check_reflectance(percent)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_reflectance(np.append(np.full(60, 0.2), np.full(40, 1.2)))
+
+
+def test_what_has_no_data_is_not_told_another_value(fractions):
+    whole = (fractions * 10000).astype("int16")
+    with pytest.raises(ValueError, match=r"scale_factor=0\.0001\), as"):
+        incoming(whole.assign_attrs(_FillValue=-9999), "surface_reflectance")
+    with pytest.raises(ValueError, match=r"scale_factor=0\.0001, _FillValue=0\), as"):
+        incoming(whole, "surface_reflectance")
+    with pytest.raises(ValueError, match=r"open its file with fifesim\.open_image"):
+        incoming(whole.assign_attrs(FIFESIM="{}"), "surface_reflectance")
+
+
+def test_fractions_that_say_a_scale_are_asked_whether_it_was_applied(fractions):
+    """Arithmetic keeps attributes, so a raster that was divided still says its scale."""
+    with pytest.raises(ValueError, match=r"says scale_factor 0\.0001.*drop them from \.attrs.*mask_and_scale=True"):
+        incoming(fractions.assign_attrs(scale_factor=1e-4), "surface_reflectance")
+    incoming(fractions.assign_attrs(scale_factor=1.0, add_offset=0.0), "surface_reflectance")
+
+
+def test_single_precision_is_kept(fractions):
+    single = fractions.astype("float32")
+    assert incoming(single, "surface_reflectance").dtype == np.float32
+    assert single.fifesim.to_toa(AIR, time=TIME, instrument="MSI").dtype == np.float32
+
+
+def test_a_dataset_of_bands(fractions):
+    dataset = xr.Dataset({name: fractions.sel(band=band, drop=True) for name, band in (("red", "B04"), ("nir", "B08"))})
+    known = fractions.fifesim.to_toa(AIR, time=TIME, instrument="MSI")
+    np.testing.assert_array_equal(dataset.fifesim.to_toa(AIR, time=TIME, instrument="MSI"), known)
+    whole = stored(fractions, scale_factor=1e-4, nodata=-9999)
+    mixed = xr.Dataset({"red": whole.sel(band="B04", drop=True), "nir": fractions.sel(band="B08", drop=True)})
+    np.testing.assert_allclose(incoming(mixed, "surface_reflectance")[1], fractions[1])
+    with pytest.raises(ValueError, match=r"no variables over \(y, x\): sza"):
+        incoming(xr.Dataset({"sza": 3.0}), "surface_reflectance")
+
+
+def test_a_dataset_with_dates(fractions):
+    """As odc.stac.load gives it: a variable for each band over (time, y, x)."""
+    times = np.array(["2022-05-01T17:10", "2022-06-03T17:10"], "M8[ns]")
+    whole = stored(fractions, scale_factor=1e-4, nodata=-9999)
+    dates = xr.concat([whole, whole], dim=xr.DataArray(times, dims="time", name="time"))
+    loaded = xr.Dataset({name: dates.sel(band=band, drop=True) for name, band in (("red", "B04"), ("nir", "B08"))})
+    toa = loaded.fifesim.to_toa(AIR, instrument="MSI")
+    assert toa.dims == ("time", "band", "y", "x") and toa["sza"].dims == ("time",)
+    alone = whole.fifesim.to_toa(AIR, time=times[1], instrument="MSI")
+    np.testing.assert_array_equal(toa[1], alone)
+
+
+def test_a_file_of_rioxarray(fractions, tmp_path):
+    """Bands count from 1 there, and their names are in long_name."""
+    path = tmp_path / "mine.tif"
+    whole = stored(fractions).rio.write_nodata(-9999)
+    whole.rio.to_raster(path)
+    with rasterio.open(path, "r+") as file:
+        file.descriptions, file.scales = ("red", "nir"), (1e-4, 1e-4)
+    known = with_hole(fractions).fifesim.to_toa(AIR, time=TIME, instrument="MSI")
+    for options in ({}, {"chunks": {"y": 20}}, {"mask_and_scale": True}):
+        with rioxarray.open_rasterio(path, **options) as mine:
+            toa = mine.fifesim.to_toa(AIR, time=TIME, instrument="Sentinel-2")
+            np.testing.assert_allclose(toa, known, rtol=0, atol=1e-7)
+            assert toa["band"].values.tolist() == ["MSI4", "MSI8"]
+
+
+@pytest.mark.parametrize("unit", ["nm", "Nanometers"])
+def test_wavelengths_in_nanometres(fractions, unit):
+    there = fractions.drop_vars("band").assign_coords(wavelength=("band", [665.0, 833.0], {"units": unit}))
+    np.testing.assert_allclose(in_micrometres(there)["wavelength"], [0.665, 0.833], rtol=1e-12)
+    here = fractions.drop_vars("band").assign_coords(wavelength=("band", [0.665, 0.833]))
+    np.testing.assert_array_equal(there.fifesim.to_toa(AIR, time=TIME), here.fifesim.to_toa(AIR, time=TIME))
+
+
+def test_wavelengths_that_cannot_be(fractions):
+    with pytest.raises(ValueError, match=r"reaches 833 um.*attrs\['units'\] = 'nm'"):
+        fractions.assign_coords(wavelength=("band", [665.0, 833.0])).fifesim.to_toa(AIR, time=TIME)
+    with pytest.raises(ValueError, match="units 'angstrom': they are to be um or nm"):
+        in_micrometres(fractions.assign_coords(wavelength=("band", [6650.0, 8330.0], {"units": "angstrom"})))
+
+
+def test_names_are_those_of_the_numbers(fractions, tmp_path):
+    """A selection of bands keeps the numbers, and the file's names of all."""
+    path = tmp_path / "six.tif"
+    six = xr.concat([fractions * share for share in (1.0, 0.5, 0.25)], "band").drop_vars("band")
+    six.rio.to_raster(path)
+    names = ("B02", "B03", "B04", "B08", "B11", "B12")
+    with rasterio.open(path, "r+") as file:
+        file.descriptions = names
+    with rioxarray.open_rasterio(path) as mine:
+        for chosen in ([2, 3], [5, 4, 3], [0]):
+            taken = incoming(mine.isel(band=chosen), "surface_reflectance")
+            assert taken["band"].values.tolist() == [names[number] for number in chosen]
+        assert incoming(mine.sel(band=3), "surface_reflectance")["band"].item() == "B04"
+    with rioxarray.open_rasterio(path, band_as_variable=True) as mine:
+        assert incoming(mine, "surface_reflectance")["band"].values.tolist() == list(names)
+
+
+def test_counted_bands_are_no_silent_assumption(fractions):
+    with pytest.warns(UserWarning, match="counts its bands 1 to 2, taken for TM1 to TM2: name them"):
+        fractions.assign_coords(band=[1, 2]).fifesim.to_toa(AIR, time=TIME, instrument="TM")
+
+
+def test_a_dataset_says_its_scale_once(fractions):
+    """As `ds.assign_attrs` puts it, where the message says what to type."""
+    whole = stored(fractions)
+    dataset = xr.Dataset({"red": whole.sel(band="B04", drop=True), "nir": whole.sel(band="B08", drop=True)})
+    taken = incoming(dataset.assign_attrs(scale_factor=1e-4, nodata=-9999), "surface_reflectance")
+    np.testing.assert_allclose(taken, with_hole(fractions), rtol=0, atol=1e-12)
+
+
+def test_no_data_that_nobody_marks_is_told(fractions):
+    """Digital number 0 of Landsat's Level 2 would be a reflectance of -0.2."""
+    mine = stored(fractions.fillna(0), scale_factor=2.75e-5, add_offset=-0.2)
+    with pytest.warns(UserWarning, match=r"no value for cells without data.*_FillValue=0"):
+        incoming(mine, "surface_reflectance")
+
+
+def test_ndvi_of_red_and_nir_by_name(fractions):
+    named = fractions.assign_coords(band=["red", "nir"])
+    expected = (fractions[1] - fractions[0]) / (fractions[1] + fractions[0])
+    np.testing.assert_allclose(named.fifesim.ndvi(), expected, rtol=1e-12)
+
+
+def test_bands_of_another_instrument_are_no_silent_assumption(lai):
+    toa = lai.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"]).fifesim.to_toa()
+    with pytest.warns(UserWarning, match=r"MSI4, MSI8 of MSI are taken for TM3, TM4 of TM.*adjust_bands\('TM'\)"):
+        toa.fifesim.sense("TM")
+    rho = lai.fifesim.surface_reflectance("MSI", bands=["MSI4", "MSI8"])
+    with pytest.warns(UserWarning, match="are taken for TM3, TM4"):
+        as_tm = rho.fifesim.to_toa(instrument="TM")
+    assert as_tm["band"].values.tolist() == ["TM3", "TM4"] and as_tm.attrs["instrument"] == "TM"

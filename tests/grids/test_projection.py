@@ -1,0 +1,131 @@
+"""Coordinate operations of known accuracy."""
+
+import warnings
+
+import numpy as np
+import odc.geo.xr  # noqa: F401  registers .odc
+import pyproj
+import pytest
+
+from fifesim.grids import projection, sites
+from fifesim.grids.grid import check_grid, grid_at
+
+FIFE = (-96.63, 38.98, -96.45, 39.13)
+
+
+def test_nad27_goes_to_nad83_by_a_route_of_known_accuracy():
+    """
+    FIFE's corner by the NADCON grids is 704968 E 4334211 N.
+
+    Two Helmert operations to WGS 84 (EPSG:1173, of metres) stand in for them and are 2 m off at most there.
+    """
+    pipeline, accuracy = projection.operation("EPSG:26714", "EPSG:26914", FIFE)
+    east, north = pyproj.Transformer.from_pipeline(pipeline).transform(705000.0, 4334000.0)
+    assert np.hypot(east - 704968, north - 4334211) < 2.0
+    assert 0 < accuracy <= 15
+
+
+def test_direct_operation_would_be_a_ballpark_a_pixel_off():
+    """Without grid files PROJ's own choice passes latitude and longitude unchanged, and says so nowhere but here."""
+    direct = pyproj.transformer.TransformerGroup(26714, 26914).transformers[0]
+    if "Ballpark" not in direct.description:
+        pytest.skip("PROJ has its grid files here")
+    east, north = direct.transform(705000.0, 4334000.0)
+    assert 25 < np.hypot(east - 704968, north - 4334211) < 35
+    pipeline, _ = projection.operation("EPSG:26714", "EPSG:26914", FIFE)
+    assert "helmert" in pipeline
+
+
+def test_operation_runs_in_both_directions():
+    forth, _ = projection.operation("EPSG:26714", "EPSG:26914", FIFE)
+    back, _ = projection.operation("EPSG:26914", "EPSG:26714", FIFE)
+    there = pyproj.Transformer.from_pipeline(forth).transform(705000.0, 4334000.0)
+    again = pyproj.Transformer.from_pipeline(back).transform(*there)
+    np.testing.assert_allclose(again, (705000.0, 4334000.0), rtol=0, atol=1e-3)
+
+
+def test_same_crs_needs_no_operation():
+    assert projection.operation("EPSG:26914", pyproj.CRS("EPSG:26914").to_wkt()) == (None, 0.0)
+
+
+def test_convergence_of_a_utm_zone_is_positive_east_of_its_meridian():
+    """Sine of the latitude times the distance from the central meridian."""
+    expected = np.sin(np.radians(39.06)) * (99 - 96.54)
+    assert projection.convergence(sites.fife_site(30)) == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:3031", "EPSG:3413", "EPSG:5041", "EPSG:5042", "EPSG:32661", "EPSG:26914"])
+def test_points_are_carried_easting_first(crs):
+    """Both axes of a polar CRS lead north, or both south, and some give northing first."""
+    latitude = -72.0 if crs in ("EPSG:3031", "EPSG:5042") else 72.0
+    pipeline, _ = projection.operation(crs, "EPSG:4326")
+    expected = pyproj.Transformer.from_crs(4326, crs, always_xy=True).transform(-95.0, latitude)
+    back = projection.carry(pipeline, crs, "EPSG:4326", *expected)
+    np.testing.assert_allclose(back, (-95.0, latitude), rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize(("crs", "latitude"), [("EPSG:3031", -72.0), ("EPSG:3413", 71.0), ("EPSG:5041", 85.0)])
+def test_convergence_of_a_polar_grid_is_where_true_north_is(crs, latitude):
+    """Brute force: a step toward the pole, as the grid sees it."""
+    to_plane = pyproj.Transformer.from_crs(4326, crs, always_xy=True)
+    (west, north), (x, y) = to_plane.transform(30.0, latitude), to_plane.transform(30.0, latitude + 1e-4)
+    grid = grid_at(crs, west - 50, north + 50, 100, 100, 10)
+    east_of_grid_north = np.degrees(np.arctan2(x - west, y - north))
+    assert projection.convergence(grid) == pytest.approx(-east_of_grid_north, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("crs", "west", "north", "said"),
+    [
+        ("EPSG:3031", 0.0, 3.5e6, "scale of EPSG:3031 is 1.050 .* such as EPSG:32731"),
+        ("EPSG:3413", 0.0, -3.5e6, "scale of EPSG:3413 is 1.047 .* such as EPSG:32623"),
+        ("EPSG:3857", -10.75e6, 4.7e6, "scale of EPSG:3857 is 1.284 .* such as EPSG:32614"),
+        ("EPSG:3857", 17e6, -4.7e6, "such as EPSG:32756"),
+        ("EPSG:6933", -9.26e6, 4.6e6, "scale of EPSG:6933 is 1.1"),
+        ("EPSG:3857", 1e8, 0.0, r"west = 100000000, north = 0: the grid lies outside .* -20037508 to 20037508 E"),
+        ("EPSG:26914", float("nan"), 4e6, "outside of the area of EPSG:26914"),
+        ("EPSG:2053", 0.0, 0.0, "axes of the CRS must lead east and north, those of EPSG:2053 lead"),
+        ("EPSG:2277", 0.0, 0.0, "must be in metres, EPSG:2277 is in US survey foot"),
+        ("EPSG:4978", 0.0, 0.0, "must be projected, EPSG:4978 is not"),
+        ("EPSG:5703", 0.0, 0.0, "must be projected"),
+        ("", 0.0, 0.0, "crs = '': PROJ knows no such"),
+        ("[" * 10_000, 0.0, 0.0, "PROJ knows no such"),
+        (None, 0.0, 0.0, "crs = None: PROJ knows no such"),
+    ],
+)
+def test_coordinates_that_are_no_metres_on_the_ground_are_refused(crs, west, north, said):
+    with pytest.raises(ValueError, match=said) as caught:
+        grid_at(crs, west, north, 90.0, 90.0, 10.0)
+    assert len(str(caught.value)) < 300 and str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("crs", "west", "north"),
+    [
+        *(("EPSG:3031", 0.0, 0.0), ("EPSG:3413", 0.0, -2e6), ("EPSG:5042", 2e6, 2e6), ("EPSG:32661", 2e6, 2e6)),
+        *(("EPSG:3857", -10.75e6, 0.0), ("EPSG:3035", 4.3e6, 3.2e6), ("EPSG:2193", 1.6e6, 5.2e6)),
+        # Longitude from Paris and from Ferro.
+        *(("EPSG:27572", 6e5, 2.2e6), ("EPSG:31281", 12674.0, 5206730.0)),
+    ],
+)
+def test_any_projection_that_keeps_distances_is_taken(crs, west, north):
+    grid = grid_at(crs, west, north, 90.0, 90.0, 10.0)
+    assert (grid.affine.c, grid.affine.f) == (west, north)
+
+
+def test_heights_are_left_out():
+    assert projection.horizontal("EPSG:26914+5703") == "EPSG:26914"
+    assert projection.horizontal(pyproj.CRS("EPSG:7415").to_wkt()) == "EPSG:28992"
+    assert projection.horizontal("EPSG:26914") == "EPSG:26914"
+
+
+def test_a_scale_beyond_a_percent_is_told_once_for_a_place():
+    """Web Mercator stretches by the secant of the latitude; 8 degrees from the equator, by 1 %."""
+    mercator = {"crs": "EPSG:3857", "width": 300.0, "height": 300.0, "cell": 30.0}
+    with pytest.warns(UserWarning, match=r"of EPSG:3857 is 1.02 near .* 30 m is 29.\d m on the ground.*EPSG:32735"):
+        grid = grid_at(west=28.2e5 * 1.113, north=-1.2e6, **mercator)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        grid_at(west=28.2e5 * 1.113 + 30, north=-1.2e6, **mercator)
+        check_grid(grid)
+        grid_at(west=28.2e5 * 1.113, north=-0.5e6, **mercator)

@@ -1,0 +1,240 @@
+"""Files onto grids: operations of known accuracy, and the same numbers as an interpolation by another route."""
+
+import numpy as np
+import pyproj
+import pytest
+import rasterio
+import rioxarray
+import xarray as xr
+from affine import Affine
+from lazy import check_place, no_compute
+from odc.geo.geobox import GeoBox
+from scipy.interpolate import RegularGridInterpolator
+
+import fifesim
+from fifesim.grids import grid as grids
+from fifesim.grids import projection, warp
+
+FIFE = (-96.63, 38.98, -96.45, 39.13)
+GRID = fifesim.fife_site(10.0, window=((300, 400), (500, 620)))
+
+
+def write(path, values, affine, crs, nodata=-999.0, dtype="float64"):
+    with rasterio.open(
+        path, "w", driver="GTiff", height=values.shape[0], width=values.shape[1], count=1, dtype=dtype, crs=crs,
+        transform=affine, nodata=nodata,
+    ) as sink:  # fmt: skip
+        sink.write(np.where(np.isnan(values), nodata, values).astype(dtype), 1)
+    return path
+
+
+def hills(rows, columns):
+    """Smooth on the scale of a file's cells, and different everywhere."""
+    i, j = np.arange(rows)[:, None], np.arange(columns)
+    return 2 + np.sin(i / 5) + 0.5 * np.cos(j / 7 + i / 11)
+
+
+def geographic(path, values=None, crs="EPSG:4326", cell=0.0002):
+    """A file in degrees around the grid's place, cells of about 20 m."""
+    west, north = -96.6, 39.12
+    values = hills(500, 500) if values is None else values
+    return write(path, values, Affine(cell, 0, west, 0, -cell, north), crs), values
+
+
+def interpolated(path, values, grid, transform):
+    """Bilinear interpolation between the file's cell centres, at the grid's cell centres. NaN beyond the centres."""
+    with rasterio.open(path) as source:
+        affine = source.transform
+    rows, columns = np.arange(values.shape[0]) + 0.5, np.arange(values.shape[1]) + 0.5
+    place = grids.coordinates(grid)
+    x, y = np.meshgrid(place["x"].values, place["y"].values)
+    x, y = transform(x, y)
+    column, row = ~affine * (x, y)
+    return RegularGridInterpolator((rows, columns), values, bounds_error=False)((row, column))
+
+
+UNKNOWN = "+proj=utm +zone=14 +ellps=clrk66 +units=m +no_defs"
+
+
+def test_unknown_datum_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"no operation of known accuracy.*EPSG:26914.*ballpark.*projsync"):
+        projection.operation(UNKNOWN, "EPSG:26914", FIFE)
+    path = write(tmp_path / "lai.tif", hills(400, 400), Affine(10, 0, 709000, 0, -10, 4332000), UNKNOWN)
+    with pytest.raises(ValueError, match="no operation of known accuracy"):
+        fifesim.open_lai(path, GRID)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:4269"])
+def test_degrees_onto_metres_is_bilinear_interpolation(tmp_path, crs):
+    """
+    The warper's rows are straight over 32 cells: 320 m on the ellipsoid sag by 2 mm, 1e-4 of a file's cell.
+
+    The values change by 0.3 a cell at most.
+    """
+    path, values = geographic(tmp_path / "lai.tif", crs=crs)
+    found = warp.file_onto_grid(path, GRID)
+    pipeline, _ = projection.operation("EPSG:26914", crs, FIFE)
+
+    def to_degrees(x, y):
+        latitude, longitude = pyproj.Transformer.from_pipeline(pipeline).transform(x, y)
+        return longitude, latitude
+
+    expected = interpolated(path, values, GRID, to_degrees)
+    assert np.isfinite(expected).all()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=3e-5)
+    check_place(found, GRID.crs)
+
+
+@pytest.mark.parametrize("cell, shift", [(30.0, 0.0), (30.0, 11.3), (10.0, 3.3)])
+def test_metres_onto_metres_is_bilinear_interpolation(tmp_path, cell, shift):
+    affine = Affine(cell, 0, 709000 + shift, 0, -cell, 4332000 - shift)
+    values = hills(*(np.array([4000, 4000]) // cell).astype(int))
+    path = write(tmp_path / "lai.tif", values, affine, "EPSG:26914")
+    expected = interpolated(path, values, GRID, lambda x, y: (x, y))
+    np.testing.assert_allclose(warp.file_onto_grid(path, GRID), expected, rtol=0, atol=1e-6)
+
+
+def test_file_on_the_grid_is_read_as_it_is(tmp_path):
+    values = hills(100, 120)
+    path = write(tmp_path / "lai.tif", values, GRID.affine, "EPSG:26914")
+    np.testing.assert_array_equal(warp.file_onto_grid(path, GRID), values)
+
+
+def test_larger_cells_hold_means(tmp_path):
+    values = np.random.default_rng(0).random((500, 600))
+    path = write(tmp_path / "lai.tif", values, GRID.affine * Affine.scale(0.2), "EPSG:26914")
+    means = values.reshape(100, 5, 120, 5).mean(axis=(1, 3))
+    np.testing.assert_allclose(warp.file_onto_grid(path, GRID), means, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:26914"])
+def test_chunks_and_windows_change_nothing(tmp_path, crs):
+    grid = fifesim.fife_site(5.0, window=((600, 1300), (1000, 1700)))
+    if crs == "EPSG:4326":
+        path, _ = geographic(tmp_path / "lai.tif")
+    else:
+        path = write(tmp_path / "lai.tif", hills(300, 300), Affine(17, 0, 709003, 0, -17, 4332000), crs)
+    whole = warp.file_onto_grid(path, grid)
+    assert np.isfinite(whole).any()
+    for chunks in ("auto", 333, {"y": 101, "x": 700}):
+        with no_compute():
+            lazy = warp.file_onto_grid(path, grid, chunks)
+        assert lazy.chunks is not None
+        xr.testing.assert_identical(lazy.compute(), whole)
+    part = warp.file_onto_grid(path, grid[200:420, 10:600])
+    xr.testing.assert_identical(part, whole[200:420, 10:600].assign_coords(spatial_ref=part["spatial_ref"]))
+
+
+@pytest.mark.parametrize("dtype, nodata", [("float32", -999.0), ("float64", np.nan), ("int16", -1)])
+def test_no_data_stay_no_data(tmp_path, dtype, nodata):
+    """And do not leak into their neighbours as numbers."""
+    values = np.full((400, 400), 3.0)
+    values[150:170, 200:260] = np.nan
+    affine = Affine(10, 0, GRID.affine.c - 1400, 0, -10, GRID.affine.f + 1200)
+    path = write(tmp_path / "lai.tif", values, affine, "EPSG:26914", nodata, dtype)
+    expected = values[120:220, 140:260]
+    np.testing.assert_array_equal(warp.file_onto_grid(path, GRID), expected)
+    finer = warp.file_onto_grid(path, fifesim.fife_site(4.0, window=((750, 1000), (1250, 1550))))
+    np.testing.assert_allclose(finer.values[np.isfinite(finer)], 3.0, rtol=1e-14)
+    assert np.isnan(finer[90, 200]) and np.isfinite(finer[10, 10])
+
+
+def test_cells_beyond_the_file_are_missing(tmp_path):
+    affine = Affine(10, 0, GRID.affine.c + 300, 0, -10, GRID.affine.f - 400)
+    path = write(tmp_path / "lai.tif", hills(400, 400), affine, "EPSG:26914")
+    found = warp.file_onto_grid(path, GRID)
+    assert np.isnan(found[:40]).all() and np.isnan(found[:, :30]).all()
+    assert np.isfinite(found[40:, 30:]).all()
+
+
+def test_nad27_file_lands_where_it_belongs(tmp_path):
+    """A bright square at a known place in NAD27 is found there, not a TM pixel away."""
+    values = np.zeros((400, 400))
+    values[200:210, 200:210] = 1.0
+    path = write(tmp_path / "lai.tif", values, Affine(10, 0, 709000, 0, -10, 4332000), "EPSG:26714")
+    pipeline, _ = projection.operation("EPSG:26714", "EPSG:26914", FIFE)
+    east, north = pyproj.Transformer.from_pipeline(pipeline).transform(711050.0, 4329950.0)
+    grid = fifesim.grid_at("EPSG:26914", 710700.0, 4330600.0, 800.0, 800.0, 2.0)
+    found = warp.file_onto_grid(path, grid)
+    assert float((found * found["x"]).sum() / found.sum()) == pytest.approx(east, abs=0.5)
+    assert float((found * found["y"]).sum() / found.sum()) == pytest.approx(north, abs=0.5)
+
+
+def test_files_that_cannot_be_used_are_named(tmp_path):
+    with pytest.raises(ValueError, match=r"cannot read .*missing\.tif as a raster: no raster file is there"):
+        fifesim.open_lai(tmp_path / "missing.tif", GRID)
+    text = tmp_path / "text.tif"
+    text.write_text("no raster")
+    with pytest.raises(ValueError, match=r"cannot read .*text\.tif as a raster"):
+        fifesim.open_lai(text, GRID)
+    nowhere = write(tmp_path / "nowhere.tif", hills(40, 40), GRID.affine, None)
+    with pytest.raises(ValueError, match=r"nowhere\.tif has no CRS.*gdal_edit"):
+        fifesim.open_lai(nowhere, GRID)
+    away = write(tmp_path / "away.tif", hills(40, 40), Affine(10, 0, 600000, 0, -10, 4332000), "EPSG:26914")
+    with pytest.raises(ValueError, match=r"away\.tif does not overlap the grid, which spans"):
+        fifesim.open_lai(away, GRID)
+
+
+def test_grids_whose_cells_are_no_metres_are_refused(tmp_path):
+    path = write(tmp_path / "hills.tif", hills(40, 40), GRID.affine, "EPSG:26914")
+    degrees = GeoBox((9, 9), Affine(0.001, 0, -97, 0, -0.001, 39), "EPSG:4326")
+    for bring, raster in ((warp.file_onto_grid, path), (warp.raster_onto_grid, fifesim.open_lai(path, GRID))):
+        with pytest.raises(ValueError, match="the grid is in a geographic CRS"):
+            bring(raster, degrees)
+
+
+@pytest.mark.parametrize("times", [8, 40])
+def test_far_finer_files_are_averaged_block_by_block(tmp_path, times):
+    """Means are exact, and the same in every window and chunk; a whole tile of the file is never read."""
+    grid = fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 400.0, 360.0, 10.0)
+    values = np.random.default_rng(0).random((36 * times, 40 * times)).astype("float32")
+    path = write(tmp_path / "fine.tif", values, grid.affine * Affine.scale(1 / times), "EPSG:26914", dtype="float32")
+    means = values.astype(float).reshape(36, times, 40, times).mean(axis=(1, 3))
+    whole = warp.file_onto_grid(path, grid)
+    np.testing.assert_allclose(whole, means, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(warp.file_onto_grid(path, grid[7:29, 11:30]), whole[7:29, 11:30])
+    np.testing.assert_array_equal(warp.file_onto_grid(path, grid, chunks=13), whole)
+
+
+def test_blocks_read_no_more_than_so_many_cells():
+    assert warp._block_size(warp._MUCH_FINER) == warp._TILE
+    assert [warp._block_size(cells) for cells in (7, 64, 65, 2048, 1e6, np.nan)] == [32, 32, 16, 1, 1, 32]
+
+
+def test_a_cell_of_too_many_is_refused(tmp_path):
+    path = tmp_path / "finest.tif"
+    profile = {"driver": "GTiff", "width": 100_000, "height": 100_000, "count": 1, "dtype": "uint8", "sparse_ok": True}
+    profile |= {"tiled": True, "blockxsize": 8192, "blockysize": 8192, "crs": "EPSG:26914"}
+    with rasterio.open(path, "w", **profile, transform=Affine(0.01, 0, 708000, 0, -0.01, 4332000)):
+        pass
+    with pytest.raises(ValueError, match=r"finest\.tif is far finer than the cells.*gdalwarp -r average -tr"):
+        fifesim.open_lai(path, fifesim.grid_at("EPSG:26914", 708000.0, 4332000.0, 900.0, 900.0, 300.0))
+
+
+@pytest.mark.parametrize("south_up", [False, True])
+@pytest.mark.parametrize("kind", ["same", "coarser", "degrees"])
+def test_an_array_comes_onto_a_grid_as_its_file_does(tmp_path, kind, south_up):
+    """In memory and lazy, under any chunks of either, to the bit."""
+    if kind == "degrees":
+        path, _ = geographic(tmp_path / "lai.tif")
+    else:
+        cell = 10 if kind == "same" else 33
+        path = write(tmp_path / "lai.tif", hills(120, 130), Affine(cell, 0, 709450, 0, -cell, 4331500), "EPSG:26914")
+    raster = xr.DataArray(rioxarray.open_rasterio(path, masked=True))
+    raster = raster.isel(y=slice(None, None, -1)) if south_up else raster
+    whole = warp.file_onto_grid(path, GRID)
+    assert np.isfinite(whole).mean() > 0.3
+    tolerance = {"rtol": 0, "atol": 1e-9 if south_up else 0}
+    found = warp.raster_onto_grid(raster.squeeze("band"), GRID)
+    np.testing.assert_allclose(found, whole, **tolerance)
+    with no_compute():
+        lazy = warp.raster_onto_grid(raster.squeeze("band").chunk({"y": 50, "x": 70}), GRID, {"y": 33, "x": 41})
+    np.testing.assert_array_equal(lazy.compute(scheduler="synchronous"), found)
+    check_place(lazy, GRID.crs)
+
+
+def test_an_array_elsewhere_says_where_it_lies():
+    away = xr.DataArray(np.ones((4, 4)), dims=("y", "x"), name="mine")
+    grid = fifesim.grid_at("EPSG:32735", 620000.0, 7220000.0, 40.0, 40.0, 10.0)
+    with pytest.raises(ValueError, match=r"mine does not overlap .* it spans 620000 to 620040 E .*\(latitude -25.13, "):
+        warp.raster_onto_grid(grids.place(away, grid), GRID)
