@@ -13,6 +13,9 @@ from fifesim.base.arguments import described
 from fifesim.base.caches import cached
 from fifesim.base.messages import closest
 
+DEGREE = math.pi / 180
+"""One degree [radian]; unlike numpy.radians it takes complex angles, for derivatives."""
+
 
 @dataclass(frozen=True)
 class LeafAngles:
@@ -279,9 +282,9 @@ def azimuth_limit(inclination, zenith):
     ----------
     [Verhoef1984]_
     """
-    inclination, zenith = np.radians(inclination), np.radians(zenith)
-    cosines = np.cos(inclination) * np.cos(zenith)
-    sines = np.sin(inclination) * np.sin(zenith)
+    tilt, slant = np.multiply(inclination, DEGREE), np.multiply(zenith, DEGREE)
+    cosines = np.cos(tilt) * np.cos(slant)
+    sines = np.sin(tilt) * np.sin(slant)
     turns = sines > cosines
     ratio = np.where(turns, cosines / np.where(turns, sines, 1), 1)
     return np.arccos(-ratio), cosines, sines

@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from fifesim.base.geometry import relative_azimuth
-from fifesim.ground.canopy.leaf_angles import azimuth_limit, leaf_angle_classes, leaf_projection
+from fifesim.ground.canopy.leaf_angles import DEGREE, azimuth_limit, leaf_angle_classes, leaf_projection
 
 
 class Surface(NamedTuple):
@@ -54,7 +54,7 @@ def with_background(canopy, background):
     >>> float(with_background(sail(0.0, 0.1, 0.1, sza=30), 0.15).rso)
     0.15
     """
-    c, r = canopy, np.asarray(background, float)
+    c, r = canopy, _numbers(background)
     returned = r / (1 - r * c.rdd_below)
     sun_down, to_observer = c.tss + c.tsd, c.too + c.tdo
     return Surface(
@@ -134,9 +134,10 @@ def reflectance_factor(rso, rdo, diffuse_fraction):
 
 def direction_distance(sza, vza, raa):
     """Distance between two directions on a horizontal plane one unit below, 0 in the hot spot. [1]"""
-    tan_s, tan_v = np.tan(np.radians(sza)), np.tan(np.radians(vza))
+    sza, vza, raa = (np.multiply(angle, DEGREE) for angle in (sza, vza, raa))
+    tan_s, tan_v = np.tan(sza), np.tan(vza)
     # Without cancellation near the hot spot.
-    chord = 4 * tan_s * tan_v * np.sin(np.radians(raa) / 2) ** 2
+    chord = 4 * tan_s * tan_v * np.sin(raa / 2) ** 2
     return np.sqrt((tan_s - tan_v) ** 2 + chord)
 
 
@@ -203,20 +204,36 @@ def bidirectional_gap(lai, ks, ko, alpha):
     ----------
     [Kuusk1991]_
     """
-    extinction, kappa = ks + ko, np.sqrt(ks * ko)
-    finite = np.where((alpha > 0) & (alpha < np.inf), alpha, 1)
-    overlap = np.where(alpha > 0, np.where(alpha < np.inf, -np.expm1(-finite) / finite, 0), 1)
-    tsstoo = np.exp(-(extinction - kappa * overlap) * lai)
-    shade = np.exp(-alpha)
-    term, below = np.broadcast_arrays(1.0, tsstoo)
-    total = term - below
-    for n in range(1, 57):
+    shape, flat = _flat(lai, ks, ko, alpha)
+    gaps = np.empty((2, flat.shape[1]), flat.dtype)
+    _gaps(*flat, gaps)
+    tsstoo, seen = gaps.reshape(2, *shape)
+    return tsstoo[()], seen[()]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _gaps(lai, ks, ko, alpha, gaps):
+    """Gap fraction of both beams, and its integral, for each cell."""
+    for cell in range(lai.size):
+        depth, decay = lai[cell], alpha[cell]
+        extinction, kappa = ks[cell] + ko[cell], np.sqrt(ks[cell] * ko[cell])
+        if decay.real == np.inf:
+            through = np.exp(-extinction * depth)
+            gaps[0, cell], gaps[1, cell] = through, _of_two(depth, extinction, 0 * extinction, through, 1 + 0 * through)
+            continue
+        shade = np.exp(-decay)
+        overlap = _of_two(1 + 0 * decay, decay, 0 * decay, shade, 1 + 0 * shade)
+        through = np.exp(-(extinction - kappa * overlap) * depth)
         # At zero depth in the exact hot spot 0 / 0 stands for a term that does not count.
-        rate = extinction * lai + n * alpha
-        ratio = kappa * lai / np.where(rate > 0, rate, 1)
-        term, below = term * ratio, below * ratio * shade
-        total = total + (term - below)
-    return tsstoo, total / extinction
+        term, below = 1 + 0 * through, through
+        total, n = term - below, 0
+        while n < 56 and abs(term) > 1e-18:
+            n += 1
+            rate = extinction * depth + n * decay
+            ratio = kappa * depth / rate if rate.real > 0 else 0 * rate
+            term, below = term * ratio, below * ratio * shade
+            total += term - below
+        gaps[0, cell], gaps[1, cell] = through, total / extinction
 
 
 # The Taylor series takes over below this spread of exponents; recursion loses no more than a digit above it.
@@ -262,27 +279,33 @@ def exponential_chain(lai, *rates):
     >>> float(exponential_chain(3.0, 0.0, 0.0, 0.0))
     4.5
     """
-    given = [np.asarray(each, float) for each in (lai, *rates)]
-    flat = np.empty((len(given), *np.broadcast_shapes(*(each.shape for each in given))))
-    for number, each in enumerate(given):
-        flat[number] = each
-    shape, flat = flat.shape[1:], flat.reshape(len(given), -1)
-    chains = np.empty(flat.shape[1])
+    shape, flat = _flat(lai, *rates)
+    chains = np.empty(flat.shape[1], flat.dtype)
     _chains(flat[0], flat[1:], chains)
     return chains.reshape(shape)[()]
+
+
+def _flat(*given):
+    """Common shape of some arguments, and their values as rows of one array."""
+    given = [np.asarray(each) for each in given]
+    shape = np.broadcast_shapes(*(each.shape for each in given))
+    flat = np.empty((len(given), *shape), np.result_type(float, *given))
+    for number, each in enumerate(given):
+        flat[number] = each
+    return shape, flat.reshape(len(given), -1)
 
 
 @numba.njit(nogil=True, cache=True)
 def _chains(lai, rates, chains):
     """Divided differences of the exponential over all exponents of each cell, times a power of the depth."""
     count = rates.shape[0]
-    x, difference, homogeneous = np.empty(count), np.empty(count), np.empty(count)
+    x, difference, homogeneous = np.empty_like(rates[:, 0]), np.empty_like(rates[:, 0]), np.empty_like(rates[:, 0])
     for cell in range(lai.size):
         _sort_exponents(lai[cell], rates[:, cell], x)
-        if math.isnan(x[0]):
+        if np.isnan(x[0]):
             chains[cell] = math.nan
             continue
-        if x[-1] - x[0] < _SPREAD:
+        if (x[-1] - x[0]).real < _SPREAD:
             difference[0] = _series(x, 0, count, homogeneous)
         else:
             _recursion(x, difference, homogeneous)
@@ -294,11 +317,11 @@ def _sort_exponents(lai, rates, x):
     """Sort the exponents by insertion, NaN first; the recursion divides by the widest difference."""
     for i in range(x.size):
         exponent = -rates[i] * lai
-        if math.isnan(exponent):
+        if np.isnan(exponent):
             x[0] = math.nan
             return
         j = i
-        while j > 0 and x[j - 1] > exponent:
+        while j > 0 and x[j - 1].real > exponent.real:
             x[j] = x[j - 1]
             j -= 1
         x[j] = exponent
@@ -312,7 +335,7 @@ def _recursion(x, difference, homogeneous):
     for order in range(1, x.size):
         for i in range(x.size - order):
             spread = x[i + order] - x[i]
-            if spread < _SPREAD:
+            if spread.real < _SPREAD:
                 difference[i] = _series(x, i, order + 1, homogeneous)
             else:
                 difference[i] = (difference[i + 1] - difference[i]) / spread
@@ -327,14 +350,14 @@ def _series(x, start, count, homogeneous):
     factorial = 1.0
     for n in range(2, count):
         factorial *= n
-    total = 1 / factorial
+    total = homogeneous[0] / factorial
     for n in range(1, _TERMS):
         factorial *= n + count - 1
         homogeneous[0] *= x[start] - centre
         for j in range(1, count):
             homogeneous[j] = homogeneous[j - 1] + (x[start + j] - centre) * homogeneous[j]
         total += homogeneous[count - 1] / factorial
-    return math.exp(centre) * total
+    return np.exp(centre) * total
 
 
 class CanopyLayer(NamedTuple):
@@ -421,14 +444,18 @@ def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, le
     >>> float(round(canopy.rsd + canopy.tsd + canopy.tss, 12))
     1.0
     """
-    lai = np.asarray(lai, float)
-    rho, tau = np.asarray(leaf_reflectance, float), np.asarray(leaf_transmittance, float)
+    lai, rho, tau = _numbers(lai), _numbers(leaf_reflectance), _numbers(leaf_transmittance)
     raa = relative_azimuth(raa, 0.0)
     c = leaf_scattering(rho, tau, sza, vza, raa, leaf_angle_classes(leaf_angles))
-    alpha = hotspot_decay(sza, vza, raa, c.ks + c.ko, np.asarray(hotspot, float))
+    alpha = hotspot_decay(sza, vza, raa, c.ks + c.ko, _numbers(hotspot))
     tsstoo, sunlit_and_seen = bidirectional_gap(lai, c.ks, c.ko, alpha)
     layer = scattered_again(lai, c)
     return layer._replace(rso=c.w * sunlit_and_seen + layer.rso, tsstoo=tsstoo)
+
+
+def _numbers(values):
+    """Values as an array of floating-point numbers; complex ones, whose imaginary part is a derivative, stay."""
+    return np.asarray(values, complex if np.iscomplexobj(values) else float)
 
 
 def scattered_again(lai, c):
@@ -450,23 +477,13 @@ def scattered_again(lai, c):
     ----------
     [Verhoef1984]_; [Verhoef2007]_
     """
-    # sinh(m L) / m and A(L) of a slab, both times e^(-m L).
-    sinh = exponential_chain(lai, 2 * c.m, 0.0)
-    slab = np.exp(-2 * c.m * lai) + (c.a + c.m) * sinh
-    tss, too, rdd = np.exp(-c.ks * lai), np.exp(-c.ko * lai), c.sigma * sinh / slab
-    return CanopyLayer(
-        rso=_multiple_scattering(lai, c) / slab,
-        rdo=_turned_back(lai, c, c.ko, c.vf, c.vb) / slab,
-        rsd=_turned_back(lai, c, c.ks, c.sf, c.sb) / slab,
-        rdd=rdd,
-        tss=tss,
-        too=too,
-        tsd=_passed_on(lai, c, c.ks, c.sf, c.sb) / slab,
-        tdo=_passed_on(lai, c, c.ko, c.vf, c.vb) / slab,
-        tdd=np.exp(-c.m * lai) / slab,
-        tsstoo=tss * too,
-        rdd_below=rdd,
-    )
+    shape, flat = _flat(lai, c.ks, c.ko, c.a, c.sigma, c.m, c.sf, c.sb, c.vf, c.vb)
+    out = np.empty((9, flat.shape[1]), flat.dtype)
+    nearly_vertical = _slabs(*flat, out)
+    if nearly_vertical.any():
+        out[:, nearly_vertical] = _by_chains(*flat[:, nearly_vertical])
+    rso, rdo, rsd, rdd, tss, too, tsd, tdo, tdd = (each[()] for each in out.reshape(9, *shape))
+    return CanopyLayer(rso, rdo, rsd, rdd, tss, too, tsd, tdo, tdd, tss * too, rdd)
 
 
 def leaf_scattering(rho, tau, sza, vza, raa, leaf_angles):
@@ -490,14 +507,8 @@ def leaf_scattering(rho, tau, sza, vza, raa, leaf_angles):
     ----------
     [Verhoef1984]_
     """
-    inclination, fraction = np.asarray(leaf_angles.inclination), np.asarray(leaf_angles.fraction)
-    sza, vza, raa = (np.asarray(angle, float)[..., None] for angle in (sza, vza, raa))
-    mu_s, mu_v = np.cos(np.radians(sza)), np.cos(np.radians(vza))
-    ks = _over_leaves(leaf_projection(inclination, sza) / mu_s, fraction)
-    ko = _over_leaves(leaf_projection(inclination, vza) / mu_v, fraction)
-    bf = np.cos(np.radians(inclination)) ** 2 @ fraction
-    reflected, transmitted = volume_scattering(inclination, sza, vza, raa)
-    scattered = [_over_leaves(phase / (mu_s * mu_v), fraction) for phase in (reflected, transmitted)]
+    sums = leaf_angle_sums(sza, vza, raa, leaf_angles)
+    ks, ko, bf = sums.ks, sums.ko, sums.bf
     sigma = ((1 + bf) * rho + (1 - bf) * tau) / 2
     absorbed = 1 - rho - tau
     return LeafScattering(
@@ -511,13 +522,37 @@ def leaf_scattering(rho, tau, sza, vza, raa, leaf_angles):
         sb=((ks + bf) * rho + (ks - bf) * tau) / 2,
         vf=((ko - bf) * rho + (ko + bf) * tau) / 2,
         vb=((ko + bf) * rho + (ko - bf) * tau) / 2,
-        w=np.pi * (scattered[0] * rho + scattered[1] * tau),
+        w=sums.reflected * rho + sums.transmitted * tau,
     )
 
 
-def _over_leaves(values, fraction):
-    """Sum over leaf angles, whose last bits, unlike those in a matrix product, do not depend on the number of cells."""
-    return np.sum(values * fraction, axis=-1)
+class LeafAngleSums(NamedTuple):
+    """Sums over leaf angle classes, which depend on the directions alone. [1]"""
+
+    ks: np.ndarray  # extinction of the sunbeam
+    ko: np.ndarray  # and toward the observer
+    bf: float  # mean squared cosine of the leaf inclination
+    reflected: np.ndarray  # weight of leaf reflectance in the scattering from the sun to the observer
+    transmitted: np.ndarray  # and of leaf transmittance
+
+
+def leaf_angle_sums(sza, vza, raa, leaf_angles):
+    """LeafAngleSums of directions [degree], of their broadcast shape, for a LeafAngles."""
+    inclination, fraction = np.asarray(leaf_angles.inclination), np.asarray(leaf_angles.fraction)
+    bf = np.cos(inclination * DEGREE) ** 2 @ fraction
+    shape, flat = _flat(sza, vza, raa)
+    if shape:
+        # The sums cost more than SAIL, and views of one column of a scan are often the same.
+        flat, index = np.unique(flat, axis=1, return_inverse=True)
+    sun, view, azimuth = flat[..., None]
+    mu_s, mu_v = np.cos(sun * DEGREE), np.cos(view * DEGREE)
+    reflected, transmitted = volume_scattering(inclination, sun, view, azimuth)
+    terms = leaf_projection(inclination, sun) / mu_s, leaf_projection(inclination, view) / mu_v
+    terms += np.pi * (reflected / (mu_s * mu_v)), np.pi * (transmitted / (mu_s * mu_v))
+    # The last bits of these sums, unlike those of a matrix product, do not depend on the number of cells.
+    sums = (np.sum(term * fraction, axis=-1) for term in terms)
+    ks, ko, *scattered = (each[index].reshape(shape) if shape else each[0] for each in sums)
+    return LeafAngleSums(ks, ko, bf, *scattered)
 
 
 def volume_scattering(inclination, sza, vza, raa):
@@ -550,9 +585,10 @@ def volume_scattering(inclination, sza, vza, raa):
     """
     beta_s, cos_s, sin_s = azimuth_limit(inclination, sza)
     beta_o, cos_o, sin_o = azimuth_limit(inclination, vza)
-    psi = np.radians(raa)
-    near, far = np.abs(beta_s - beta_o), np.pi - np.abs(beta_s + beta_o - np.pi)
-    first, middle, last = np.minimum(psi, near), np.clip(psi, near, far), np.maximum(psi, far)
+    psi = np.multiply(raa, DEGREE)
+    near = np.maximum(beta_s - beta_o, beta_o - beta_s)
+    far = np.minimum(beta_s + beta_o, 2 * np.pi - beta_s - beta_o)
+    first, middle, last = np.minimum(psi, near), np.minimum(np.maximum(psi, near), far), np.maximum(psi, far)
     product = 2 * np.maximum(cos_s, sin_s) * np.maximum(cos_o, sin_o)
     even = 2 * cos_s * cos_o + sin_s * sin_o * np.cos(psi)
     odd = np.sin(middle) * (product + sin_s * sin_o * np.cos(first) * np.cos(last))
@@ -565,40 +601,117 @@ def volume_scattering(inclination, sza, vza, raa):
 #     toward the far side  A(u) = cosh(m u) + a sinh(m u) / m,   back  B(u) = sigma sinh(m u) / m,
 # both over A(L). Writing A(u) = e^(-m u) + (a + m) sinh(m u) / m leaves positive terms only, and sinh(m u) / m is
 # the chain of -m and m. All chains carry a factor e^(-m L) against overflow: each rate is m higher.
+# Where light crosses leaves that hardly intercept it, `_by_chains` keeps the digits that `_slabs` would lose.
+_LEAST_EXTINCTION = 0.1
 
 
-def _turned_back(lai, c, k, forward, backward):
-    """Beam of extinction k converted to diffuse light that leaves on the side of entry, times A(L) e^(-m L)."""
-    again = (c.a + c.m) * backward + c.sigma * forward
-    beam = k + c.m
-    return backward * exponential_chain(lai, beam, 2 * c.m) + again * exponential_chain(lai, beam, 2 * c.m, 0.0)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _slabs(lai, ks, ko, a, sigma, m, sf, sb, vf, vb, out):
+    """Fields rso to tdd of `scattered_again`, and the cells that need `_by_chains` instead."""
+    left = np.zeros(lai.size, np.bool_)
+    for i in range(lai.size):
+        if (ks[i] + ko[i]).real < _LEAST_EXTINCTION or (min(ks[i].real, ko[i].real) + m[i].real) < _LEAST_EXTINCTION:
+            left[i] = True
+            continue
+        depth, twice = lai[i], 2 * m[i]
+        sun, view, diffuse = np.exp(-ks[i] * depth), np.exp(-ko[i] * depth), np.exp(-m[i] * depth)
+        square = diffuse * diffuse
+        # sinh(m L) / m and A(L) of a slab, both times e^(-m L).
+        sinh = _of_two(depth, twice, 0 * twice, square, 1 + 0 * square)
+        slab = 1 / (square + (a[i] + m[i]) * sinh)
+        # Chains (k, m) and (k + m, 0), and (k + m, 2 m, 0), of each beam.
+        sun_diffuse = _of_two(depth, ks[i], m[i], sun, diffuse)
+        view_diffuse = _of_two(depth, ko[i], m[i], view, diffuse)
+        sun_out = (1 - sun * diffuse) / (ks[i] + m[i])
+        view_out = (1 - view * diffuse) / (ko[i] + m[i])
+        sun_back = (sinh - diffuse * sun_diffuse) / (ks[i] + m[i])
+        view_back = (sinh - diffuse * view_diffuse) / (ko[i] + m[i])
+        sun_again = (a[i] + m[i]) * sb[i] + sigma[i] * sf[i]
+        view_again = (a[i] + m[i]) * vb[i] + sigma[i] * vf[i]
+        sun_forward = (a[i] + m[i]) * sf[i] + sigma[i] * sb[i]
+        view_forward = (a[i] + m[i]) * vf[i] + sigma[i] * vb[i]
+        # Paths with the scatterings of one beam above those by the other. Both beams cross the leaves above the upper
+        # scattering, only the other beam those between; above and below, the diffuse light is as on its own.
+        both, both_through = ks[i] + ko[i], sun * view
+        crossed = _of_two(depth, both, twice, both_through, square)
+        rso = 0 * slab
+        for upper in range(2):
+            if upper == 0:
+                k, other, forward, forward_again, turned = ko[i], ks[i], sf[i], sun_forward, vb[i]
+                own_diffuse, other_diffuse, through = view_diffuse, sun_diffuse, view
+                other_out, back, turned_again = sun_out, view_back, view_again
+            else:
+                k, other, forward, forward_again, turned = ks[i], ko[i], vf[i], view_forward, sb[i]
+                own_diffuse, other_diffuse, through = sun_diffuse, view_diffuse, sun
+                other_out, back, turned_again = view_out, sun_back, sun_again
+            one, last = diffuse * own_diffuse, through * other_diffuse  # (k + m, 2 m) and (both, k + m)
+            three = _of_three(depth, both - twice, k - m[i], one, last, crossed, square)  # (both, k + m, 2 m)
+            direct = (one - through * diffuse * other_out) / both  # (both + 2 m, k + m, 2 m)
+            above = (three - (last - both_through * sinh) / (other + m[i])) / both  # (both + 2 m, both, k + m, 2 m)
+            below = (back - direct) / (both + twice)  # (both + 2 m, k + m, 2 m, 0)
+            either = ((back - three) / both - above) / (both + twice)  # all five
+            rso += turned * (forward * direct + forward_again * above)
+            rso += turned_again * (forward * below + forward_again * either)
+        out[0, i] = rso * slab
+        out[1, i] = (vb[i] * diffuse * view_diffuse + view_again * view_back) * slab
+        out[2, i] = (sb[i] * diffuse * sun_diffuse + sun_again * sun_back) * slab
+        out[3, i] = sigma[i] * sinh * slab
+        out[4, i], out[5, i] = sun, view
+        out[6, i] = (sf[i] * diffuse * sun_out + sun_forward * (sun_diffuse - sun * sinh) / (ks[i] + m[i])) * slab
+        out[7, i] = (vf[i] * diffuse * view_out + view_forward * (view_diffuse - view * sinh) / (ko[i] + m[i])) * slab
+        out[8, i] = diffuse * slab
+    return left
 
 
-def _passed_on(lai, c, k, forward, backward):
-    """Beam of extinction k converted to diffuse light that leaves on the far side, times A(L) e^(-m L)."""
-    again = (c.a + c.m) * forward + c.sigma * backward
-    beam = k + 2 * c.m
-    return forward * exponential_chain(lai, beam, c.m) + again * exponential_chain(lai, beam, k, c.m)
+@register_jitable
+def _of_two(depth, p, q, through_p, through_q):
+    """Chain of two rates from their transmittances, by its series where they are nearly equal."""
+    x = (p - q) * depth
+    if abs(x) > 0.05:
+        return (through_q - through_p) / (p - q)
+    series = 1 / 720 - x * (1 / 5040 - x / 40320)
+    return through_q * depth * (1 - x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * series)))))
 
 
-def _multiple_scattering(lai, c):
-    """Sunlight that reaches the observer after two or more scatterings, times A(L) e^(-m L)."""
-    down = _between(lai, c, c.ko, (c.sf, c.sb), (c.vb, c.vf))
-    return down + _between(lai, c, c.ks, (c.vf, c.vb), (c.sb, c.sf))
+@register_jitable
+def _of_three(depth, x, y, low, high, across, through):
+    """Chain of the rates q + x, q + y and q: from those of (q + y, q), (q + x, q + y), (q + x, q) and e^(-q L)."""
+    widest = max(abs(x), abs(y), abs(x - y))
+    if widest * depth.real > 0.5:
+        if abs(x) == widest:
+            return (low - high) / x
+        return (across - high) / y if abs(y) == widest else (low - across) / (x - y)
+    p, q = -x * depth, -y * depth
+    power, homogeneous, factorial = 1 + 0 * p, 1 + 0 * p, 2.0
+    total = homogeneous / factorial
+    for n in range(1, 15):
+        factorial *= n + 2
+        power *= q
+        homogeneous = power + p * homogeneous
+        total += homogeneous / factorial
+    return through * depth * depth * total
 
 
-def _between(lai, c, k, upper, lower):
-    """Paths with the scatterings of one beam, of extinction k, above those by the other."""
-    # Both beams cross the leaves above the upper scattering, only the other beam those between. Above and below, the
-    # diffuse light is as in `_passed_on` and `_turned_back`.
-    (forward, backward), (turned, kept) = upper, lower
-    forward_again = (c.a + c.m) * forward + c.sigma * backward
-    turned_again = (c.a + c.m) * turned + c.sigma * kept
-    both, one, m2 = c.ks + c.ko, k + c.m, 2 * c.m
-    direct = exponential_chain(lai, both + m2, one, m2)
-    from_above = exponential_chain(lai, both + m2, both, one, m2)
-    from_below = exponential_chain(lai, both + m2, one, m2, 0.0)
-    from_either = exponential_chain(lai, both + m2, both, one, m2, 0.0)
-    return turned * (forward * direct + forward_again * from_above) + turned_again * (
-        forward * from_below + forward_again * from_either
-    )
+def _by_chains(lai, ks, ko, a, sigma, m, sf, sb, vf, vb):
+    """Fields of `_slabs`, each a sum of chains; slower, and without a limit on the rates."""
+    sinh = exponential_chain(lai, 2 * m, 0.0)
+    slab = np.exp(-2 * m * lai) + (a + m) * sinh
+    fields = []
+    for k, forward, backward in ((ko, vf, vb), (ks, sf, sb)):
+        again = (a + m) * backward + sigma * forward
+        turned_back = backward * exponential_chain(lai, k + m, 2 * m)
+        fields.append(turned_back + again * exponential_chain(lai, k + m, 2 * m, 0.0))
+    for k, forward, backward in ((ks, sf, sb), (ko, vf, vb)):
+        again = (a + m) * forward + sigma * backward
+        passed_on = forward * exponential_chain(lai, k + 2 * m, m)
+        fields.append(passed_on + again * exponential_chain(lai, k + 2 * m, k, m))
+    both, twice, rso = ks + ko, 2 * m, 0.0
+    for k, (forward, backward), (kept, turned) in ((ko, (sf, sb), (vf, vb)), (ks, (vf, vb), (sf, sb))):
+        forward_again, turned_again = (a + m) * forward + sigma * backward, (a + m) * turned + sigma * kept
+        from_above = forward_again * exponential_chain(lai, both + twice, both, k + m, twice)
+        rso = rso + turned * (forward * exponential_chain(lai, both + twice, k + m, twice) + from_above)
+        from_either = forward_again * exponential_chain(lai, both + twice, both, k + m, twice, 0.0)
+        rso = rso + turned_again * (forward * exponential_chain(lai, both + twice, k + m, twice, 0.0) + from_either)
+    rdo, rsd, tsd, tdo = fields
+    through = np.exp(-ks * lai) * slab, np.exp(-ko * lai) * slab
+    return np.stack([rso, rdo, rsd, sigma * sinh, *through, tsd, tdo, np.exp(-m * lai)]) / slab
