@@ -34,6 +34,7 @@ from .ground.canopy.description import Canopy as Canopy
 from .ground.canopy.prospect import Leaf as Leaf
 from .ground.canopy.spectra import Background as Background
 from .chain.steps import surface_reflectance as surface_reflectance  # method, of a Dataset too
+from .chain.spectra import canopy_spectra as canopy_spectra
 from .chain.landscapes import fpar as fpar  # method, of a Dataset too
 
 # Terrain

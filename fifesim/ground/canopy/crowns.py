@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
+from fifesim.base.arrays import numbers
+from fifesim.ground.canopy.leaf_angles import RADIANS_PER_DEGREE
 from fifesim.ground.canopy.leaf_area import LARGEST_LAI, check_share
 from fifesim.ground.canopy.sail_model import direction_distance, over_background
 
@@ -67,10 +69,10 @@ def crown_shares(crown_cover, crown_shape, sza, vza, raa):
     >>> float(crown_shares(1.0, 1.0, 60.0, 0.0, 0.0).both)
     1.0
     """
-    gap = 1 - np.asarray(crown_cover, float)
-    sun_path, view_path = (1 / np.cos(np.radians(np.asarray(angle, float))) for angle in (sza, vza))
+    gap = 1 - numbers(crown_cover)
+    sun_path, view_path = (1 / np.cos(numbers(angle) * RADIANS_PER_DEGREE) for angle in (sza, vza))
     sun, view = 1 - gap**sun_path, 1 - gap**view_path
-    shape = np.asarray(crown_shape, float)
+    shape = numbers(crown_shape)
     close = np.where(shape > 0, np.exp(-direction_distance(sza, vza, raa) / np.where(shape > 0, shape, 1)), 0)
     beyond = np.minimum(sun * (1 - view), view * (1 - sun)) * close
     both = sun * view + beyond
@@ -200,7 +202,7 @@ def crowns_over_background(terms, shares, background):
 
 def lai_in_crowns(lai, crown_cover):
     """Leaf area index within crowns, 0 where there are none. [m2 m-2]"""
-    lai, cover = np.asarray(lai, float), np.asarray(crown_cover, float)
+    lai, cover = numbers(lai), numbers(crown_cover)
     # NaN of the leaf area stays.
     return np.where(cover > 0, lai / np.where(cover > 0, cover, 1), 0 * lai)
 

@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fifesim.base.geometry import relative_azimuth
+from fifesim.base.arrays import numbers
 from fifesim.ground.canopy.crowns import SHAPE, clumped, crown_shares, lai_in_crowns
 from fifesim.ground.canopy.leaf_angles import leaf_angle_classes, leaf_projection
 from fifesim.ground.canopy.sail_model import (
     CanopyLayer,
     bidirectional_gap,
+    folded,
     hotspot_decay,
     leaf_scattering,
     scattered_again,
@@ -64,7 +65,7 @@ def leaf_layers(lai, brown, dissociation):
     >>> round(float(layers.lai * layers.brown + layers.lai_below * layers.brown_below), 12)
     1.2
     """
-    lai, brown, mixed = np.asarray(lai, float), np.asarray(brown, float), 1 - np.asarray(dissociation, float)
+    lai, brown, mixed = numbers(lai), numbers(brown), 1 - numbers(dissociation)
     return Layers((1 - brown) * lai, brown * lai, mixed * brown, 1 - mixed * (1 - brown))
 
 
@@ -121,17 +122,17 @@ def two_layers(
     >>> bool(abs(both.rso - sail(3.0, 0.45, 0.42, sza=30, hotspot=0.1).rso) < 1e-14)
     True
     """
-    raa = relative_azimuth(raa, 0.0)
+    raa = folded(raa)
     green, dead = (leaf_reflectance, leaf_transmittance), (brown_reflectance, brown_transmittance)
     layers = leaf_layers(lai, brown, dissociation)
     angles = sza, vza, raa, leaf_angle_classes(leaf_angles)
     upper = leaf_scattering(*mixed(green, dead, layers.brown), *angles)
     lower = leaf_scattering(*mixed(green, dead, layers.brown_below), *angles)
-    alpha = hotspot_decay(sza, vza, raa, upper.ks + upper.ko, np.asarray(hotspot, float))
+    alpha = hotspot_decay(sza, vza, raa, upper.ks + upper.ko, numbers(hotspot))
     # Without a hot spot the decay is infinite, which no share of the depth makes less.
     none = np.isinf(alpha)
-    alpha_above = np.where(none, np.inf, np.where(none, 0, alpha) * (1 - np.asarray(brown, float)))
-    lai = np.asarray(lai, float)
+    alpha_above = np.where(none, np.inf, np.where(none, 0, alpha) * (1 - numbers(brown)))
+    lai = numbers(lai)
     tsstoo, seen = bidirectional_gap(lai, upper.ks, upper.ko, alpha)
     _, seen_above = bidirectional_gap(layers.lai, upper.ks, upper.ko, alpha_above)
     both = added(scattered_again(layers.lai, upper), scattered_again(layers.lai_below, lower))
@@ -141,7 +142,7 @@ def two_layers(
 
 def mixed(green, dead, brown):
     """Mean optics of a mixture of green and dead leaves. [1]"""
-    pairs = ((np.asarray(one, float), np.asarray(other, float)) for one, other in zip(green, dead, strict=True))
+    pairs = ((numbers(one), numbers(other)) for one, other in zip(green, dead, strict=True))
     return tuple(one + brown * (other - one) for one, other in pairs)
 
 

@@ -13,8 +13,8 @@ from fifesim.base.arguments import described
 from fifesim.base.caches import cached
 from fifesim.base.messages import closest
 
-DEGREE = math.pi / 180
-"""One degree [radian]; unlike numpy.radians it takes complex angles, for derivatives."""
+RADIANS_PER_DEGREE = math.pi / 180
+"""Unlike numpy.radians, it serves complex angles, for derivatives."""
 
 
 @dataclass(frozen=True)
@@ -282,7 +282,7 @@ def azimuth_limit(inclination, zenith):
     ----------
     [Verhoef1984]_
     """
-    tilt, slant = np.multiply(inclination, DEGREE), np.multiply(zenith, DEGREE)
+    tilt, slant = np.multiply(inclination, RADIANS_PER_DEGREE), np.multiply(zenith, RADIANS_PER_DEGREE)
     cosines = np.cos(tilt) * np.cos(slant)
     sines = np.sin(tilt) * np.sin(slant)
     turns = sines > cosines

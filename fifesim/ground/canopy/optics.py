@@ -12,7 +12,7 @@ from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.ground.canopy.interpolation import refined
 from fifesim.ground.canopy.leaf_area import check_fraction, check_share
-from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf, leaf_spectrum
+from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf, leaf_band_means, leaf_spectrum
 from fifesim.ground.canopy.spectra import (
     Background,
     LeafSpectrum,
@@ -164,8 +164,6 @@ def check_background(reflectance):
     check_share("background reflectance", reflectance)
 
 
-_BLOCK = 2**8  # leaves at a time, to bound memory: a spectrum has up to 2101 values
-
 LEAF_TOLERANCE = 1e-8
 """Of leaf reflectance and transmittance from a table [1]."""
 
@@ -194,20 +192,26 @@ def _each_kind(bands, leaf, names, cells):
     means = np.full((2, len(bands), cells.shape[1]), np.nan)
     known = ~np.isnan(cells).any(axis=0)
     kinds, index = np.unique(cells[:, known], axis=1, return_inverse=True)
-    of_kinds = np.empty((2, len(bands), kinds.shape[1]))
-    for start in range(0, kinds.shape[1], _BLOCK):
-        block = slice(start, start + _BLOCK)
-        part = dict(zip(names, kinds[:, block], strict=True))
-        of_kinds[..., block] = np.moveaxis(_means(bands, replace(leaf, **part)), -1, 1)
+    of_kinds = np.moveaxis(_means(bands, replace(leaf, **dict(zip(names, kinds, strict=True)))), -1, 1)
     means[..., known] = of_kinds[..., index.reshape(-1)]
     return means
 
 
 def _means(bands, leaf):
     """Reflectance and transmittance of each leaf in each band, shape (2, n, band)."""
-    limits = min(band.limits[0] for band in bands), max(band.limits[1] for band in bands)
-    wavelength, *spectra = leaf_spectrum(leaf, limits)
-    return band_means(bands, wavelength, np.stack(spectra))
+    return np.moveaxis(leaf_band_means(leaf.contents(), leaf_weights(tuple(bands))), 1, -1)
+
+
+_ROWS = 256  # wavelengths at a time, to bound memory
+
+
+@cached(32, "weights of wavelengths in bands")
+def leaf_weights(bands):
+    """Weights of the wavelengths of leaves in the mean of each band, shape (2101, band)."""
+    wavelength, *_ = leaf_spectrum(Leaf(), (0.0, np.inf))
+    rows = range(0, wavelength.size, _ROWS)
+    weights = [band_means(bands, wavelength, np.eye(_ROWS, wavelength.size, row)) for row in rows]
+    return np.concatenate(weights)[: wavelength.size]
 
 
 @cached(32, "splines of leaf optics")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numba
 import numpy as np
-from scipy.special import exp1
+from numba.extending import register_jitable
 
 from fifesim.base import files
 from fifesim.base.annotations import Array, NumberOrArray
 from fifesim.base.arguments import described
+from fifesim.base.arrays import as_rows, numbers
 from fifesim.base.caches import cached
 
 CONTENTS = {
@@ -94,6 +97,10 @@ class Leaf:
                     raise ValueError(f"Leaf: {name} must be in [{low:g}, {high:g}]{unit}, got {got:g}: check its unit")
             object.__setattr__(self, name, value)
 
+    def contents(self) -> list[NumberOrArray]:
+        """Structure and contents, in the order of the fields."""
+        return [getattr(self, name) for name in ("structure", *CONTENTS)]
+
     def varying(self) -> dict[str, Array]:
         """What differs from leaf to leaf, a dict of str to array."""
         values = {name: getattr(self, name) for name in ("structure", *CONTENTS)}
@@ -135,20 +142,83 @@ def leaf_spectrum(leaf, limits=(0.4, 2.5)):
     """
     table = files.table("prospect_d.csv")
     first, last = np.searchsorted(table["wavelength"].to_numpy(), limits)
-    table = table.iloc[max(first - 1, 0) : last + 2]
-    refractive_index = table["refractive_index"].to_numpy()
-    content = {name: _column(getattr(leaf, name)) for name in CONTENTS}
-    structure = _column(leaf.structure)
-    absorption = sum(content[name] * table[name].to_numpy() for name in CONTENTS) / structure
-    tau = layer_transmissivity(absorption)
-    # Reflectance of one layer that is lit from outside, and of one between others.
-    first = plate(refractive_index, tau, _INCIDENCE)
-    other = plate(refractive_index, tau, 90.0)
-    reflectance_below, transmittance_below = pile(*other, structure - 1)
-    multiple = 1 - reflectance_below * other[0]
-    reflectance = first[0] + first[1] * reflectance_below * other[1] / multiple
-    transmittance = first[1] * transmittance_below / multiple
-    return table["wavelength"].to_numpy(), reflectance, transmittance
+    nodes = slice(max(first - 1, 0), last + 2)
+    shape, contents = as_rows(*leaf.contents())
+    spectra = np.empty((2, contents.shape[1], len(table.iloc[nodes])), contents.dtype)
+    _spectra(contents, _constants()[:, nodes], spectra)
+    reflectance, transmittance = spectra.reshape(2, *shape, -1)
+    return table["wavelength"].to_numpy()[nodes], reflectance, transmittance
+
+
+def leaf_band_means(contents, weights):
+    """
+    Means of leaf reflectance and transmittance over bands, without keeping spectra.
+
+    Parameters
+    ----------
+    contents : sequence of 7 arrays
+        Structure and contents, in the order and units of `Leaf`, of shapes (...) that broadcast; NaN gives NaN.
+    weights : array, shape (2101, band)
+        Weight of each wavelength of ``prospect_d.csv``, 0.4 to 2.5 um. [1]
+
+    Returns
+    -------
+    means : array, shape (2, band, ...)
+        Reflectance and transmittance. [1]
+
+    References
+    ----------
+    [Jacquemoud1990]_; [Feret2017]_
+    """
+    shape, rows = as_rows(*contents)
+    used = np.flatnonzero(weights.any(axis=1))
+    means = np.zeros((2, weights.shape[1], rows.shape[1]), rows.dtype)
+    _means(rows, np.ascontiguousarray(_constants()[:, used]), np.ascontiguousarray(weights[used]), means)
+    return means.reshape(2, weights.shape[1], *shape)
+
+
+@cached(1, "constants of leaves")
+def _constants():
+    """Specific absorption of the contents, and three transmissivities of leaf surfaces, shape (9, wavelength)."""
+    table = files.table("prospect_d.csv")
+    n = table["refractive_index"].to_numpy()
+    entering = [interface_transmissivity(n, cone) for cone in (_INCIDENCE, 90.0)]
+    return np.ascontiguousarray([*(table[name] for name in CONTENTS), *entering, entering[1] / n**2])
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _spectra(contents, constants, spectra):
+    """Reflectance and transmittance of each leaf at each wavelength."""
+    for leaf in range(contents.shape[1]):
+        for node in range(constants.shape[1]):
+            spectra[0, leaf, node], spectra[1, leaf, node] = _leaf(contents[:, leaf], constants[:, node])
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _means(contents, constants, weights, means):
+    """Sums of reflectance and transmittance of each leaf over wavelengths, by weights of each band."""
+    for leaf in range(contents.shape[1]):
+        for node in range(constants.shape[1]):
+            reflectance, transmittance = _leaf(contents[:, leaf], constants[:, node])
+            for band in range(weights.shape[1]):
+                means[0, band, leaf] += weights[node, band] * reflectance
+                means[1, band, leaf] += weights[node, band] * transmittance
+
+
+@register_jitable
+def _leaf(contents, constants):
+    """Reflectance and transmittance of a leaf at one wavelength."""
+    absorption, structure = 0 * contents[0], contents[0]
+    for number in range(1, contents.size):
+        absorption += contents[number] * constants[number - 1]
+    tau = _transmissivity(absorption / structure)
+    cone, hemisphere, leaving = constants[-3], constants[-2], constants[-1]
+    # One layer that is lit from outside, and one between others.
+    top_reflectance, top_transmittance = _plate(cone, leaving, tau)
+    reflectance, transmittance = _plate(hemisphere, leaving, tau)
+    below_reflectance, below_transmittance = _pile(reflectance, transmittance, structure - 1)
+    multiple = top_transmittance / (1 - below_reflectance * reflectance)
+    return top_reflectance + multiple * below_reflectance * transmittance, multiple * below_transmittance
 
 
 def _number(name, value):
@@ -156,11 +226,6 @@ def _number(name, value):
         return float(value)
     except (TypeError, ValueError):
         raise TypeError(f"Leaf: {name} must be a number, or a raster, got {described(value)}") from None
-
-
-def _column(value):
-    """A number unchanged, or an array of leaves with an axis for wavelengths."""
-    return value if isinstance(value, float) else np.asarray(value, float)[..., None]
 
 
 def layer_transmissivity(absorption):
@@ -190,9 +255,37 @@ def layer_transmissivity(absorption):
     >>> float(layer_transmissivity(0.0))
     1.0
     """
-    k = np.asarray(absorption, float)
-    # k^2 E1(k) vanishes at 0, where E1 does not exist.
-    return (1 - k) * np.exp(-k) + k**2 * exp1(np.where(k > 0, k, 1.0))
+    shape, rows = as_rows(numbers(absorption))
+    tau = np.empty_like(rows[0])
+    _transmissivities(rows[0], tau)
+    return tau.reshape(shape)[()]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _transmissivities(absorption, tau):
+    """Transmittance of each of some layers."""
+    for layer in range(absorption.size):
+        tau[layer] = _transmissivity(absorption[layer])
+
+
+# Coefficients of k^n in E1(k) + ln(k), which is entire; 40 reach rounding up to k = 4.
+_SERIES = np.array([-np.euler_gamma, *(-((-1) ** n) / (n * math.factorial(n)) for n in range(1, 41))])
+
+
+@register_jitable
+def _transmissivity(k):
+    """Transmittance of a layer, 2 E3(k): by the series of E1, or a continued fraction [DLMF 8.9.2] of E3."""
+    if k.real <= 0:
+        return 1 + 0 * k
+    if k.real > 4:
+        fraction = k + 63
+        for n in range(30, 0, -1):
+            fraction = k + 1 + 2 * n - n * (n + 2) / fraction
+        return 2 * np.exp(-k) / fraction
+    total = 0 * k
+    for n in range(18 if k.real < 1 else 40, -1, -1):
+        total = total * k + _SERIES[n]
+    return (1 - k) * np.exp(-k) + k * k * (total - np.log(k))
 
 
 def interface_transmissivity(refractive_index, angle):
@@ -266,19 +359,15 @@ def plate(refractive_index, tau, angle):
     True
     """
     n = np.asarray(refractive_index, float)
-    entering, leaving = (_passing(n.tobytes(), n.shape, cone) for cone in (angle, 90.0))
-    leaving = leaving / n**2
-    inside = 1 - leaving
-    transmittance = entering * tau * leaving / (1 - inside**2 * tau**2)
-    return 1 - entering + inside * tau * transmittance, transmittance
+    return _plate(interface_transmissivity(n, angle), interface_transmissivity(n, 90.0) / n**2, tau)
 
 
-@cached(16, "transmissivity of leaf surfaces")
-def _passing(refractive_index, shape, angle):
-    """`interface_transmissivity` of the bytes of an array, cached because leaves share it."""
-    passing = np.asarray(interface_transmissivity(np.frombuffer(refractive_index).reshape(shape), angle))
-    passing.flags.writeable = False
-    return passing
+@register_jitable
+def _plate(entering, leaving, tau):
+    """Reflectance and transmittance of a layer from the transmissivities of its surfaces and its inside."""
+    inside = (1 - leaving) * tau
+    transmittance = entering * tau * leaving / (1 - inside * inside)
+    return 1 - entering + inside * transmittance, transmittance
 
 
 def pile(reflectance, transmittance, layers):
@@ -309,16 +398,30 @@ def pile(reflectance, transmittance, layers):
     >>> float(reflectance), float(transmittance)
     (0.0, 1.0)
     """
-    r, t = np.asarray(reflectance, float), np.asarray(transmittance, float)
-    d = np.sqrt(np.maximum((1 + r + t) * (1 + r - t) * (1 - r + t) * (1 - r - t), 0))
-    a = (1 + r**2 - t**2 + d) / (2 * r)
+    shape, rows = as_rows(reflectance, transmittance, layers)
+    found = np.empty_like(rows[:2])
+    _piles(*rows, found)
+    r, t = found.reshape(2, *shape)
+    return r[()], t[()]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _piles(reflectance, transmittance, layers, found):
+    """Reflectance and transmittance of each of some piles."""
+    for i in range(layers.size):
+        found[0, i], found[1, i] = _pile(reflectance[i], transmittance[i], layers[i])
+
+
+@register_jitable
+def _pile(r, t, layers):
+    """Reflectance and transmittance of a pile of layers with reflectance r and transmittance t."""
+    square = (1 + r + t) * (1 + r - t) * (1 - r + t) * (1 - r - t)
+    d = np.sqrt(square) if square.real > 0 else 0 * square
+    a = (1 + r * r - t * t + d) / (2 * r)
+    if (a * a - 1).real < 1e-7:
+        # Without absorption the limit is that of a random walk.
+        passed = t / (t + (1 - t) * layers) if t.real > 0 else t
+        return 1 - passed, passed
     # The inverse of Stokes' b: it is 0, not infinite, where a layer is opaque.
-    q = (2 * t / (1 - r**2 + t**2 + d)) ** layers
-    # Without absorption a and q are 1, and the limit is that of a random walk.
-    conservative = a**2 - 1 < 1e-7
-    divisor = np.where(conservative, 1.0, a**2 - q**2)
-    passed = t / (t + (1 - t) * layers + (t == 0))
-    return (
-        np.where(conservative, 1 - passed, a * (1 - q**2) / divisor),
-        np.where(conservative, passed, q * (a**2 - 1) / divisor),
-    )
+    q = (2 * t / (1 - r * r + t * t + d)) ** layers if t.real > 0 else (0 * t if layers.real > 0 else 1 + 0 * t)
+    return a * (1 - q * q) / (a * a - q * q), q * (a * a - 1) / (a * a - q * q)

@@ -7,8 +7,9 @@ import numba
 import numpy as np
 from numba.extending import register_jitable
 
+from fifesim.base.arrays import as_rows, numbers
 from fifesim.base.geometry import relative_azimuth
-from fifesim.ground.canopy.leaf_angles import DEGREE, azimuth_limit, leaf_angle_classes, leaf_projection
+from fifesim.ground.canopy.leaf_angles import RADIANS_PER_DEGREE, azimuth_limit, leaf_angle_classes, leaf_projection
 
 
 class Surface(NamedTuple):
@@ -54,7 +55,7 @@ def with_background(canopy, background):
     >>> float(with_background(sail(0.0, 0.1, 0.1, sza=30), 0.15).rso)
     0.15
     """
-    c, r = canopy, _numbers(background)
+    c, r = canopy, numbers(background)
     returned = r / (1 - r * c.rdd_below)
     sun_down, to_observer = c.tss + c.tsd, c.too + c.tdo
     return Surface(
@@ -134,7 +135,7 @@ def reflectance_factor(rso, rdo, diffuse_fraction):
 
 def direction_distance(sza, vza, raa):
     """Distance between two directions on a horizontal plane one unit below, 0 in the hot spot. [1]"""
-    sza, vza, raa = (np.multiply(angle, DEGREE) for angle in (sza, vza, raa))
+    sza, vza, raa = (np.multiply(angle, RADIANS_PER_DEGREE) for angle in (sza, vza, raa))
     tan_s, tan_v = np.tan(sza), np.tan(vza)
     # Without cancellation near the hot spot.
     chord = 4 * tan_s * tan_v * np.sin(raa / 2) ** 2
@@ -204,7 +205,7 @@ def bidirectional_gap(lai, ks, ko, alpha):
     ----------
     [Kuusk1991]_
     """
-    shape, flat = _flat(lai, ks, ko, alpha)
+    shape, flat = as_rows(lai, ks, ko, alpha)
     gaps = np.empty((2, flat.shape[1]), flat.dtype)
     _gaps(*flat, gaps)
     tsstoo, seen = gaps.reshape(2, *shape)
@@ -279,20 +280,10 @@ def exponential_chain(lai, *rates):
     >>> float(exponential_chain(3.0, 0.0, 0.0, 0.0))
     4.5
     """
-    shape, flat = _flat(lai, *rates)
+    shape, flat = as_rows(lai, *rates)
     chains = np.empty(flat.shape[1], flat.dtype)
     _chains(flat[0], flat[1:], chains)
     return chains.reshape(shape)[()]
-
-
-def _flat(*given):
-    """Common shape of some arguments, and their values as rows of one array."""
-    given = [np.asarray(each) for each in given]
-    shape = np.broadcast_shapes(*(each.shape for each in given))
-    flat = np.empty((len(given), *shape), np.result_type(float, *given))
-    for number, each in enumerate(given):
-        flat[number] = each
-    return shape, flat.reshape(len(given), -1)
 
 
 @numba.njit(nogil=True, cache=True)
@@ -444,18 +435,13 @@ def sail(lai, leaf_reflectance, leaf_transmittance, *, sza, vza=0.0, raa=0.0, le
     >>> float(round(canopy.rsd + canopy.tsd + canopy.tss, 12))
     1.0
     """
-    lai, rho, tau = _numbers(lai), _numbers(leaf_reflectance), _numbers(leaf_transmittance)
-    raa = relative_azimuth(raa, 0.0)
+    lai, rho, tau = numbers(lai), numbers(leaf_reflectance), numbers(leaf_transmittance)
+    raa = folded(raa)
     c = leaf_scattering(rho, tau, sza, vza, raa, leaf_angle_classes(leaf_angles))
-    alpha = hotspot_decay(sza, vza, raa, c.ks + c.ko, _numbers(hotspot))
+    alpha = hotspot_decay(sza, vza, raa, c.ks + c.ko, numbers(hotspot))
     tsstoo, sunlit_and_seen = bidirectional_gap(lai, c.ks, c.ko, alpha)
     layer = scattered_again(lai, c)
     return layer._replace(rso=c.w * sunlit_and_seen + layer.rso, tsstoo=tsstoo)
-
-
-def _numbers(values):
-    """Values as an array of floating-point numbers; complex ones, whose imaginary part is a derivative, stay."""
-    return np.asarray(values, complex if np.iscomplexobj(values) else float)
 
 
 def scattered_again(lai, c):
@@ -477,13 +463,21 @@ def scattered_again(lai, c):
     ----------
     [Verhoef1984]_; [Verhoef2007]_
     """
-    shape, flat = _flat(lai, c.ks, c.ko, c.a, c.sigma, c.m, c.sf, c.sb, c.vf, c.vb)
+    shape, flat = as_rows(lai, c.ks, c.ko, c.a, c.sigma, c.m, c.sf, c.sb, c.vf, c.vb)
     out = np.empty((9, flat.shape[1]), flat.dtype)
     nearly_vertical = _slabs(*flat, out)
     if nearly_vertical.any():
         out[:, nearly_vertical] = _by_chains(*flat[:, nearly_vertical])
     rso, rdo, rsd, rdd, tss, too, tsd, tdo, tdd = (each[()] for each in out.reshape(9, *shape))
     return CanopyLayer(rso, rdo, rsd, rdd, tss, too, tsd, tdo, tdd, tss * too, rdd)
+
+
+def folded(raa):
+    """Relative azimuth folded to 0 to 180 degrees, also of complex numbers."""
+    if not np.iscomplexobj(raa):
+        return relative_azimuth(raa, 0.0)
+    turned = np.real(raa) % 360
+    return np.where(turned > 180, -1, 1) * 1j * np.imag(raa) + relative_azimuth(np.real(raa), 0.0)
 
 
 def leaf_scattering(rho, tau, sza, vza, raa, leaf_angles):
@@ -539,13 +533,13 @@ class LeafAngleSums(NamedTuple):
 def leaf_angle_sums(sza, vza, raa, leaf_angles):
     """LeafAngleSums of directions [degree], of their broadcast shape, for a LeafAngles."""
     inclination, fraction = np.asarray(leaf_angles.inclination), np.asarray(leaf_angles.fraction)
-    bf = np.cos(inclination * DEGREE) ** 2 @ fraction
-    shape, flat = _flat(sza, vza, raa)
+    bf = np.cos(inclination * RADIANS_PER_DEGREE) ** 2 @ fraction
+    shape, flat = as_rows(sza, vza, raa)
     if shape:
         # The sums cost more than SAIL, and views of one column of a scan are often the same.
         flat, index = np.unique(flat, axis=1, return_inverse=True)
     sun, view, azimuth = flat[..., None]
-    mu_s, mu_v = np.cos(sun * DEGREE), np.cos(view * DEGREE)
+    mu_s, mu_v = np.cos(sun * RADIANS_PER_DEGREE), np.cos(view * RADIANS_PER_DEGREE)
     reflected, transmitted = volume_scattering(inclination, sun, view, azimuth)
     terms = leaf_projection(inclination, sun) / mu_s, leaf_projection(inclination, view) / mu_v
     terms += np.pi * (reflected / (mu_s * mu_v)), np.pi * (transmitted / (mu_s * mu_v))
@@ -585,7 +579,7 @@ def volume_scattering(inclination, sza, vza, raa):
     """
     beta_s, cos_s, sin_s = azimuth_limit(inclination, sza)
     beta_o, cos_o, sin_o = azimuth_limit(inclination, vza)
-    psi = np.multiply(raa, DEGREE)
+    psi = np.multiply(raa, RADIANS_PER_DEGREE)
     near = np.maximum(beta_s - beta_o, beta_o - beta_s)
     far = np.minimum(beta_s + beta_o, 2 * np.pi - beta_s - beta_o)
     first, middle, last = np.minimum(psi, near), np.minimum(np.maximum(psi, near), far), np.maximum(psi, far)

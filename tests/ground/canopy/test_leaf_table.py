@@ -37,18 +37,17 @@ def test_exact_leaves_are_those_of_prospect():
 
 
 def test_several_contents_are_computed_by_kind_of_leaf(monkeypatch):
-    """Equal leaves once, also across blocks, and contents that broadcast."""
-    from fifesim.ground.canopy import optics as leaf_table
-
+    """Equal leaves once, and contents that broadcast."""
     asked = []
-    spectrum = leaf_table.leaf_spectrum
-    monkeypatch.setattr(leaf_table, "_BLOCK", 2)
+    means = optics.leaf_band_means
     monkeypatch.setattr(
-        leaf_table, "leaf_spectrum", lambda leaf, *limits: asked.append(np.size(leaf.water)) or spectrum(leaf, *limits)
+        optics,
+        "leaf_band_means",
+        lambda contents, weights: asked.append(max(map(np.size, contents))) or means(contents, weights),
     )
     water, chlorophyll = np.array([0.01, 0.02, 0.01, 0.02]), np.array([[30.0], [50.0], [30.0]])
     found = leaf_means(BANDS, Leaf(water=water, chlorophyll=chlorophyll))
-    assert found.shape == (2, 2, 3, 4) and asked == [2, 2]
+    assert found.shape == (2, 2, 3, 4) and asked == [4]
     for row, column in np.ndindex(3, 4):
         leaf = Leaf(water=float(water[column]), chlorophyll=float(chlorophyll[row, 0]))
         np.testing.assert_allclose(found[..., row, column], optics.band_leaf_optics(BANDS, leaf), rtol=1e-12)

@@ -1,0 +1,18 @@
+"""Arguments of compiled kernels as arrays."""
+
+import numpy as np
+
+
+def numbers(values):
+    """Values as an array of floating-point numbers; complex ones, whose imaginary part is a derivative, stay."""
+    return np.asarray(values, complex if np.iscomplexobj(values) else float)
+
+
+def as_rows(*given):
+    """Common shape of some arguments, and their values as rows of one array, shape (argument, n)."""
+    given = [np.asarray(each) for each in given]
+    shape = np.broadcast_shapes(*(each.shape for each in given))
+    rows = np.empty((len(given), *shape), np.result_type(float, *given))
+    for number, each in enumerate(given):
+        rows[number] = each
+    return shape, rows.reshape(len(given), -1)
