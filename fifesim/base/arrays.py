@@ -1,6 +1,7 @@
 """Arguments of compiled kernels as arrays."""
 
 import numpy as np
+import pandas as pd
 
 
 def numbers(values):
@@ -16,3 +17,14 @@ def as_rows(*given):
     for number, each in enumerate(given):
         rows[number] = each
     return shape, rows.reshape(len(given), -1)
+
+
+def distinct_columns(rows):
+    """Place of the first of each kind of equal columns, and the kind of each column."""
+    kind = np.zeros(rows.shape[1], np.int64)
+    for row in rows:
+        codes, values = pd.factorize(row, use_na_sentinel=False)
+        kind = pd.factorize(kind * len(values) + codes)[0]
+    first = np.zeros(kind.max(initial=-1) + 1, np.int64)
+    first[kind[::-1]] = np.arange(kind.size)[::-1]
+    return first, kind

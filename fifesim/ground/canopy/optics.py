@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from fifesim.base import files
 from fifesim.base.arguments import is_path
+from fifesim.base.arrays import distinct_columns
 from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.ground.canopy.interpolation import refined
@@ -191,9 +192,9 @@ def _each_kind(bands, leaf, names, cells):
     """Band means of leaves, shape (2, band, n), from the varying contents, shape (name, n), once per kind of leaf."""
     means = np.full((2, len(bands), cells.shape[1]), np.nan)
     known = ~np.isnan(cells).any(axis=0)
-    kinds, index = np.unique(cells[:, known], axis=1, return_inverse=True)
-    of_kinds = np.moveaxis(_means(bands, replace(leaf, **dict(zip(names, kinds, strict=True)))), -1, 1)
-    means[..., known] = of_kinds[..., index.reshape(-1)]
+    first, kind = distinct_columns(cells[:, known])
+    kinds = dict(zip(names, cells[:, known][:, first], strict=True))
+    means[..., known] = np.moveaxis(_means(bands, replace(leaf, **kinds)), -1, 1)[..., kind]
     return means
 
 

@@ -23,7 +23,7 @@ from fifesim.ground.canopy.leaf_area import check_lai, check_share
 from fifesim.ground.canopy.optics import check_background, check_leaf_optics
 from fifesim.ground.canopy.sail_model import over_background, reflectance_factor, sail, with_background
 
-_BLOCK = 2**15  # cells evaluated at a time, to bound memory
+_BLOCK = 2**13  # cells at a time, so that intermediate results stay in the cache of the processor
 
 # Background reflectances for which a table of terms is tested.
 _GROUNDS = (0.0, 0.5, 1.0)

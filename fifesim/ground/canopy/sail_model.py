@@ -7,7 +7,7 @@ import numba
 import numpy as np
 from numba.extending import register_jitable
 
-from fifesim.base.arrays import as_rows, numbers
+from fifesim.base.arrays import as_rows, distinct_columns, numbers
 from fifesim.base.geometry import relative_azimuth
 from fifesim.ground.canopy.leaf_angles import RADIANS_PER_DEGREE, azimuth_limit, leaf_angle_classes, leaf_projection
 
@@ -537,7 +537,8 @@ def leaf_angle_sums(sza, vza, raa, leaf_angles):
     shape, flat = as_rows(sza, vza, raa)
     if shape:
         # The sums cost more than SAIL, and views of one column of a scan are often the same.
-        flat, index = np.unique(flat, axis=1, return_inverse=True)
+        first, kind = distinct_columns(flat)
+        flat = flat[:, first]
     sun, view, azimuth = flat[..., None]
     mu_s, mu_v = np.cos(sun * RADIANS_PER_DEGREE), np.cos(view * RADIANS_PER_DEGREE)
     reflected, transmitted = volume_scattering(inclination, sun, view, azimuth)
@@ -545,7 +546,7 @@ def leaf_angle_sums(sza, vza, raa, leaf_angles):
     terms += np.pi * (reflected / (mu_s * mu_v)), np.pi * (transmitted / (mu_s * mu_v))
     # The last bits of these sums, unlike those of a matrix product, do not depend on the number of cells.
     sums = (np.sum(term * fraction, axis=-1) for term in terms)
-    ks, ko, *scattered = (each[index].reshape(shape) if shape else each[0] for each in sums)
+    ks, ko, *scattered = (each[kind].reshape(shape) if shape else each[0] for each in sums)
     return LeafAngleSums(ks, ko, bf, *scattered)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fifesim
+from fifesim.base.arrays import distinct_columns
 from fifesim.ground.canopy import optics
 from fifesim.ground.canopy.optics import LEAF_TOLERANCE, leaf_means
 from fifesim.ground.canopy.prospect import CONTENTS, LARGEST_STRUCTURE, Leaf
@@ -68,3 +69,11 @@ def test_leaves_almost_without_absorption_give_no_more_than_they_get():
     coastal = fifesim.instrument("MSI").select(["MSI1"])[0].response
     clear = dict.fromkeys(CONTENTS, 0.0) | {"brown": np.geomspace(1e-15, 0.1, 3000)}
     assert leaf_means((coastal,), Leaf(structure=1.0, **clear)).sum(axis=0).max() <= 1 + 1e-15
+
+
+def test_equal_columns_are_found():
+    rows = np.array([[1.0, 2.0, 1.0, np.nan, 2.0, np.nan], [5.0, 5.0, 5.0, 1.0, 6.0, 1.0]])
+    first, kind = distinct_columns(rows)
+    assert first.tolist() == [0, 1, 3, 4] and kind.tolist() == [0, 1, 0, 2, 3, 2]
+    np.testing.assert_array_equal(rows[:, first][:, kind], rows)
+    assert [each.tolist() for each in distinct_columns(np.empty((2, 0)))] == [[], []]
