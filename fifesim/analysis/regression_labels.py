@@ -316,7 +316,7 @@ def invert(
         raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")
     line = f"invert: {fit.intercept:.6g} + {fit.slope:.6g} x {ndvi.name or 'index'}"
     allowed = _RANGES[quantity]
-    found = {quantity: chunks.pointwise(_clipped, ndvi, fit=fit, allowed=allowed)}
+    found: dict = {quantity: chunks.pointwise(_clipped, ndvi, fit=fit, allowed=allowed)}
     for end, name in enumerate(_LIMITS):
         found[name] = chunks.pointwise(_limit, ndvi, fit=fit, allowed=allowed, end=end, level=level)
     for name, values in found.items():

@@ -281,7 +281,7 @@ def kt(
     """
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
-    return terrain_labels.kt_on_slopes(directions.dated(reflectance, time), sunlight(dem, horizon, *air, "kt"))
+    return terrain_labels.kt_on_slopes(directions.dated(reflectance, time), sunlight(dem, horizon, *air, "kt"))  # type: ignore[call-arg]
 
 
 def kt_and_reflectance(level, dem, horizon=None, upwelling=True):

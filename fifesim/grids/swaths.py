@@ -88,7 +88,7 @@ def grid_swath(
     x, y = _places(image, grid)
     row, column = (y - grid.affine.f) / grid.affine.e, (x - grid.affine.c) / grid.affine.a
     reach = scan_pixels.reach(row, column, grids.cell_size(grid))
-    scan = _Scan(row, column, *scan_pixels.corners(row, column), reach)
+    scan = _Scan(row, column, *scan_pixels.corners(row, column), reach)  # type: ignore[call-arg]
     _check_overlap(scan, grid)
     nearest = method == "nearest"
     data = _nearest(scan, image.data, grid) if nearest else _means(scan, image.data, grid, min_valid)

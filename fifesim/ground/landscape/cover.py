@@ -289,7 +289,7 @@ class Patches:
             return tuple(float(self.shares[name]) for name in names)
         if len(self.shares) != len(names):
             raise ValueError(f"{len(self.shares)} shares for {len(names)} classes: give one for each")
-        return self.shares
+        return tuple(self.shares)
 
 
 def patch_classes(patches, shares, seed, northing, easting, codes=None):

@@ -203,7 +203,7 @@ def calibrate(
         bits = 16 if dn.dtype.itemsize > 1 else 8
         # Products of instruments of up to 8 bits have 8, also where they are stored in wider numbers.
         full = 8 if description.bits <= 8 else bits
-        if not np.all(gain > 0):
+        if not np.all(gain > 0):  # type: ignore[operator]
             raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")
         _check_scale(gain * (2**full - 1) + offset, bands)
     saturated = _saturation(saturated, 2**full - 1, 2**bits - 1)
