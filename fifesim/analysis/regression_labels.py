@@ -27,10 +27,15 @@ _LARGEST = 1e15
 _SAME_PIXEL = 2.0
 
 
-def matched(y, x, pair="coordinates"):
-    """Cut two rasters so that their pixels pair, by coordinates or by row and column."""
+def check_pair(pair):
+    """Raise ValueError if no way of pairing pixels has this name."""
     if pair not in ("coordinates", "index"):
         raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
+
+
+def matched(y, x, pair="coordinates"):
+    """Cut two rasters so that their pixels pair, by coordinates or by row and column."""
+    check_pair(pair)
     y, x = sound_cells(y), sound_cells(x)
     for array in (y, x):
         if set(array.dims) != {"y", "x"}:

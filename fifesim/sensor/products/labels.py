@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.annotations import NumberByBand, Time
-from fifesim.base.arguments import UNCHECKED
+from fifesim.base.arguments import Kind
 from fifesim.base.bands import counts
 from fifesim.base.files import in_a_line
 from fifesim.grids import cf, chunks, directions
@@ -110,7 +110,12 @@ _CURE = (
 _DIMMEST, _BRIGHTEST = 0.02, 20.0
 
 # The digital number of saturated pixels; None where no number marks them.
-Saturation: TypeAlias = Annotated[int | Literal["largest"] | None, UNCHECKED]
+Saturation: TypeAlias = Annotated[
+    int | Literal["largest"] | None,
+    Kind(
+        "'largest', None, or a digital number", lambda value: value is None or isinstance(value, str | int | np.integer)
+    ),
+]
 
 
 @by_date
