@@ -1,6 +1,5 @@
 """Names, units and provenance."""
 
-import re
 
 import numpy as np
 import pytest

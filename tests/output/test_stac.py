@@ -96,7 +96,7 @@ def test_bands_of_the_extension_are_those_of_the_core(item, pystac):
 
 
 def test_the_footprint_is_that_of_the_pixels(item):
-    """Quarters of the edges by GDAL's own transformation, to a tenth of a metre, counterclockwise from the southwest."""
+    """Quarters of the edges by GDAL's own transformation, to 0.1 m, counterclockwise from the southwest."""
     (ring,) = item["geometry"]["coordinates"]
     west, south, east, north = 704970, 4333620, 705870, 4334220
     share = np.arange(4) / 4
