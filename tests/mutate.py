@@ -1,7 +1,7 @@
 """
 Change one operator, comparison, constant or call of the package at a time, and list the changes that no test notices.
 
-    python tests/mutate.py fifesim/output/stac.py                      # 20 changes of a file, a few minutes
+    python tests/mutate.py fifesim/output/stac.py                      # 15 changes of a file, a few minutes
     pytest -n auto --cov=fifesim --cov-context=test --cov-report=      # once: which test runs which line
     python tests/mutate.py --draws 300 --log mutations.txt             # the package, hours; goes on where the log ends
     python tests/mutate.py --draws 40 --verify                         # what `fifesim verify` notices in its kernels
@@ -271,7 +271,7 @@ class Checkout:
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument("path", nargs="?", default="fifesim", help="folder or module of the package")
-    parser.add_argument("--draws", type=int, default=20)
+    parser.add_argument("--draws", type=int, default=15)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--verify", action="store_true", help="ask `fifesim verify` instead of the tests")
     parser.add_argument("--log", type=Path, help="file of results, whose changes are not tried again")
