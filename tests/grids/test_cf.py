@@ -1,6 +1,5 @@
 """Names, units and provenance."""
 
-
 import numpy as np
 import pytest
 import xarray as xr
