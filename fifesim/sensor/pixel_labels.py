@@ -130,12 +130,12 @@ def means_by_band(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_va
         check_scene(spreads, grids.geobox(array), min_valid, f"{instrument.name} {names}")
         return regularized(part, spreads, pixels, shifts=shifts, min_valid=min_valid)
 
-    return by_line_spread(means, array, instrument, bands)
+    return by_line_spread(means, array, instrument.line_spreads, bands)
 
 
-def by_line_spread(means, array, instrument, bands):
+def by_line_spread(means, array, line_spreads, bands):
     """Raster computed for all bands with the same line spread functions at a time, in the order of the array."""
-    groups = _grouped(bands, instrument.line_spreads)
+    groups = _grouped(bands, line_spreads)
     parts = []
     for spreads, numbers in groups.items():
         part = array if len(groups) == 1 else array.isel(band=numbers)
