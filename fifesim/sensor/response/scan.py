@@ -243,6 +243,10 @@ def ground_of_detector(track_angle, scan_angle, altitude):
     central_angle : array
         Between the point and the track, at the earth's centre, with the sign of the scan angle. [degree]
 
+    References
+    ----------
+    [Ichoku2005]_ gives the sizes of pixels for small beta
+
     Examples
     --------
     The line spacing of MODIS doubles at the edge of its scan:

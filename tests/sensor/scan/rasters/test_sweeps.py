@@ -166,5 +166,7 @@ def test_indices_and_files_of_a_sweep_keep_what_a_map_needs(tmp_path):
     with xr.open_dataarray(tmp_path / "sweep.nc", decode_coords="all") as back:
         xr.testing.assert_equal(back, image)
         assert back["deleted"].dtype == bool
-    reflectance = image.fifesim.to_reflectance()
-    assert {"sweep", "deleted"} <= set(reflectance.coords)
+    view = {"nadir_offset": OFFSETS["VIIRS"][55], "view_tolerance": 180, "min_valid": 0.0}
+    pair = xr.concat([scene("VIIRS"), 2 * scene("VIIRS").assign_coords(band=["I2"])], "band", combine_attrs="override")
+    ndvi = fifesim.sense_swath(pair.assign_attrs(units="W m-2 sr-1 um-1"), "VIIRS", **view).fifesim.ndvi()
+    assert {"sweep", "deleted"} <= set(ndvi.coords)
