@@ -358,6 +358,77 @@ class LowPass(CutoffTransfer):
 
 
 @dataclass(frozen=True)
+class Mixture(Transfer):
+    r"""
+    Transfer function of a sum of bands, each with the parts of its own response.
+
+    .. math:: M(f) = \sum_s a_s \prod_k M_{sk}(f), \qquad \sum_s a_s = 1
+
+    Parameters
+    ----------
+    shares : sequence of float
+        Shares a of the bands. [1]
+    parts : sequence
+        For each band, objects with ``mtf(frequency)``.
+    """
+
+    shares: tuple
+    parts: tuple
+
+    def _mtf(self, frequency):
+        return sum(share * _product(each, frequency) for share, each in zip(self.shares, self.parts, strict=True))
+
+
+@dataclass(frozen=True)
+class Difference(Transfer):
+    r"""
+    Transfer function from the image of one instrument to the image of another, a part of `SystemSpread`.
+
+    .. math:: K(f) = M_t(f) \, \frac{M(f) \, (1 + \epsilon^2)}{M(f)^2 + \epsilon^2}
+
+    It is the ratio of both transfers where the first instrument passes much more than the floor, and falls to zero
+    where it passes less. Frequencies are amplified :math:`(1 + \epsilon^2) / 2 \epsilon` times at most.
+
+    Parameters
+    ----------
+    target : Transfer
+        The other instrument, Mt.
+    recorded : Transfer
+        The instrument that recorded the image, M.
+    floor : float
+        Floor epsilon, in (0, 1). [1]
+
+    Raises
+    ------
+    ValueError
+        If the floor is not in (0, 1).
+
+    Examples
+    --------
+    >>> from fifesim.base.line_spread import Boxcar
+    >>> round(float(Difference(Boxcar(30.0), Boxcar(10.0), 0.01).mtf(1 / 60) * Boxcar(10.0).mtf(1 / 60)), 3)
+    0.637
+    """
+
+    target: Transfer
+    recorded: Transfer
+    floor: float
+
+    def __post_init__(self):
+        if not 0 < self.floor < 1:
+            raise ValueError(f"floor must be in (0, 1), got {self.floor}: it is a transfer")
+
+    def left(self, frequency):
+        """Transfer of both images together relative to the target alone. [1]"""
+        square = self.recorded.mtf(frequency) ** 2
+        return square * (1 + self.floor**2) / (square + self.floor**2)
+
+    def _mtf(self, frequency):
+        recorded = self.recorded.mtf(frequency)
+        return self.target.mtf(frequency) * recorded * (1 + self.floor**2) / (recorded**2 + self.floor**2)
+
+
+@dataclass(frozen=True)
 class SystemSpread(LineSpread):
     r"""
     Line spread function of a chain of parts, whose transfer functions are multiplied.
