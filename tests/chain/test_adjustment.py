@@ -11,6 +11,7 @@ from fifesim.base import files
 from fifesim.chain import adjustment
 from fifesim.grids import directions
 from fifesim.grids import grid as grids
+from fifesim.ground.canopy.library import library_spectra
 
 # Bands of the MSI nearest to those of the TM.
 NEAREST = {"TM1": "MSI2", "TM2": "MSI3", "TM3": "MSI4", "TM4": "MSI8", "TM5": "MSI11", "TM7": "MSI12"}
@@ -303,7 +304,17 @@ def test_shares_of_bands_are_those_of_the_variance():
     shares = adjustment._variance_shares(sources, sources[2:], 1e-5)
     np.testing.assert_allclose(shares, [[0, 0, 1, 0], [0, 0, 0, 1]], rtol=0, atol=2e-3)
     others = tuple(band.response for band in fifesim.instrument("TM").select(["TM2", "TM4"]))
-    np.testing.assert_allclose(adjustment._variance_shares(sources, others, 5e-4).sum(axis=1), 1, rtol=1e-12)
+    _, spectra = library_spectra()
+    means = spectra @ adjustment._weights(sources).T
+    for weights, shares in zip(
+        adjustment._estimate(sources, others, 5e-4).weights,
+        adjustment._variance_shares(sources, others, 5e-4),
+        strict=True,
+    ):
+        parts = weights * means
+        whole = parts.sum(axis=1)
+        expected = [np.cov(part, whole)[0, 1] / np.var(whole, ddof=1) for part in parts.T]
+        np.testing.assert_allclose(shares, expected, rtol=1e-9, atol=1e-12)
 
 
 def test_a_recorded_scene_is_the_same_in_any_chunks(msi):
