@@ -304,7 +304,8 @@ def _variance_shares(sources, targets, uncertainty):
     """Shares of the source's bands in the variance of each estimated band over the library, which sum to 1."""
     _, spectra = library_spectra()
     weights = _estimate(sources, targets, uncertainty).weights
-    covariance = np.atleast_2d(np.cov(spectra @ _weights(sources).T, rowvar=False))
+    means = (spectra @ _weights(sources).T).reshape(-1, len(sources))
+    covariance = np.atleast_2d(np.cov(means, rowvar=False))
     shares = weights * (weights @ covariance)
     return shares / shares.sum(axis=1, keepdims=True)
 

@@ -305,7 +305,7 @@ def test_shares_of_bands_are_those_of_the_variance():
     np.testing.assert_allclose(shares, [[0, 0, 1, 0], [0, 0, 0, 1]], rtol=0, atol=2e-3)
     others = tuple(band.response for band in fifesim.instrument("TM").select(["TM2", "TM4"]))
     _, spectra = library_spectra()
-    means = spectra @ adjustment._weights(sources).T
+    means = (spectra @ adjustment._weights(sources).T).reshape(-1, len(sources))
     for weights, shares in zip(
         adjustment._estimate(sources, others, 5e-4).weights,
         adjustment._variance_shares(sources, others, 5e-4),
