@@ -61,3 +61,15 @@ def sunlit_and_seen(lai, ks, ko, alpha):
     scales = np.outer([1 / max(alpha, 1e-9), 1 / max((ks + ko) * lai, 1e-9)], [0.3, 1, 3, 10, 30]).ravel()
     edges = np.unique(np.clip([0, *scales, 1], 0, 1))
     return lai * sum(quad(gap, a, b, epsabs=1e-15, epsrel=1e-10)[0] for a, b in pairwise(edges))
+
+
+def fpar_of_green_leaves(lai, sza, brown, dissociation, crown_cover, fpar_inf, projection=0.5):
+    """FPAR of green leaves of a mean projection: two layers of random crowns, 4SAIL2 of Verhoef and Bach (2007). [1]"""
+    cosine = np.cos(np.radians(sza))
+    extinction, inside = projection / cosine, lai / crown_cover
+    above, below = (1 - brown) * inside, brown * inside
+    green_above = 1 - (1 - dissociation) * brown
+    green_below = (1 - dissociation) * (1 - brown)
+    absorbed = green_above * (1 - np.exp(-extinction * above))
+    absorbed += green_below * np.exp(-extinction * above) * (1 - np.exp(-extinction * below))
+    return (1 - (1 - crown_cover) ** (1 / cosine)) * fpar_inf * absorbed

@@ -96,8 +96,7 @@ class Regression:
         >>> line.predict([0.25, 0.5]).tolist()
         [1.5, 2.0]
         """
-        x = np.asarray(x, float) if isinstance(x, list | tuple) else x
-        return self.intercept + self.slope * x
+        return self.intercept + self.slope * (np.asarray(x, float) if isinstance(x, list | tuple) else x)  # type: ignore[operator, return-value]
 
     def extrapolates(self, x: Numbers) -> np.ndarray:
         """

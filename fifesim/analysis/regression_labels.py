@@ -27,10 +27,15 @@ _LARGEST = 1e15
 _SAME_PIXEL = 2.0
 
 
-def matched(y, x, pair="coordinates"):
-    """Cut two rasters so that their pixels pair, by coordinates or by row and column."""
+def check_pair(pair):
+    """Raise ValueError if no way of pairing pixels has this name."""
     if pair not in ("coordinates", "index"):
         raise ValueError(f"pair must be 'coordinates' or 'index', got {pair!r}")
+
+
+def matched(y, x, pair="coordinates"):
+    """Cut two rasters so that their pixels pair, by coordinates or by row and column."""
+    check_pair(pair)
     y, x = sound_cells(y), sound_cells(x)
     for array in (y, x):
         if set(array.dims) != {"y", "x"}:
@@ -316,7 +321,7 @@ def invert(
         raise ValueError(f"level must be between 0 and 1, got {level:g}: 0.95 holds 95 % of new values")
     line = f"invert: {fit.intercept:.6g} + {fit.slope:.6g} x {ndvi.name or 'index'}"
     allowed = _RANGES[quantity]
-    found = {quantity: chunks.pointwise(_clipped, ndvi, fit=fit, allowed=allowed)}
+    found: dict = {quantity: chunks.pointwise(_clipped, ndvi, fit=fit, allowed=allowed)}
     for end, name in enumerate(_LIMITS):
         found[name] = chunks.pointwise(_limit, ndvi, fit=fit, allowed=allowed, end=end, level=level)
     for name, values in found.items():

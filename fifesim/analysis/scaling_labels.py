@@ -263,7 +263,7 @@ def share_kept(pixels: AnyDimensions, cells: xr.DataArray) -> xr.Dataset:
     """
     pixels, cells = sound_cells(pixels), sound_cells(cells)
     check_same_quantity(pixels, cells, ("pixels", "cells"))
-    coarse, fine = (abs(np.diff(each["x"].values[:2])) if "x" in each.coords else [] for each in (pixels, cells))
+    coarse, fine = (abs(np.diff(each["x"].values[:2])) if "x" in each.coords else [] for each in (pixels, cells))  # type: ignore[var-annotated]
     if len(coarse) and len(fine) and coarse[0] < 0.99 * fine[0]:
         raise ValueError(f"pixels must not be finer than cells, got {coarse[0]:g} and {fine[0]:g} m: exchange them")
     extent = (pixels.max() - pixels.min()) / (cells.max() - cells.min())

@@ -139,6 +139,8 @@ class Band:
     response: Sequence[float] = field(repr=False)
 
     def __post_init__(self):
+        if not isinstance(self.name, str):
+            raise TypeError(f"name of a Band must be text, got {described(self.name)}")
         wavelength, response = (_numbers(self, name) for name in ("wavelength", "response"))
         if len(wavelength) < 2 or len(wavelength) != len(response) or np.any(np.diff(wavelength) <= 0):
             raise ValueError(f"band {self.name}: wavelengths must increase, one for each response")

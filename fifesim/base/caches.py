@@ -47,4 +47,4 @@ def clear_caches() -> None:
     >>> fifesim.clear_caches()
     """
     for cache in CACHES:
-        cache.function.cache_clear()
+        cache.function.cache_clear()  # type: ignore[attr-defined]

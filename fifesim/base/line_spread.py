@@ -7,6 +7,7 @@ A line spread function (lsf) is any object with ``half_width`` [m], outside of w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
@@ -18,6 +19,8 @@ from fifesim.base.arguments import Kind
 
 class Transfer:
     """Transfer function of a part of an instrument; subclasses give the formula, ``_mtf(frequency)``."""
+
+    _mtf: Callable
 
     def mtf(self, frequency: Numbers) -> np.ndarray:
         """Modulation transfer function at spatial frequencies [cycles m-1], negative where contrast is reversed. [1]"""
@@ -31,6 +34,7 @@ class LineSpread(Transfer):
     # `_mtf(frequency)`.
 
     half_width: float
+    _cumulative: Callable
 
     def cumulative(self, x: Numbers) -> np.ndarray:
         """Share of the response before a distance [m] from the pixel centre. [1]"""

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from functools import wraps
 from pathlib import Path
 
-PARTS = {}
+PARTS: dict = {}
 """Names of a description and of its fields by the argument that takes it, for messages."""
 
 

@@ -256,7 +256,8 @@ def fpar(
     if land.cover is None:
         return absorbed(stands[None])
     # Classes whose canopies absorb alike are computed once.
-    kernels, known = {}, []
+    kernels: dict = {}
+    known: list = []
     for code, stand in stands.items():
         alike = [kernel for other, kernel in known if ground.same_properties(stand, other, ground.ABSORBING)]
         kernels[code] = alike[0] if alike else (np.positive, [absorbed(stand)])

@@ -119,7 +119,8 @@ def canopy_spectra(
         if name not in _NAMES:
             near = closest(name, _NAMES)
             meant = f", did you mean {near!r}?" if near else ""
-            raise ValueError(f"unknown quantity {name!r} of canopies{meant} Known: {', '.join(_NAMES)}")
+            known = ", ".join(_NAMES)
+            raise ValueError(f"{name!r} is no quantity of canopies and their derivatives{meant} There are {known}")
     model = _Model(responses, canopy or TALLGRASS, bool(_LEAF.keys() & {*values, *derivatives}))
     values = model.defaults(geometry, atmosphere, values) | values
     count = max(np.shape(each)[0] for each in values.values())

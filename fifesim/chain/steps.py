@@ -12,7 +12,7 @@ from fifesim.atmosphere import engines
 from fifesim.atmosphere import labels as atmosphere_labels
 from fifesim.atmosphere.models import Atmosphere
 from fifesim.base.annotations import Names, Surroundings, Time
-from fifesim.base.arguments import UNCHECKED, described
+from fifesim.base.arguments import Kind, described
 from fifesim.base.bands import Band
 from fifesim.base.caches import cached
 from fifesim.base.messages import warn
@@ -160,7 +160,10 @@ def ndvi(image: RasterOrDataset) -> xr.DataArray:
 @by_date
 def index(
     image: xr.DataArray,
-    name: Annotated[Literal["NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"], UNCHECKED],
+    name: Annotated[
+        Literal["NDVI", "EVI", "EVI2", "SAVI", "MSAVI", "NDWI", "NDMI", "NIRv"],
+        Kind("the name of an index, such as 'NDVI'"),
+    ],
 ) -> xr.DataArray:
     """
     Spectral index of an image.
@@ -281,7 +284,7 @@ def kt(
     """
     reflectance = as_bands_of(reflectance, instrument, "surface_reflectance")
     air = air_bands_and_geometry(reflectance, atmosphere, geometry, instrument, time)
-    return terrain_labels.kt_on_slopes(directions.dated(reflectance, time), sunlight(dem, horizon, *air, "kt"))
+    return terrain_labels.kt_on_slopes(directions.dated(reflectance, time), sunlight(dem, horizon, *air, "kt"))  # type: ignore[call-arg]
 
 
 def kt_and_reflectance(level, dem, horizon=None, upwelling=True):

@@ -292,7 +292,8 @@ class _Sealed:
         return self.name
 
 
-_known, _asked = {}, Lock()
+_known: dict = {}
+_asked = Lock()
 
 
 def _computed(sealed):

@@ -210,7 +210,7 @@ def to_geotiff(
     grid = grids.geobox(array)
     dates = [name for name, value in array.coords.items() if value.dtype.kind == "M" and {"y", "x"} <= set(value.dims)]
     layers = dates if array.dtype.kind == "f" else []
-    varying = [name for name in ANGLES if name in array.coords and array.coords[name].ndim]
+    varying: list = [name for name in ANGLES if name in array.coords and array.coords[name].ndim]
     varying += [name for name in dates if name not in layers]
     cells = with_layers(array, layers)
     _check_room(cells, path)

@@ -320,7 +320,7 @@ def _whole(grid):
 
 # Coordinates made by `place` and their grid, by the identity of the pandas index of x, which copies of a raster share.
 # Reading the grid from the coordinates takes 0.2 ms, several times in each step.
-_placed = {}
+_placed: dict = {}
 _placing = Lock()
 
 

@@ -157,7 +157,7 @@ def sun_position(
     if not np.ndim(values) and not any(np.ndim(each) for each in (latitude, longitude, altitude)):
         return geometry.sun_geometry(values, latitude, longitude, altitude)
     places = [np.asarray(each, float) for each in (latitude, longitude, altitude)]
-    times = list(values) if np.ndim(values) else [values] * max(each.size for each in places)
+    times: list = list(values) if np.ndim(values) else [values] * max(each.size for each in places)
     utc, *found = geometry.sun_positions(times, *places)
     names = "sza", "saa", "earth_sun_distance"
     data = {name: ("time", each, cf.attributes(name)) for name, each in zip(names, found, strict=True)}

@@ -94,7 +94,7 @@ def grid_swath(
     if "deleted" in image.coords:  # pixels without a place, which are nearest to no cell
         deleted = np.asarray(image["deleted"].transpose(*DIMS), bool)
         row, column = np.where(deleted, np.nan, row), np.where(deleted, np.nan, column)
-    scan = _Scan(row, column, *edges, reach)
+    scan = _Scan(row, column, *edges, reach)  # type: ignore[call-arg]
     _check_overlap(scan, grid)
     nearest = method == "nearest"
     data = _nearest(scan, image.data, grid) if nearest else _means(scan, image.data, grid, min_valid)

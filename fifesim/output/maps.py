@@ -96,8 +96,17 @@ def rgb(
     return out.rename("colours")
 
 
+def check_composite(composite):
+    """Raise ValueError if a text names no composite."""
+    if isinstance(composite, str) and composite not in COMPOSITES:
+        raise ValueError(
+            f"composite must be {' or '.join(map(repr, COMPOSITES))}, or the names of three bands, got {composite!r}"
+        )
+
+
 def composite_bands(image, composite="false colour"):
     """Names of the bands shown as red, green and blue."""
+    check_composite(composite)
     if "band" not in image.dims:
         raise ValueError(f"colours are of several bands along a dimension band, got {image.dims}: draw it with .plot()")
     have = [str(name) for name in image["band"].values] if "band" in image.coords else []
@@ -106,10 +115,6 @@ def composite_bands(image, composite="false colour"):
         if missing or len(composite) != 3:
             raise ValueError(f"a composite is of three of the bands {', '.join(have)}, got {tuple(composite)}")
         return [str(name) for name in composite]
-    if composite not in COMPOSITES:
-        raise ValueError(
-            f"composite must be {' or '.join(map(repr, COMPOSITES))}, or the names of three bands, got {composite!r}"
-        )
     if "wavelength" not in image.coords:
         three = tuple(have[-1:-4:-1]) if len(have) > 2 else ("B5", "B4", "B3")
         raise ValueError(f"the image has no wavelength [um] along band: name three bands, composite={three}")

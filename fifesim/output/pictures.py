@@ -5,6 +5,7 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
@@ -19,7 +20,7 @@ from fifesim.grids import grid as grids
 from fifesim.grids import swaths
 from fifesim.grids.reductions import computed
 from fifesim.output import colours
-from fifesim.output.maps import Composite, composite_bands, rgb, thinned, valid
+from fifesim.output.maps import Composite, check_composite, composite_bands, rgb, thinned, valid
 
 # Pixels that are drawn along the longer side at most.
 _SIZE = 1500
@@ -81,6 +82,7 @@ def plot(
     1.0
     """
     raster = _checked(raster, band)
+    check_composite(composite)
     names = composite_bands(raster, composite) if "band" in raster.dims else []
     few = raster.sel(band=list(dict.fromkeys(names))) if names else valid(raster)
     shown = computed(thinned(few, size))[0]
@@ -93,6 +95,8 @@ def plot(
         _draw(axes, picture, rgba=np.dstack([np.nan_to_num(picture.values), picture.notnull().all("rgb").values]))
         what = picture.attrs["long_name"]
     else:
+        if isinstance(cmap, str) and cmap not in colormaps:
+            raise ValueError(f"cmap: matplotlib has no colour map {cmap!r}, type for instance cmap='viridis'")
         own, middle = colours.colours_of(shown.name)
         if limits is None:
             middle = middle if cmap is None else None

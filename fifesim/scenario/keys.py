@@ -160,7 +160,7 @@ _Structure = create_model("_Structure", __base__=_LeafArea, **{name: _key(known)
 
 
 # mypy does not know classes that are made of a table.
-class StandKeys(_Structure):  # type: ignore[valid-type]
+class StandKeys(_Structure):  # type: ignore[misc, valid-type]
     """Leaf area, leaves and what lies below them, of a stand of plants."""
 
     leaf_reflectance: ByName = text({}, "by band [1]; all bands or none")
@@ -433,7 +433,7 @@ class Keys(Section):
     terrain: TerrainKeys = TerrainKeys()
     geometry: SunAndViewKeys = SunAndViewKeys()
     atmosphere: AirKeys = AirKeys()
-    sensor: SensorKeys = SensorKeys()
+    sensor: SensorKeys = SensorKeys()  # type: ignore[call-arg]
 
     @field_validator("classes")
     @classmethod

@@ -205,7 +205,7 @@ class Scenario(Keys):
     classes: dict[str, CoverStand] = Field({})
     terrain: Terrain = Terrain()
     atmosphere: Air = Air()
-    sensor: Sensor = Sensor()
+    sensor: Sensor = Sensor()  # type: ignore[call-arg]
 
     def __init__(self, /, **sections: Any) -> None:
         try:

@@ -98,7 +98,7 @@ class Study:
     @cached_property
     def values(self) -> dict[str, Any]:
         """What all chips share, nested as in a scenario; sun and altitude are those of the scenario's own place."""
-        return _settled(self.scenario, {key.path for key in self.drawn})
+        return _settled(self.scenario, {key.path for key in self.drawn})  # type: ignore[attr-defined]
 
     def quotas(self) -> dict[str, int]:
         """Landscapes of each part of the split, a dict of int by name."""

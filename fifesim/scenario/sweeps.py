@@ -12,7 +12,7 @@ import dask.array as da
 import numpy as np
 import xarray as xr
 
-from fifesim.analysis.regression_labels import regress
+from fifesim.analysis.regression_labels import check_pair, regress
 from fifesim.base.annotations import Array, Pairing
 from fifesim.base.arguments import PLAIN, described
 from fifesim.scenario.ensemble import realise
@@ -76,6 +76,7 @@ def sweep(
         raise TypeError(f"axes must map keys to values, such as {{'visibility': [5, 45]}}, got {described(axes)}")
     if not axes:
         raise ValueError("a sweep needs an axis, such as {'arp': [0.05, 0.15, 0.24]}")
+    check_pair(pair)
     steps = {name: _axis(name, given) for name, given in axes.items()}
     names = STATISTICS if measures is None else tuple(measures)
     shape = (len(names),) + ((len(VARIABLES),) if measures is None else ())

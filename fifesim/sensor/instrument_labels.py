@@ -20,7 +20,7 @@ from fifesim.sensor.description.instruments import catalogued, instrument_names,
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.spectral_response import ResponseList
 
-_ADAPTER = TypeAdapter(Instrument)
+_ADAPTER: TypeAdapter = TypeAdapter(Instrument)
 
 # What the paper simulates, and so scenes made on its site.
 _FIFE = "TM"

@@ -109,9 +109,9 @@ def _checked_radiance(largest, dn, *scale):
 
 def noisy(radiance, instrument, bands, kinds, seed, first=(0, 0), given=None):
     """Radiance with the noise of an instrument, dims (band, y, x). [W m-2 sr-1 um-1]"""
+    check_seed(seed)
     if not check_kinds(kinds):
         return radiance
-    check_seed(seed)
     models = noise_models(instrument, bands, kinds, given)
     numbers = [instrument.bands.index(band) for band in bands]
     image = epoch(radiance)

@@ -133,7 +133,7 @@ def test_a_dataset_keeps_its_dimension_and_coordinates():
         ({"lai": [1.0, 2.0], "brown": [0.1] * 3}, {"geometry": SUN}, "equal numbers of values"),
         ({"lai": 1.0, "background": [[0.1] * 5]}, {"geometry": SUN}, "background must be of shape"),
         ({"lai": 1.0, "sza": [10.0, 20.0]}, {"atmosphere": fifesim.Atmosphere()}, "diffuse fraction for one sun"),
-        ({"lai": 1.0}, {"geometry": SUN, "derivatives": ["water"]}, "unknown quantity 'water'"),
+        ({"lai": 1.0}, {"geometry": SUN, "derivatives": ["water"]}, "'water' is no quantity of canopies"),
     ],
 )
 def test_mistakes_are_refused(values, options, message):

@@ -97,6 +97,9 @@ def test_colours_of_a_lazy_image_are_lazy_and_the_same():
     lazy = lazy.copy(data=lazy.data.map_blocks(lambda block: read.append(1) or block, meta=np.empty((0, 0, 0))))
     found = rgb(lazy)
     assert found.chunks is not None
+    # Colours are stretched between limits of the whole image, which is read once for them; no pixel is kept.
+    limits = len(read)
+    assert limits == lazy.data.npartitions
     with dask.config.set(scheduler="synchronous"):
         xr.testing.assert_identical(found.compute(), rgb(array))
 

@@ -8,9 +8,11 @@ import pytest
 import xarray as xr
 from elevations import write
 from lazy import no_compute
+from oracles_canopy import fpar_of_green_leaves
 
 import fifesim
 from fifesim.grids import grid as grids
+from fifesim.ground.canopy.layers import extinction_coefficient
 from fifesim.scenario.ground import canopy_of, drawn_properties, ground_scene, truth_of, warn_of_canopy
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.simulation import setup_of
@@ -105,10 +107,14 @@ def test_light_and_truth_of_a_scenario_are_those_written_out(scenario, by_hand):
     truth = {
         "lai": by_hand["lai"],
         "fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, canopy=shares),
-        "green_fpar": fifesim.fpar(by_hand, geometry=sun, fpar_inf=0.9, leaves="green", canopy=shares),
         "soil": by_hand["soil"],
     }
-    assert set(tree["truth"].data_vars) == {*truth, "brown"}
+    assert set(tree["truth"].data_vars) == {*truth, "brown", "green_fpar"}
+    wood = extinction_coefficient(sun.sza, "erectophile") * np.cos(np.radians(sun.sza))
+    projection = np.where(by_hand["cover"] == 2, wood, 0.5)
+    green = fpar_of_green_leaves(by_hand["lai"].values, sun.sza, by_hand["brown"].values, 0.5, 0.8, 0.9, projection)
+    green = fifesim.aggregate(by_hand["lai"].copy(data=green), 30.0)
+    np.testing.assert_allclose(tree["truth"]["green_fpar"], green, rtol=1e-12)
     for name, each in truth.items():
         np.testing.assert_array_equal(tree["truth"][name], fifesim.aggregate(each, 30.0), err_msg=name)
     # Of the leaf area of a pixel, not of its ground.

@@ -21,8 +21,8 @@ LEAF = arguments.Kind(
         isinstance(value, Leaf)
         or arguments.is_a(value, "Dataset")
         or arguments.is_path(value)
-        or arguments.MAPPING.fits(value)
-        or arguments.TWO.fits(value)
+        or arguments.MAPPING.fits(value)  # type: ignore[misc]
+        or arguments.TWO.fits(value)  # type: ignore[misc]
     ),
 )
 

@@ -167,7 +167,9 @@ class Background:
 
     def spectra(self) -> list[tuple[Spectrum, NumberOrArray]]:
         """Spectrum and share of each part that reflects, a list of (Spectrum, float)."""
-        return [(_spectrum(name), value) for name, value in self.fractions.items() if name != SHADE and value > 0]
+        return [
+            (_spectrum(name), value) for name, value in self.fractions.items() if name != SHADE and np.greater(value, 0)
+        ]
 
 
 def check_shares(names, shares):

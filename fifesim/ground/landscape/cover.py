@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from scipy.stats import norm
 
-from fifesim.base.arguments import described
+from fifesim.base.arguments import NUMBER, described
 from fifesim.base.caches import cached
 from fifesim.base.lattice import assemble, generator
 
@@ -251,10 +251,10 @@ class Patches:
     shares: Sequence[float] | Mapping[str, float] | None = None
 
     def __post_init__(self):
-        if self.pattern not in PATTERNS:
+        if not isinstance(self.pattern, str) or self.pattern not in PATTERNS:
             raise ValueError(f"the pattern of patches is one of {', '.join(PATTERNS)}, got {described(self.pattern)}")
         size = self.size
-        if isinstance(size, bool | str) or np.ndim(size) or not 0 < float(size) < np.inf:
+        if not NUMBER.fits(size) or not 0 < float(size) < np.inf:
             raise ValueError(f"the size of patches is a number above 0, in metres, got {described(size)}")
         object.__setattr__(self, "size", float(size))
         if self.shares is not None:
@@ -289,7 +289,7 @@ class Patches:
             return tuple(float(self.shares[name]) for name in names)
         if len(self.shares) != len(names):
             raise ValueError(f"{len(self.shares)} shares for {len(names)} classes: give one for each")
-        return self.shares
+        return tuple(self.shares)
 
 
 def patch_classes(patches, shares, seed, northing, easting, codes=None):

@@ -87,7 +87,7 @@ def lai_distribution(source: LaiDistribution) -> FrozenDistribution:
                 f"leaf area index cannot be negative, got a distribution from {low:g} up: "
                 "truncate it at zero, for instance scipy.stats.truncnorm"
             )
-        return source
+        return source  # type: ignore[return-value]
     if not isinstance(source, str | Path):
         raise TypeError(f"an LAI distribution is a name, a CSV file or a frozen scipy distribution, got {type(source)}")
     if str(source) in treatments():

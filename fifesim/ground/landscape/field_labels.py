@@ -82,7 +82,7 @@ def _evenly(array):
 
 _ARPS = Kind(
     "a number for each field, such as {'lai': 0.15, 'soil': 0.24}",
-    lambda arps: all(isinstance(name, str) and NUMBER.fits(arp) for name, arp in arps.items()),
+    lambda arps: all(isinstance(name, str) and NUMBER.fits(arp) for name, arp in arps.items()),  # type: ignore[misc]
 )
 
 OF_ELEVATION = ("elevation", "wetness", "illumination", "slope")

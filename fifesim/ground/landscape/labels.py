@@ -252,6 +252,7 @@ def _cover(grid, cover, table, seed, chunks, allow_remote):
         return drawn_cover(grid, cover, table, seed, chunks)
     if not (isinstance(cover, xr.DataArray) or is_path(cover)):
         raise TypeError(f"cover must be a fifesim.Patches, the path of a map or a raster, got {described(cover)}")
+    cover = cover.rename("cover") if isinstance(cover, xr.DataArray) else cover
     return cover_map(cover, grid, table, chunks, allow_remote=allow_remote)
 
 
@@ -319,7 +320,7 @@ def _property(name, given, grid, chunks, allow_remote):
     if isinstance(given, Number):
         return cf.label(xr.DataArray(check(float(given))), name, history=f"landscape: {name} {given:g}")
     if isinstance(given, xr.DataArray):
-        found = raster_onto_grid(unpacked(given), grid, chunks)
+        found = raster_onto_grid(unpacked(given).rename(name), grid, chunks)
     elif is_path(given):
         found = file_onto_grid(given, grid, chunks, allow_remote)
     else:

@@ -214,9 +214,9 @@ def horizon(
     places = places_of(elevation_grid(dem), source_resolution(dem, resolution))
     azimuths = horizons.azimuths(directions)
     samples, chunks = _samples(dem.transpose("y", "x").data, places)
-    horizons.horizon_margin(*places.cell, reach)
+    horizons.horizon_margin(*places.cell, reach)  # type: ignore[call-arg]
     useful = useful_reach(reach, places)
-    reads = chunking.margin_reads(samples[0], *horizons.horizon_margin(*places.cell, useful))
+    reads = chunking.margin_reads(samples[0], *horizons.horizon_margin(*places.cell, useful))  # type: ignore[call-arg]
     if chunks is not None and beside is not None:
         chunks = chunks_beside(beside.transpose("y", "x"), places.coarse)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
 
 from fifesim.base.annotations import FilePath, WholeNumber
-from fifesim.base.arguments import described
+from fifesim.base.arguments import Kind, described, is_a
 from fifesim.base.messages import warn
 from fifesim.grids.chunks import found_client
 from fifesim.ground.landscape.autoregression import FIELD_TILE
@@ -45,7 +45,7 @@ def dataset(
     overwrite: bool = False,
     resume: bool = False,
     workers: WholeNumber = 1,
-    client: Any = None,
+    client: Annotated[Any, Kind("a distributed.Client", lambda client: is_a(client, "Client"))] = None,
 ) -> xr.Dataset:
     """
     Make a training set: chips of a study in a folder, as sharded Zarr.

@@ -209,7 +209,7 @@ BAND_NUMBERS = ("srf", "full_scale_radiance", "min_radiance", "solar_irradiance"
 OPTIONAL_NUMBERS = ("ifov", "detectors", "scan", "product", "noise", "gains", "limits", "geolocation", "compression")
 
 # Publications by number.
-Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]  # type: ignore[valid-type]
+Sources = dict[Literal[INSTRUMENT_NUMBERS + BAND_NUMBERS + OPTIONAL_NUMBERS], str]  # type: ignore[misc, valid-type]
 
 # Fields that the text of a band shows where they are given.
 _SHOWN = ("name", "srf", "full_scale_radiance", "min_radiance", "solar_irradiance", "limits", "gsd", "gain")
@@ -617,14 +617,14 @@ class Instrument:
             pair = [self._showing(window, pixel) for window in (RED, NEAR_INFRARED)]
             if all(pair):
                 return tuple(pair)
-        pair = {window: self._showing(window) for window in (RED, NEAR_INFRARED)}
-        for window, band in pair.items():
+        shown = {window: self._showing(window) for window in (RED, NEAR_INFRARED)}
+        for window, band in shown.items():
             if band is None:
                 raise ValueError(
                     f"{self.name} has no {window.name} band, {window.low:g} to {window.high:g} um: say which of its "
                     f"bands are meant: {', '.join(band.name for band in self.bands)}"
                 )
-        return tuple(pair.values())
+        return tuple(shown.values())
 
     def _showing(self, window, pixel=None):
         """Band that is best for a window, among those with a pixel size."""
@@ -652,7 +652,7 @@ class Instrument:
         ValueError
             If the number has no source, or its source is not among the references.
         """
-        key = (band.sources if band else {}).get(number) or self.sources.get(number)
+        key = (band.sources if band else {}).get(number) or self.sources.get(number)  # type: ignore[attr-defined]
         if key not in self.references:
             raise ValueError(f"sources.{number}: must be one of {', '.join(self.references)}, got {key!r}")
         return self.references[key]

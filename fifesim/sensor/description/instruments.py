@@ -14,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from fifesim.base import files
 from fifesim.base.annotations import FilePath
-from fifesim.base.arguments import UNCHECKED
+from fifesim.base.arguments import Kind
 from fifesim.base.caches import cached
 from fifesim.base.files import in_a_line, read_toml
 from fifesim.sensor.description.fields import errors_in_words, key, lookup
@@ -37,7 +37,8 @@ _KEYS |= {"center", "width", "shape", "snr", "snr_radiance", "snr_shot"}
 
 
 def instrument(
-    name: InstrumentLike, response: Annotated[Literal["system", "detector", "paper"], UNCHECKED] | None = None
+    name: InstrumentLike,
+    response: Annotated[Literal["system", "detector", "paper"], Kind("'system', 'detector' or 'paper'")] | None = None,
 ) -> Instrument:
     """
     Description of an instrument by its name, or from a file.

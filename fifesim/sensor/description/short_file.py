@@ -25,7 +25,7 @@ _REFERENCES = {
 _NOISE = {"snr": "snr", "snr_radiance": "radiance", "snr_shot": "shot"}
 
 # Made once: making it takes longer than what it does.
-_ADAPTER = TypeAdapter(SpectralResponse)
+_ADAPTER: TypeAdapter = TypeAdapter(SpectralResponse)
 
 
 def completed(content, path):

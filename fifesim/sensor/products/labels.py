@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fifesim.base.annotations import NumberByBand, Time
-from fifesim.base.arguments import UNCHECKED
+from fifesim.base.arguments import Kind
 from fifesim.base.bands import counts
 from fifesim.base.files import in_a_line
 from fifesim.grids import cf, chunks, directions
@@ -111,7 +111,12 @@ _CURE = (
 _DIMMEST, _BRIGHTEST = 0.02, 20.0
 
 # The digital number of saturated pixels; None where no number marks them.
-Saturation: TypeAlias = Annotated[int | Literal["largest"] | None, UNCHECKED]
+Saturation: TypeAlias = Annotated[
+    int | Literal["largest"] | None,
+    Kind(
+        "'largest', None, or a digital number", lambda value: value is None or isinstance(value, str | int | np.integer)
+    ),
+]
 
 
 @by_date
@@ -204,7 +209,7 @@ def calibrate(
         bits = 16 if dn.dtype.itemsize > 1 else 8
         # Products of instruments of up to 8 bits have 8, also where they are stored in wider numbers.
         full = 8 if description.bits <= 8 else bits
-        if not np.all(gain > 0):
+        if not np.all(gain > 0):  # type: ignore[operator]
             raise ValueError(f"gain must be above 0 W m-2 sr-1 um-1 per count, got {np.min(gain):g}")
         _check_scale(gain * (2**full - 1) + offset, bands)
     saturated = _saturation(saturated, 2**full - 1, 2**bits - 1)

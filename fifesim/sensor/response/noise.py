@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 import numpy as np
 
 from fifesim.base.annotations import Names, Numbers
-from fifesim.base.arguments import PLAIN, check_fields
+from fifesim.base.arguments import MAPPING, Kind, check_fields
 from fifesim.base.lattice import generator
 
 # Kinds of noise that can be requested by name.
@@ -192,7 +192,12 @@ class NoiseModel:
 
 
 # One model for all bands, or by band.
-NoiseModels: TypeAlias = Annotated[NoiseModel | Mapping[str, NoiseModel], PLAIN]
+NoiseModels: TypeAlias = Annotated[
+    NoiseModel | Mapping[str, NoiseModel],
+    Kind(
+        "a fifesim.NoiseModel, or one for each band", lambda given: isinstance(given, NoiseModel) or MAPPING.fits(given)
+    ),
+]
 
 
 def check_kinds(kinds):

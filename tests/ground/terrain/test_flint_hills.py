@@ -135,7 +135,7 @@ def test_tiles_and_uplands_meet_without_a_seam():
     seam = flint_hills.HILLS_TILE * flint_hills.HILLS_STEP
     profile = flint_hills.hills_elevation(5, np.array([40.0]), seam - 500 + np.arange(1000.0))[0]
     curvature = np.abs(np.diff(profile, 2))
-    assert curvature[480:520].max() <= curvature.max()
+    assert curvature[480:520].max() <= np.delete(curvature, slice(480, 520)).max()
     assert curvature.max() < 0.05
     long = flint_hills.hills_elevation(5, np.array([40.0]), np.arange(0, 20000, 5.0))[0]
     assert np.abs(np.diff(long)).max() < 5 * np.tan(np.radians(35))

@@ -279,9 +279,13 @@ def test_processes_make_the_same_bits(study, whole, tmp_path):
     assert contents(tmp_path / "chips.zarr") == contents(whole)
 
 
+class Client:
+    """Stands for a client of distributed."""
+
+
 @pytest.mark.parametrize(
     ("workers", "client", "said"),
-    [(0, None, "from 1 up, got 0"), (2.0, None, "from 1 up, got 2.0"), (2, "mine", "give one of them")],
+    [(0, None, "from 1 up, got 0"), (2.0, None, "from 1 up, got 2.0"), (2, Client(), "give one of them")],
 )
 def test_processes_are_a_number_or_a_cluster(workers, client, said, study, tmp_path):
     with pytest.raises(ValueError, match=said):
