@@ -142,8 +142,8 @@ def as_seen_by(
     by themselves for what else they know.
 
     A scene that an instrument recorded is blurred already: only the difference of both blurs is applied, by the ratio
-    of the modulation transfers, with a floor. Details that the source did not record stay missing; a warning and
-    ``contrast_left`` say how much.
+    of the modulation transfers, with a floor. Details that the source did not record stay missing: ``contrast_left`` is
+    the contrast that remains, and a warning names the bands with less than 0.9 of it.
 
     Parameters
     ----------
@@ -246,8 +246,8 @@ def _is_recorded(given, by, source):
         return given
     if by not in (None, source.name):
         warn(
-            f"{by} recorded the scene before its bands became those of {source.name}: its blur stays; give the image "
-            f"of {by} itself"
+            f"{by} recorded the scene before its bands were converted to {source.name}: its blur stays; give the "
+            f"image of {by} itself"
         )
     return by == source.name
 

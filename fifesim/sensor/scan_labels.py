@@ -302,8 +302,8 @@ def sense_swath(
 
     Notes
     -----
-    Sweeps follow each other by the height of a sweep at nadir. The platform stands still during a sweep, the view is
-    that of an instrument abeam of the pixel, and noise does not depend on the number of samples that are summed.
+    Sweeps follow each other by the height of a sweep at nadir. The platform stands still during a sweep, the
+    instrument stands abeam of each pixel, and noise does not depend on the number of samples that are summed.
 
     See Also
     --------

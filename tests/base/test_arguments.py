@@ -51,8 +51,8 @@ ACCEPTED = {
     ("write_style", "path"): {"str"},
     # Descriptions without a grid check rasters and spectra when they are used: see the test of fields of a canopy.
     **{("Canopy", name): {"list", "str", "dataset", "numpy", "1-d", "crs"} for name in PROPERTIES},
-    **{("Leaf", name): {"numpy", "1-d", "crs", "empty"} for name in ("structure", "chlorophyll", "carotenoids", "anthocyanins",
-                                                            "brown", "water", "dry_matter")},
+    **{("Leaf", name): {"numpy", "1-d", "crs", "empty"} for name in ("structure", "chlorophyll", "carotenoids",
+                                                            "anthocyanins", "brown", "water", "dry_matter")},
     # A Dataset of rasters is taken raster by raster, and one with coordinates of the sun is a geometry.
     ("aggregate", "array"): {"dataset", "crs"}, ("to_geotiff", "raster"): {"dataset", "crs"},
     **{(name, "geometry"): {"dataset"} for name in ("fpar", "illumination", "kt", "sense", "shadow",

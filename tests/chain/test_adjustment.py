@@ -285,7 +285,9 @@ def test_who_recorded_a_scene_travels_with_it():
     assert image.fifesim.to_reflectance().attrs["recorded_by"] == "MSI" and "recorded_by" not in cells.attrs
     adjusted = image.fifesim.to_surface().fifesim.adjust_bands("TM", bands=["TM3", "TM4"])
     assert adjusted.attrs["instrument"] == "TM" and adjusted.attrs["recorded_by"] == "MSI"
-    with pytest.warns(UserWarning, match="MSI recorded the scene before its bands became those of TM: its blur stays"):
+    with pytest.warns(
+        UserWarning, match="MSI recorded the scene before its bands were converted to TM: its blur stays"
+    ):
         again = adjusted.fifesim.as_seen_by("L4TM", bands=["TM3", "TM4"])
     xr.testing.assert_equal(again, adjusted.fifesim.as_seen_by("L4TM", bands=["TM3", "TM4"], recorded=False))
 

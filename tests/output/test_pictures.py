@@ -101,7 +101,7 @@ def test_a_scan_is_drawn_where_its_pixels_lie(site):
         sweeps = len(np.unique(image["sweep"]))
         assert sweeps > 1
         assert corners.shape == (image.sizes["line"] + sweeps, image.sizes["sample"] + 1, 2)
-        # The middles of the rows are those of the lines; an empty row lies between two sweeps.
+        # Rows of the mesh lie on the lines; an empty row lies between two sweeps.
         middles = corners[:-1, :-1] + corners[:-1, 1:] + corners[1:, :-1] + corners[1:, 1:]
         values = np.ma.getdata(drawn(axes).get_array())
         empty = values[..., -1] == 0 if values.ndim > 2 else np.isnan(values)

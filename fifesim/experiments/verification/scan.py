@@ -73,7 +73,7 @@ def _detector(track_angle, scan_angle, altitude):
 
 
 def _sweeps():
-    """Check places of detectors beside the plane of the scan, and sums of samples."""
+    """Check places of detectors out of the plane of the scan, and sums of samples."""
     track_angle, scan_angle = np.array([0.4, -0.4, 2.0, -0.1]), np.array([56.0, -44.0, 10.0, 31.0])
     distance, aside = scan.ground_of_detector(track_angle, scan_angle, _ALTITUDE)
     found = np.degrees(distance / scan.EARTH_RADIUS), aside

@@ -360,7 +360,7 @@ class LowPass(CutoffTransfer):
 @dataclass(frozen=True)
 class Mixture(Transfer):
     r"""
-    Transfer function of a sum of bands, each with the parts of its own response.
+    Transfer function of a weighted sum of bands.
 
     .. math:: M(f) = \sum_s a_s \prod_k M_{sk}(f), \qquad \sum_s a_s = 1
 

@@ -109,7 +109,7 @@ def sampled_contrast(spread, frequency, recorded, cell=10.0, pixel=30.0):
 @pytest.mark.parametrize("frequency", [0.0, 0.004, 1 / 60, 0.03])
 @pytest.mark.parametrize("target", [GaussianSpread(36.0), SystemSpread((Boxcar(30.0), GaussianSpread(12.0)))])
 def test_an_image_of_an_image_has_the_contrast_of_the_second_instrument(frequency, target):
-    """What cells of 10 m recorded, averaged by the difference, is what the target passes, but for what is said left."""
+    """An image in cells of 10 m, averaged by the difference, has the contrast of the target times `left`."""
     recorded = GaussianSpread(14.0)
     difference = Difference(target, Mixture((1.0,), ((recorded, Boxcar(10.0)),)), 0.2)
     found = sampled_contrast(SystemSpread((difference,)), frequency, recorded)
@@ -135,7 +135,7 @@ def test_contrast_that_was_not_recorded_is_not_made_up():
 
 
 def test_a_mixture_is_the_transfer_of_the_sum_of_bands():
-    """Waves of two bands with their own parts, weighted and added."""
+    """Waves of two bands, each by its parts, weighted and added."""
     mixture = Mixture((1.3, -0.3), ((GaussianSpread(20.0), Boxcar(10.0)), (Boxcar(20.0),)))
     frequency = np.array([0.0, 0.01, 0.04])
     expected = 1.3 * GaussianSpread(20.0).mtf(frequency) * np.sinc(10 * frequency) - 0.3 * np.sinc(20 * frequency)

@@ -80,8 +80,8 @@ def test_areas_of_viirs_follow_its_zones(scan_angle, area):
     """
     Areas of I pixels by W. Schroeder (NOAA), in km2, within 3 % of a side.
 
-    They are those of a fit of degree 5 in NASA's fire emission code, at the samples that have these angles if 0.1552
-    mrad, the design, lie between two elementary samples.
+    A fit of degree 5 in NASA's fire emission code is evaluated at the samples that have these angles by design, with
+    0.1552 mrad between two elementary samples.
     """
     along, across = pixel_size("VIIRS", "I1", scan_angle)
     assert np.sqrt(along * across * 1e-6) == pytest.approx(np.sqrt(area), rel=0.03)
@@ -183,7 +183,7 @@ def test_a_pushbroom_and_a_single_detector_sweep_one_line():
 
 
 def test_sums_of_samples_add_their_variances():
-    """The variance of a sum is that of one sample and that of their places: (n^2 - 1) d^2 / 12."""
+    """The variance of a sum is the variance of one sample plus the variance of the places, (n^2 - 1) d^2 / 12."""
     x = np.linspace(-1500, 1500, 60_001)
     for count in (1, 2, 3):
         spread = AggregatedSpread(GaussianSpread(150.0), count, 128.0)
