@@ -159,7 +159,9 @@ def _check_scan(instrument):
     if samples is not None:
         step = by_axes(first.interval or instrument.interval).across
         half = np.degrees(samples * step / 2)
-        if abs(half / scan.max_angle - 1) > _SAMPLED:
+        # A flat row of detectors has equal steps of the tangent.
+        flat = np.degrees(np.arctan(samples * step / 2)) if scan.kind == "pushbroom" else half
+        if not any(abs(each / scan.max_angle - 1) <= _SAMPLED for each in (half, flat)):
             raise ValueError(
                 f"scan: samples of {first.name} times interval, {samples} x {step:g} radians, reach {half:.3g} degrees "
                 f"to either side, and max_angle = {scan.max_angle:g} degrees from nadir; radians times 180 / pi, count "

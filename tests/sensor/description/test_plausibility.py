@@ -94,6 +94,21 @@ def test_sums_of_samples_are_counted_as_what_they_are_made_of(tmp_path):
             read_instrument(path)
 
 
+@pytest.mark.parametrize(("angle", "fits"), [(30.0, True), (33.08, True), (36.0, False), (27.0, False)])
+def test_a_flat_row_of_detectors_has_equal_steps_of_the_tangent(tmp_path, angle, fits):
+    """1000 pixels of 0.1 m from 86.6 m: half of the row is 50 / 86.6, the tangent of 30 degrees, or 33.08 degrees."""
+    bands = '[{ name = "red", center = 0.668, width = 0.010 }]'
+    scan = f'{{ kind = "pushbroom", max_angle = {angle}, samples = 1000 }}'
+    path = tmp_path / "camera.toml"
+    text = f'name = "Camera"\naltitude = 86.6\ngsd = 0.1\nbits = 12\nscan = {scan}\nbands = {bands}\n'
+    path.write_text(text, encoding="utf-8")
+    if fits:
+        assert read_instrument(path).scan.samples == 1000
+        return
+    with pytest.raises(ValueError, match="samples of red times interval, 1000 x 0\\.00115473 radians"):
+        read_instrument(path)
+
+
 @pytest.mark.parametrize(
     ("replacements", "message"),
     [
