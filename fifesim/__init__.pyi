@@ -76,6 +76,7 @@ from .sensor.instrument_labels import mtf as mtf
 from .sensor.response.noise import NoiseModel as NoiseModel
 from .sensor.instrument_labels import noise_equivalent_radiance as noise_equivalent_radiance
 from .sensor.instrument_labels import snr as snr
+from .chain.noise_propagation import noise_std as noise_std  # method
 from .sensor.labels import to_radiance as to_radiance  # method
 from .sensor.labels import to_reflectance as to_reflectance  # method
 from .sensor.description.instruments import instrument as instrument

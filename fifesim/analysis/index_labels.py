@@ -53,6 +53,13 @@ def red_and_nir(reflectance):
 def _bands(reflectance, windows, what):
     """Bands nearest to some spectral windows, without the coordinates along band."""
     cf.check_quantity(reflectance, "toa_reflectance", "surface_reflectance")
+    per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
+    numbers = band_numbers(reflectance, windows, what)
+    return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
+
+
+def band_numbers(reflectance, windows, what):
+    """Places along band of the bands nearest to some spectral windows."""
     if "band" not in reflectance.dims:
         raise ValueError(f"{what} needs a {windows[0].name} and other bands along band, got a raster of one band")
     wavelengths = _wavelengths(reflectance)
@@ -63,8 +70,7 @@ def _bands(reflectance, windows, what):
             raise ValueError(
                 f"no {window.name} band between {window.low:g} and {window.high:g} um: the raster has {found} um"
             )
-    per_band = [name for name, value in reflectance.coords.items() if "band" in value.dims]
-    return tuple(reflectance.isel(band=k).drop_vars([*per_band, "band"], errors="ignore") for k in numbers)
+    return numbers
 
 
 def _wavelengths(reflectance):

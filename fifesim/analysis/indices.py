@@ -32,6 +32,41 @@ def normalized_difference(nir, red):
     return _ratio(nir - red, nir + red)
 
 
+def normalized_difference_std(nir, red, nir_std, red_std):
+    r"""
+    Standard deviation of NDVI from the independent errors of its bands, to first order.
+
+    .. math::
+
+        s^2 = \left( \frac{2 \rho_\mathrm{red}}{\Sigma^2} s_\mathrm{nir} \right)^2 +
+            \left( \frac{2 \rho_\mathrm{nir}}{\Sigma^2} s_\mathrm{red} \right)^2, \qquad
+        \Sigma = \rho_\mathrm{nir} + \rho_\mathrm{red}
+
+    Parameters
+    ----------
+    nir, red : array
+        Reflectances in the near infrared and in the red. [1]
+    nir_std, red_std : array
+        Their standard deviations. [1]
+
+    Returns
+    -------
+    std : array, shape of the broadcast inputs
+        NaN where the reflectances add up to zero. [1]
+
+    References
+    ----------
+    [JCGM2008]_, 5.1.2
+
+    Examples
+    --------
+    >>> round(float(normalized_difference_std(0.4, 0.1, 0.02, 0.0)), 9)
+    0.016
+    """
+    nir, red = np.asarray(nir, float), np.asarray(red, float)
+    return _ratio(2 * np.hypot(red * nir_std, nir * red_std), (nir + red) ** 2)
+
+
 def enhanced(nir, red, blue):
     r"""
     Enhanced vegetation index (EVI).

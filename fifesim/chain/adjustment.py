@@ -32,7 +32,7 @@ from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.spectral_response import half_peak
 from fifesim.sensor.instrument_labels import attributes_of, carried_instrument, matching_bands
 from fifesim.sensor.response.spatial import Difference, Mixture, SystemSpread
-from fifesim.sensor.response.spectral import band_moments, band_weights, best_linear, covered_steps, line_between
+from fifesim.sensor.response.spectral import band_weights, best_linear, covered_steps, line_between
 
 UNCERTAINTY = 0.0005
 """Standard error of the reflectance that an adjustment allows for by default [1]."""
@@ -51,7 +51,8 @@ def adjust_bands(
     Surface reflectance in the bands of another instrument, by spectra that fit each pixel.
 
     Every band of the other instrument is the sum of all bands of the raster, with the weights that estimate it best
-    over a library of spectra by PROSPECT, SAIL and soils, whose leaves, leaf area and ground vary widely.
+    over a library of 4800 spectra by PROSPECT, SAIL and soils of the world, whose leaves (green, red, dry and dead),
+    leaf area, ground and sun vary widely.
 
     Parameters
     ----------
@@ -71,8 +72,9 @@ def adjust_bands(
     Returns
     -------
     reflectance : xarray.DataArray
-        With ``adjustment_error`` along band: the standard error over the library, with the uncertainty of the input.
-        NaN where any band is. Lazy where the input is. [1]
+        With ``adjustment_error`` along band: the standard error over spectra of the library that did not take part,
+        each leaf left out in turn, with the uncertainty of the input. NaN where any band is. Lazy where the input is.
+        [1]
 
     Raises
     ------
@@ -82,8 +84,10 @@ def adjust_bands(
 
     Notes
     -----
-    The library holds leaves, litter and soil. Snow and water are none of these, and the error does not hold for them;
-    what is grey stays about grey. The directions of sun and view stay those of the raster.
+    The error is that of land in general: for spectra of another code over other soils, the realised error was 0.8 to
+    1.3 times the stated one in each band of ten pairs of instruments; for bare soil or dead grass alone, up to 3.3
+    times. The library lacks snow and water, and the error does not hold for them; grey surfaces change by 2 % at most,
+    by 4 % in OLI1 from ETM+. The directions of sun and view stay those of the raster.
 
     See Also
     --------
@@ -346,7 +350,7 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
     >>> import fifesim
     >>> lines = fifesim.spectral_adjustment("MSI", "OLI", bands=["OLI4"])
     >>> lines.source_band.item(), lines.slope.round(2).item()
-    ('MSI4', 0.96)
+    ('MSI4', 0.97)
     """
     source, target = find_instrument(source), find_instrument(target)
     to = target.select(bands) if bands is not None else [band for band in target.bands if _beside(source.bands, band)]
@@ -354,7 +358,7 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
     nearest = [min(source.bands, key=lambda band: abs(band.wavelength - each.wavelength)) for each in to]
     _, spectra = library_spectra()
     own, other = (spectra @ _weights(_responses(each)).T for each in (nearest, to))
-    lines = [line_between(own[:, number], other[:, number]) for number in range(len(to))]
+    lines = [line_between(own[..., number], other[..., number]) for number in range(len(to))]
     columns = {name: [getattr(line, name) for line in lines] for name in ("slope", "offset", "error", "difference")}
     pairs = zip(nearest, to, strict=True)
     columns |= _published([(source.name, band.name, target.name, each.name) for band, each in pairs])
@@ -422,9 +426,8 @@ def _weights(responses):
 @cached(64, "regressions between bands")
 def _estimate(sources, targets, uncertainty):
     """Best linear estimate of bands from other bands over the library."""
-    wavelength, spectra = library_spectra()
-    moments = band_moments(_weights(sources + targets), wavelength, spectra)
-    return best_linear(moments, len(sources), uncertainty)
+    _, spectra = library_spectra()
+    return best_linear(spectra @ _weights(sources).T, spectra @ _weights(targets).T, uncertainty)
 
 
 def _published(pairs):

@@ -340,6 +340,51 @@ class Scenario(Keys):
         update = {"grid": grid_keys(box), "ground": ground, "geometry": own_time, "sensor": sensor}
         return self.model_copy(update=update).with_paths(full_path)
 
+    def replace(self, /, **changes: Any) -> Self:
+        """
+        The same scenario with other values of some keys.
+
+        Parameters
+        ----------
+        **changes
+            New values by the names of keys, such as ``visibility=20``. Names with a dot are given in a dictionary, such
+            as ``**{"sensor.seed": 3}``: the section is needed for a key of several sections, for a key of a class,
+            ``"classes.grass.brown"``, and for an entry of a key that is a table, ``"ground.leaf.chlorophyll"``.
+
+        Returns
+        -------
+        scenario : Scenario
+            Checked as a whole, so that keys that belong together can be changed together.
+
+        Raises
+        ------
+        ValueError
+            If a name is no key, is a key of several sections or is given twice, if there is no such class, or if a
+            value is not allowed.
+
+        Examples
+        --------
+        >>> import fifesim
+        >>> scenario = fifesim.Scenario(ground={"arp": 0.24})
+        >>> changed = scenario.replace(visibility=20, **{"sensor.seed": 3})
+        >>> changed.ground.arp, changed.atmosphere.visibility, changed.sensor.seed, scenario.sensor.seed
+        (0.24, 20.0, 3, 0)
+        """
+        values, names = values_of(self), {}
+        for name, value in changes.items():
+            key = find_key(name, called="replace:")
+            if key.place[0] == "classes" and key.place[1] not in self.classes:
+                hint = nearest(key.place[1], self.classes)
+                raise ValueError(
+                    f"replace: {name} is of a class that the scenario does not have: {hint}its classes are "
+                    f"{', '.join(self.classes) or 'none'}"
+                )
+            if key in names:
+                raise ValueError(f"replace: {names[key]} and {name} are one key, {key.name}: give it once")
+            names[key] = name
+            put(values, key.path, value)
+        return type(self)(**values)
+
     def with_paths(self, change: Callable[[str], str]) -> Self:
         """
         The same with other paths of its files.
@@ -510,8 +555,10 @@ def find_key(name, called="the axis"):
     if found:
         written = " or ".join(each.name for each in found)
         raise ValueError(f"{called} {shown(name)} is a key of several sections: write {written}")
-    known = {each for place in Scenario().sections() for each in Keys.section(place).model_fields}
-    hint = nearest(parts[-1] if parts else "classes", sorted(known))
+    places = [*Scenario().sections(), *(table for table in tables if len(table) == 2)]
+    # A name with its section is compared with whole names.
+    known = {(*place, key) for place in places for key in Keys.section(place).model_fields}
+    hint = nearest(name, sorted(".".join(each) if "." in str(name) else each[-1] for each in known))
     raise ValueError(
         f"{called} {shown(name)} is no key of a scenario: {hint}`fifesim scenario` prints all that there are"
     )
@@ -535,13 +582,6 @@ def put(values, path, value):
     for name in tables:
         values = values.setdefault(name, {})
     values[last] = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
-
-
-def changed(key, scenario, value):
-    """Scenario with a changed value of a key."""
-    values = values_of(scenario)
-    put(values, key.path, value)
-    return parse_scenario(values)
 
 
 def in_text(value):

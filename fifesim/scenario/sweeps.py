@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from itertools import product
 from typing import Annotated, Any
 
@@ -16,7 +15,7 @@ from fifesim.analysis.regression_labels import check_pair, regress
 from fifesim.base.annotations import Array, Pairing
 from fifesim.base.arguments import PLAIN, described
 from fifesim.scenario.ensemble import realise
-from fifesim.scenario.scenario import Scenario, changed, find_key, in_text
+from fifesim.scenario.scenario import Scenario, find_key, in_text
 from fifesim.scenario.simulation import simulate
 
 # What is kept of a regression of the truth on NDVI.
@@ -119,7 +118,7 @@ def _axis(name, given):
     if has_function:
         return list(values), given[1], {}
     key = find_key(name)
-    return list(values), partial(changed, key), key.attributes
+    return list(values), lambda scenario, value: scenario.replace(**{key.name: value}), key.attributes
 
 
 def _labels(values):

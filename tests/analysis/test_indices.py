@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fifesim.analysis import indices
-from fifesim.analysis.indices import normalized_difference
+from fifesim.analysis.indices import normalized_difference, normalized_difference_std
 from fifesim.base.bands import BLUE, GREEN, NEAR_INFRARED, RED, SHORTWAVE_INFRARED
 
 # As the catalogue of spyndex writes them, with its letters for the bands.
@@ -78,3 +78,14 @@ def test_index_of_nothing_is_missing(nir, red):
 def test_unsigned_integers_do_not_wrap():
     ndvi = normalized_difference(np.array([1000, 65000], "uint16"), np.array([2000, 65000], "uint16"))
     np.testing.assert_allclose(ndvi, [-1 / 3, 0.0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("nir", "red"), [(0.4, 0.05), (0.25, 0.25), (0.05, 0.2)])
+def test_error_of_ndvi_follows_from_its_derivatives(nir, red):
+    """Central differences, and the root of the sum of squares of both contributions."""
+    h = 1e-6
+    by_nir = (normalized_difference(nir + h, red) - normalized_difference(nir - h, red)) / (2 * h)
+    by_red = (normalized_difference(nir, red + h) - normalized_difference(nir, red - h)) / (2 * h)
+    found = normalized_difference_std(nir, red, 0.003, 0.001)
+    assert found == pytest.approx(np.hypot(by_nir * 0.003, by_red * 0.001), rel=1e-8)
+    assert np.isnan(normalized_difference_std(0.0, 0.0, 0.003, 0.001))

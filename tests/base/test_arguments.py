@@ -221,6 +221,7 @@ def calls(tmp_path_factory):
         "invert": {"ndvi": ndvi, "fit": fifesim.regress(lai, ndvi), "quantity": "lai", "level": 0.95},
         "inversion_error": {"estimate": lai, "truth": lai, "pair": "coordinates"},
         "score": {"estimate": fifesim.invert(ndvi, fit), "truth": lai.isel(y=slice(6), x=slice(6)), "pair": "index"},
+        "noise_std": {"image": image, "instrument": "TM", "noise_models": fifesim.NoiseModel(thermal=1.0)},
         "share_kept": {"pixels": lai, "cells": lai},
         "density": {"array": lai, "points": 32, "bandwidth": None},
         "scale_bias": {"algorithm": np.sqrt, "array": lai, "pixel": 30.0},

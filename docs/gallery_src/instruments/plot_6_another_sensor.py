@@ -49,8 +49,8 @@ for axis, (title, image) in zip(axes, images.items(), strict=True):
     axis.set(title=f"NDVI, {title}", xticks=[], yticks=[], aspect=1)
 
 # %%
-# **By band.** The best linear estimate from all bands, beside the nearest band taken as it is. Leaves, leaf angles and
-# the mixture of soils are none of those in the library of spectra that the estimate is made with.
+# **By band.** The best linear estimate from all bands, compared with the nearest band taken as it is. Leaves, leaf
+# angles and the mixture of soils are not in the library of spectra that the estimate is made with.
 
 nearest = {
     "TM1": "MSI2",

@@ -153,6 +153,39 @@ def dn_to_radiance(dn, gain, offset, compression=0):
     return np.where(dn == 0, np.nan, counts * np.asarray(gain, float) + offset)
 
 
+def digital_step(radiance, gain, offset, compression=0):
+    r"""
+    Radiance between two digital numbers.
+
+    .. math:: \Delta = g, \qquad \Delta = 2 g \sqrt{\frac{L - o}{g \, c}}
+
+    on a linear scale, and on one of square roots, :math:`L = o + g \, DN^2 / c`.
+
+    Parameters
+    ----------
+    radiance : array
+        [W m-2 sr-1 um-1]
+    gain, offset, compression : float
+        As in `dn_to_radiance`.
+
+    Returns
+    -------
+    step : array, shape of radiance
+        NaN where the radiance is. [W m-2 sr-1 um-1]
+
+    Examples
+    --------
+    >>> digital_step([20.0, 100.0], 0.5, -1.0).tolist()
+    [0.5, 0.5]
+    >>> digital_step(15.75, 1.0, 0.0, compression=63).item()
+    1.0
+    """
+    radiance = np.asarray(radiance, float)
+    if compression:
+        return 2 * gain * np.sqrt(np.maximum(radiance - offset, 0.0) / (gain * compression))
+    return np.where(np.isnan(radiance), np.nan, gain)
+
+
 def reflectance_to_radiance(reflectance, solar_irradiance, mu_s, earth_sun_distance=1.0):
     r"""
     Radiance of a planetary reflectance.

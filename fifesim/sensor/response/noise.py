@@ -284,5 +284,50 @@ def add_noise(radiance, model, kinds, *, seed, band, row=0, column=0, epoch=0):
     return out
 
 
+def radiance_std(radiance, model, kinds, step=0.0):
+    r"""
+    Standard deviation of a measured radiance over many images of one scene by other detectors.
+
+    .. math:: s^2 = \sigma^2(L) + s_g^2 L^2 + s_o^2 + \frac{\Delta^2}{12}
+
+    The terms are shot and thermal noise, the fixed pattern of gain and offset, and rounding to steps of
+    :math:`\Delta`. Products of noise and gain are of second order, and are left out.
+
+    Parameters
+    ----------
+    radiance : array
+        [W m-2 sr-1 um-1]
+    model : NoiseModel
+    kinds : sequence of str
+        Among `KINDS`.
+    step : array, optional
+        Radiance between digital numbers; 0 without digitising. [W m-2 sr-1 um-1]
+
+    Returns
+    -------
+    std : array, shape of radiance
+        NaN where the radiance is. [W m-2 sr-1 um-1]
+
+    Notes
+    -----
+    Rounding is a uniform error if the other noise is larger than about half of a step.
+
+    References
+    ----------
+    [Schowengerdt2007]_, section 3.2; [JCGM2008]_, 4.3.7 and 5.1.2
+
+    Examples
+    --------
+    >>> model = NoiseModel(thermal=3.0, shot=0.16, detectors=9, gain_spread=0.12)
+    >>> round(float(radiance_std(100.0, model, KINDS)), 9)
+    13.0
+    """
+    radiance = np.asarray(radiance, float)
+    variance = model.noise_equivalent_radiance(radiance, kinds) ** 2 + np.asarray(step, float) ** 2 / 12
+    if "fixed-pattern" in kinds:
+        variance = variance + (model.gain_spread * radiance) ** 2 + model.offset_spread**2
+    return np.sqrt(variance)
+
+
 def _normals(seed, band, place, size):
     return generator(seed, _SENSOR + band, place).standard_normal(size)

@@ -127,12 +127,6 @@ def _runs(nodes, chosen):
     return tuple((float(nodes[first]), float(nodes[last])) for first, last in edges.reshape(-1, 2))
 
 
-# How real spectra differ from those of a library: by a smooth factor of this standard deviation [1] and
-# correlation length [um]. Held out soils and canopies decided it: more costs what the library knows of water, less
-# follows the library into bands far away.
-DEVIATION = 0.005
-CORRELATION = 0.05
-
 # Share [1] and reflectance [1] of grey surfaces beside a library of land: roads, roofs and clouds stay about what they
 # are. A tenth of it would leave a road of 0.2 at 0.196 in TM5.
 GREY_SHARE = 0.01
@@ -143,7 +137,7 @@ class Estimate(NamedTuple):
     """Linear estimate of the bands of one instrument from the bands of another."""
 
     weights: np.ndarray  # of the source's bands in each target band, shape (target, source) [1]
-    error: np.ndarray  # standard error of each target band over the library, shape (target,) [1]
+    error: np.ndarray  # standard error of each target band over spectra of unknown leaves, shape (target,) [1]
 
 
 class Line(NamedTuple):
@@ -155,78 +149,53 @@ class Line(NamedTuple):
     difference: float  # root mean square of the bands' difference, without the line [1]
 
 
-def band_moments(weights, wavelength, spectra):
+def best_linear(source, target, uncertainty):
     r"""
-    Second moments of band means over a library of spectra with smooth relative deviations.
+    Best linear estimate of bands from other bands over a library, and its error in spectra of leaves that it lacks.
 
-    .. math:: C = W \, (M \circ (1 + K)) \, W^T, \quad M = \frac{1}{N} \sum_n \rho_n \rho_n^T + g \rho_g^2, \quad
-        K_{ij} = s^2 \exp\left(-\frac{(\lambda_i - \lambda_j)^2}{2 \ell^2}\right)
+    .. math::
 
-    with :math:`s = 0.005` and :math:`\ell = 0.05` um, and a share :math:`g = 0.01` of grey surfaces of
-    :math:`\rho_g = 0.3`.
+        B = C_{ts} \, (C_{ss} + u^2 I)^{-1}, \quad C = \frac{1}{N} \sum_n \rho_n \rho_n^T + g \, \rho_g^2, \quad
+        e_t^2 = \frac{1}{N} \sum_n (\rho_t - B_{(n)} \rho_s)_n^2 + u^2 \sum_s B_{ts}^2
+
+    with a share :math:`g = 0.01` of grey surfaces of :math:`\rho_g = 0.3`, and :math:`B_{(n)}` the estimate from the
+    spectra of all other leaves than that of spectrum n. There is no offset: a black surface is black in all bands, and
+    half the light is half the reflectance.
 
     Parameters
     ----------
-    weights : array, shape (band, n)
-        Weights of the wavelengths in each band. [1]
-    wavelength : array, shape (n,)
-        [um]
-    spectra : array, shape (spectrum, n)
-        [1]
-
-    Returns
-    -------
-    moments : array, shape (band, band)
-        [1]
-
-    Examples
-    --------
-    >>> band_moments([[1.0, 0.0]], [0.5, 0.6], [[0.2, 0.4]]).round(6).tolist()
-    [[0.040901]]
-    """
-    weights, spectra = np.asarray(weights, float), np.asarray(spectra, float)
-    apart = np.subtract.outer(np.asarray(wavelength, float), np.asarray(wavelength, float))
-    deviation = DEVIATION**2 * np.exp(-(apart**2) / (2 * CORRELATION**2))
-    land = spectra.T @ spectra / len(spectra) + GREY_SHARE * GREY**2
-    return weights @ (land * (1 + deviation)) @ weights.T
-
-
-def best_linear(moments, sources, uncertainty):
-    r"""
-    Best linear estimate of bands from other bands, and its error.
-
-    .. math:: B = C_{ts} \, (C_{ss} + u^2 I)^{-1}, \quad
-        e_t^2 = (C_{tt} - B \, C_{st})_{tt}
-
-    It has no offset: a black surface is black in all bands, and half the light is half the reflectance.
-
-    Parameters
-    ----------
-    moments : array, shape (band, band)
-        Second moments :math:`C` of the source's bands, then the target's, from `band_moments`. [1]
-    sources : int
-        How many bands are the source's.
+    source, target : array, shape (leaf, spectrum, band)
+        Reflectance of the library's spectra in the bands of either instrument. [1]
     uncertainty : float
-        Standard error :math:`u` of the source's reflectance, independent from band to band. [1]
+        Standard error :math:`u` of the source's reflectance, independent from band to band, above 0. [1]
 
     Returns
     -------
     estimate : Estimate
 
+    Notes
+    -----
+    Without the spectra :math:`X` of a leaf, whose errors with all spectra are :math:`E`, they are
+    :math:`(I - H)^{-1} E` with :math:`H = X \, (N (C_{ss} + u^2 I))^{-1} X^T` (Sherman, Morrison and Woodbury).
+
     Examples
     --------
-    A band that is another's double is found as such:
+    The weights of a band that the source has too, which gives its uncertainty to the estimate:
 
-    >>> found = best_linear(np.array([[1.0, 2.0], [2.0, 4.0]]), 1, 0.0)
-    >>> found.weights.tolist(), found.error.tolist()
-    ([[2.0]], [0.0])
+    >>> source = np.array([[[0.1, 0.4], [0.2, 0.3]], [[0.1, 0.5], [0.1, 0.1]]])
+    >>> found = best_linear(source, source[..., :1], 1e-6)
+    >>> found.weights.round(6).tolist(), found.error.round(9).tolist()
+    ([[1.0, 0.0]], [1e-06])
     """
-    moments = np.asarray(moments, float)
-    own, cross, target = moments[:sources, :sources], moments[:sources, sources:], moments[sources:, sources:]
-    weights = np.linalg.solve(own + uncertainty**2 * np.eye(sources), cross).T
-    # Rounding may leave less than nothing of a band that the source has itself.
-    squared = np.diag(target) - np.sum(weights * cross.T, axis=1)
-    return Estimate(weights, np.sqrt(np.maximum(squared, 0.0)))
+    source, target = np.asarray(source, float), np.asarray(target, float)
+    (leaves, count, _), number = source.shape, source.shape[0] * source.shape[1]
+    grey = number * GREY_SHARE * GREY**2
+    own = np.einsum("lns,lnr->sr", source, source) + grey + number * uncertainty**2 * np.eye(source.shape[2])
+    weights = np.linalg.solve(own, np.einsum("lns,lnt->st", source, target) + grey).T
+    leverage = source @ np.linalg.solve(own, source.transpose(0, 2, 1))
+    errors = np.linalg.solve(np.eye(count) - leverage, target - source @ weights.T)
+    squared = np.sum(errors**2, axis=(0, 1)) / (leaves * count)
+    return Estimate(weights, np.sqrt(squared + uncertainty**2 * np.sum(weights**2, axis=1)))
 
 
 def line_between(source, target):

@@ -3,61 +3,56 @@
 import numpy as np
 import pytest
 
-from fifesim.sensor.response.spectral import (
-    CORRELATION,
-    DEVIATION,
-    GREY,
-    GREY_SHARE,
-    band_moments,
-    best_linear,
-    line_between,
-)
+from fifesim.sensor.response.spectral import GREY, GREY_SHARE, best_linear, line_between
 
 
 @pytest.fixture
 def spectra():
-    return np.random.Generator(np.random.Philox(2)).uniform(0.05, 0.5, (4000, 6))
+    """Spectra of 500 leaves, 8 of each, in 6 bands."""
+    return np.random.Generator(np.random.Philox(2)).uniform(0.05, 0.5, (500, 8, 6))
 
 
 def test_estimate_is_least_squares_with_noisy_bands(spectra):
     """With as many noisy copies of the spectra as one likes, ordinary least squares finds the same weights."""
     truth = spectra @ np.array([0.5, 0.2, 0.0, 0.3, 0.0, -0.1])
     noise = 0.05 * np.random.Generator(np.random.Philox(3)).standard_normal(spectra.shape)
-    together = np.column_stack([spectra, truth])
-    found = best_linear(together.T @ together / len(truth), 6, 0.05)
-    by_squares, *_ = np.linalg.lstsq(spectra + noise, truth, rcond=None)
+    found = best_linear(spectra, truth[..., None], 0.05)
+    noisy = (spectra + noise).reshape(-1, 6)
+    by_squares, *_ = np.linalg.lstsq(noisy, truth.ravel(), rcond=None)
     np.testing.assert_allclose(found.weights[0], by_squares, atol=0.02)
-    left = np.sqrt(np.mean((truth - (spectra + noise) @ found.weights[0]) ** 2))
+    left = np.sqrt(np.mean((truth.ravel() - noisy @ found.weights[0]) ** 2))
     assert found.error[0] == pytest.approx(left, rel=0.03)
 
 
+def test_error_is_that_of_fits_without_each_leaf():
+    """Few leaves of few spectra, so that each has much influence, fitted again without each of them."""
+    random = np.random.Generator(np.random.Philox(5))
+    source, target = random.uniform(0.05, 0.5, (7, 3, 2)), random.uniform(0.05, 0.5, (7, 3, 2))
+    uncertainty, grey = 0.02, np.sqrt(21 * GREY_SHARE) * GREY
+    found = best_linear(source, target, uncertainty)
+
+    def fitted(leaves):
+        # Rows of least squares: spectra, the grey surfaces, and the uncertainty of each band.
+        left = np.vstack([source[leaves].reshape(-1, 2), [[grey] * 2], np.sqrt(21) * uncertainty * np.eye(2)])
+        right = np.vstack([target[leaves].reshape(-1, 2), [[grey] * 2], np.zeros((2, 2))])
+        return np.linalg.lstsq(left, right, rcond=None)[0].T
+
+    leaves = np.arange(7)
+    np.testing.assert_allclose(found.weights, fitted(leaves), rtol=1e-10)
+    errors = [target[leaf] - source[leaf] @ fitted(leaves[leaves != leaf]).T for leaf in leaves]
+    expected = np.mean(np.square(errors), axis=(0, 1)) + uncertainty**2 * np.sum(found.weights**2, axis=1)
+    np.testing.assert_allclose(found.error**2, expected, rtol=1e-10)
+
+
 def test_a_band_that_is_there_is_itself(spectra):
-    moments = spectra.T @ spectra / len(spectra)
-    both = np.block([[moments, moments], [moments, moments]])
-    found = best_linear(both, 6, 1e-6)
+    found = best_linear(spectra, spectra, 1e-6)
     np.testing.assert_allclose(found.weights, np.eye(6), atol=1e-6)
     assert np.all(found.error < 1e-5)
 
 
 def test_more_uncertainty_is_more_error(spectra):
-    moments = spectra.T @ spectra / len(spectra)
-    errors = [best_linear(moments, 5, uncertainty).error[0] for uncertainty in (0.001, 0.01, 0.1)]
+    errors = [best_linear(spectra[..., :5], spectra[..., 5:], each).error[0] for each in (0.001, 0.01, 0.1)]
     assert errors[0] < errors[1] < errors[2]
-
-
-def test_moments_are_those_of_spectra_with_smooth_factors():
-    """Beside a sample of spectra times one plus a Gaussian process."""
-    wavelength = np.linspace(0.4, 0.8, 5)
-    mean = np.array([0.1, 0.2, 0.3, 0.4, 0.5])
-    apart = wavelength[:, None] - wavelength
-    covariance = DEVIATION**2 * np.exp(-0.5 * (apart / CORRELATION) ** 2)
-    factors = 1 + np.random.Generator(np.random.Philox(4)).multivariate_normal(np.zeros(5), covariance, 200_000)
-    weights = np.array([[0.5, 0.5, 0, 0, 0], [0, 0, 0.2, 0.3, 0.5]])
-    means = (factors * mean) @ weights.T
-    straight = weights @ np.outer(mean, mean) @ weights.T
-    grey = GREY_SHARE * GREY**2 * weights @ (1 + covariance) @ weights.T
-    found = band_moments(weights, wavelength, mean[None]) - straight - grey
-    np.testing.assert_allclose(found, np.cov(means.T), rtol=0, atol=0.01 * found.max())
 
 
 def test_line_is_that_of_a_fit():
