@@ -321,7 +321,7 @@ def test_dataset_makes_chips_and_names_what_people_read(invoke, tmp_path):
         (["study.toml"], STUDY.replace("visibility", "visibilty"), "did you mean 'visibility'"),
         (["study.toml"], STUDY.replace("uniform", "unifrom"), "did you mean 'uniform'"),
         (["study.toml"], STUDY.replace('"10 km"', "1"), "draw.atmosphere.visibility"),
-        (["study.toml"], "[grid]\nwidth = 180\nheight = 180\n", "a study draws something"),
+        (["study.toml"], "[grid]\nwidth = 180\nheight = 180\n", "a study needs a table"),
         (["study.toml", "--workers", "2", "--scheduler", "tcp://nowhere:1"], STUDY, "give one of them"),
     ],
 )

@@ -190,8 +190,8 @@ RECIPES = {
         [
             (
                 "fifesim/scenario/keys.py",
-                '    seed: int = seed(0, "of the noise")\n',
-                '    seed: int = seed(0, "of the noise")\n    polish: float = number(0.5, "1", "of the mirror")\n',
+                '    seed: int = seed(0, "seed of the noise")\n',
+                '    seed: int = seed(0, "seed of the noise")\n    polish: float = number(0.5, "1", "of the mirror")\n',
             ),
             (
                 "fifesim/scenario/sections.py",

@@ -798,7 +798,7 @@ STUDIES = [
     refused("haze drawn twice", 'study({"visibility": {"uniform": [5, 60]}, "aot": {"uniform": [0, 1]}})', "not both"),
     refused("a split in percent", "study(split={'train': 80, 'test': 20})", "sum to 1"),
     refused("a misspelt sequence", "study(sequence='sobool')", "'sobool'", "'sobol'"),
-    refused("no chips", "fifesim.dataset(study(), 'chips.zarr', n=0)", "from 1 up, got 0"),
+    refused("no chips", "fifesim.dataset(study(), 'chips.zarr', n=0)", "at least 1, got 0"),
     refused(
         "a scenario for a study", "fifesim.dataset(fifesim.Scenario(), 'chips.zarr', n=2)", "Study", error=TypeError
     ),

@@ -86,7 +86,7 @@ def test_pixels_are_those_of_the_bands_as_in_python():
     assert Sensor(instrument="MSI", bands=["MSI11"]).size == 20
     assert Sensor(instrument="MSI", bands=["MSI4", "MSI11"], pixel=20).size == 20
     with pytest.raises(
-        ValueError, match=r"bands of MSI lie on different grids \(10 m: MSI4; 20 m: MSI11\): name those"
+        ValueError, match=r"bands of MSI have different grids \(10 m: MSI4; 20 m: MSI11\): name bands of one"
     ):
         Sensor(instrument="MSI", bands=["MSI4", "MSI11"])
 

@@ -115,5 +115,5 @@ def test_pixels_at_the_edge_are_those_of_a_larger_scene():
     whole = fifesim.simulate(parse_scenario({**SMALL, "grid": larger, "sensor": {"instrument": "L4TM"}}))["image"]["dn"]
     np.testing.assert_array_equal(image, whole.sel(y=image.y, x=image.x, method="nearest", tolerance=0.01))
     periodic = parse_scenario(SMALL | {"ground": {"method": "periodic"}})
-    with pytest.raises(ValueError, match=r"no ground beyond the scene: type method = \"streaming\""):
+    with pytest.raises(ValueError, match=r"no ground beyond the scene: use method = \"streaming\""):
         fifesim.simulate(periodic, complete=True)

@@ -285,7 +285,7 @@ class Client:
 
 @pytest.mark.parametrize(
     ("workers", "client", "said"),
-    [(0, None, "from 1 up, got 0"), (2.0, None, "from 1 up, got 2.0"), (2, Client(), "give one of them")],
+    [(0, None, "at least 1, got 0"), (2.0, None, "at least 1, got 2.0"), (2, Client(), "give one of them")],
 )
 def test_processes_are_a_number_or_a_cluster(workers, client, said, study, tmp_path):
     with pytest.raises(ValueError, match=said):
