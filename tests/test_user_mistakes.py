@@ -539,7 +539,7 @@ AIR = [
     refused("a number for the air", "rho.fifesim.to_toa(23)", "fifesim.Atmosphere, got 23", error=TypeError),
     refused("a word for the air", 'rho.fifesim.to_toa("clear")', "fifesim.Atmosphere, got 'clear'", error=TypeError),
     warned("no air over an own map", "own(rho.values).fifesim.to_toa(geometry=sun, instrument='TM')",
-           "what air lies over"),
+           "the atmosphere over"),
     refused("no sun over an own map", "own(rho.values).fifesim.to_toa(air, instrument='TM')", "where the sun stands"),
     refused("surroundings in percent", "rho.fifesim.to_toa(adjacency=True, surroundings=30)", "0 to 1", "30"),
     refused("surroundings without adjacency", "rho.fifesim.to_toa(surroundings=0.3)", "adjacency=True"),

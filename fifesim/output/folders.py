@@ -105,7 +105,7 @@ def errors_with_their_file(folder):
     except OSError as error:
         name = f" ({error.filename})" if error.filename and str(error.filename) not in str(error.strerror) else ""
         message = f"{error.strerror}{name}" if error.strerror else str(error)
-        hint = f"; what is finished is kept, go on with --resume -o {folder}"
+        hint = f"; finished blocks are kept, continue with --resume -o {folder}"
         raise OSError(f"{message}{hint if (folder / UNFINISHED).exists() else ''}") from error
 
 

@@ -28,7 +28,7 @@ from fifesim.base.messages import LOG, is_quiet, quiet
 
 @contextmanager
 def interrupts_blocked():
-    """Context in which Ctrl-C is delayed: KeyboardInterrupt is raised at its end."""
+    """Context that delays Ctrl-C: KeyboardInterrupt is raised at its end."""
     # An interrupted import fails in other ways, and processes started within the context never receive Ctrl-C.
     handler = signal.getsignal(signal.SIGINT)
     can_block = threading.current_thread() is threading.main_thread() and hasattr(signal, "pthread_sigmask")
@@ -36,7 +36,7 @@ def interrupts_blocked():
         # In another thread, on Windows, and where Ctrl-C is ignored or has another handler.
         yield
         return
-    # The mask is for processes that are started. In this one, another thread may take the signal.
+    # The mask protects child processes. In this process, another thread may receive the signal.
     pressed = []
     signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -65,7 +65,7 @@ class Exit(IntEnum):
 
 
 class Door(TyperGroup):
-    """Common exit of all commands: an error or Ctrl-C is one line, and the exit code tells the kind."""
+    """Common exit of all commands. Errors and Ctrl-C print one line, and the exit code tells them apart."""
 
     def main(self, *arguments, **options):
         """Run the command line, and exit with its code."""
@@ -78,7 +78,7 @@ class Door(TyperGroup):
                 raise KeyboardInterrupt
             sys.exit(code)
         except (KeyboardInterrupt, typer.Abort):
-            stop("interrupted; nothing is written", Exit.INTERRUPTED)
+            stop("interrupted; nothing was written", Exit.INTERRUPTED)
         except _UsageError as error:
             error.message = in_a_line(error.message)
             error.show()
@@ -86,7 +86,7 @@ class Door(TyperGroup):
         except (ValueError, FileNotFoundError, IsADirectoryError) as error:
             stop(error, Exit.MISTAKE)
         except (OSError, MemoryError, RuntimeError, ImportError) as error:
-            stop(error or "memory does not suffice", Exit.FAILURE)
+            stop(error or "out of memory", Exit.FAILURE)
 
 
 def _be_quiet(context: typer.Context, wanted: bool):
@@ -99,11 +99,9 @@ def _be_verbose(context: typer.Context, times: int):
         context.with_resource(listening(logging.INFO if times == 1 else logging.DEBUG))
 
 
-Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", callback=_be_quiet, help="No progress and no list of files; mistakes stay.")
-]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_be_quiet, help="Only print errors.")]
 Verbose = Annotated[
-    int, typer.Option("--verbose", "-v", count=True, callback=_be_verbose, help="Say each step; -vv its parts too.")
+    int, typer.Option("--verbose", "-v", count=True, callback=_be_verbose, help="Print each step; -vv for more detail.")
 ]
 """Options of long commands; their callbacks take effect before the command begins."""
 
@@ -131,7 +129,7 @@ def listening(level):
 
 @contextmanager
 def importing():
-    """Context for slow imports, with which a command on scenes begins."""
+    """Context for slow imports at the start of a command."""
     # Imported objects are permanent: garbage collection among them takes a sixth of the import time, and half of the
     # time at exit. The number of BLAS threads is set afterwards, as numpy comes with the package.
     atexit.register(gc.freeze)
@@ -159,11 +157,15 @@ def tell(message, *_):
 
 @contextmanager
 def kept(output):
-    """Context that tells a user who interrupts a run what remains of it."""
+    """Context that reports the remaining files when a run is interrupted."""
     try:
         yield
     except KeyboardInterrupt:
-        left = f"what is finished is kept, go on with --resume -o {output}" if output.exists() else "nothing is written"
+        left = (
+            f"finished blocks are kept, continue with --resume -o {output}"
+            if output.exists()
+            else "nothing was written"
+        )
         stop(f"interrupted; {left}", Exit.INTERRUPTED)
 
 
@@ -172,7 +174,7 @@ def report(files, seconds, look, as_json=False, finished=False):
     if as_json:
         say(json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)}))
     elif not is_quiet():
-        done = "this run was finished before, nothing is left to do" if finished else f"done in {in_time(seconds)}"
+        done = "this run is already finished" if finished else f"done in {in_time(seconds)}"
         say(*files, f"{done}: open {look}")
 
 
@@ -195,6 +197,6 @@ def stop(error, code):
     try:
         sys.stdout.flush()
     except OSError:
-        # Otherwise the interpreter would report the failed flush again at its end, with a traceback.
+        # Otherwise the interpreter would report the failed flush again at exit, with a traceback.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(code)

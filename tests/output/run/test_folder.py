@@ -278,6 +278,6 @@ def test_a_run_on_a_map_says_that_tallgrass_is_taken(tmp_path):
     values = np.linspace(0.5, 3, 600).reshape(20, 30)
     scenario = parse_scenario({**SMALL, **lai_map(tmp_path / "lai.tif", values)})
     with pytest.warns(
-        UserWarning, match="grows on lai.tif: FIFE's tallgrass is taken for soil and litter, green leaves"
+        UserWarning, match="vegetation of lai.tif is unknown: using FIFE's tallgrass for soil and litter, green leaves"
     ):
         simulate_to_folder(scenario, tmp_path / "run")
