@@ -214,7 +214,7 @@ ELEVATION = [
     refused(
         "a DEM half a cell off",
         'lai.fifesim.surface_reflectance("TM", dem=dem.assign_coords(x=dem.x + 5))',
-        "dem lies on other cells",
+        "dem has other cells",
     ),
     refused("one elevation as a number", "rho.fifesim.to_toa(elevation=400)", "elevation", "got 400", error=TypeError),
     refused("elevation ten times too high", "rho.fifesim.to_toa(elevation=dem * 10)", "0 to 4 km", "got 4.15"),
@@ -540,7 +540,7 @@ AIR = [
     refused("a word for the air", 'rho.fifesim.to_toa("clear")', "fifesim.Atmosphere, got 'clear'", error=TypeError),
     warned("no air over an own map", "own(rho.values).fifesim.to_toa(geometry=sun, instrument='TM')",
            "the atmosphere over"),
-    refused("no sun over an own map", "own(rho.values).fifesim.to_toa(air, instrument='TM')", "where the sun stands"),
+    refused("no sun over an own map", "own(rho.values).fifesim.to_toa(air, instrument='TM')", "position of the sun"),
     refused("surroundings in percent", "rho.fifesim.to_toa(adjacency=True, surroundings=30)", "0 to 1", "30"),
     refused("surroundings without adjacency", "rho.fifesim.to_toa(surroundings=0.3)", "adjacency=True"),
 ]  # fmt: skip

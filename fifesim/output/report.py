@@ -36,7 +36,7 @@ def page_html(template, **values):
 def png(figure, dpi):
     """Bytes of a PNG file of a figure, reproducible, with a palette."""
     figure.set_dpi(dpi)
-    # Unlike savefig, this lays the figure out and draws it once.
+    # Unlike savefig, this computes the layout and draws only once.
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     drawn, buffer = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]), io.BytesIO()
@@ -55,7 +55,7 @@ def fixed(value, digits=2, sign=False):
 
 
 def plus_minus(value, digits=1):
-    """Text of a standard error to follow its number."""
+    """Text of a standard error, to be placed after its number."""
     return f" ± {value:.{digits}f}" if np.isfinite(value) else ""
 
 
@@ -73,7 +73,7 @@ _PAPERS_INSTRUMENT = "TM"
 
 
 def pairing_rows(scenario, fits):
-    """R2 in Table 2 of Friedl et al. (1995) for the ground of a run, and why it is lower, as two rows or none."""
+    """Published R2 for the ground of a run, and the reason for the difference, as two rows or none."""
     paper, own = _paper_r2(scenario), scenario.sensor
     if paper is None or "lai" not in fits or own.interval != "product" or own.description.name != _PAPERS_INSTRUMENT:
         return []
@@ -134,7 +134,7 @@ def fit_figure(image, truth, name, fit):
     title = f"{fit.intercept:.3f} {sign} {abs(fit.slope):.3f} {index},  R² = {fit.r2:.3f},  n = {fit.n}"
     axis.set(xlabel=f"{index} at the top of the atmosphere", ylabel=f"True {axis_label(name)}")
     axis.set_title(title.replace("-", "−"), fontsize=10)
-    # Above all that is drawn, whichever way the line goes; not below the least that the quantity can be.
+    # The range includes everything drawn, and excludes values below the physical minimum.
     low, high = axis.get_ylim()
     lowest = cf.QUANTITIES[name].lowest
     low = low if lowest is None else max(low, lowest)
@@ -150,7 +150,7 @@ def _density(axis, beside, x, y):
     shown = np.log10(np.where(count > 0, count, np.nan)).T
     extent = [across[0], across[-1], up[0], up[-1]]
     most = max(float(np.nanmax(shown)), 0.5)
-    # Even one pixel is to be seen: the lightest colour is a grey.
+    # The lightest colour is grey, so that a single pixel is visible.
     style = {"cmap": "Greys", "vmin": -0.35 * most, "vmax": most, "aspect": "auto", "origin": "lower"}
     drawn = axis.imshow(shown, extent=extent, interpolation="nearest", **style)
     bar = axis.figure.colorbar(drawn, cax=beside, boundaries=np.linspace(0, most, 64))
@@ -198,11 +198,11 @@ def reflectance_change(dn, level, band):
 
 
 _TEMPLATE = Path(__file__).with_name("report.html.j2")
-# Resolution of figures, which pages show at half of it or less. [dots per inch]
+# Resolution of figures, twice the displayed resolution. [dots per inch]
 _DPI = 200
-# Rows or columns beyond which maps skip pixels of an image. [pixel]
+# Maximum rows or columns of maps; larger images are subsampled. [pixel]
 _MOST = 600
-# Difference of 5S from successive orders beyond which the report advises another engine. [1]
+# Error of 5S beyond which the report suggests another engine. [1]
 _ENGINE_BOUND = 0.02
 
 
@@ -249,7 +249,7 @@ def finding(truth, fits, reasons):
 
 
 def pairing(scenario, image, truth):
-    """Sentence about the ground with which each pixel is compared."""
+    """Text on the ground with which each pixel is compared."""
     block, cell = grids.cell_size(grids.geobox(truth["lai"]))[1], grids.cell_size(scenario.geobox())[1]
     pairs = ((image[axis].values, truth[axis].values) for axis in ("y", "x"))
     apart = [np.abs(np.subtract(*(each[: min(map(len, pair))] for each in pair))).max() for pair in pairs]

@@ -101,7 +101,7 @@ def test_air_of_a_raster_of_ones_own_is_no_silent_assumption(site, lai):
     assert __file__ in {each.filename for each in said}
     with pytest.raises(ValueError, match="which instrument looks at"):
         theirs.fifesim.surface_reflectance(time="1987-06-06T16:35Z", atmosphere=AIR)
-    with pytest.raises(ValueError, match="where the sun stands over"):
+    with pytest.raises(ValueError, match="position of the sun over"):
         theirs.fifesim.surface_reflectance("TM", atmosphere=AIR)
 
 

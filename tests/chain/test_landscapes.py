@@ -120,7 +120,7 @@ def test_code_without_a_class_is_named(land):
     "change, message",
     [
         (lambda land: land[["cover"]], "a landscape needs a variable lai, this Dataset has cover"),
-        (lambda land: land.assign(cover=land.cover.drop_attrs(deep=False)), "does not say what its classes are"),
+        (lambda land: land.assign(cover=land.cover.drop_attrs(deep=False)), "the classes of the cover are unknown"),
     ],
 )
 def test_other_datasets_are_refused(land, change, message):

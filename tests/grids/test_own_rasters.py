@@ -202,7 +202,7 @@ def test_a_dataset_says_its_scale_once(fractions):
 def test_no_data_that_nobody_marks_is_told(fractions):
     """Digital number 0 of Landsat's Level 2 would be a reflectance of -0.2."""
     mine = stored(fractions.fillna(0), scale_factor=2.75e-5, add_offset=-0.2)
-    with pytest.warns(UserWarning, match=r"no value for cells without data.*_FillValue=0"):
+    with pytest.warns(UserWarning, match=r"no value for no data.*_FillValue=0"):
         incoming(mine, "surface_reflectance")
 
 

@@ -287,10 +287,10 @@ def test_a_map_of_real_ground_lies_on_no_invented_hills():
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"grid": {"north": 1e300}}, "north = 1e+300: the grid lies outside of the area of EPSG:26914"),
-        ({"grid": {"north": 2**64}}, "north = 1.844674407e+19: the grid lies outside"),
-        ({"grid": {"west": 1e12}}, "west = 1e+12, north = 4334220: the grid lies outside"),
-        ({"grid": {"cell": 1000}}, "holds no cell of 1000 x 1000 m: type a width and height of a cell or more"),
+        ({"grid": {"north": 1e300}}, "north = 1e+300: the grid is outside the area of EPSG:26914"),
+        ({"grid": {"north": 2**64}}, "north = 1.844674407e+19: the grid is outside"),
+        ({"grid": {"west": 1e12}}, "west = 1e+12, north = 4334220: the grid is outside"),
+        ({"grid": {"cell": 1000}}, "holds no cell of 1000 x 1000 m: use a larger width and height"),
         ({"grid": {"width": 1}}, "width = 1, height = 150 m holds no cell of 3.33333 x 3.33333 m"),
         ({"grid": {"width": 1e12}}, "holds over 2147483647 cells of 3.33333 x 3.33333 m along a side"),
         ({"grid": {"width": 10}}, "the image must have 2 x 2 pixels or more, sensor.pixel of 30 x 30 m fits 5 x 0"),

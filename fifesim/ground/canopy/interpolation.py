@@ -284,8 +284,8 @@ def _place(position, nodes):
     return interval, position - interval
 
 
-# The three below are loops without branches, so that cells are done several at once. What is wrong is counted beside
-# divisions, which take as long without.
+# The next three are loops without branches, which are vectorized. Invalid values are counted separately, divisions,
+# which take as long without.
 @register_jitable
 def _places(table, lai, brown, starts, leaves, dead):
     """Fill in first coefficients of cells, -1 outside of the table, and places; count the invalid cells."""

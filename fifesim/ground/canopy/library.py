@@ -8,14 +8,14 @@ from fifesim.base.lattice import generator
 from fifesim.ground.canopy.prospect import Leaf, leaf_spectrum
 from fifesim.ground.canopy.sail_model import reflectance_factor, sail, with_background
 
-# How many leaves there are, and canopies of each.
+# Number of leaves, and of canopies per leaf.
 LEAVES = 60
 CANOPIES = 8
 
-# Every so many of PROSPECT's wavelengths, which are 1 nm apart: band means differ by 1e-4 at most.
+# Step through PROSPECT's wavelengths (1 nm); band means change by at most 1e-4.
 _STRIDE = 5
 
-# Uniform ranges that leaves are drawn from: wide, and fitted to nothing. Contents as in `Leaf`.
+# Uniform ranges of leaf contents as in `Leaf`, chosen to be wide and not fitted to data.
 _STRUCTURE = (1.2, 2.5)
 _CHLOROPHYLL = (5.0, 80.0)
 _CAROTENOIDS = (0.15, 0.35)  # over chlorophyll
@@ -29,10 +29,10 @@ _SZA = (20.0, 60.0)
 _SKYLIGHT = 0.3
 _LEAF_ANGLES = ("planophile", "spherical", "erectophile", "plagiophile")
 
-# Brightness of the ground over that of the mixed spectra.
+# Ground brightness relative to the mixed spectra.
 _BRIGHTNESS = (0.3, 1.1)
 
-# The stream of random numbers that is the library's.
+# Random number stream of the library.
 _STREAM = 2
 
 

@@ -122,7 +122,7 @@ def score_table(sample):
     kept = np.unique(np.linspace(0, values.size - 1, _NODES).round().astype(int))
     values, scores = values[kept], scores[kept]
     even, rounding = np.linspace(values[0], values[-1], _STARTS, retstep=True)
-    # A value that lies on one of the even ones may by rounding be taken for one beside.
+    # By rounding, a value at a node may be assigned to a neighbouring interval.
     first, last = (
         np.clip(np.searchsorted(values, even + aside * rounding, side="right") - 1, 0, values.size - 2)
         for aside in (-_ROUNDING, 1 + _ROUNDING)
@@ -319,7 +319,7 @@ def _known(coarse, names, shares):
             matrix[i, j] = matrix[j, i] = left / most if most > 0 else 0.0
     _check_matrix(matrix[: len(coarse), : len(coarse)])
     for i in range(len(coarse), len(every)):
-        # Each of the others by itself: what they share beside this is a matter of their noises.
+        # Each other field separately, because their remaining correlation depends on their noises.
         _check_matrix(matrix[np.ix_([*range(len(coarse)), i], [*range(len(coarse)), i])])
     return _weights(every, coarse, matrix)
 

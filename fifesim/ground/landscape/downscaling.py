@@ -26,7 +26,7 @@ from fifesim.base.caches import cached
 from fifesim.ground.landscape.autoregression import field_variance, response
 from fifesim.ground.landscape.distribution import quantile_map, quantile_table
 
-# Of the squared frequency, so that the trend has a spectral density at zero. [radian2 per pixel2]
+# Offset of the squared frequency, so that the spectral density of the trend is finite at zero. [radian2 per pixel2]
 _SLOWEST = 1e-5
 
 
@@ -329,7 +329,7 @@ def residual_shift(own, known, shift, kriging, transform, deviation):
         variance = np.maximum(kriging_block_means(np.square(deviation), ratio), variance / 4)
     pixels = fft.irfft2(spectrum, s=known.shape) / variance + weighed(bent, kriging.response, ratio)
     gradient = by_pixel((pixels / bent[: ratio[0], : ratio[1]].size).astype(np.float32), ratio) * steep - bent
-    # What all cells of a pixel share is no residual.
+    # The mean over the cells of a pixel is not part of the residual.
     gradient -= by_pixel(kriging_block_means(gradient, ratio), ratio)
     spectrum = fft.rfft2(deviation * gradient)
     spectrum *= kriging.process

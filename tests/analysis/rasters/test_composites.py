@@ -63,7 +63,11 @@ def test_images_are_composed_by_their_ndvi_or_by_what_is_given(stack):
 @pytest.mark.parametrize(
     ("change", "options", "said"),
     [
-        (lambda ndvi: ndvi.fillna(0).astype(np.uint8), {}, r"another sun at each date, take \.fifesim\.to_reflectance"),
+        (
+            lambda ndvi: ndvi.fillna(0).astype(np.uint8),
+            {},
+            r"the sun of each date: convert them with \.fifesim\.to_reflectance",
+        ),
         (lambda ndvi: ndvi.isel(time=0), {}, "images along time, got dimensions"),
         (lambda ndvi: ndvi, {"method": "median"}, "method must be one of maximum-value, got 'median'"),
         (lambda ndvi: ndvi, {"by": xr.DataArray(np.zeros((2, 2, 2)), dims=("time", "y", "x"))}, "dates of the images"),
@@ -125,7 +129,7 @@ def test_a_composite_comes_back_from_netcdf_and_zarr(stack, tmp_path, kind, chun
 
 def test_the_date_of_a_composite_has_its_own_attributes(stack):
     found = fifesim.composite(stack)
-    assert found["date"].attrs == {"long_name": "date of the image that is kept"}
+    assert found["date"].attrs == {"long_name": "date of the selected image"}
     assert found["sza"].attrs["standard_name"] == "solar_zenith_angle" and "history" not in found["sza"].attrs
 
 

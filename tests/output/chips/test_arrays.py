@@ -68,7 +68,7 @@ def test_a_part_of_the_chips_is_a_slice(chips, layout, arrays):
 
 def test_a_truth_that_others_have_not_names_its_chip(chips, layout):
     without = layout._replace(truth=("lai", "fpar"))
-    with pytest.raises(ValueError, match=r"chip \d: has a truth that others have not, green_fpar"):
+    with pytest.raises(ValueError, match=r"chip \d: has a true property that others lack, green_fpar"):
         chip_arrays(chips, range(0, 7), without)
 
 

@@ -161,5 +161,5 @@ def test_map_that_is_of_no_use_is_refused(tmp_path, site, codes):
 
 
 def test_cover_that_says_no_classes_is_refused(site):
-    with pytest.raises(ValueError, match="does not say what its classes are"):
+    with pytest.raises(ValueError, match="the classes of the cover are unknown"):
         classes_of(drawn_cover(site, Patches("voronoi", 40), TABLE, 7).drop_attrs())
