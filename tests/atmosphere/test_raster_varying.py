@@ -131,7 +131,7 @@ def test_swath_needs_a_table(ground, swath):
 
 
 def test_angle_on_other_cells_is_refused(ground, swath):
-    with pytest.raises(ValueError, match="lie on different grids"):
+    with pytest.raises(ValueError, match="have different grids"):
         toa_from_surface(ground, AIR, BANDS, by_cell(40.0, 120.0, swath.vza[:-1], 200.0))
 
 

@@ -84,7 +84,7 @@ def test_what_makes_no_composite_is_refused(stack, change, options, said):
     [
         (lambda by: by.isel(time=[1, 0, 2]), r"other dates than the images, or in another order: .*\.sortby\('time'\)"),
         (lambda by: by.isel(time=[1, 0, 2]).drop_vars(set(by.coords) - {"time"}), "other dates than the images"),
-        (lambda by: by.assign_coords(x=by["x"] + 30.0), "lie on different grids"),
+        (lambda by: by.assign_coords(x=by["x"] + 30.0), "have different grids"),
     ],
 )
 def test_what_decides_has_the_dates_and_cells_of_the_images(stack, change, said):

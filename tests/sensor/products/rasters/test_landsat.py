@@ -197,7 +197,7 @@ def test_the_panchromatic_band_is_opened_by_name(folders):
     pan = fifesim.open_landsat(folder, bands="OLI8")
     assert pan.shape == (1, 23, 35) and "quality" not in pan.coords
     assert float(pan["x"][1] - pan["x"][0]) == 15.0
-    with pytest.raises(ValueError, match=r"^LC08_\w+_B4\.TIF and LC08_\w+_B8\.TIF lie on different grids"):
+    with pytest.raises(ValueError, match=r"^LC08_\w+_B4\.TIF and LC08_\w+_B8\.TIF have different grids"):
         fifesim.open_landsat(folder, bands=["OLI8", "OLI4"])
     assert "OLI9" in fifesim.open_landsat(folder, bands=["OLI9"])["band"].values
 
