@@ -680,7 +680,7 @@ SENSORS = [
     ),
     refused("a negative interval", 'toa.fifesim.sense("TM", interval=-30)', "positive metres", "got -30"),
     refused("one number for an offset", 'toa.fifesim.sense("TM", offset=0.5)', "offset must be two", "got 0.5"),
-    refused("an instrument twice", 'fifesim.compare(lai, ["TM", "TM"])', "each once"),
+    refused("an instrument twice", 'fifesim.compare(lai, ["TM", "TM"])', "different names"),
     refused("a negative radiance", 'fifesim.snr("MSI", "MSI4", -10)', "must not be negative, got -10"),
     refused("altitude in km", 'camera(altitude="705.0")', "interval", "radians"),
     refused("pixel in km, in a file", 'camera(gsd="0.03")', "gsd = 0.03", "multiply by 1000"),

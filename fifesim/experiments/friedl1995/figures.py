@@ -115,7 +115,7 @@ def _figure4(found, reading):
     for axis, arp in zip(axes, found["arp"].values, strict=True):
         shown = found["cell_lai"].sel(arp=arp).values[:120, :120]
         extent = np.array([0, shown.shape[1], shown.shape[0], 0]) * size
-        drawn = axis.imshow(shown, cmap="viridis", vmin=0, vmax=high, extent=extent, interpolation="nearest")
+        drawn = axis.imshow(shown, cmap="YlGn", vmin=0, vmax=high, extent=extent, interpolation="nearest")
         axis.set(xlabel="east [m]", title=f"arp {arp:g}")
         axis.title.set_fontsize(9)
         axis.xaxis.set_major_locator(MaxNLocator(4))

@@ -135,7 +135,7 @@ def test_the_date_of_a_composite_has_its_own_attributes(stack):
 
 def test_a_composite_with_angles_of_its_cells_goes_to_netcdf_as_the_warning_says(stack, tmp_path):
     found = fifesim.composite(stack)
-    with pytest.warns(UserWarning, match="leaves out sza, .* or write a netCDF with"):
+    with pytest.warns(UserWarning, match="lacks sza, .* or write a netCDF with"):
         again = fifesim.open_image(found.fifesim.to_geotiff(tmp_path / "composite.tif"))
     xr.testing.assert_identical(again, found.drop_vars("sza"))
     found.to_netcdf(tmp_path / "composite.nc")

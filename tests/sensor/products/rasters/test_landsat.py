@@ -187,7 +187,7 @@ def test_a_scene_by_pixel_goes_through(folders, tmp_path):
     ndvi = scene.fifesim.to_surface().fifesim.ndvi()
     centre = fifesim.open_landsat(folder, bands=["OLI4", "OLI5"]).fifesim.to_surface().fifesim.ndvi()
     assert float(abs(ndvi - centre).max()) < 0.05
-    with pytest.warns(UserWarning, match="leaves out sza"):
+    with pytest.warns(UserWarning, match="lacks sza"):
         ndvi.fifesim.to_geotiff(tmp_path / "ndvi.tif")
 
 
