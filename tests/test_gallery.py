@@ -31,7 +31,7 @@ def drawn():
 
 
 def test_hot_spot_of_the_canopy_is_drawn_at_the_sun(drawn):
-    names = drawn("ground/plot_5_canopy_reflectance")
+    names = drawn("ground/plot_5_canopy_reflectance", [0, 1, 2])
     for axis in names["axes"]:
         assert axis.get_xlabel().endswith(SIGNED)
         _, *with_hot_spot, sun = axis.get_lines()
