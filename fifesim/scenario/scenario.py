@@ -121,7 +121,7 @@ def _of_fife(scenario):
     """Parts of a landscape without files that come from FIFE."""
     types = _distributions(scenario)
     found = [f"the {_COUNTS[len(types)]}"] if types <= set(treatments()) else []
-    return found + ["the location"] * _is_on_site(scenario)
+    return found + ["the location"] * is_on_site(scenario)
 
 
 def _distributions(scenario):
@@ -131,7 +131,7 @@ def _distributions(scenario):
     return {stand.lai_source(scenario.ground) for stand in scenario.classes.values()} or set(treatments())
 
 
-def _is_on_site(scenario):
+def is_on_site(scenario):
     """Whether the scenario is known to be on the FIFE site, without opening a file."""
     if scenario.ground.lai_file and not scenario.grid.model_fields_set.intersection(EXTENT):
         return False
@@ -146,7 +146,7 @@ def _is_hypothetical(scenario):
     """Whether the time is the default on the FIFE site, at which no Landsat passed."""
     given = scenario.geometry
     default = given.time is None or utc(given.time)[0] == utc(times.TIME)[0]
-    return given.sza is None and default and _is_on_site(scenario)
+    return given.sza is None and default and is_on_site(scenario)
 
 
 def _overpass(scenario):
@@ -154,11 +154,12 @@ def _overpass(scenario):
     if given.sza is not None:
         return "Sun angles as given."
     if _is_hypothetical(scenario):
-        return f"Hypothetical overpass, {_time(times.TIME)}."
-    return "" if given.time is None else f"Time as given, {_time(given.time)}."
+        return f"Hypothetical overpass, {time_in_words(times.TIME)}."
+    return "" if given.time is None else f"Time as given, {time_in_words(given.time)}."
 
 
-def _time(time):
+def time_in_words(time):
+    """Day and time in UTC as text."""
     (known,) = utc(time)
     return f"{known.day} {known.month_name()} {known.year} {known:%H:%M} UTC"
 

@@ -177,7 +177,7 @@ def _write_files(scenario, tree, found, folder, home):
     (folder / "quicklook.png").write_bytes(quicklook)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / identity.SCENARIO).write_text(write_scenario(scenario), encoding="utf-8")
-    stac.write_stac(stac.item(scenario, folder, report.title(scenario)), folder / "item.json")
+    stac.write_stac(stac.item(scenario, folder, report.headline(scenario)), folder / "item.json")
 
 
 def _check_some_data(scenario, image):
