@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from fifesim.output.terminal import Door, Exit, Quiet, Verbose, importing, kept, report, say, stop
+from fifesim.output.terminal import Commands, Exit, Quiet, Verbose, importing, kept, print_lines, report, stop
 
 app = typer.Typer(
-    cls=Door,
+    cls=Commands,
     help="Simulate satellite images of vegetated land, with the true LAI and FPAR of each pixel.",
     no_args_is_help=True,
     add_completion=False,
@@ -53,7 +53,7 @@ def _version(wanted: bool):
     if wanted:
         from fifesim import __version__
 
-        say(f"fifesim {__version__}")
+        print_lines(f"fifesim {__version__}")
         raise typer.Exit
 
 
@@ -104,7 +104,7 @@ def simulate_command(
     found = found or (_default(paper) if scenario is None else read_scenario(scenario))
     if dry_run:
         cost = estimate(found, output, threads=workers or threads, scene=scene, start=since_start())
-        say(estimate_in_words(cost, as_json))
+        print_lines(estimate_in_words(cost, as_json))
         return
     found.complete()
     with kept(output), cluster(workers, scheduler) as client:
@@ -130,7 +130,7 @@ def rerun_command(
         from fifesim.output.run.again import outcome_in_words, rerun
 
     found = rerun(file, output, overwrite=overwrite, threads=threads)
-    say(outcome_in_words(file, found))
+    print_lines(outcome_in_words(file, found))
     if found.differing:
         raise typer.Exit(Exit.FAILURE)
 
@@ -297,7 +297,7 @@ def scenario_command(paper: _Paper = False):
     """Print the default scenario as TOML. Every key has its unit and meaning; save it to a file and edit."""
     from fifesim.scenario.toml import write_scenario
 
-    say(write_scenario(_default(paper).complete()).rstrip())
+    print_lines(write_scenario(_default(paper).complete()).rstrip())
 
 
 @app.command("sensors")
@@ -310,12 +310,12 @@ def sensors_command(
     from fifesim.sensor.description.listing import instrument_in_words, list_instruments
 
     if check is not None:
-        say(instrument_in_words(read_instrument(check)))
-        say(f"{check} is valid: every number has a source and a plausible unit.")
+        print_lines(instrument_in_words(read_instrument(check)))
+        print_lines(f"{check} is valid: every number has a source and a plausible unit.")
     elif name is not None:
-        say(instrument_in_words(instrument(name)))
+        print_lines(instrument_in_words(instrument(name)))
     else:
-        say(list_instruments([instrument(known) for known in instrument_names()]))
+        print_lines(list_instruments([instrument(known) for known in instrument_names()]))
 
 
 @app.command("verify")
@@ -328,14 +328,14 @@ def verify_command():
     from fifesim.experiments.verification.deviations import HEADING, by_stage, deviation_summary
 
     found = []
-    say(HEADING)
+    print_lines(HEADING)
     try:
         for text in by_stage(_collected(deviations(), found)):
-            say(text)
+            print_lines(text)
     except FileNotFoundError as error:
         # A table missing from the installation is a failure, not an invalid request.
         stop(error, Exit.FAILURE)
-    say(deviation_summary(found))
+    print_lines(deviation_summary(found))
     if not all(deviation.within for deviation in found):
         raise typer.Exit(Exit.FAILURE)
 

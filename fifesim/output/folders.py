@@ -160,7 +160,7 @@ def _move_into_place(hidden, folder, names, stale):
     replaced = hidden / _REPLACED
     shutil.rmtree(replaced, ignore_errors=True)
     replaced.mkdir()
-    # GDAL and GIS keep statistics of a raster in a file beside it, which do not hold for the new raster.
+    # GDAL and GIS keep statistics of a raster in a separate file, which is not valid for the new raster.
     earlier = [each for name in reversed([*stale, *names]) for each in (name, f"{name}.aux.xml")]
     moves = [(folder / name, replaced / name) for name in earlier if os.path.lexists(folder / name)]
     moves += [(hidden / name, folder / name) for name in names]

@@ -286,7 +286,7 @@ def _scale(width):
 
 def _bar(palette, low, high):
     ticks = [each for each in MaxNLocator(4).tick_values(low, high) if low <= each <= high and high > low]
-    # As few as the steps need: that from .25 to .5 has two.
+    # As few decimals as the steps need: two for a step from 0.25 to 0.5.
     step = min(np.diff(ticks), default=1.0) * 10.0 ** np.arange(_MOST_DIGITS)
     digits = int(np.argmax(np.abs(step - step.round()) < 1e-6 * step))
     texts = (f"{each:.{digits}f}".replace("-", "−") for each in ticks)

@@ -64,14 +64,14 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
-class Door(TyperGroup):
+class Commands(TyperGroup):
     """Common exit of all commands. Errors and Ctrl-C print one line, and the exit code tells them apart."""
 
     def main(self, *arguments, **options):
         """Run the command line, and exit with its code."""
         try:
             with warnings.catch_warnings():
-                warnings.showwarning = tell
+                warnings.showwarning = print_warning
                 code = super().main(*arguments, **options | {"standalone_mode": False})
             if code == Exit.INTERRUPTED:
                 # typer turns Ctrl-C into this code.
@@ -144,15 +144,15 @@ def importing():
             threadpool_limits(1, user_api="blas")
 
 
-def say(*texts, err=False):
+def print_lines(*texts, err=False):
     """Print texts without control characters."""
     for text in texts:
         typer.echo("\n".join(in_a_line(line, sys.maxsize) for line in str(text).split("\n")), err=err)
 
 
-def tell(message, *_):
+def print_warning(message, *_):
     """Print a warning as a line."""
-    say(in_a_line(f"fifesim: warning: {message}"), err=True)
+    print_lines(in_a_line(f"fifesim: warning: {message}"), err=True)
 
 
 @contextmanager
@@ -172,10 +172,12 @@ def kept(output):
 def report(files, seconds, look, as_json=False, finished=False):
     """Print the files that a command has made, its duration and the file to open, unless quiet."""
     if as_json:
-        say(json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)}))
+        print_lines(
+            json.dumps({"event": "finished", "files": [str(path) for path in files], "seconds": round(seconds, 1)})
+        )
     elif not is_quiet():
         done = "this run is already finished" if finished else f"done in {in_time(seconds)}"
-        say(*files, f"{done}: open {look}")
+        print_lines(*files, f"{done}: open {look}")
 
 
 def in_time(seconds):
@@ -190,7 +192,7 @@ def stop(error, code):
     """Exit with a message and a code."""
     lines = str(error).split("\n")
     length = max(_LONGEST // len(lines), _SHORTEST)
-    say(
+    print_lines(
         "\n".join(in_a_line(line, length) for line in ["fifesim: " + lines[0], *lines[1:]][: _LONGEST // _SHORTEST]),
         err=True,
     )

@@ -337,7 +337,7 @@ def _fill(seed, row, first, out):
                 out[i, 4 * g + k] = normals[k, g]
 
 
-# No divisor is 0: without that being asked, cells are done several at once.
+# No divisor is 0; without this check the loop is vectorized.
 @njit(nogil=True, cache=True, error_model="numpy")
 def _box_muller(one, other, cosines, sines):
     """Two normal deviates from two 32-bit words."""

@@ -138,7 +138,7 @@ def weighed(cells, response, ratio):
     """Sums of cells weighted as in the estimate from pixels, the transpose of `kriged`, shape (rows, columns)."""
     spectrum = fft.rfft2(cells)
     spectrum *= np.conj(response)
-    # Of every ratio-th row the spectrum is the mean over the frequencies that are one of pixels.
+    # The spectrum of every ratio-th row is the mean over the frequencies that alias to one pixel frequency.
     folded = spectrum.reshape(ratio[0], -1, spectrum.shape[1]).mean(axis=0)
     return fft.irfft2(folded, s=(len(folded), cells.shape[1]))[:, :: ratio[1]]
 
@@ -149,7 +149,7 @@ _LAGS, _PIXELS = (1, 2, 4, 8), 128
 # Median of the square of a standard normal number.
 _MEDIAN = 0.454936423119572
 
-# Powers of two that are told apart: beyond these the process, or the trend, alone is left.
+# Range of tabulated powers of two; beyond them, only the process or only the trend remains.
 _LEAST, _MOST = -4, 6
 
 
@@ -238,8 +238,8 @@ def _second_differences(arp, ratio):
 # Of the shift before, where the gradient is asked again: (1 - H)^(-1/2) = 1 + H / 2 + 3 / 8 H^2 for a quadratic ln w.
 _AGAIN = 0.75
 
-# What the levels of pixels vary about is their mean by weights of this standard deviation, a quarter of the pixels that
-# are read around a tile; by narrower weights, the process itself would count as its mean. [pixel]
+# Standard deviation of the weights of the local mean of pixel levels, a quarter of the pixels read around a tile. With
+# narrower weights, the process itself would be part of the mean. [pixel]
 _SURROUNDINGS = 3.0
 
 

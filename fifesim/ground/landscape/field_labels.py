@@ -209,8 +209,8 @@ def landscape_fields(
     correlations = {name: r for name, r in covary.items() if name not in of_lai} if of_lai else covary
     if of_lai:
         correlations = correlations | {("lai", name): r for name, r in of_lai.items()}
-    asked = {name for one, other, _ in flat(correlations or {}) for name in (one, other)} - set(arps) - set(covariates)
-    of_dem = [name for name in OF_ELEVATION if name in asked]
+    named = {name for one, other, _ in flat(correlations or {}) for name in (one, other)} - set(arps) - set(covariates)
+    of_dem = [name for name in OF_ELEVATION if name in named]
     if of_dem and dem is None:
         raise ValueError(f"covary names {', '.join(of_dem)}, which needs an elevation: give dem=")
     if of_dem:

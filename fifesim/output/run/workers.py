@@ -199,12 +199,12 @@ def _in_pieces(graph, outputs, deliver):
 
 def _needed(key, dependencies, made):
     """A task and all of its dependencies that are not computed yet."""
-    needed, asked = set(), [key]
-    while asked:
-        each = asked.pop()
+    needed, pending = set(), [key]
+    while pending:
+        each = pending.pop()
         if each not in made and each not in needed:
             needed.add(each)
-            asked += dependencies[each]
+            pending += dependencies[each]
     return needed
 
 

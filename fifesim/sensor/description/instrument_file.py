@@ -296,7 +296,7 @@ class Instrument:
     product : Product, optional
         Scale of the agency's product.
     not_found : dict, optional
-        What is left out of ``noise`` and ``blur``, and who published it.
+        Parts missing in ``noise`` and ``blur``, with their publisher.
     aliases : tuple of str, optional
         Other names.
 
@@ -491,7 +491,7 @@ class Instrument:
         Returns
         -------
         bands : tuple of InstrumentBand
-            In the order asked for.
+            In the requested order.
 
         Raises
         ------
@@ -523,7 +523,7 @@ class Instrument:
         Returns
         -------
         bands : (InstrumentBand, InstrumentBand)
-            Of the finest grid that has both.
+            Bands on the finest grid that has both.
 
         Raises
         ------

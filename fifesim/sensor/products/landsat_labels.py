@@ -110,7 +110,7 @@ def open_landsat(
     there = [band.name for band in scene.bands if (folder / band.file).exists()]
     cure = f"fetch it, or open those that are there with bands={there}" if there else "is the product unpacked there?"
     layers = [open_layer(folder, band.file, sizes, cure) for band in selected]
-    # The panchromatic band's pixels are not parts of those of the other files.
+    # The pixels of the panchromatic band are not aligned with the other files.
     beside = quality and all(band.flag for band in selected)
     mask, flags = _quality(scene, folder, sizes, layers[0]) if beside else (None, None)
     geometry = _geometry(scene, folder, sizes, angles, layers[0])

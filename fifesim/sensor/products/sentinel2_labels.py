@@ -160,15 +160,15 @@ def _selected(product, description, resolution, names):
             raise ValueError(f"{product.product} has no band of {resolution} m")
         return found
     names = [names] if isinstance(names, str) else [str(name) for name in names]
-    asked = [band.name for band in description.select(names)]
-    for name in asked:
+    requested = [band.name for band in description.select(names)]
+    for name in requested:
         if name not in known:
             sizes = [f"{size} m" for size, bands in product.bands.items() if name in {band.name for band in bands}]
             raise ValueError(
                 f"{product.product} has no {name} of {resolution} m"
                 + (f": it has it at {' and '.join(sizes)}, give resolution=" if sizes else "")
             )
-    return [known[name] for name in asked]
+    return [known[name] for name in requested]
 
 
 def _geometry(product, tile, bands, angles, beside, sizes):

@@ -78,7 +78,7 @@ def test_page_says_the_reading_the_inputs_and_what_is_fitted(prepared, tmp_path,
     page = re.sub(r"\s+", " ", (tmp_path / "own" / "report.html").read_text())
     assert "Table 1 is interpreted as <em>aligned</em>" in page and "also shown for <em>native</em>" in page
     assert "The ground is the synthetic Flint Hills." in page
-    assert "0 of the numbers below were fitted to the 54" in page
+    assert "0 of the values below were fitted to the 54" in page
     assert "given by you" in page and "--reading aligned --dem flint-hills --densities" in page
     (case,) = prepared.asked
     assert case.optics == {"TM3": (0.09, 0.05), "TM4": (0.42, 0.40)} and case.cells == 90
