@@ -87,7 +87,7 @@ left.text(1, 0.05, "lines: 5S, dots: successive orders", fontsize=9)
 # %%
 # The atmosphere lowers NDVI. The effect increases with haze, for a low sun and for oblique views, because the path
 # through the atmosphere is longer. The view zenith in the right panel has a sign; it is positive toward the sun: the
-# hot spot is at +``sza``, 45°. At negative angles, aerosol scatters forward into the line of sight, and NDVI is lowest.
+# hot spot is at ``sza``, 45°. At negative angles, aerosol scatters forward into the line of sight, and NDVI is lowest.
 # The closed forms of 5S (lines) overestimate NDVI by 0.01 in clear air and by up to 0.05 in haze at negative angles,
 # compared with successive orders of scattering (dots).
 #
