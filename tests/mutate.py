@@ -1,10 +1,13 @@
 """
-Turn one operator, comparison, constant or call of the package at a time, and list what no test notices.
+Change one operator, comparison, constant or call of the package at a time, and list the changes that no test notices.
 
+    python tests/mutate.py fifesim/output/stac.py                      # 15 changes of a file, a few minutes
     pytest -n auto --cov=fifesim --cov-context=test --cov-report=      # once: which test runs which line
-    python tests/mutate.py 300 --seed 1 --log mutations.txt            # an hour; goes on where the log ends
-    python tests/mutate.py 20 --only fifesim/ground                    # part of the package
-    python tests/mutate.py 40 --verify                                 # what `fifesim verify` notices in its kernels
+    python tests/mutate.py --draws 300 --log mutations.txt             # the package, hours; goes on where the log ends
+    python tests/mutate.py --draws 40 --verify                         # what `fifesim verify` notices in its kernels
+
+The last lines are a summary for a pull request. Without the run for coverage, only the tests of the module and of those
+that import it are asked.
 
 Each change is made in a copy of the checkout. The module's own tests and examples come first, then some of each other
 file that run the line, then those of the modules that import it and some that run any line of it, the nearest first and
@@ -68,6 +71,8 @@ def lines_of(path):
 
     Compiled lines have none, and those that fill a cache have the first test alone.
     """
+    if not (ROOT / ".coverage").exists():
+        return {}
     from coverage import CoverageData  # which tests themselves do not need
 
     known = CoverageData(str(ROOT / ".coverage"))
@@ -77,11 +82,21 @@ def lines_of(path):
     return {line: {each.split("|")[0].split("[")[0] for each in tests if "|" in each} for line, tests in found.items()}
 
 
+@cache
+def tests_by_module():
+    """Test files that import a module, by module."""
+    found = {}
+    for path in sorted((ROOT / "tests").rglob("test_*.py")):
+        for each in imported(ast.parse(path.read_text())):
+            found.setdefault(each, []).append(path.relative_to(ROOT))
+    return found
+
+
 def own_tests(path):
-    """The test file of a module, and its examples."""
+    """The test file of a module, its examples, and the test files that import it."""
     inside = path.relative_to("fifesim")
-    own = [Path("tests") / inside.parent / f"test_{inside.name}", path]
-    return [str(each) for each in own if (ROOT / each).exists()]
+    own = [Path("tests") / inside.parent / f"test_{inside.name}", path, *tests_by_module().get(path, ())]
+    return list(dict.fromkeys(str(each) for each in own if (ROOT / each).exists()))
 
 
 def _few(tests, path, without):
@@ -255,16 +270,17 @@ class Checkout:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument("draws", type=int)
+    parser.add_argument("path", nargs="?", default="fifesim", help="folder or module of the package")
+    parser.add_argument("--draws", type=int, default=15)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", default="fifesim", help="folder or module of the package")
     parser.add_argument("--verify", action="store_true", help="ask `fifesim verify` instead of the tests")
-    parser.add_argument("--log", type=Path, default=Path("mutations.txt"))
+    parser.add_argument("--log", type=Path, help="file of results, whose changes are not tried again")
     parser.add_argument("--part", default="1/1", help="such as 2/2: every second, to run two at once")
     given = parser.parse_args()
     part, parts = map(int, given.part.split("/"))
-    known = given.log.read_text() if given.log.exists() else ""
-    drawn = draw(given.draws, given.seed, given.only, given.verify)[part - 1 :: parts]
+    lines = given.log.read_text().splitlines() if given.log and given.log.exists() else []
+    known = "\n".join(lines)
+    drawn = draw(given.draws, given.seed, given.path, given.verify)[part - 1 :: parts]
     # Threads that wait for each other cost more than they bring in products so small.
     os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with tempfile.TemporaryDirectory() as scratch:
@@ -275,9 +291,14 @@ def main():
                 continue
             began = time.monotonic()
             words, found = checkout.tried(path, number, given.verify)
-            with given.log.open("a") as log:
-                spent = f"{time.monotonic() - began:.0f} s"
-                print(f"{path} {number}: {words} | {found or 'SURVIVES'} | {spent}", file=log)
+            lines.append(f"{path} {number}: {words} | {found or 'SURVIVES'} | {time.monotonic() - began:.0f} s")
+            print(lines[-1], flush=True)
+            if given.log:
+                with given.log.open("a") as log:
+                    print(lines[-1], file=log)
+    survivors = [line for line in lines if "| SURVIVES |" in line]
+    print(f"\n{len(lines) - len(survivors)} of {len(lines)} changes of {given.path} are noticed (seed {given.seed})")
+    print(*(f"- {line.split(' | ')[0]}" for line in survivors), sep="\n")
 
 
 if __name__ == "__main__":

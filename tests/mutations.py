@@ -66,8 +66,8 @@ def changed(source, number):
 
 def draw(count, seed, only, verify=False):
     """Places of changes, drawn from all with equal weight; or from those in kernels that `fifesim verify` names."""
-    places = []
-    for path in sorted(each.relative_to(ROOT) for each in (ROOT / only).rglob("*.py")):
+    places, start = [], ROOT / only
+    for path in sorted(each.relative_to(ROOT) for each in ([start] if start.is_file() else start.rglob("*.py"))):
         tree = ast.parse((ROOT / path).read_text())
         lines = _named_lines(path, tree) if verify else None
         places += [(path, n) for n, (node, *_) in enumerate(changes(tree)) if not verify or node.lineno in lines]

@@ -330,6 +330,7 @@ def invert(
         if name in _LIMITS:
             found[name].attrs.pop("standard_name", None)
             found[name].attrs["long_name"] += f", {name} end of the {100 * level:g} % prediction interval"
+            found[name] = found[name].assign_coords(level=level)
     flag = swaths.placed_as(chunks.pointwise(_flag, ndvi, dtype=np.int8, fit=fit, allowed=allowed), ndvi).rename("flag")
     flag.attrs = {
         "standard_name": f"{found[quantity].attrs['standard_name']} status_flag",

@@ -93,8 +93,8 @@ def matrix_moments(phase, polarization, scattering_cosine, weights, count, diago
     Examples
     --------
     >>> cosine, weights = np.polynomial.legendre.leggauss(8)
-    >>> matrix_moments(np.ones(8), np.zeros(8), cosine, weights, 3)[:, 0].round(12).tolist()
-    [1.0, 0.0, 0.0]
+    >>> matrix_moments(np.ones(8), np.zeros(8), cosine, weights, 3)[0, 0].round(12).item()
+    1.0
     """
     amount = phase * weights / np.sum(phase * weights)
     linear = wigner(2, 2, scattering_cosine, count) @ amount

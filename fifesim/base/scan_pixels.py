@@ -1,5 +1,7 @@
 """Pixels of a scan on the cells of a map: nearest pixels and area-weighted means."""
 
+from itertools import pairwise
+
 import numpy as np
 from numba import njit
 
@@ -7,14 +9,28 @@ from numba import njit
 _MOST = 64
 
 
-def corners(row, column):
-    """Corners of the pixels of a swath, half way between their centres, shape (line + 1, sample + 1). [cell]"""
+def corners(row, column, sweep=None):
+    """Corners of pixels half way between centres of one sweep, by line, its two edges, and sample + 1. [cell]"""
     if min(np.shape(row)) < 2:
         raise ValueError(
             f"a swath of {' x '.join(map(str, np.shape(row)))} pixels does not tell how large they are: "
             "take at least 2 lines and 2 samples"
         )
-    return tuple(_between(_between(np.asarray(each, float)).T).T for each in (row, column))
+    sweep = np.zeros(len(row), int) if sweep is None else np.asarray(sweep)
+    starts = [0, *(np.flatnonzero(np.diff(sweep)) + 1).tolist(), len(sweep)]
+    out = []
+    for places in (row, column):
+        across = _between(np.asarray(places, float).T).T
+        edges = np.empty((len(row), 2, across.shape[1]))
+        for start, stop in pairwise(starts):
+            lines = across[start:stop]
+            if stop - start == 1:  # as high as the lines of the neighbouring sweep
+                pair = min(1, len(row) - 2) if start == 0 else max(start - 2, 0)
+                lines = lines + across[pair : pair + 2] - across[pair]
+            limits = _between(lines)
+            edges[start:stop, 0], edges[start:stop, 1] = limits[: stop - start], limits[1 : stop - start + 1]
+        out.append(edges)
+    return tuple(out)
 
 
 def _between(values):
@@ -23,13 +39,13 @@ def _between(values):
     return np.concatenate([values[:1] * 1.5 - values[1:2] / 2, inside, values[-1:] * 1.5 - values[-2:-1] / 2])
 
 
-def reach(row, column, cell):
+def reach(row, column, edges, cell):
     """Distance from the centre of each pixel to its farthest corner, shape (line, sample). [m]"""
-    rows, columns = corners(row, column)
+    rows, columns = edges
     farthest = np.zeros(np.shape(row))
-    for down in (slice(-1), slice(1, None)):
+    for edge in (0, 1):
         for right in (slice(-1), slice(1, None)):
-            away = (rows[down, right] - row) * cell[0], (columns[down, right] - column) * cell[1]
+            away = (rows[:, edge, right] - row) * cell[0], (columns[:, edge, right] - column) * cell[1]
             farthest = np.maximum(farthest, np.hypot(*away))
     return farthest
 
@@ -74,8 +90,8 @@ def covered_means(values, row, column, rows, columns):
     for line in range(values.shape[1]):
         for sample in range(values.shape[2]):
             for k in range(4):
-                down, right = line + k // 2, sample + (k + 1) // 2 % 2
-                pixel[k, 0], pixel[k, 1] = row[down, right], column[down, right]
+                edge, right = k // 2, sample + (k + 1) // 2 % 2
+                pixel[k, 0], pixel[k, 1] = row[line, edge, right], column[line, edge, right]
             top, bottom = _touched(pixel[:, 0], rows)
             left, right = _touched(pixel[:, 1], columns)
             for i in range(top, bottom):

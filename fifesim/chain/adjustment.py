@@ -14,6 +14,8 @@ from fifesim.atmosphere.models import Atmosphere
 from fifesim.base import files
 from fifesim.base.annotations import Names, NoiseKinds, Time, WholeNumber
 from fifesim.base.caches import cached
+from fifesim.base.line_spread import Boxcar
+from fifesim.base.messages import warn
 from fifesim.chain.steps import as_bands_of, to_toa
 from fifesim.grids import cf, directions
 from fifesim.grids import grid as grids
@@ -24,10 +26,12 @@ from fifesim.grids.reductions import combined
 from fifesim.ground.canopy.library import library_spectra
 from fifesim.sensor import labels as sensor
 from fifesim.sensor.band_labels import MIN_COVERAGE
+from fifesim.sensor.description.fields import AlongAcross
 from fifesim.sensor.description.instrument_file import InstrumentLike
 from fifesim.sensor.description.instruments import instrument as find_instrument
 from fifesim.sensor.description.spectral_response import half_peak
 from fifesim.sensor.instrument_labels import attributes_of, carried_instrument, matching_bands
+from fifesim.sensor.response.spatial import Difference, Mixture, SystemSpread
 from fifesim.sensor.response.spectral import band_moments, band_weights, best_linear, covered_steps, line_between
 
 UNCERTAINTY = 0.0005
@@ -128,11 +132,16 @@ def as_seen_by(
     noise: NoiseKinds = (),
     seed: WholeNumber = 0,
     uncertainty: float = UNCERTAINTY,
+    recorded: bool | None = None,
 ) -> Image:
     """
     Simulate the image of a scene by another instrument, from surface reflectance.
 
     The function applies `adjust_bands`, `to_toa` and `sense` in sequence. Call them separately for further options.
+
+    A scene that an instrument recorded is blurred already: only the difference of both blurs is applied, by the ratio
+    of the modulation transfers, with a floor. Details that the source did not record stay missing: ``contrast_left`` is
+    the contrast that remains, and a warning names the bands with less than 0.9 of it.
 
     Parameters
     ----------
@@ -153,11 +162,15 @@ def as_seen_by(
         Directions of sun and sensor, instead of ``time``; by default from the raster.
     onto, noise, seed : optional
         As in `sense`.
+    recorded : bool, optional
+        Whether the source recorded the raster, so that its pixels have the source's blur; otherwise they are cells of
+        the ground. By default images from `sense`, `open_landsat` and `open_sentinel2` are recorded.
 
     Returns
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x), or xarray.DataTree
-        As from `sense`, with a coordinate ``adjustment_error`` of the surface reflectance along band.
+        As from `sense`, with coordinates along band: ``adjustment_error`` of the surface reflectance, and for a
+        recorded scene ``contrast_left``, the contrast at the Nyquist frequency of the pixels relative to an image of the ground.
 
     Raises
     ------
@@ -166,7 +179,7 @@ def as_seen_by(
 
     See Also
     --------
-    adjust_bands, to_toa, sense
+    adjust_bands, to_toa, sense, fifesim.sensor.response.spatial.Difference
 
     Examples
     --------
@@ -179,23 +192,118 @@ def as_seen_by(
     ((2, 10, 10), dtype('uint8'))
     """
     description = find_instrument(instrument)
+    by = reflectance.attrs.get("recorded_by")
     reflectance = as_bands_of(reflectance, source, "surface_reflectance")
     geometry = _geometry(reflectance, time, geometry)
     reflectance = directions.dated(reflectance, time)
     surface = adjust_bands(reflectance, description, bands=bands, source=source, uncertainty=uncertainty)
     toa = to_toa(surface, atmosphere, geometry=geometry, instrument=description)
-    image = sensor.sense(toa, description, onto=onto, noise=noise, seed=seed, geometry=geometry)
+    along_band, line_spreads, recorder = [surface["adjustment_error"]], None, _source(reflectance, source)
+    if _is_recorded(recorded, by, recorder):
+        differences = _differences(reflectance, recorder, description, description.select(bands), uncertainty)
+        along_band.append(_contrast_left(differences, description, recorder))
+        line_spreads = {band: _spreads(axes) for band, axes in differences.items()}.__getitem__
+        note = f"as_seen_by: blur of {description.name} less the blur of {recorder.name}, floor {_FLOOR:g}"
+        toa = toa.assign_attrs(history=f"{toa.attrs['history']}\n{note}")
+    image = sensor.sensed(
+        toa, description, onto=onto, noise=noise, seed=seed, geometry=geometry, line_spreads=line_spreads
+    )
     if isinstance(image, xr.DataTree):
-        found = {node.path: _with_error(node.to_dataset(), surface) for node in image.leaves}
+        found = {node.path: _with_bands(node.to_dataset(), along_band) for node in image.leaves}
         return xr.DataTree.from_dict(found)
-    return _with_error(image, surface)
+    return _with_bands(image, along_band)
 
 
-def _with_error(image, surface):
-    """Add the adjustment error of the bands to an image."""
-    # Use the variable: a DataArray would add its sun coordinates.
-    error = surface["adjustment_error"].sel(band=image["band"].values)
-    return image.assign_coords(adjustment_error=error.variable)
+def _with_bands(image, along_band):
+    """Add coordinates along band to an image."""
+    # Use variables: a DataArray would add its sun coordinates.
+    found = {each.name: each.sel(band=image["band"].values).variable for each in along_band}
+    return image.assign_coords(found)
+
+
+# Transfer of the source below which the difference of two blurs falls to zero: contrasts grow 2.6 times at most.
+_FLOOR = 0.2
+
+# Share of the contrast at the Nyquist frequency below which an image is called too smooth.
+_TOO_SMOOTH = 0.9
+
+
+def _source(array, given):
+    """Instrument of the bands of a raster, as given or from its attributes."""
+    description = carried_instrument(array) if given is None else find_instrument(given)
+    if description is None:
+        raise ValueError("the instrument of the raster is unknown: give source=, such as source='MSI'")
+    return description
+
+
+def _is_recorded(given, by, source):
+    """Whether the source recorded a raster: as given, else from its attributes."""
+    if given is not None:
+        return given
+    if by not in (None, source.name):
+        warn(
+            f"{by} recorded the scene before its bands were converted to {source.name}: its blur stays; give the "
+            f"image of {by} itself"
+        )
+    return by == source.name
+
+
+def _differences(array, recorder, description, bands, uncertainty):
+    """Differences between the blur of bands and of the raster that they are estimated from, by band and axis."""
+    own = matching_bands(array, recorder)
+    shares = _variance_shares(_responses(own), _responses(bands), float(uncertainty))
+    cells = grids.cell_size(grids.geobox(array))
+    out = {}
+    for band, share in zip(bands, shares.tolist(), strict=True):
+        parts = [_parts(recorder, each, cells) for each in own]
+        mixed = [Mixture(tuple(share), each) for each in zip(*parts, strict=True)]
+        pairs = zip(description.line_spreads(band), mixed, strict=True)
+        out[band] = [Difference(target, recorded, _FLOOR) for target, recorded in pairs]
+    return out
+
+
+def _parts(recorder, band, cells):
+    """Parts of the blur of a recorded raster in one band, along and across the track."""
+    pixel, out = recorder.pixel(band), []
+    for spread, cell in zip(recorder.line_spreads(band), cells, strict=True):
+        # Cells are uniform in themselves. Larger ones than the pixel are means of pixels, smaller ones repeat them.
+        means = (Boxcar(cell),) if cell > 1.01 * pixel else ()
+        out.append((spread, *means, Boxcar(max(cell, pixel))))
+    return out
+
+
+def _spreads(axes):
+    """Line spread functions of differences along and across the track."""
+    return AlongAcross(*(SystemSpread((each,)) for each in axes))
+
+
+def _contrast_left(differences, description, recorder):
+    """Contrast at the Nyquist frequency of the pixels relative to an image of the ground, along band."""
+    left = {
+        band.name: min(float(each.left(0.5 / description.pixel(band))) for each in axes)
+        for band, axes in differences.items()
+    }
+    if smooth := {name: value for name, value in left.items() if value < _TOO_SMOOTH}:
+        low, high = min(smooth.values()), max(smooth.values())
+        share = f"{low:.0%}" if high - low < 0.005 else f"{low:.0%} to {high:.0%}"
+        warn(
+            f"the image of {', '.join(smooth)} is too smooth: it has {share} of the contrast of {description.name} at "
+            f"the Nyquist frequency of its pixels, because {recorder.name} recorded little there; take a scene of "
+            "smaller pixels"
+        )
+    labels = {"name": "contrast_left", "attrs": cf.attributes("contrast_left")}
+    return xr.DataArray(list(left.values()), dims="band", coords={"band": list(left)}, **labels)
+
+
+@cached(64, "shares of bands in estimates")
+def _variance_shares(sources, targets, uncertainty):
+    """Shares of the source's bands in the variance of each estimated band over the library, which sum to 1."""
+    _, spectra = library_spectra()
+    weights = _estimate(sources, targets, uncertainty).weights
+    means = (spectra @ _weights(sources).T).reshape(-1, len(sources))
+    covariance = np.atleast_2d(np.cov(means, rowvar=False))
+    shares = weights * (weights @ covariance)
+    return shares / shares.sum(axis=1, keepdims=True)
 
 
 def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands: Names | None = None) -> xr.Dataset:
@@ -255,9 +363,7 @@ def spectral_adjustment(source: InstrumentLike, target: InstrumentLike, *, bands
 
 def _source_bands(array, source):
     """Bands of a raster, from the given instrument or its attributes."""
-    description = carried_instrument(array) if source is None else find_instrument(source)
-    if description is None:
-        raise ValueError("the instrument of the raster is unknown: give source=, such as source='MSI'")
+    description = _source(array, source)
     if "band" not in array.dims:
         raise ValueError(f"the raster needs a dimension band, got {array.dims}: keep all of its bands")
     return matching_bands(array, description)

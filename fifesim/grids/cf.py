@@ -133,6 +133,8 @@ QUANTITIES = {
         "extraterrestrial solar irradiance of the band at 1 AU", label="solar irradiance", lowest=0),
     "adjustment_error": Quantity("1", "", "standard error of the surface reflectance from another instrument's bands",
         label="adjustment error", lowest=0),
+    "contrast_left": Quantity("1", "", "contrast at the Nyquist frequency relative to an image of the ground itself",
+        label="contrast left", lowest=0),
     "gain": Quantity("W m-2 sr-1 um-1", "", "radiance of one digital count", label="gain"),
     "offset": Quantity("W m-2 sr-1 um-1", "", "radiance of digital number 0", label="offset"),
     "compression": Quantity("1", "", "largest digital number of a scale of square roots",
@@ -147,7 +149,8 @@ TIME_ATTRIBUTES = {"standard_name": "time", "long_name": "time, UTC"}
 # Attributes that are copied from inputs to results; others are replaced.
 PROVENANCE = (
     "site", "rng_seed", "arp", "lai_distribution", "method", "leaf_angles", "background", "soil", "moisture",
-    "atmosphere", "instrument", "instrument_description", "composite", "references",
+    "atmosphere", "instrument", "instrument_description", "recorded_by", "composite",
+    "references",
 )  # fmt: skip
 
 # Other spellings of units.

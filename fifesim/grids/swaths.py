@@ -23,7 +23,7 @@ METHODS = ("nearest", "mean")
 _BLOCK = 512
 
 # Coordinates of pixel positions, which a map does not need.
-_PLACES = ("x", "y", "latitude", "longitude", "spatial_ref", *DIMS)
+_PLACES = ("x", "y", "latitude", "longitude", "spatial_ref", "sweep", "deleted", *DIMS)
 
 
 def placed_as(array, image, coordinates=None):
@@ -47,7 +47,9 @@ def grid_swath(
     Parameters
     ----------
     image : xarray.DataArray, dims ([band], line, sample)
-        From `fifesim.sense_swath`, or with coordinates ``latitude`` and ``longitude`` [degree] of each pixel.
+        From `fifesim.sense_swath`, or with coordinates ``latitude`` and ``longitude`` [degree] of each pixel. Lines
+        that differ in a coordinate ``sweep`` do not share edges, and pixels that a coordinate ``deleted`` marks are
+        left out.
     grid : odc.geo.geobox.GeoBox
         Grid in any projected CRS in metres, for example from `fifesim.grid_at`.
     method : {"nearest", "mean"}, optional
@@ -86,8 +88,12 @@ def grid_swath(
     image = image.transpose(..., *DIMS)
     x, y = _places(image, grid)
     row, column = (y - grid.affine.f) / grid.affine.e, (x - grid.affine.c) / grid.affine.a
-    reach = scan_pixels.reach(row, column, grids.cell_size(grid))
-    scan = _Scan(row, column, *scan_pixels.corners(row, column), reach)  # type: ignore[call-arg]
+    edges = scan_pixels.corners(row, column, image["sweep"].values if "sweep" in image.coords else None)
+    reach = scan_pixels.reach(row, column, edges, grids.cell_size(grid))
+    if "deleted" in image.coords:  # pixels without a place, which are nearest to no cell
+        deleted = np.asarray(image["deleted"].transpose(*DIMS), bool)
+        row, column = np.where(deleted, np.nan, row), np.where(deleted, np.nan, column)
+    scan = _Scan(row, column, *edges, reach)  # type: ignore[call-arg]
     _check_overlap(scan, grid)
     nearest = method == "nearest"
     data = _nearest(scan, image.data, grid) if nearest else _means(scan, image.data, grid, min_valid)
@@ -123,7 +129,7 @@ def _check(image, method, min_valid):
 
 
 class _Scan(NamedTuple):
-    """Pixels of a scan on the cells of a map: centres and corners [cell], and reach [m]."""
+    """Pixels of a scan on the cells of a map: centres and corners by line and edge [cell], and reach [m]."""
 
     row: np.ndarray
     column: np.ndarray
@@ -209,7 +215,7 @@ def _means(scan, values, grid, min_valid):
 
 def _means_block(touching, min_valid, rows, columns, pixels):
     lines, samples = touching.window(rows, columns)
-    around = slice(lines.start, lines.stop + 1), slice(samples.start, samples.stop + 1)
+    around = lines, slice(None), slice(samples.start, samples.stop + 1)
     layers = np.asarray(pixels, float).reshape(-1, *pixels.shape[-2:])
     limits = (rows.start, rows.stop), (columns.start, columns.stop)
     edges = (np.ascontiguousarray(each[around]) for each in (touching.scan.rows, touching.scan.columns))

@@ -82,7 +82,7 @@ def rgb(
     layers = [valid(image.isel(band=have.index(name))) for name in names]
     limits = map(limits_of, computed(*(thinned(layer, _SAMPLE) for layer in layers)))
     # xarray would put scalar coordinates, such as the distance of the sun, into the title of a picture.
-    place = {*swaths.DIMS, "y", "x", "latitude", "longitude", "spatial_ref", "time"}
+    place = {*swaths.DIMS, "y", "x", "latitude", "longitude", "spatial_ref", "time", "sweep"}
     shares = [
         chunks.pointwise(stretched, layer.drop_vars(set(layer.coords) - place), dtype=np.float32, low=low, high=high)
         for layer, (low, high) in zip(layers, limits, strict=True)

@@ -277,12 +277,12 @@ def _draw(axes, array, rgba=None, **style):
     """Draw a raster as a map with equal scales in metres or kilometres."""
     values = array.values if rgba is None else rgba
     if "line" in array.dims and "x" not in array.coords:
-        latitude, longitude = corners(array["latitude"].values, array["longitude"].values)
+        latitude, longitude, values = _mesh(array, ("latitude", "longitude"), values)
         drawn = axes.pcolormesh(longitude, latitude, values, **style)
         axes.set(xlabel="Longitude [°]", ylabel="Latitude [°]", aspect=1 / np.cos(np.radians(latitude.mean())))
         return drawn
     if "line" in array.dims:
-        y, x = corners(array["y"].values, array["x"].values)
+        y, x, values = _mesh(array, ("y", "x"), values)
         unit_size, name = _length(np.ptp(x), np.ptp(y))
         drawn = axes.pcolormesh(x / unit_size, y / unit_size, values, **style)
     else:
@@ -295,6 +295,18 @@ def _draw(axes, array, rgba=None, **style):
     axes.locator_params(nbins=4)
     axes.tick_params(labelsize="small")
     return drawn
+
+
+def _mesh(array, places, values):
+    """Corners of the pixels of a scan as a mesh, and their values, with an empty row between two sweeps."""
+    sweep = array["sweep"].values if "sweep" in array.coords else np.zeros(array.sizes["line"], int)
+    ends = np.append(np.diff(sweep) != 0, True)
+    # The upper edge of each line, and the lower edge of the last line of a sweep.
+    order = np.flatnonzero(np.stack([np.ones_like(ends), ends], axis=1))
+    edges = corners(*(array[name].values for name in places), sweep)
+    up, right = (each.reshape(-1, each.shape[-1])[order] for each in edges)
+    blank = np.zeros(values.shape[1:]) if values.ndim > 2 else np.full(values.shape[1:], np.nan)
+    return up, right, np.insert(np.asarray(values, float), np.flatnonzero(ends[:-1]) + 1, blank, axis=0)
 
 
 def _length(width, height):

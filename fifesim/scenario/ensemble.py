@@ -118,7 +118,7 @@ def _labelled_image(scene):
     along |= {"gain": gain, "offset": offset}
     along |= {"compression": driver.compression} if driver.compression.any() else {}
     along |= {"solar_irradiance": driver.irradiance}
-    own = attributes_of(driver.instrument) | {"atmosphere": driver.air.text}
+    own = attributes_of(driver.instrument) | {"atmosphere": driver.air.text, "recorded_by": driver.instrument.name}
     fill = {"dn": {"_FillValue": image["dn"].dtype.type(0)}}
     variables = {
         name: xr.Variable(("band", "y", "x")[-each.ndim :], each, cf.attributes(name) | own | fill.get(name, {}))

@@ -242,8 +242,20 @@ def sense(
     >>> image.mean(["y", "x"]).round(1).values
     array([51.8, 73.4])
     """
+    return sensed(
+        toa, instrument, onto=onto, interval=interval, offset=offset, noise=noise, seed=seed, noise_models=noise_models,
+        quantise=quantise, scaling=scaling, min_valid=min_valid, geometry=geometry, time=time,
+    )  # fmt: skip
+
+
+def sensed(
+    toa, instrument, *, onto, interval=None, offset=(0.0, 0.0), noise, seed, noise_models=None, quantise=True,
+    scaling="detector", min_valid=MIN_VALID, geometry, time=None, line_spreads=None,
+):  # fmt: skip
+    """Image as from `sense`, with other line spread functions by band if they are given."""
     toa, description, bands = by_bands(toa, instrument)
     check_scaling(scaling, description, quantise)
+    line_spreads = line_spreads or description.line_spreads
     # A radiance is recorded whatever the sun.
     needed = not is_radiance(toa) or scaling == "product"
     geometry = (directions.given_geometry if needed else directions.known_geometry)(geometry, toa, time)
@@ -255,7 +267,9 @@ def sense(
         pixels = pixel_grid(grids.geobox(toa), description, bands, onto, interval)
         light = None if geometry is None else directions_on(pixels, geometry)
         scene = toa.drop_vars(ANGLES, errors="ignore") if light is None else toa
-        means = means_by_band(scene, description, bands, pixels, offset=offset, min_valid=min_valid)
+        means = means_by_band(
+            scene, description, bands, pixels, offset=offset, min_valid=min_valid, line_spreads=line_spreads
+        )
         # Lines are counted from the origin of the CRS, so that a window has the same noise as the whole image.
         first = grids.lattice_position(pixels)
         radiance = noisy(as_radiance(means, bands, light), description, bands, noise, seed, first, noise_models)
@@ -291,7 +305,8 @@ def by_bands(toa, instrument):
 def labelled(image, toa, description, history):
     """Image with labels: digital numbers if it holds integers, else radiance."""
     name = "dn" if image.dtype.kind == "u" else "toa_radiance"
-    image = cf.label(image, name, source=toa, history=history, **attributes_of(description))
+    own = attributes_of(description) | {"recorded_by": description.name}
+    image = cf.label(image, name, source=toa, history=history, **own)
     if name == "dn":
         image.attrs["_FillValue"] = image.dtype.type(0)
     return image

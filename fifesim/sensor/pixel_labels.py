@@ -122,20 +122,20 @@ def common_size(instrument, bands, size):
     return next(iter(groups))
 
 
-def means_by_band(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_valid):
-    """Means over the footprints of pixels, with the line spread functions of each band, dims (band, y, x)."""
+def means_by_band(array, instrument, bands, pixels, *, offset=(0.0, 0.0), min_valid, line_spreads=None):
+    """Means over the footprints of pixels, with the given or own line spread functions by band, dims (band, y, x)."""
     shifts = shifts_of(offset, pixels)
 
     def means(part, spreads, names):
         check_scene(spreads, grids.geobox(array), min_valid, f"{instrument.name} {names}")
         return regularized(part, spreads, pixels, shifts=shifts, min_valid=min_valid)
 
-    return by_line_spread(means, array, instrument, bands)
+    return by_line_spread(means, array, line_spreads or instrument.line_spreads, bands)
 
 
-def by_line_spread(means, array, instrument, bands):
+def by_line_spread(means, array, line_spreads, bands):
     """Raster computed for all bands with the same line spread functions at a time, in the order of the array."""
-    groups = _grouped(bands, instrument.line_spreads)
+    groups = _grouped(bands, line_spreads)
     parts = []
     for spreads, numbers in groups.items():
         part = array if len(groups) == 1 else array.isel(band=numbers)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import dask.array as da
@@ -267,7 +268,9 @@ def sense_swath(
     """
     Simulate a scan by line and sample, at the sampling interval of the instrument and without resampling.
 
-    The footprint of each pixel depends on its scan angle and is rotated with the track.
+    The footprint of each pixel depends on its scan angle and is rotated with the track. Lines of one sweep of a
+    whiskbroom scanner spread toward the ends of the scan and overlap the next sweep (bow-tie). Samples are summed and
+    lines deleted as on board.
 
     Parameters
     ----------
@@ -287,7 +290,9 @@ def sense_swath(
     -------
     image : xarray.DataArray, dims (band, line, sample)
         Digital numbers or radiance. Lines are in flight direction, samples from left to right. ``latitude``,
-        ``longitude``, ``x``, ``y``, ``vza`` and ``vaa`` are coordinates of each pixel. [1 or W m-2 sr-1 um-1]
+        ``longitude``, ``x``, ``y``, ``vza`` and ``vaa`` are coordinates of each pixel. ``sweep`` is the number of the
+        sweep of each line if several lines are swept together. ``deleted`` marks the pixels that the instrument
+        deletes on board, which are NaN or digital number 0. [1 or W m-2 sr-1 um-1]
 
     Raises
     ------
@@ -297,12 +302,12 @@ def sense_swath(
 
     Notes
     -----
-    Each line is a separate sweep, and lines are spaced by the interval at nadir. The increasing overlap of instruments
-    with several lines per sweep is not simulated.
+    Sweeps are spaced by the height of a sweep at nadir. The platform does not move during a sweep, each pixel is seen
+    at right angles to the track, and noise does not depend on the number of summed samples.
 
     See Also
     --------
-    fifesim.sensor.response.scan.footprint_operator, fifesim.sensor.response.scan
+    fifesim.sensor.response.scan.footprint_operator, fifesim.sensor.response.scan.ground_of_detector
 
     Examples
     --------
@@ -336,9 +341,11 @@ def sense_swath(
 
 @dataclass(frozen=True, eq=False)
 class _Pixels:
-    """Lines and samples of a scan: first numbers, places, and the steps of a cell in the frame of each pixel."""
+    """Lines and samples of a scan, their places, and the steps of a cell in the frame of each pixel."""
 
-    first: tuple
+    pattern: scan.ScanPattern
+    lines: np.ndarray  # numbers, shape (line,)
+    samples: np.ndarray  # shape (sample,)
     latitude: np.ndarray  # shape (line, sample)
     longitude: np.ndarray
     row: np.ndarray
@@ -346,23 +353,41 @@ class _Pixels:
     frame: np.ndarray  # shape (line, sample, 2, 2)
     track: scan.Track
 
+    @property
+    def first(self):
+        """Numbers of the first line and sample."""
+        return int(self.lines[0]), int(self.samples[0])
+
+    @property
+    def deleted(self):
+        """Whether a pixel is deleted on board, shape (line, sample)."""
+        return self.pattern.is_deleted(self.lines[:, None], self.samples)
+
+    def zones(self):
+        """Samples in each zone from left to right, as slices, and the elementary samples that are summed there."""
+        zone = self.pattern.zone_of(self.samples)
+        edges = [0, *(np.flatnonzero(np.diff(zone)) + 1).tolist(), zone.size]
+        for start, stop in pairwise(edges):
+            count = self.pattern.zones[zone[start]].aggregation if self.pattern.zones else None
+            yield slice(start, stop), count
+
 
 def _pixels(scene, description, bands, track):
     """Pixels with centres in the smallest box of lines and samples around a scene."""
-    spacing, across = common_size(description, bands, description.ground_intervals)
-    angle = np.degrees(across / description.altitude)
+    spacing, _ = common_size(description, bands, description.ground_intervals)
+    pattern = description.scan_pattern(bands[0])
     distance, _, scan_angle, seen = scan_nodes(description, scene, track)
     if not seen.any():
         raise ValueError(
             f"{description.name} does not see the scene, whose scan angles are beyond {description.max_angle:g} degrees"
         )
-    lines, samples = _inside(distance[seen] / spacing), _inside(scan_angle[seen] / angle)
+    samples = _inside(pattern.position(scan_angle[seen]))
+    theta = pattern.scan_angle(samples + 0.5)
+    lines, along, aside = _lines(pattern, spacing, theta, distance[seen], description.altitude)
     if not (lines.size and samples.size):
         raise ValueError(
             f"no pixel of {description.name}, {spacing:g} m along the track, lies in the scene: simulate a larger one"
         )
-    along, theta = np.meshgrid((lines + 0.5) * spacing, (samples + 0.5) * angle, indexing="ij")
-    _, aside = scan.view_from_scan(theta, description.altitude)
     latitude, longitude = scan.place_of(track, along, aside)
     row, column = _cells(scene, latitude, longitude)
     parallel = np.cos(np.radians(aside))
@@ -372,11 +397,26 @@ def _pixels(scene, description, bands, track):
     here = np.stack([row, column], axis=-1)
     steps = np.stack([np.stack(forward, axis=-1) - here, np.stack(sideward, axis=-1) - here], axis=-1)
     frame = np.linalg.inv(steps / _STEP) / np.stack(scan.growth(theta, description.altitude), axis=-1)[..., None]
-    return _Pixels((int(lines[0]), int(samples[0])), latitude, longitude, row, column, frame, track)
+    return _Pixels(pattern, lines, samples, latitude, longitude, row, column, frame, track)
+
+
+def _lines(pattern, spacing, theta, distance, altitude):
+    """Numbers of the lines between two distances along the track, their distances [m] and central angles [degree]."""
+    if not theta.size:
+        return np.empty(0, int), np.empty((0, 0)), np.empty((0, 0))
+    ahead, aside = scan.ground_of_detector(pattern.track_angle()[:, None], theta, altitude)
+    advance, reach = pattern.lines * spacing, np.abs(ahead).max()
+    low, high = distance.min(), distance.max()
+    sweeps = np.arange(int(np.floor((low - reach) / advance)) - 1, int(np.ceil((high + reach) / advance)) + 1)
+    along = (((sweeps + 0.5) * advance)[:, None, None] + ahead).reshape(-1, theta.size)
+    within = np.flatnonzero(((along >= low) & (along <= high)).any(axis=1))
+    kept = slice(within[0], within[-1] + 1) if within.size else slice(0)
+    numbers = sweeps[0] * pattern.lines + np.arange(len(along))
+    return numbers[kept], along[kept], np.tile(aside, (sweeps.size, 1))[kept]
 
 
 def _inside(places):
-    """Numbers of the lines or samples with centres between the outermost of some places."""
+    """Numbers of the samples with centres between the outermost of some places."""
     return np.arange(int(np.ceil(places.min() - 0.5)), int(np.floor(places.max() - 0.5)) + 1)
 
 
@@ -402,15 +442,24 @@ def _means(toa, description, bands, pixels, min_valid):
     if not 0 <= min_valid <= 1:
         raise ValueError(f"min_valid must be in [0, 1], got {min_valid}: it is a share of the footprint")
 
-    def means(part, spreads, names):
-        footprints = Footprints(pixels.row, pixels.column, pixels.frame, *spreads)
+    def means(zone, part, spreads, names):
+        places = (each[:, zone] for each in (pixels.row, pixels.column, pixels.frame))
+        footprints = Footprints(*places, *spreads)
         kernel = partial(_block_means, footprints, part.shape[-2:], min_valid)
-        shape = part.sizes["band"], *pixels.row.shape
+        shape = part.sizes["band"], *footprints.row.shape
         data = chunks.in_blocks(kernel, [_Seen(part.data, footprints)], shape, _SWATH_BLOCK)
         coords = chunks.other_coordinates(part)
         return xr.DataArray(data, dims=("band", "line", "sample"), coords=coords, attrs=toa.attrs)
 
-    return by_line_spread(means, toa, description, bands)
+    parts = []
+    for zone, count in pixels.zones():
+        spreads = partial(description.line_spreads, aggregation=count)
+        parts.append(by_line_spread(partial(means, zone), toa, spreads, bands))
+    whole, deleted = parts[0], pixels.deleted
+    if len(parts) > 1:
+        alike = {"combine_attrs": "override", "coords": "minimal", "compat": "override", "join": "exact"}
+        whole = xr.concat(parts, dim="sample", **alike)
+    return whole.where(~xr.Variable(("line", "sample"), deleted)) if deleted.any() else whole
 
 
 def _block_means(footprints, shape, min_valid, lines, samples, cells):
@@ -434,6 +483,10 @@ def _coordinates(scene, pixels, description):
         "vaa": (np.degrees(np.arctan2(east, north)) % 360, cf.attributes("vaa")),
     }
     out = {name: (("line", "sample"), value, attrs) for name, (value, attrs) in values.items()}
-    for axis, first, size in zip(("line", "sample"), pixels.first, pixels.row.shape, strict=True):
-        out[axis] = (axis, first + np.arange(size), {"long_name": f"{axis} of the scan, from the track's point"})
+    for axis, numbers in (("line", pixels.lines), ("sample", pixels.samples)):
+        out[axis] = (axis, numbers, {"long_name": f"{axis} of the scan, from the track's point"})
+    if pixels.pattern.lines > 1:
+        out["sweep"] = ("line", pixels.lines // pixels.pattern.lines, {"long_name": "sweep across the track"})
+    if any(zone.deleted for zone in pixels.pattern.zones):
+        out["deleted"] = (("line", "sample"), pixels.deleted, {"long_name": "deleted on board"})
     return out | {"spatial_ref": grids.coordinates(scene)["spatial_ref"]}

@@ -51,8 +51,8 @@ ACCEPTED = {
     ("write_style", "path"): {"str"},
     # Descriptions without a grid check rasters and spectra when they are used: see the test of fields of a canopy.
     **{("Canopy", name): {"list", "str", "dataset", "numpy", "1-d", "crs"} for name in PROPERTIES},
-    **{("Leaf", name): {"numpy", "1-d", "crs"} for name in ("structure", "chlorophyll", "carotenoids", "anthocyanins",
-                                                            "brown", "water", "dry_matter")},
+    **{("Leaf", name): {"numpy", "1-d", "crs", "empty"} for name in ("structure", "chlorophyll", "carotenoids",
+                                                            "anthocyanins", "brown", "water", "dry_matter")},
     # A Dataset of rasters is taken raster by raster, and one with coordinates of the sun is a geometry.
     ("aggregate", "array"): {"dataset", "crs"}, ("to_geotiff", "raster"): {"dataset", "crs"},
     **{(name, "geometry"): {"dataset"} for name in ("fpar", "illumination", "kt", "sense", "shadow",
@@ -71,7 +71,8 @@ ACCEPTED = {
     # Names of three bands, which a raster without bands does not need; two limits; None where it says something.
     ("plot", "composite"): LIST, ("plot", "limits"): LIST, ("plot_comparison", "limits"): LIST,
     ("plot", "stretch"): LIST,
-    ("rgb", "stretch"): LIST, ("calibrate", "saturated"): {"none"}, ("simulate", "chunks"): {"none"},
+    ("score", "by"): LIST, ("score", "truth"): {"crs"}, ("rgb", "stretch"): LIST,
+    ("calibrate", "saturated"): {"none"}, ("simulate", "chunks"): {"none"},
 }  # fmt: skip
 
 
@@ -219,6 +220,7 @@ def calls(tmp_path_factory):
                                       "pair": "coordinates"},
         "invert": {"ndvi": ndvi, "fit": fifesim.regress(lai, ndvi), "quantity": "lai", "level": 0.95},
         "inversion_error": {"estimate": lai, "truth": lai, "pair": "coordinates"},
+        "score": {"estimate": fifesim.invert(ndvi, fit), "truth": lai.isel(y=slice(6), x=slice(6)), "pair": "index"},
         "share_kept": {"pixels": lai, "cells": lai},
         "density": {"array": lai, "points": 32, "bandwidth": None},
         "scale_bias": {"algorithm": np.sqrt, "array": lai, "pixel": 30.0},

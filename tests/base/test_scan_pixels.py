@@ -19,20 +19,39 @@ def swath(lines=7, samples=9):
 def test_corners_lie_between_centres_and_tile_the_swath():
     row, column = swath()
     rows, columns = corners(row, column)
-    assert rows.shape == (8, 10)
-    assert rows[3, 4] == pytest.approx(row[2:4, 3:5].mean(), abs=1e-14)
-    np.testing.assert_allclose(rows[0], 2 * rows[1] - rows[2], rtol=0, atol=0.05)
-    assert columns[0, 0] < column[0, 0] < columns[1, 1]
+    assert rows.shape == (7, 2, 10)
+    assert rows[3, 0, 4] == pytest.approx(row[2:4, 3:5].mean(), abs=1e-14)
+    np.testing.assert_array_equal(rows[1:, 0], rows[:-1, 1])
+    np.testing.assert_allclose(rows[0, 0], 2 * rows[1, 0] - rows[2, 0], rtol=0, atol=0.05)
+    assert columns[0, 0, 0] < column[0, 0] < columns[0, 1, 1]
+
+
+def test_lines_of_one_sweep_share_their_edges_alone():
+    """Sweeps of 1, 3 and 3 lines are the sweeps by themselves; a single line is as high as its neighbours."""
+    row, column = swath()
+    sweep = np.array([4, 5, 5, 5, 6, 6, 6])
+    row = row - 0.4 * sweep[:, None]
+    rows, columns = corners(row, column, sweep)
+    for part in (slice(1, 4), slice(4, 7)):
+        for found, alone in zip((rows, columns), corners(row[part], column[part]), strict=True):
+            np.testing.assert_allclose(found[part], alone, rtol=0, atol=1e-13)
+    assert np.all(rows[4, 0] < rows[3, 1])
+    np.testing.assert_allclose(rows[0, 1] - rows[0, 0], rows[1, 1] - rows[1, 0], rtol=0, atol=1e-13)
+    last = corners(row[:5], column[:5], sweep[:5])[0]
+    np.testing.assert_allclose(last[4, 1] - last[4, 0], last[3, 1] - last[3, 0], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(last[4, 0][1:-1], (row[4, 1:] + row[4, :-1]) / 2 - 0.45, rtol=0, atol=1e-13)
 
 
 def test_reach_is_the_farthest_corner():
     row, column = swath()
     rows, columns = corners(row, column)
-    found = reach(row, column, CELL)
+    found = reach(row, column, (rows, columns), CELL)
     for line, sample in ((0, 0), (3, 4), (6, 8)):
         away = [
-            np.hypot((rows[i, j] - row[line, sample]) * CELL[0], (columns[i, j] - column[line, sample]) * CELL[1])
-            for i in (line, line + 1)
+            np.hypot(
+                (rows[line, i, j] - row[line, sample]) * CELL[0], (columns[line, i, j] - column[line, sample]) * CELL[1]
+            )
+            for i in (0, 1)
             for j in (sample, sample + 1)
         ]
         assert found[line, sample] == pytest.approx(max(away), rel=1e-14)
@@ -40,7 +59,7 @@ def test_reach_is_the_farthest_corner():
 
 def test_nearest_is_the_nearest_of_all():
     row, column = swath()
-    far = reach(row, column, CELL)
+    far = reach(row, column, corners(row, column), CELL)
     found = nearest_pixels(row.ravel(), column.ravel(), far.ravel(), CELL, (1, 12), (0, 15))
     i, j = np.mgrid[1:12, 0:15] + 0.5
     away = np.hypot((i[..., None] - row.ravel()) * CELL[0], (j[..., None] - column.ravel()) * CELL[1])
@@ -70,7 +89,7 @@ def test_means_go_by_the_area_that_polygons_share():
     total, area = np.zeros_like(means), np.zeros_like(means)
     for line in range(row.shape[0]):
         for sample in range(row.shape[1]):
-            around = [(line, sample), (line, sample + 1), (line + 1, sample + 1), (line + 1, sample)]
+            around = [(line, *edge) for edge in ((0, sample), (0, sample + 1), (1, sample + 1), (1, sample))]
             pixel = Polygon([(columns[at], rows[at]) for at in around])
             for i in range(1, 12):
                 for j in range(15):

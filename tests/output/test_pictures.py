@@ -98,9 +98,18 @@ def test_a_scan_is_drawn_where_its_pixels_lie(site):
     image = image.fifesim.sense_swath("TM", heading=193.6)
     for axes in (image.fifesim.plot(), image.fifesim.ndvi().fifesim.plot()):
         corners = drawn(axes).get_coordinates()
-        assert corners.shape == (image.sizes["line"] + 1, image.sizes["sample"] + 1, 2)
-        inside = corners[1:-1, 1:-1].mean((0, 1))
-        np.testing.assert_allclose(inside, [image["x"].mean(), image["y"].mean()], rtol=0, atol=1e-2)
+        sweeps = len(np.unique(image["sweep"]))
+        assert sweeps > 1
+        assert corners.shape == (image.sizes["line"] + sweeps, image.sizes["sample"] + 1, 2)
+        # Rows of the mesh lie on the lines; an empty row lies between two sweeps.
+        middles = corners[:-1, :-1] + corners[:-1, 1:] + corners[1:, :-1] + corners[1:, 1:]
+        values = np.ma.getdata(drawn(axes).get_array())
+        empty = values[..., -1] == 0 if values.ndim > 2 else np.isnan(values)
+        between = np.flatnonzero(np.diff(image["sweep"])) + np.arange(1, sweeps)
+        assert empty[between].all() and not empty.all(axis=1)[between - 1].any()
+        for k, name in enumerate("xy"):
+            lines = np.delete(middles[..., k] / 4, between, axis=0)
+            np.testing.assert_allclose(lines, image[name], rtol=0, atol=0.02)
 
 
 def test_a_scan_that_knows_degrees_alone_is_drawn_in_them():

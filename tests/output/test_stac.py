@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import rasterio
-from rasterio.warp import transform
+from rasterio.warp import transform, transform_bounds
 
 from fifesim.output import stac
 from fifesim.scenario.scenario import parse_scenario, read_scenario
@@ -96,16 +96,17 @@ def test_bands_of_the_extension_are_those_of_the_core(item, pystac):
 
 
 def test_the_footprint_is_that_of_the_pixels(item):
-    """Corners by GDAL's own transformation, to a tenth of a metre; the ring is closed and runs counterclockwise."""
+    """Quarters of the edges by GDAL's own transformation, to 0.1 m, counterclockwise from the southwest."""
     (ring,) = item["geometry"]["coordinates"]
-    corners = transform(
-        "EPSG:26914", "EPSG:4326", [704970, 705870, 705870, 704970], [4333620, 4333620, 4334220, 4334220]
-    )
+    west, south, east, north = 704970, 4333620, 705870, 4334220
+    share = np.arange(4) / 4
+    x = np.concatenate([west + share * 900, np.full(4, east), east - share * 900, np.full(4, west)])
+    y = np.concatenate([np.full(4, south), south + share * 600, np.full(4, north), north - share * 600])
     assert ring[0] == ring[-1] and len(ring) == 17
-    np.testing.assert_allclose(ring[:-1:4], np.transpose(corners), rtol=0, atol=1e-6)
-    x, y = np.transpose(ring)
-    assert np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) > 0
-    assert item["bbox"] == [x.min(), y.min(), x.max(), y.max()]
+    expected = np.transpose(transform("EPSG:26914", "EPSG:4326", x, y))
+    np.testing.assert_allclose(ring[:-1], expected, rtol=0, atol=1e-6)
+    bounds = transform_bounds("EPSG:26914", "EPSG:4326", west, south, east, north)
+    np.testing.assert_allclose(item["bbox"], bounds, rtol=0, atol=1e-6)
 
 
 def test_names_are_those_of_the_folder(item, travelled):
@@ -139,3 +140,11 @@ def test_a_collection_is_valid_and_leads_to_its_items(item, tmp_path, pystac):
     west, south, east, north = found.extent.spatial.bboxes[0]
     assert (west, south, east, north) == (item["bbox"][0], 39.0, -95.9, item["bbox"][3])
     assert [str(each.date()) for each in found.extent.temporal.intervals[0]] == ["1987-06-06", "1987-06-06"]
+
+
+def test_a_band_has_the_common_name_whose_middle_is_nearest():
+    """Bands 5 of OLI, 8 and 9 of MSI: all three lie in the range of the name nir."""
+    coords = {"wavelength": [0.865, 0.842, 0.945], "solar_irradiance": [951.0, 1037.0, 817.0]}
+    found = [stac._spectral(coords, number) for number in (1, 2, 3)]
+    assert [band["eo:common_name"] for band in found] == ["nir08", "nir", "nir09"]
+    assert [band["eo:solar_illumination"] for band in found] == coords["solar_irradiance"]

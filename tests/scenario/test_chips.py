@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fifesim.ground.landscape.autoregression import FIELD_TILE
 from fifesim.scenario.chips import chips_of
 from fifesim.scenario.scenario import parse_scenario
 from fifesim.scenario.studies import Study
@@ -46,6 +47,18 @@ def test_no_two_chips_share_ground(chips):
     for name in ("west", "north"):
         apart = np.diff(np.unique(table[name].values))
         assert apart.min() >= 180 - 1e-6
+
+
+def test_the_first_chips_lie_in_the_tile_of_the_scenario(chips):
+    """Upper left corners: the first is that of a place in the tile of 1008 cells that holds the scenario's own."""
+    table, grid = chips.table(), chips.study.scenario.geobox()
+    cell, side = grid.resolution.x, FIELD_TILE * grid.resolution.x
+    first = table.isel(chip=slice(8))
+    assert len({(float(west), float(north)) for west, north in zip(first.west, first.north, strict=True)}) == 1
+    column, row = float(first.west[0]) / cell, -float(first.north[0]) / cell
+    assert column == pytest.approx(round(column), abs=1e-6) and row == pytest.approx(round(row), abs=1e-6)
+    for corner, own in ((float(first.west[0]), grid.affine.c), (-float(first.north[0]), -grid.affine.f)):
+        assert own // side == corner // side == (corner + 180.0 - 1e-6) // side
 
 
 def test_a_landscape_has_one_seed_and_one_arp(chips):

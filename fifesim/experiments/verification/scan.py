@@ -12,7 +12,7 @@ from fifesim.experiments.verification.deviations import Deviation, largest
 from fifesim.grids import grid as grids
 from fifesim.sensor.response import scan
 from fifesim.sensor.response.scan import Footprints, apply_operator, footprint_operator
-from fifesim.sensor.response.spatial import CosineSpread, GaussianSpread
+from fifesim.sensor.response.spatial import AggregatedSpread, CosineSpread, GaussianSpread
 from fifesim.sensor.scan_labels import scan_geometry, sense_swath
 
 _deviation = partial(Deviation, "sensor")
@@ -60,6 +60,29 @@ def _places():
     sine, azimuth = np.sin(np.radians(_triangle(np.abs(aside))[2])), np.radians(back)
     worst = largest(scan.view_components(_TRACK, lat, lon, _ALTITUDE), [sine * np.sin(azimuth), sine * np.cos(azimuth)])
     yield _deviation("direction to the sensor", worst, 1e-9, "1", "geodesics and a triangle")
+
+
+def _detector(track_angle, scan_angle, altitude):
+    """Angles at the earth's centre along and across the track by a right spherical triangle. [degree]"""
+    beta, theta = np.radians(track_angle), np.radians(scan_angle)
+    away = np.arccos(np.cos(beta) * np.cos(theta))
+    arc = np.arcsin((1 + altitude / scan.EARTH_RADIUS) * np.sin(away)) - away
+    right, forward = np.cos(beta) * np.sin(theta), np.sin(beta)
+    along = np.arctan(np.tan(arc) * forward / np.sin(away))
+    return np.degrees(along), np.degrees(np.arcsin(np.sin(arc) * right / np.sin(away)))
+
+
+def _sweeps():
+    """Check places of detectors out of the plane of the scan, and sums of samples."""
+    track_angle, scan_angle = np.array([0.4, -0.4, 2.0, -0.1]), np.array([56.0, -44.0, 10.0, 31.0])
+    distance, aside = scan.ground_of_detector(track_angle, scan_angle, _ALTITUDE)
+    found = np.degrees(distance / scan.EARTH_RADIUS), aside
+    worst = largest(found, _detector(track_angle, scan_angle, _ALTITUDE))
+    yield _deviation("places of detectors in a sweep", worst, 1e-9, "degree", "right spherical triangles")
+    x, frequency = np.linspace(-600, 600, 241), np.array([0.0, 1e-3, 2.5e-3])
+    spread, one = AggregatedSpread(Boxcar(128.0), 3, 128.0), Boxcar(384.0)
+    worst = largest([*spread.cumulative(x), *spread.mtf(frequency)], [*one.cumulative(x), *one.mtf(frequency)])
+    yield _deviation("sum of three samples", worst, 1e-12, "1", "one detector of three times the width")
 
 
 def _grid():
@@ -170,10 +193,11 @@ def _plane():
     expected = 40 + 0.02 * (image["x"] - 705900) - 0.03 * (image["y"] - 4333750)
     worst = np.abs(image - expected).max() / np.hypot(0.02, 0.03) / (10 / 3)
     yield _deviation("plane in a scan", float(worst), 0.01, "cell", "the plane at its pixels")
-    theta = (image["sample"].values + 0.5) * 43e-6
-    vza = np.degrees(np.arcsin(np.sin(np.abs(theta)) * (1 + 705e3 / scan.EARTH_RADIUS)))
-    worst = largest(image["vza"].values, vza)
+    # 16 detectors, half of them on either side of the plane of the scan.
+    detector, theta = image["line"].values % 16 - 7.5, np.degrees((image["sample"].values + 0.5) * 43e-6)
+    aside = _detector(np.degrees(detector * 43e-6)[:, None], theta, 705e3)[1]
+    worst = largest(image["vza"].values, _triangle(np.abs(aside), 705e3)[2])
     yield _deviation("view of its samples", worst, 1e-9, "degree", "Friedl et al. (1995), Table 1")
 
 
-CHECKS = (_lines_of_sight, _places, _grid, _orbits, _turned, _rectangle, _straight, _plane)
+CHECKS = (_lines_of_sight, _places, _sweeps, _grid, _orbits, _turned, _rectangle, _straight, _plane)

@@ -88,8 +88,6 @@ class Leaf:
             value = getattr(self, name)
             if not hasattr(value, "ndim") or not value.ndim:
                 value = _number(name, value)
-            if not getattr(value, "size", 1):
-                raise ValueError(f"Leaf: {name} has no values, its shape is {value.shape}: give a number or a raster")
             # Lazy arrays are checked when they are computed.
             if isinstance(value, float | np.ndarray):
                 outside = np.atleast_1d(value)[np.atleast_1d((value < low) | (value > high))]

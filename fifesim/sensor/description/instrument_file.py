@@ -29,6 +29,8 @@ from fifesim.sensor.description.fields import (
 from fifesim.sensor.description.spatial_response import SpatialResponse, View
 from fifesim.sensor.description.spectral_response import SpectralResponse
 from fifesim.sensor.response.noise import NoiseModel
+from fifesim.sensor.response.scan import ScanPattern, Zone
+from fifesim.sensor.response.spatial import AggregatedSpread
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -127,6 +129,26 @@ class Product:
 
 
 @dataclass(frozen=True, config=CONFIG)
+class ScanZone:
+    """
+    Zone of a scan in which samples are summed on board, on one side of nadir.
+
+    Parameters
+    ----------
+    samples : int
+        Samples of a line in the zone.
+    aggregation : int
+        Elementary samples in the sum.
+    deleted : int, optional
+        Lines that are deleted at each end of a sweep, as the neighbouring sweeps see the same ground.
+    """
+
+    samples: Count
+    aggregation: Count
+    deleted: Annotated[int, Field(strict=True, ge=0)] = 0
+
+
+@dataclass(frozen=True, config=CONFIG)
 class Scan:
     """
     How an instrument covers the width of its swath.
@@ -138,13 +160,21 @@ class Scan:
     max_angle : float
         Largest angle from nadir, at the instrument. [degree]
     samples : int, optional
-        Samples of a line.
+        Samples of a line of the first band.
     lines : int, optional
-        Lines of a sweep, which are seen at once.
+        Lines of a sweep of the first band, which are seen at once.
     period : float, optional
         Time from one sweep, or one line, to the next. [s]
     swath : float, optional
         Width on the ground that is published. [m]
+    zones : tuple of ScanZone, optional
+        From nadir outward, for the first band; the same on either side. The intervals of the instrument are then those
+        of the elementary samples.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If the samples of the zones are not half of all samples, or every line of a sweep is deleted.
     """
 
     kind: Literal["whiskbroom", "pushbroom"]
@@ -153,6 +183,24 @@ class Scan:
     lines: Count | None = None
     period: Positive | None = None
     swath: Positive | None = None
+    zones: tuple[ScanZone, ...] = ()
+
+    def __post_init__(self):
+        if not self.zones:
+            return
+        count = sum(zone.samples for zone in self.zones)
+        if self.samples is not None and 2 * count != self.samples:
+            raise ValueError(
+                f"zones: their samples on one side of nadir must be half of samples = {self.samples}, got {count}"
+            )
+        if (deleted := max(zone.deleted for zone in self.zones)) and 2 * deleted >= (self.lines or 1):
+            raise ValueError(f"zones: deleted = {deleted} at each end leaves none of lines = {self.lines or 1}")
+
+    def elementary_samples(self):
+        """Samples of a line of the first band before aggregation, None if they are not given."""
+        if not self.zones:
+            return self.samples
+        return 2 * sum(zone.samples * zone.aggregation for zone in self.zones)
 
 
 # Numbers that must be there and those that may; each that is there has a source.
@@ -275,7 +323,7 @@ class Instrument:
     gsd : float
         Pixel of the gridded product. [m]
     interval : float or Angles
-        Angle between the instrument's own samples. [rad]
+        Angle between the instrument's own samples, before aggregation on board. [rad]
     bits : int
         Number of radiometric bits.
     lsf : response of both axes or TwoAxesResponse
@@ -379,7 +427,7 @@ class Instrument:
 
     def ground_intervals(self, band: InstrumentBand) -> AlongAcross:
         """
-        Distances on the ground between a band's own samples at nadir.
+        Distances on the ground between a band's own samples at nadir, after aggregation on board.
 
         Parameters
         ----------
@@ -390,7 +438,36 @@ class Instrument:
         intervals : AlongAcross
             [m]
         """
-        return self._on_ground(band.interval or self.interval)
+        along, across = self._on_ground(band.interval or self.interval)
+        return AlongAcross(along, across * self._aggregation)
+
+    @property
+    def _aggregation(self):
+        """Elementary samples that are summed at nadir."""
+        return self.scan.zones[0].aggregation if self.scan and self.scan.zones else 1
+
+    def scan_pattern(self, band: InstrumentBand) -> ScanPattern:
+        """
+        Lines and samples that a band takes in one sweep.
+
+        Parameters
+        ----------
+        band : InstrumentBand
+
+        Returns
+        -------
+        pattern : fifesim.sensor.response.scan.ScanPattern
+            One line for a pushbroom, and where the instrument's file has no number of lines.
+        """
+        step, first = (by_axes(each.interval or self.interval) for each in (band, self.bands[0]))
+        if self.scan is None or self.scan.kind == "pushbroom":
+            return ScanPattern(step.along, step.across)
+        fewer, shorter = first.along / step.along, first.across / step.across
+        zones = tuple(
+            Zone(round(zone.samples * shorter), zone.aggregation, round(zone.deleted * fewer))
+            for zone in self.scan.zones
+        )
+        return ScanPattern(step.along, step.across, max(round((self.scan.lines or 1) * fewer), 1), zones)
 
     def ground_fields(self, band: InstrumentBand) -> AlongAcross:
         """
@@ -411,13 +488,15 @@ class Instrument:
         along, across = by_axes(angle)
         return AlongAcross(along and self.altitude * along, across and self.altitude * across)
 
-    def line_spreads(self, band: InstrumentBand) -> AlongAcross:
+    def line_spreads(self, band: InstrumentBand, aggregation: int | None = None) -> AlongAcross:
         """
         Line spread functions of a band on the ground.
 
         Parameters
         ----------
         band : InstrumentBand
+        aggregation : int, optional
+            Elementary samples that are summed across the track; by default as many as at nadir.
 
         Returns
         -------
@@ -426,7 +505,11 @@ class Instrument:
         """
         given = band.lsf or self.lsf, band.ifov or self.ifov, band.interval or self.interval
         axes = zip(*map(by_axes, given), strict=True)
-        return AlongAcross(*(lsf.spread(View(self.altitude, ifov, interval, band)) for lsf, ifov, interval in axes))
+        along, across = (lsf.spread(View(self.altitude, ifov, interval, band)) for lsf, ifov, interval in axes)
+        count = self._aggregation if aggregation is None else aggregation
+        if count > 1:
+            across = AggregatedSpread(across, count, by_axes(given[2]).across * self.altitude)
+        return AlongAcross(along, across)
 
     def noise_model(self, band: InstrumentBand) -> NoiseModel:
         """

@@ -18,13 +18,21 @@ from fifesim.base.arguments import Kind
 from fifesim.base.caches import cached
 from fifesim.base.files import in_a_line, read_toml
 from fifesim.sensor.description.fields import errors_in_words, key, lookup
-from fifesim.sensor.description.instrument_file import Instrument, InstrumentBand, InstrumentLike, Noise, Product, Scan
+from fifesim.sensor.description.instrument_file import (
+    Instrument,
+    InstrumentBand,
+    InstrumentLike,
+    Noise,
+    Product,
+    Scan,
+    ScanZone,
+)
 from fifesim.sensor.description.plausibility import check_instrument_units
 from fifesim.sensor.description.short_file import completed
 from fifesim.sensor.description.spatial_response import with_response
 
 # Keys that are suggested for misspelt ones, including keys of short files.
-_KEYS = {key.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan) for key in fields(kind)}
+_KEYS = {key.name for kind in (Instrument, InstrumentBand, Noise, Product, Scan, ScanZone) for key in fields(kind)}
 _KEYS |= {"center", "width", "shape", "snr", "snr_radiance", "snr_shot"}
 
 

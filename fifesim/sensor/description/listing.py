@@ -34,6 +34,8 @@ def _scan(instrument):
     parts = [f"{scan.kind}, {scan.max_angle:g} degrees to either side"]
     parts += [f"swath {scan.swath / 1000:g} km"] if scan.swath else []
     parts += [f"{instrument.detectors} detectors a band"] if instrument.detectors else []
+    sums = [str(zone.aggregation) for zone in scan.zones]
+    parts += [f"sums of {', '.join(sums)} samples from nadir outward"] if sums else []
     return [f"  {', '.join(parts)}"]
 
 

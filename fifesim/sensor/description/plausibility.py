@@ -40,8 +40,8 @@ _END = 0.2
 # Published swaths are round numbers, and that of a plane is up to 20 % narrower than that of the sphere.
 _SWATH = 0.25
 
-# Samples times interval beside the angle of the scan: bands count their samples each, some overlap.
-_SAMPLED = 6.0
+# Samples times interval and the angle of the scan: published swaths, from which angles are derived, are rounded.
+_SAMPLED = 0.05
 
 
 def check_instrument_units(instrument):
@@ -155,13 +155,17 @@ def _check_scan(instrument):
             f"scan.max_angle = {scan.max_angle:g}: at that angle from nadir, in degrees, the line of sight misses the "
             f"earth from an altitude of {instrument.altitude:g} m"
         )
-    if scan.samples is not None:
-        first = instrument.bands[0]
-        half = np.degrees(scan.samples * by_axes(first.interval or instrument.interval).across / 2)
-        if not 1 / _SAMPLED < half / scan.max_angle < _SAMPLED:
+    samples, first = scan.elementary_samples(), instrument.bands[0]
+    if samples is not None:
+        step = by_axes(first.interval or instrument.interval).across
+        half = np.degrees(samples * step / 2)
+        # A flat row of detectors has equal steps of the tangent.
+        flat = np.degrees(np.arctan(samples * step / 2)) if scan.kind == "pushbroom" else half
+        if not any(abs(each / scan.max_angle - 1) <= _SAMPLED for each in (half, flat)):
             raise ValueError(
-                f"scan.max_angle = {scan.max_angle:g}: it is in degrees from nadir, and {scan.samples} samples of the "
-                f"first band reach {half:.3g} degrees to either side; radians times 180 / pi"
+                f"scan: samples of {first.name} times interval, {samples} x {step:g} radians, reach {half:.3g} degrees "
+                f"to either side, and max_angle = {scan.max_angle:g} degrees from nadir; radians times 180 / pi, count "
+                "the samples of the first band, and describe sums of samples on board by [[scan.zones]]"
             )
     if scan.swath is not None and abs(np.log(width / scan.swath)) > np.log(1 + _SWATH):
         raise ValueError(

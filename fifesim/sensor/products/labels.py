@@ -97,7 +97,8 @@ def as_image(array, bands, description, *, level, time, geometry, quality, histo
     if quality is not None:
         array = array.assign_coords(quality=(("y", "x"), quality.data, quality.attrs))
     name = "toa_reflectance" if level == 1 else "surface_reflectance"
-    return cf.label(array, name, history=history, references=reference, **attributes_of(description))
+    source = {"references": reference, "recorded_by": description.name}
+    return cf.label(array, name, history=history, **source, **attributes_of(description))
 
 
 _CURE = (

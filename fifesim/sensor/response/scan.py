@@ -1,5 +1,5 @@
 """
-Scans across the track: geometry on a sphere, and footprints turned against the grid of the ground.
+Scans across the track: geometry on a sphere, sweeps of several lines, and footprints turned against the ground's grid.
 
 The track is a great circle, and a ground point is seen when the instrument is abeam of it. Scan angles are positive to
 the right of the flight direction. Geodetic latitudes are used as latitudes on the sphere, with an error of 0.3 % of a
@@ -213,6 +213,126 @@ def growth(scan_angle, altitude):
     # The difference of two legs, which stays defined at nadir.
     slant = orbit * np.cos(np.radians(scan_angle)) - EARTH_RADIUS * mu_v
     return slant / altitude, slant / altitude / mu_v
+
+
+def ground_of_detector(track_angle, scan_angle, altitude):
+    r"""
+    Ground point that a detector sees whose line of sight leaves the plane of the scan.
+
+    .. math::
+
+        u &= (\cos \beta \cos \theta, \; \cos \beta \sin \theta, \; \sin \beta) \\
+        \rho &= (R + h) u_1 - \sqrt{R^2 - (R + h)^2 (1 - u_1^2)}
+
+    with the components of the line of sight u downward, to the right and forward, and its length :math:`\rho` to the
+    ground. Lines that are swept together therefore move apart toward the ends of the scan (bow-tie).
+
+    Parameters
+    ----------
+    track_angle : array
+        Angle beta of the line of sight forward of the plane of the scan. [degree]
+    scan_angle : array
+        Angle theta within that plane, from nadir. [degree]
+    altitude : float
+        [m]
+
+    Returns
+    -------
+    distance : array
+        Along the track, forward of the point below the instrument. [m]
+    central_angle : array
+        Between the point and the track, at the earth's centre, with the sign of the scan angle. [degree]
+
+    References
+    ----------
+    [Ichoku2005]_ gives the sizes of pixels for small beta
+
+    Examples
+    --------
+    The line spacing of MODIS doubles at the edge of its scan:
+
+    >>> ahead = [float(ground_of_detector(0.1, angle, 705e3)[0]) for angle in (0.0, 55.0)]
+    >>> round(ahead[1] / ahead[0], 2)
+    2.04
+    """
+    beta, theta = np.radians(track_angle), np.radians(scan_angle)
+    down, right, forward = np.cos(beta) * np.cos(theta), np.cos(beta) * np.sin(theta), np.sin(beta)
+    orbit = EARTH_RADIUS + altitude
+    square = EARTH_RADIUS**2 - orbit**2 * (1 - down**2)
+    slant = orbit * down - np.sqrt(np.where(square >= 0, square, np.nan))
+    distance = EARTH_RADIUS * np.arctan2(slant * forward, orbit - slant * down)
+    return distance, np.degrees(np.arcsin(slant * right / EARTH_RADIUS))
+
+
+class Zone(NamedTuple):
+    """Zone of a scan on one side of nadir: samples of a line, elementary samples in each, lines deleted at each end."""
+
+    samples: int
+    aggregation: int
+    deleted: int
+
+
+@dataclass(frozen=True)
+class ScanPattern:
+    """
+    Lines and samples that an instrument takes in one sweep across the track.
+
+    Samples count from nadir, to the left with negative numbers; sample n has its centre at position n + 1/2.
+
+    Parameters
+    ----------
+    track_interval, scan_interval : float
+        Angles between lines along the track and between elementary samples across it. [rad]
+    lines : int, optional
+        Number of lines that are swept together.
+    zones : tuple of Zone, optional
+        From nadir outward on either side; by default each sample is elementary and no line is deleted.
+    """
+
+    track_interval: float
+    scan_interval: float
+    lines: int = 1
+    zones: tuple[Zone, ...] = ()
+
+    def track_angle(self):
+        """Angles of the lines forward of the plane of the scan, shape (lines,). [degree]"""
+        return np.degrees((np.arange(self.lines) - (self.lines - 1) / 2) * self.track_interval)
+
+    def scan_angle(self, position):
+        """Scan angle at a position on the line, which counts samples from nadir. [degree]"""
+        if not self.zones:
+            return np.degrees(np.asarray(position) * self.scan_interval)
+        positions, angles = self._limits()
+        return np.sign(position) * np.interp(np.abs(position), positions, angles)
+
+    def position(self, scan_angle):
+        """Position on the line at a scan angle, the inverse of `scan_angle`; the ends of the line beyond them. [1]"""
+        if not self.zones:
+            return np.radians(scan_angle) / self.scan_interval
+        positions, angles = self._limits()
+        return np.sign(scan_angle) * np.interp(np.abs(scan_angle), angles, positions)
+
+    def _limits(self):
+        """Limits of the zones as positions on the line and as scan angles [degree]."""
+        samples = np.array([zone.samples for zone in self.zones])
+        sums = np.array([zone.aggregation for zone in self.zones])
+        edges = [np.concatenate([[0], np.cumsum(each)]) for each in (samples, samples * sums)]
+        return edges[0], np.degrees(edges[1] * self.scan_interval)
+
+    def zone_of(self, sample):
+        """Number of the zone that samples lie in, 0 at nadir."""
+        if not self.zones:
+            return np.zeros(np.shape(sample), int)
+        limits = self._limits()[0][1:-1]
+        return np.searchsorted(limits, np.abs(np.asarray(sample) + 0.5))
+
+    def is_deleted(self, line, sample):
+        """Whether the instrument deletes lines of the image at samples, because the next sweep sees the same ground."""
+        if not self.zones:
+            return np.zeros(np.broadcast_shapes(np.shape(line), np.shape(sample)), bool)
+        deleted = np.array([zone.deleted for zone in self.zones])[self.zone_of(sample)]
+        detector = np.asarray(line) % self.lines
+        return np.minimum(detector, self.lines - 1 - detector) < deleted
 
 
 def swath_width(altitude, max_angle):

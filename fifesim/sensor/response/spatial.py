@@ -217,6 +217,66 @@ class TableSpread(LineSpread):
         return transform.real if symmetric else np.abs(transform)
 
 
+@dataclass(frozen=True)
+class AggregatedSpread(LineSpread):
+    r"""
+    Line spread function of samples that an instrument sums.
+
+    .. math::
+
+        C(x) = \frac{1}{n} \sum_{k=1}^{n} C_1(x - x_k), \qquad
+        M(f) = M_1(f) \, \frac{1}{n} \sum_{k=1}^{n} \cos 2 \pi f x_k, \qquad x_k = \left(k - \tfrac{n + 1}{2}\right) d
+
+    Parameters
+    ----------
+    sample : LineSpread
+        Line spread function of one sample, C1 and M1.
+    count : int
+        Number n of samples.
+    interval : float
+        Distance d between them. [m]
+
+    Raises
+    ------
+    ValueError
+        If the number or the interval is not positive.
+
+    Examples
+    --------
+    Detectors as wide as their interval see what one of three times the width sees:
+
+    >>> from fifesim.base.line_spread import Boxcar
+    >>> spread = AggregatedSpread(Boxcar(10.0), 3, 10.0)
+    >>> round(float(spread.mtf(1 / 60) / Boxcar(30.0).mtf(1 / 60)), 12)
+    1.0
+    """
+
+    sample: LineSpread
+    count: int
+    interval: float
+
+    def __post_init__(self):
+        self._check_width(self.interval)
+        if self.count < 1:
+            raise ValueError(f"count must be at least 1, got {self.count}: it is the number of samples in the sum")
+
+    @property
+    def half_width(self):
+        """Distance from the pixel centre beyond which the response is zero. [m]"""
+        return self.sample.half_width + float(self._places.max())
+
+    @property
+    def _places(self):
+        """Centres of the samples. [m]"""
+        return (np.arange(self.count) - (self.count - 1) / 2) * self.interval
+
+    def _cumulative(self, x):
+        return self.sample.cumulative(x[..., None] - self._places).mean(axis=-1)
+
+    def _mtf(self, frequency):
+        return self.sample.mtf(frequency) * np.cos(2 * np.pi * frequency[..., None] * self._places).mean(axis=-1)
+
+
 # Samples of the tabulated response over its equivalent width, and the periods of the transform that are tried, in the
 # same widths. What lies beyond half a period folds back into it: of a response that decays as x^-2 about 1 % of the
 # share that is cut at a sixteenth of the period.
@@ -295,6 +355,77 @@ class LowPass(CutoffTransfer):
 
     def _mtf(self, frequency):
         return (1 + (frequency / self.cutoff) ** (2 * self.order)) ** -0.5
+
+
+@dataclass(frozen=True)
+class Mixture(Transfer):
+    r"""
+    Transfer function of a weighted sum of bands.
+
+    .. math:: M(f) = \sum_s a_s \prod_k M_{sk}(f), \qquad \sum_s a_s = 1
+
+    Parameters
+    ----------
+    shares : sequence of float
+        Shares a of the bands. [1]
+    parts : sequence
+        For each band, objects with ``mtf(frequency)``.
+    """
+
+    shares: tuple
+    parts: tuple
+
+    def _mtf(self, frequency):
+        return sum(share * _product(each, frequency) for share, each in zip(self.shares, self.parts, strict=True))
+
+
+@dataclass(frozen=True)
+class Difference(Transfer):
+    r"""
+    Transfer function from the image of one instrument to the image of another, a part of `SystemSpread`.
+
+    .. math:: K(f) = M_t(f) \, \frac{M(f) \, (1 + \epsilon^2)}{M(f)^2 + \epsilon^2}
+
+    It is the ratio of both transfers where the first instrument passes much more than the floor, and falls to zero
+    where it passes less. Frequencies are amplified :math:`(1 + \epsilon^2) / 2 \epsilon` times at most.
+
+    Parameters
+    ----------
+    target : Transfer
+        The other instrument, Mt.
+    recorded : Transfer
+        The instrument that recorded the image, M.
+    floor : float
+        Floor epsilon, in (0, 1). [1]
+
+    Raises
+    ------
+    ValueError
+        If the floor is not in (0, 1).
+
+    Examples
+    --------
+    >>> from fifesim.base.line_spread import Boxcar
+    >>> round(float(Difference(Boxcar(30.0), Boxcar(10.0), 0.01).mtf(1 / 60) * Boxcar(10.0).mtf(1 / 60)), 3)
+    0.637
+    """
+
+    target: Transfer
+    recorded: Transfer
+    floor: float
+
+    def __post_init__(self):
+        if not 0 < self.floor < 1:
+            raise ValueError(f"floor must be in (0, 1), got {self.floor}: it is a transfer")
+
+    def left(self, frequency):
+        """Transfer of both images together relative to the target alone. [1]"""
+        square = self.recorded.mtf(frequency) ** 2
+        return square * (1 + self.floor**2) / (square + self.floor**2)
+
+    def _mtf(self, frequency):
+        recorded = self.recorded.mtf(frequency)
+        return self.target.mtf(frequency) * recorded * (1 + self.floor**2) / (recorded**2 + self.floor**2)
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,31 @@ def test_reading_is_what_is_drawn(found):
     assert f"{r2[0]:.2f}" in native.get_title()
 
 
+@pytest.mark.parametrize(
+    ("number", "panel", "points", "x", "y"),
+    [
+        (5, 0, 0, "boa_ndvi", "lai"),
+        (5, 0, 1, "ndvi", "lai"),
+        (5, 1, 1, "ndvi", "fpar"),
+        (8, 0, 0, "boa_ndvi", "ndvi_of_mean"),
+        (9, 0, 0, "boa_red", "toa_red"),
+        (9, -1, 0, "boa_nir", "toa_nir"),
+    ],
+)
+def test_axes_are_those_of_the_paper(found, number, panel, points, x, y):
+    """Of figure 8 the difference is below; axes are named after what they show."""
+    axis = figures.plot_reproduction(number, found, reading="native").axes[panel]
+    arp = float(found["arp"][-1 if panel == -1 else 0])
+    values = figures.sample(found, "native", arp)
+    drawn = axis.collections[points].get_offsets()
+    np.testing.assert_allclose(drawn, np.stack([values[x], values[y]], axis=1), rtol=1e-12)
+
+
+def test_difference_of_figure_8_is_that_of_its_upper_panel(found):
+    above, below = (figures.plot_reproduction(8, found).axes[at].collections[0].get_offsets() for at in (0, 3))
+    np.testing.assert_allclose(below[:, 1], above[:, 1] - above[:, 0], rtol=1e-12)
+
+
 def test_sample_is_200_pixels_by_name(found):
     values = figures.sample(found, "native", 0.15)
     assert {"lai", "fpar", "ndvi", "analogue_ndvi", "boa_red", "toa_nir"} <= set(values)

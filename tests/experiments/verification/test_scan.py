@@ -18,6 +18,7 @@ def test_all_is_well(check):
         (track, "view_from_ground", scan._lines_of_sight),
         (track, "growth", scan._lines_of_sight),
         (track, "place_of", scan._places),
+        (track, "ground_of_detector", scan._sweeps),
         (scan, "apply_operator", scan._straight),
     ],
 )

@@ -59,14 +59,53 @@ def test_every_radiance_in_milliwatts_is_found_out(changed):
 
 @pytest.mark.parametrize(
     ("angle", "message"),
-    [("0.9669", "0.9669: it is in degrees.*55.7 degrees to either side"), ("70.0", "70: .*misses the earth")],
+    [
+        ("0.9669", "scan: .*2048 x 0.00095 radians, reach 55.7 degrees to either side, and max_angle = 0.9669 degrees"),
+        ("60.0", "scan: .*reach 55.7 degrees to either side, and max_angle = 60 degrees"),
+        ("70.0", "scan.max_angle = 70: .*misses the earth"),
+    ],
 )
 def test_a_scan_without_a_swath_is_compared_with_its_samples_and_the_horizon(tmp_path, angle, message):
     """2048 samples of 0.95 mrad are 55.7 degrees to either side; the horizon from 833 km is at 62.2."""
     text = files.path("instruments/avhrr9.toml").read_text(encoding="utf-8")
     path = tmp_path / "mine.toml"
     path.write_text(text.replace("max_angle = 55.4", f"max_angle = {angle}"), encoding="utf-8")
-    with pytest.raises(ValueError, match=f"mine.toml: scan.max_angle = {message}"):
+    with pytest.raises(ValueError, match=f"mine.toml: {message}"):
+        read_instrument(path)
+
+
+def test_sums_of_samples_are_counted_as_what_they_are_made_of(tmp_path):
+    """6400 equal samples as wide as the sums at nadir would reach 86 degrees; the zones of VIIRS reach 56."""
+    text = files.path("instruments/viirs.toml").read_text(encoding="utf-8")
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    assert read_instrument(path).scan.elementary_samples() == 12608
+    start, end = text.index("[[scan.zones]]"), text.index("[not_found]")
+    path.write_text((text[:start] + text[end:]).replace("0.00015582", "0.00046746"), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"6400 x 0.00046746 radians, reach 85.7 degrees.*\[\[scan.zones\]\]"):
+        read_instrument(path)
+    for old, new, message in (
+        ("samples = 736", "samples = 737", "half of samples = 6400, got 3201"),
+        ("deleted = 4", "deleted = 16", "deleted = 16 at each end leaves none of lines = 32"),
+        ("aggregation = 2", "aggregation = 0", "scan.zones.2.aggregation = 0"),
+    ):
+        path.write_text(text.replace(old, new), encoding="utf-8")
+        with pytest.raises(ValueError, match=message):
+            read_instrument(path)
+
+
+@pytest.mark.parametrize(("angle", "fits"), [(30.0, True), (33.08, True), (36.0, False), (27.0, False)])
+def test_a_flat_row_of_detectors_has_equal_steps_of_the_tangent(tmp_path, angle, fits):
+    """1000 pixels of 0.1 m from 86.6 m: half of the row is 50 / 86.6, the tangent of 30 degrees, or 33.08 degrees."""
+    bands = '[{ name = "red", center = 0.668, width = 0.010 }]'
+    scan = f'{{ kind = "pushbroom", max_angle = {angle}, samples = 1000 }}'
+    path = tmp_path / "camera.toml"
+    text = f'name = "Camera"\naltitude = 86.6\ngsd = 0.1\nbits = 12\nscan = {scan}\nbands = {bands}\n'
+    path.write_text(text, encoding="utf-8")
+    if fits:
+        assert read_instrument(path).scan.samples == 1000
+        return
+    with pytest.raises(ValueError, match="samples of red times interval, 1000 x 0\\.00115473 radians"):
         read_instrument(path)
 
 

@@ -6,8 +6,16 @@ from scipy.integrate import quad
 from scipy.signal import butter, freqs
 from scipy.special import k0
 
+from fifesim.base.footprints import axis_operator
 from fifesim.base.line_spread import Boxcar
-from fifesim.sensor.response.spatial import Diffraction, GaussianSpread, LowPass, SystemSpread
+from fifesim.sensor.response.spatial import (
+    Difference,
+    Diffraction,
+    GaussianSpread,
+    LowPass,
+    Mixture,
+    SystemSpread,
+)
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.8, 1.0, 1.7])
@@ -78,3 +86,57 @@ def test_widths_of_gaussians_add_by_their_squares():
 def test_a_part_or_a_product_that_is_none_is_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def sampled_contrast(spread, frequency, recorded, cell=10.0, pixel=30.0):
+    """Contrast of a wave that is recorded at the centres of cells and then averaged by a line spread function."""
+    cells = 400
+    operator = axis_operator(
+        spread,
+        cell_origin=0.0,
+        cell_size=cell,
+        n_cells=cells,
+        pixel_origin=cells * cell / 2 - pixel / 2,
+        pixel_size=pixel,
+        n_pixels=1,
+    )
+    places = (np.arange(cells) + 0.5) * cell - cells * cell / 2
+    wave = float(recorded.mtf(frequency)) * np.cos(2 * np.pi * frequency * places)
+    window = slice(operator.start[0], operator.start[0] + operator.count[0])
+    return float(operator.weights[0, : operator.count[0]] @ wave[window])
+
+
+@pytest.mark.parametrize("frequency", [0.0, 0.004, 1 / 60, 0.03])
+@pytest.mark.parametrize("target", [GaussianSpread(36.0), SystemSpread((Boxcar(30.0), GaussianSpread(12.0)))])
+def test_an_image_of_an_image_has_the_contrast_of_the_second_instrument(frequency, target):
+    """An image in cells of 10 m, averaged by the difference, has the contrast of the target times `left`."""
+    recorded = GaussianSpread(14.0)
+    difference = Difference(target, Mixture((1.0,), ((recorded, Boxcar(10.0)),)), 0.2)
+    found = sampled_contrast(SystemSpread((difference,)), frequency, recorded)
+    expected = float(difference.left(frequency) * target.mtf(frequency))
+    # A thousandth of the response is cut off, and waves of the cells' own period come in.
+    assert found == pytest.approx(expected, abs=6e-3)
+    assert float(difference.left(frequency)) > 0.85
+    blurred_twice = sampled_contrast(target, frequency, recorded)
+    assert frequency == 0 or abs(blurred_twice - expected) > abs(found - expected)
+
+
+def test_contrast_that_was_not_recorded_is_not_made_up():
+    recorded = Boxcar(30.0)
+    difference = Difference(Boxcar(1.0), recorded, 0.2)
+    frequency = np.linspace(0, 0.2, 4001)
+    assert np.max(np.abs(difference.mtf(frequency))) <= (1 + 0.2**2) / (2 * 0.2)
+    assert float(difference.mtf(1 / 30)) == pytest.approx(0.0, abs=1e-12)
+    assert float(difference.left(0.0)) == 1 and float(difference.mtf(0.0)) == 1
+    assert np.all(difference.left(frequency) <= 1)
+    for floor in (0.0, 1.0):
+        with pytest.raises(ValueError, match=r"floor must be in \(0, 1\)"):
+            Difference(Boxcar(1.0), recorded, floor)
+
+
+def test_a_mixture_is_the_transfer_of_the_sum_of_bands():
+    """Waves of two bands, each by its parts, weighted and added."""
+    mixture = Mixture((1.3, -0.3), ((GaussianSpread(20.0), Boxcar(10.0)), (Boxcar(20.0),)))
+    frequency = np.array([0.0, 0.01, 0.04])
+    expected = 1.3 * GaussianSpread(20.0).mtf(frequency) * np.sinc(10 * frequency) - 0.3 * np.sinc(20 * frequency)
+    np.testing.assert_allclose(mixture.mtf(frequency), expected, rtol=1e-14)

@@ -1,0 +1,303 @@
+"""Scores of labelled estimates with uncertainty, by group, with standard errors over landscapes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Annotated
+
+import numpy as np
+import xarray as xr
+
+from fifesim.analysis import scores
+from fifesim.analysis.regression import totals
+from fifesim.analysis.regression_labels import check_same_quantity, matched, sound_cells
+from fifesim.base.annotations import Pairing
+from fifesim.base.arguments import Kind, described, is_a
+from fifesim.grids.inputs import AnyDimensions, RasterOrDataset
+from fifesim.grids.reductions import computed, sums_by_row
+
+_BINS = 10
+_LANDSCAPE = "landscape"
+
+# Sums of a group before those of levels: count, error, squared error, CRPS.
+_FIXED = 4
+
+By = Annotated[
+    xr.DataArray | Sequence[float],
+    Kind(
+        "a raster of classes, or the edges of bins of the true value, such as [0, 1, 2, 4]",
+        lambda by: is_a(by, "DataArray") or (isinstance(by, Sequence | np.ndarray) and not isinstance(by, str)),
+        dimensions=0,
+    ),
+]
+
+
+def score(
+    estimate: RasterOrDataset,
+    truth: AnyDimensions,
+    by: By | None = None,
+    *,
+    landscape: str = _LANDSCAPE,
+    pair: Pairing = "coordinates",
+) -> xr.Dataset:
+    """
+    Score an estimate and its uncertainty against the truth; computes.
+
+    Parameters
+    ----------
+    estimate : xarray.Dataset or xarray.DataArray
+        A map; or a Dataset with a variable named like the truth and any of: ``sd``, its standard deviation; ``low`` and
+        ``high``, the ends of central intervals, with a dimension or coordinate ``level``. The name of the variable may
+        come first, as in ``lai_sd``. An ensemble has a dimension ``member``. Mask pixels that must not count, for
+        instance with ``estimate.where(estimate.flag == 0)``.
+    truth : xarray.DataArray, dims (y, x), or any that the estimate has
+        In the unit of the estimate.
+    by : xarray.DataArray or sequence of float, optional
+        Groups that are scored one by one: a raster of classes, dims of the truth or some of them, or edges of bins of
+        the true value.
+    landscape : str, optional
+        Dimension or coordinate of the truth that counts independent landscapes. Pixels of one landscape depend on each
+        other; standard errors are computed over landscapes, and NaN with fewer than two.
+    pair : {"coordinates", "index"}, optional
+        How maps over (y, x) are paired, as in `regress`.
+
+    Returns
+    -------
+    scores : xarray.Dataset
+        ``n``, number of pixels; ``bias`` and ``rmse`` in the unit of the estimate; ``bias_se``, standard error of the
+        bias. If the estimate has intervals, by ``level``: ``coverage``, the share of true values inside, its standard
+        error ``coverage_se``, the mean ``width``, and ``interval_score``. With ``sd`` or members: ``crps``, of a normal
+        distribution or of the ensemble, and ``pit``, the density of the probability integral transform in ten bins,
+        which is 1 for a calibrated estimate. With ``by``, a first dimension of that name. The same to the bit under any
+        chunking.
+
+    Raises
+    ------
+    ValueError
+        If estimate and truth are different quantities, do not overlap, or the Dataset lacks the variable.
+
+    Notes
+    -----
+    A pixel counts if truth, estimate and every given limit and spread are known.
+
+    References
+    ----------
+    [GneitingRaftery2007]_
+
+    Examples
+    --------
+    >>> import fifesim
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> rng = np.random.default_rng(1)
+    >>> truth = xr.DataArray(rng.normal(2, 1, (20, 500)), dims=("landscape", "pixel"), name="lai")
+    >>> guess = truth + rng.normal(0, 0.3, truth.shape)
+    >>> found = fifesim.score(xr.Dataset({"lai": guess, "sd": 0.3 + 0 * guess}), truth)
+    >>> round(float(found.rmse), 1), bool(abs(found.pit - 1).max() < 0.2)
+    (0.3, True)
+    """
+    given = _parts(estimate, truth)
+    check_same_quantity(given["value"], truth, ("estimate", "truth"))
+    unit = truth.attrs.get("units", given["value"].attrs.get("units", "1"))
+    given, truth = _paired(given, truth, pair)
+    group, labels = _groups(by, truth)
+    values, levels = _pixel_scores(given, truth)
+    sums = _sums_by_landscape(values, group, truth, landscape, len(labels))
+    if not sums[..., 0].sum():
+        raise ValueError("no pixel has both an estimate and a true value: do the rasters overlap?")
+    found = _dataset(sums, levels, "crps" in values, unit)
+    if by is None:
+        return found.isel(group=0)
+    name = str(by.name or "group") if isinstance(by, xr.DataArray) else f"{truth.name or 'truth'}_bin"
+    return found.assign_coords(group=labels).rename(group=name)
+
+
+def _parts(estimate, truth):
+    """Value, spread, limits and members of an estimate by role."""
+    if isinstance(estimate, xr.DataArray):
+        return {"value": estimate}
+    name = truth.name if truth.name in estimate.data_vars else None
+    others = [each for each in estimate.data_vars if str(each).split("_")[-1] not in ("sd", "low", "high", "flag")]
+    if name is None and len(others) == 1:
+        name = others[0]
+    if name is None:
+        raise ValueError(
+            f"estimate must have a variable {truth.name or 'of one name'}, as the truth is called, it has "
+            f"{', '.join(map(str, estimate.data_vars))}: select one, or rename the truth"
+        )
+    found = {"value": estimate[name]}
+    for role in ("sd", "low", "high"):
+        own = next((each for each in (f"{name}_{role}", role) if each in estimate.data_vars), None)
+        if own is not None:
+            found[role] = estimate[own]
+    if ("low" in found) != ("high" in found):
+        raise ValueError("an interval has two ends: give both low and high")
+    if "low" in found and "level" not in found["low"].coords:
+        raise ValueError(
+            "low and high need a coordinate level, the share of true values that they shall contain: type for instance "
+            "estimate.assign_coords(level=0.95)"
+        )
+    return found
+
+
+def _paired(given, truth, pair):
+    """Rasters over (y, x) cut to their common pixels; arrays over other dimensions must have the same labels."""
+    if set(truth.dims) == {"y", "x"}:
+        cut, true = {}, truth
+        for role, each in given.items():
+            over = [dim for dim in each.dims if dim not in ("y", "x")]
+            if len(over) > 1:
+                raise ValueError(f"{each.name or role} has dimensions {each.dims}, the truth {truth.dims}: select one")
+            layers = [each] if not over else [each.isel({over[0]: at}) for at in range(each.sizes[over[0]])]
+            pairs = [matched(layer, truth, pair) for layer in layers]
+            true = pairs[0][1]
+            places = {axis: true[axis] for axis in ("y", "x") if axis in true.coords}
+            layers = [layer.drop_vars(["y", "x"], errors="ignore").assign_coords(places) for layer, _ in pairs]
+            cut[role] = layers[0] if not over else xr.concat(layers, each[over[0]]).transpose(over[0], "y", "x")
+        return cut, true
+    try:
+        truth, *aligned = xr.align(sound_cells(truth), *given.values(), join="exact")
+    except ValueError as error:
+        raise ValueError(f"estimate and truth have different labels: {str(error).splitlines()[0]}") from None
+    for role, each in zip(given, aligned, strict=True):
+        if set(each.dims) - {"level", "member"} != set(truth.dims):
+            raise ValueError(f"{role} of the estimate has dimensions {each.dims}, the truth {truth.dims}")
+    return dict(zip(given, aligned, strict=True)), truth
+
+
+def _is_ensemble(given):
+    """Whether an estimate is an ensemble."""
+    return "member" in given["value"].dims
+
+
+def _groups(by, truth):
+    """Number of the group of each pixel, NaN for none, and labels of the groups."""
+    if by is None:
+        return xr.zeros_like(truth, dtype=float), [0]
+    if isinstance(by, xr.DataArray):
+        try:
+            by = xr.align(by, truth, join="exact")[0]
+            by = by.broadcast_like(truth) if set(by.dims) <= set(truth.dims) else by
+        except ValueError:
+            raise ValueError("by must lie on the grid of the truth, its coordinates differ: bring it there") from None
+        if set(by.dims) != set(truth.dims) or any(by.sizes[dim] != truth.sizes[dim] for dim in truth.dims):
+            raise ValueError(f"by has sizes {dict(by.sizes)}, the truth {dict(truth.sizes)}: bring it onto its grid")
+        by = by.transpose(*truth.dims)
+        values = computed(by)[0].values
+        known = values[values == values] if values.dtype.kind == "f" else values
+        labels = np.unique(known)
+        number = np.searchsorted(labels, values).astype(float)
+        if values.dtype.kind == "f":
+            number[np.isnan(values)] = np.nan
+        return truth.copy(data=number), labels
+    edges = np.asarray(by, float)
+    if edges.ndim != 1 or edges.size < 2 or not np.all(np.diff(edges) > 0):
+        raise ValueError(f"by must be increasing edges of bins, such as [0, 1, 2, 4], got {described(by)}")
+    number = xr.apply_ufunc(partial(_bin, edges=edges), truth, dask="parallelized", output_dtypes=[float])
+    return number, 0.5 * (edges[1:] + edges[:-1])
+
+
+def _bin(values, edges):
+    """Number of the bin of each value, the upper edge of the last one included; NaN outside."""
+    number = np.where(values == edges[-1], edges.size - 2, np.searchsorted(edges, values, side="right") - 1.0)
+    return np.where((number >= 0) & (number < edges.size - 1), number, np.nan)
+
+
+def _pixel_scores(given, truth):
+    """Values of each pixel that are summed, by name, and the levels of the intervals."""
+    value, values = given["value"], {}
+
+    def each_pixel(function, *arrays, core=()):
+        return xr.apply_ufunc(
+            function, *arrays, input_core_dims=[list(core), *[[]] * (len(arrays) - 1)], dask="parallelized",
+            output_dtypes=[float], dask_gufunc_kwargs={"allow_rechunk": True},
+        )  # fmt: skip
+
+    if _is_ensemble(given):
+        values["error"] = value.mean("member", skipna=False) - truth
+        values["crps"] = each_pixel(scores.ensemble_crps, value, truth, core=("member",))
+        values["pit"] = each_pixel(scores.ensemble_pit, value, truth, core=("member",))
+    else:
+        values["error"] = value - truth
+        if "sd" in given:
+            values["crps"] = each_pixel(scores.normal_crps, value, given["sd"], truth)
+            values["pit"] = each_pixel(scores.normal_pit, value, given["sd"], truth)
+    levels = np.atleast_1d(given["low"]["level"].values) if "low" in given else np.array([])
+    if np.any((levels <= 0) | (levels >= 1)):
+        raise ValueError(f"level must be between 0 and 1, got {levels.tolist()}: 0.95 holds 95 % of true values")
+    for number, level in enumerate(levels.tolist()):
+        low, high = (
+            each.isel(level=number) if "level" in each.dims else each for each in (given["low"], given["high"])
+        )
+        inside = ((low <= truth) & (truth <= high)).astype(float)
+        values[f"inside {number}"] = inside.where(low.notnull() & high.notnull())
+        values[f"width {number}"] = high - low
+        values[f"score {number}"] = each_pixel(partial(scores.interval_score, level=level), low, high, truth)
+    return {name: each.drop_vars(set(each.coords) - set(each.dims)) for name, each in values.items()}, levels
+
+
+def _sums_by_landscape(values, group, truth, landscape, groups):
+    """Sums of each landscape and group, shape (landscapes, groups, sums)."""
+    if landscape in truth.dims:
+        parts = [{landscape: slice(at, at + 1)} for at in range(truth.sizes[landscape])]
+    elif landscape in truth.coords and truth[landscape].ndim == 1:
+        dim, labels = truth[landscape].dims[0], truth[landscape].values
+        parts = [{dim: np.flatnonzero(labels == each)} for each in np.unique(labels)]
+    elif landscape == _LANDSCAPE:
+        parts = [{}]
+    else:
+        raise ValueError(
+            f"landscape: the truth has no dimension or coordinate {landscape!r}, it has {list(truth.coords)}"
+        )
+    pit = values.get("pit", xr.full_like(truth, np.nan, dtype=float))
+    others = [each for name, each in values.items() if name != "pit"]
+    count = len(others) + 2 + _BINS
+    found = []
+    for part in parts:
+        cells = [_as_rows(each.transpose(*truth.dims).isel(part)) for each in (group, pit, *others)]
+        rows = sums_by_row(scores.grouped_sums, *cells, count=groups * count, groups=groups, bins=_BINS)
+        found.append(totals(rows))
+    return np.reshape(found, (len(parts), groups, count))
+
+
+def _as_rows(array):
+    """Array of two dimensions with the cells of any."""
+    data = array.data.reshape(-1, array.shape[-1]) if array.ndim > 1 else array.data.reshape(1, -1)
+    return xr.DataArray(data, dims=("y", "x"))
+
+
+def _dataset(sums, levels, is_probabilistic, unit):
+    """Scores from sums, shape (landscapes, groups, sums)."""
+    count, total = sums[..., 0], sums.sum(axis=0)
+    n = total[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = {
+            "n": (("group",), n.astype(int), {"long_name": "number of pixels", "units": "1"}),
+            "bias": (("group",), total[:, 1] / n, {"long_name": "mean of estimate less truth", "units": unit}),
+            "bias_se": (("group",), scores.ratio_error(sums[..., 1], count),
+                        {"long_name": "standard error of the bias over landscapes", "units": unit}),
+            "rmse": (("group",), np.sqrt(total[:, 2] / n), {"long_name": "root mean square error", "units": unit}),
+        }  # fmt: skip
+        at = _FIXED if is_probabilistic else _FIXED - 1
+        if is_probabilistic:
+            words = {"long_name": "continuous ranked probability score", "units": unit}
+            found["crps"] = ("group",), total[:, _FIXED - 1] / n, words
+            bins = total[:, -_BINS:]
+            words = {"long_name": "density of the probability integral transform", "units": "1"}
+            found["pit"] = ("group", "pit_bin"), bins * _BINS / bins.sum(axis=1, keepdims=True), words
+        by_level = sums[..., at : at + 3 * len(levels)].reshape(*count.shape, len(levels), 3)
+        if len(levels):
+            means = by_level.sum(axis=0) / n[:, None, None]
+            dims = ("group", "level")
+            error = scores.ratio_error(by_level[..., 0], np.broadcast_to(count[..., None], by_level[..., 0].shape))
+            found |= {
+                "coverage": (dims, means[..., 0], {"long_name": "share of true values in the interval", "units": "1"}),
+                "coverage_se": (dims, error,
+                                {"long_name": "standard error of the coverage over landscapes", "units": "1"}),
+                "width": (dims, means[..., 1], {"long_name": "mean width of the interval", "units": unit}),
+                "interval_score": (dims, means[..., 2], {"long_name": "interval score", "units": unit}),
+            }  # fmt: skip
+    coords = {"level": levels} if len(levels) else {}
+    coords |= {"pit_bin": (np.arange(_BINS) + 0.5) / _BINS} if is_probabilistic else {}
+    return xr.Dataset(found, coords)

@@ -1,0 +1,244 @@
+"""Scores of uncertain estimates against known values: CRPS, logarithmic and interval score, and coverage."""
+
+import numpy as np
+from scipy.special import ndtr
+
+_INVERSE_SQRT_PI = 1 / np.sqrt(np.pi)
+
+
+def normal_crps(mean, sd, truth):
+    r"""
+    Continuous ranked probability score of a normal distribution.
+
+    .. math::
+
+        \mathrm{CRPS} = \sigma \left[ z (2 \Phi(z) - 1) + 2 \varphi(z) - \pi^{-1/2} \right],
+        \quad z = (y - \mu) / \sigma
+
+    Parameters
+    ----------
+    mean, sd : array
+        Of the estimate. Without spread the score is the absolute error.
+    truth : array
+
+    Returns
+    -------
+    crps : array, shape of the broadcast inputs
+        In the unit of the estimate; 0 is best. NaN where an input is.
+
+    References
+    ----------
+    [GneitingRaftery2007]_, Eq. 21
+
+    Examples
+    --------
+    >>> round(float(normal_crps(0.0, 1.0, 0.0)), 4)
+    0.2337
+    """
+    mean, sd, truth = (np.asarray(each, float) for each in (mean, sd, truth))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z = (truth - mean) / sd
+        density = np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi)
+        found = sd * (z * (2 * ndtr(z) - 1) + 2 * density - _INVERSE_SQRT_PI)
+    return np.where(sd == 0, np.abs(truth - mean), found)
+
+
+def normal_log_score(mean, sd, truth):
+    r"""
+    Logarithmic score of a normal distribution.
+
+    .. math:: S = \tfrac{1}{2} \ln(2 \pi \sigma^2) + \frac{(y - \mu)^2}{2 \sigma^2}
+
+    Parameters
+    ----------
+    mean, sd, truth : array
+        As in `normal_crps`.
+
+    Returns
+    -------
+    score : array, shape of the broadcast inputs
+        Small is good. [1]
+
+    References
+    ----------
+    [GneitingRaftery2007]_, Section 4.1
+
+    Examples
+    --------
+    >>> round(float(normal_log_score(0.0, 1.0, 0.0)), 4)
+    0.9189
+    """
+    mean, sd, truth = (np.asarray(each, float) for each in (mean, sd, truth))
+    return 0.5 * np.log(2 * np.pi * sd**2) + 0.5 * ((truth - mean) / sd) ** 2
+
+
+def normal_pit(mean, sd, truth):
+    """
+    Probability integral transform of the truth by a normal distribution: uniform if the estimate is calibrated.
+
+    Parameters
+    ----------
+    mean, sd, truth : array
+        As in `normal_crps`.
+
+    Returns
+    -------
+    pit : array, shape of the broadcast inputs
+        Probability of a value below the truth, 0 to 1. [1]
+
+    Examples
+    --------
+    >>> float(normal_pit(0.0, 1.0, 0.0))
+    0.5
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return ndtr((np.asarray(truth, float) - mean) / np.asarray(sd, float))
+
+
+def ensemble_crps(members, truth, *, fair=False):
+    r"""
+    Continuous ranked probability score of an ensemble.
+
+    .. math::
+
+        \mathrm{CRPS} = \frac{1}{n} \sum_i |x_i - y| - \frac{1}{2 n^2} \sum_{i, j} |x_i - x_j|
+
+    Parameters
+    ----------
+    members : array, shape (..., n)
+        Values of the ensemble.
+    truth : array, shape (...)
+    fair : bool
+        Divide the second sum by n (n - 1) instead of n^2, so that the expected score does not depend on n.
+
+    Returns
+    -------
+    crps : array, shape (...)
+        In the unit of the members; 0 is best. NaN where an input is.
+
+    References
+    ----------
+    [GneitingRaftery2007]_, Eq. 20; Ferro (2014) for the fair score
+
+    Examples
+    --------
+    >>> float(ensemble_crps([0.0, 1.0], 0.0)), float(ensemble_crps([0.0, 1.0], 0.0, fair=True))
+    (0.25, 0.0)
+    """
+    members, truth = np.sort(np.asarray(members, float), axis=-1), np.asarray(truth, float)
+    n = members.shape[-1]
+    error = np.abs(members - truth[..., None]).mean(axis=-1)
+    # Sum over all pairs from the sorted members.
+    pairs = 2 * (members * (2 * np.arange(1, n + 1) - n - 1)).sum(axis=-1)
+    return error - 0.5 * pairs / (n * (n - 1) if fair else n * n)
+
+
+def ensemble_pit(members, truth):
+    """
+    Rank of the truth in an ensemble, as a share; ties count half.
+
+    Parameters
+    ----------
+    members, truth : array
+        As in `ensemble_crps`.
+
+    Returns
+    -------
+    pit : array, shape (...)
+        0 to 1. NaN where an input is. [1]
+
+    Examples
+    --------
+    >>> float(ensemble_pit([0.0, 1.0, 2.0], 1.5))
+    0.625
+    """
+    members, truth = np.asarray(members, float), np.asarray(truth, float)[..., None]
+    below = (members < truth).sum(axis=-1) + 0.5 * (members == truth).sum(axis=-1)
+    share = (below + 0.5) / (members.shape[-1] + 1)
+    return np.where(np.isnan(members).any(axis=-1) | np.isnan(truth[..., 0]), np.nan, share)
+
+
+def interval_score(low, high, truth, level):
+    r"""
+    Interval score of a central interval: its width, and a penalty for each truth outside.
+
+    .. math::
+
+        S = (u - l) + \frac{2}{\alpha} \left[ \max(l - y, 0) + \max(y - u, 0) \right], \quad \alpha = 1 - \mathrm{level}
+
+    Parameters
+    ----------
+    low, high : array
+        Ends of the interval, :math:`l` and :math:`u`.
+    truth : array
+    level : float
+        Share of true values that the interval shall contain, 0 to 1. [1]
+
+    Returns
+    -------
+    score : array, shape of the broadcast inputs
+        In the unit of the estimate; small is good.
+
+    References
+    ----------
+    [GneitingRaftery2007]_, Eq. 43
+
+    Examples
+    --------
+    >>> round(float(interval_score(0.0, 1.0, 1.1, 0.8)), 12)
+    2.0
+    """
+    low, high, truth = (np.asarray(each, float) for each in (low, high, truth))
+    return (high - low) + 2 / (1 - level) * (np.maximum(low - truth, 0) + np.maximum(truth - high, 0))
+
+
+def grouped_sums(group, pit, *values, groups, bins):
+    """Sums over the valid pixels of each row by group: count, error, its square, other values, and bins of the PIT."""
+    rows = len(group)
+    valid = np.isfinite(group) & np.logical_and.reduce([np.isfinite(each) for each in values])
+    at = (np.arange(rows)[:, None] * groups + np.where(valid, group, 0).astype(int))[valid]
+
+    def total(weights):
+        return np.bincount(at, weights[valid], rows * groups)
+
+    error = values[0]
+    sums = [np.bincount(at, minlength=rows * groups), total(error), total(error**2)]
+    sums += [total(each) for each in values[1:]]
+    number = np.minimum((np.where(valid, np.nan_to_num(pit), 0) * bins).astype(int), bins - 1)
+    known = valid & np.isfinite(pit)
+    at = (np.arange(rows)[:, None] * groups + np.where(valid, group, 0).astype(int))[known]
+    sums += [np.bincount(at, number[known] == each, rows * groups) for each in range(bins)]
+    return np.stack(sums, axis=-1).reshape(rows, -1)
+
+
+def ratio_error(parts, counts):
+    """
+    Standard error of a ratio of sums over independent clusters of dependent pixels.
+
+    Parameters
+    ----------
+    parts, counts : array, shape (clusters, ...)
+        Sum of a value, and number of pixels, of each cluster.
+
+    Returns
+    -------
+    error : array, shape (...)
+        Linearized (Taylor) variance of the ratio estimator. NaN with fewer than two clusters that have pixels.
+
+    References
+    ----------
+    [Cochran1977]_, Eq. 6.13
+
+    Examples
+    --------
+    >>> parts, counts = np.array([1.0, 3.0]), np.array([4.0, 4.0])
+    >>> float(ratio_error(parts, counts))
+    0.25
+    """
+    clusters = (counts > 0).sum(axis=0)
+    total = counts.sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = parts.sum(axis=0) / total
+        squares = ((parts - ratio * counts) ** 2).sum(axis=0)
+        error = np.sqrt(clusters / (clusters - 1) * squares) / total
+    return np.where(clusters > 1, error, np.nan)

@@ -1,0 +1,194 @@
+"""Scores against quadrature and brute force, and of labelled estimates with uncertainty."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from lazy import in_chunks
+from scipy.integrate import quad
+from scipy.stats import norm
+
+import fifesim
+from fifesim.analysis import scores
+
+LEVELS = [0.5, 0.8, 0.95]
+
+
+@pytest.mark.parametrize(("mean", "sd", "truth"), [(0.2, 1.2, -1.9), (-1.4, 0.3, 0.4), (1.0, 0.5, 1.0)])
+def test_scores_of_a_normal_distribution_are_those_of_quadrature(mean, sd, truth):
+    forecast = norm(mean, sd)
+    below = quad(lambda x: forecast.cdf(x) ** 2, -30, truth, epsabs=1e-13)[0]
+    above = quad(lambda x: forecast.sf(x) ** 2, truth, 30, epsabs=1e-13)[0]
+    assert scores.normal_crps(mean, sd, truth) == pytest.approx(below + above, rel=1e-10)
+    assert scores.normal_log_score(mean, sd, truth) == pytest.approx(-forecast.logpdf(truth), rel=1e-12)
+    assert scores.normal_pit(mean, sd, truth) == pytest.approx(forecast.cdf(truth), rel=1e-12)
+
+
+def test_score_without_spread_is_the_error():
+    np.testing.assert_array_equal(scores.normal_crps([1.0, np.nan], 0.0, 3.0), [2.0, np.nan])
+
+
+def test_ensemble_scores_are_those_of_all_pairs():
+    rng = np.random.default_rng(1)
+    members, truth = rng.normal(0, 1, (5, 7)), rng.normal(0, 1, 5)
+    pairs = np.abs(members[:, :, None] - members[:, None, :]).sum(axis=(1, 2))
+    error = np.abs(members - truth[:, None]).mean(axis=1)
+    np.testing.assert_allclose(scores.ensemble_crps(members, truth), error - pairs / (2 * 49), rtol=1e-12)
+    np.testing.assert_allclose(scores.ensemble_crps(members, truth, fair=True), error - pairs / (2 * 42), rtol=1e-12)
+    np.testing.assert_allclose(
+        scores.ensemble_pit(members, truth), ((members < truth[:, None]).sum(axis=1) + 0.5) / 8, rtol=1e-12
+    )
+    assert np.isnan(scores.ensemble_pit([np.nan, 1.0], 0.0)) and np.isnan(scores.ensemble_crps([np.nan, 1.0], 0.0))
+
+
+def test_interval_score_of_a_normal_is_least_for_its_own_quantiles():
+    """A proper score: intervals that are too narrow, too wide or shifted cost more on average."""
+    truth = norm.ppf((np.arange(20000) + 0.5) / 20000)
+    half = norm.ppf(0.9)
+    best = scores.interval_score(-half, half, truth, 0.8).mean()
+    for low, high in ((-0.8 * half, 0.8 * half), (-1.2 * half, 1.2 * half), (0.2 - half, 0.2 + half)):
+        assert scores.interval_score(low, high, truth, 0.8).mean() > best + 0.01
+    # Closed form: 2 pdf(q) / alpha * 2, for both ends.
+    assert best == pytest.approx(4 / 0.2 * norm.pdf(half), rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def truth():
+    rng = np.random.default_rng(2)
+    values = rng.normal(2, 0.8, (12, 30, 25))
+    values[0, 3, 4] = np.nan
+    coords = {"landscape": np.arange(12), "y": 30.0 * np.arange(30)[::-1], "x": 30.0 * np.arange(25)}
+    return xr.DataArray(values, coords, ("landscape", "y", "x"), "lai", {"units": "1"})
+
+
+@pytest.fixture(scope="module")
+def estimate(truth):
+    """Too confident by a fifth, and 0.05 too high."""
+    rng = np.random.default_rng(3)
+    value = truth + rng.normal(0.05, 0.3, truth.shape)
+    sd = xr.full_like(value, 0.25)
+    half = xr.DataArray(norm.ppf(0.5 + np.array(LEVELS) / 2), {"level": LEVELS}, "level")
+    return xr.Dataset({"lai": value, "sd": sd, "low": value - half * sd, "high": value + half * sd})
+
+
+def test_scores_are_those_of_plain_numpy(estimate, truth):
+    found = estimate.fifesim.score(truth)
+    known = np.isfinite(truth.values)
+    error = (estimate["lai"] - truth).values[known]
+    assert int(found.n) == known.sum() == 12 * 30 * 25 - 1
+    assert float(found.bias) == pytest.approx(error.mean(), rel=1e-12)
+    assert float(found.rmse) == pytest.approx(np.sqrt((error**2).mean()), rel=1e-12)
+    assert float(found.crps) == pytest.approx(scores.normal_crps(error, 0.25, 0).mean(), rel=1e-12)
+    for number, level in enumerate(LEVELS):
+        half = norm.ppf(0.5 + level / 2) * 0.25
+        assert float(found.coverage[number]) == pytest.approx((np.abs(error) <= half).mean(), rel=1e-12)
+        assert float(found.width[number]) == pytest.approx(2 * half, rel=1e-12)
+        expected = scores.interval_score(error - half, error + half, 0.0, level).mean()
+        assert float(found.interval_score[number]) == pytest.approx(expected, rel=1e-12)
+    histogram = np.histogram(norm.cdf(-error / 0.25), np.linspace(0, 1, 11), density=True)[0]
+    np.testing.assert_allclose(found.pit, histogram, rtol=1e-12)
+    assert found.pit[0] > 1.2 and found.pit[9] > 1.05, "too confident: both ends are too full"
+
+
+def test_chunks_do_not_change_a_bit(estimate, truth):
+    pieces = {"landscape": 5, "y": 7, "x": 11}
+    lazy = estimate.map(lambda each: each.chunk({dim: pieces.get(dim, -1) for dim in each.dims}))
+    xr.testing.assert_identical(lazy.fifesim.score(truth.chunk(pieces)), estimate.fifesim.score(truth))
+
+
+def test_groups_are_scored_one_by_one(estimate, truth):
+    by = xr.where(truth["x"] < 300, 3, 7).rename("cover")
+    found = estimate.fifesim.score(truth, by)
+    assert found.cover.values.tolist() == [3, 7]
+    west = estimate.isel(x=slice(10)).fifesim.score(truth.isel(x=slice(10)))
+    xr.testing.assert_allclose(found.isel(cover=0, drop=True), west, rtol=1e-12)
+    bins = estimate.fifesim.score(truth, [0, 1, 2, 5])
+    assert bins.lai_bin.values.tolist() == [0.5, 1.5, 3.5]
+    inside = ((truth >= 1) & (truth < 2)).values
+    assert int(bins.n[1]) == inside.sum()
+    assert float(bins.bias[1]) == pytest.approx(float((estimate["lai"] - truth).values[inside].mean()), rel=1e-12)
+    # The upper edge belongs to the last bin.
+    edge = xr.DataArray([[0.0, 1.0, 2.0]], dims=("y", "x"), name="lai", coords={"y": [0.0], "x": [0.0, 30.0, 60.0]})
+    assert fifesim.score(edge.expand_dims("pixel"), edge.expand_dims("pixel"), [0, 1, 2]).n.values.tolist() == [1, 2]
+
+
+def test_standard_errors_are_the_spread_over_redrawn_landscapes():
+    """Errors that a landscape shares, 200 sets of 20 landscapes; of independent pixels they would be much smaller."""
+    rng = np.random.default_rng(4)
+    drawn, errors, biases, stated = [], [], [], []
+    for _ in range(200):
+        shared = rng.normal(0, 0.2, (20, 1))
+        truth = xr.DataArray(rng.normal(2, 0.5, (20, 100)), dims=("landscape", "pixel"), name="lai")
+        value = truth + shared + rng.normal(0, 0.2, truth.shape)
+        limits = {"low": value - 0.3, "high": value + 0.3}
+        found = fifesim.score(xr.Dataset({"lai": value} | limits).assign_coords(level=0.8), truth)
+        drawn.append(float(found.coverage[0]))
+        errors.append(float(found.coverage_se[0]))
+        biases.append(float(found.bias))
+        stated.append(float(found.bias_se))
+    assert np.mean(errors) == pytest.approx(np.std(drawn), rel=0.2)
+    assert np.mean(stated) == pytest.approx(np.std(biases), rel=0.2)
+    assert np.mean(errors) > 3 * np.sqrt(0.7 * 0.3 / 2000)
+
+
+def test_landscapes_may_be_a_coordinate(estimate, truth):
+    chips = truth.rename(landscape="chip").assign_coords(landscape=("chip", np.repeat(np.arange(4), 3)))
+    given = estimate.rename(landscape="chip")
+    found = fifesim.score(given, chips)
+    by_hand = [float((given["lai"] - chips).isel(chip=slice(3 * k, 3 * k + 3)).sum()) for k in range(4)]
+    count = [float(chips.isel(chip=slice(3 * k, 3 * k + 3)).count()) for k in range(4)]
+    assert float(found.bias_se) == pytest.approx(
+        float(scores.ratio_error(np.array(by_hand), np.array(count))), rel=1e-9
+    )
+    assert np.isnan(fifesim.score(given.drop_vars("chip"), chips.drop_vars(["chip", "landscape"])).bias_se)
+    with pytest.raises(ValueError, match="no dimension or coordinate 'scene'"):
+        fifesim.score(given, chips, landscape="scene")
+
+
+def test_an_ensemble_is_scored_by_its_members(truth):
+    rng = np.random.default_rng(5)
+    members = truth + xr.DataArray(rng.normal(0, 0.3, (9, *truth.shape)), dims=("member", *truth.dims))
+    found = fifesim.score(members.rename("lai"), truth)
+    cells = members.transpose(..., "member").values[np.isfinite(truth.values)]
+    expected = scores.ensemble_crps(cells, truth.values[np.isfinite(truth.values)]).mean()
+    assert float(found.crps) == pytest.approx(expected, rel=1e-12)
+
+
+def test_maps_are_paired_by_their_places(lai):
+    """What `invert` gives is scored as `inversion_error` does it, on the common area of both maps."""
+    image = (
+        lai.fifesim.surface_reflectance("TM", bands=["TM3", "TM4"]).fifesim.to_toa().fifesim.sense("TM", min_valid=0.1)
+    )
+    ndvi, true = image.fifesim.ndvi(), lai.fifesim.aggregate(30, min_valid=0.1)
+    estimate = ndvi.fifesim.invert(fifesim.regress(true, ndvi), level=0.9)
+    found, old = estimate.fifesim.score(true), estimate.fifesim.inversion_error(true)
+    for name in ("bias", "rmse", "n"):
+        assert float(found[name]) == pytest.approx(float(old[name]), rel=1e-12, abs=1e-15)
+    assert float(found.coverage.sel(level=0.9)) == pytest.approx(float(old.coverage), rel=1e-12)
+    part = in_chunks(true[1:], {"y": 2, "x": 3})
+    assert int(estimate.fifesim.score(part).n) < int(found.n)
+
+
+@pytest.mark.parametrize(
+    ("change", "by", "message"),
+    [
+        (lambda given: given.rename(lai="fpar").assign(other=given["lai"]), None, "must have a variable lai"),
+        (lambda given: given.drop_vars("low"), None, "an interval has two ends"),
+        (lambda given: given.drop_vars("level"), None, "need a coordinate level"),
+        (lambda given: given.assign_coords(level=[0.5, 0.8, 95.0]), None, "level must be between 0 and 1, got .*95"),
+        (lambda given: given.assign_coords(x=given.x + 1), None, "different labels"),
+        (lambda given: given.isel(y=0), None, "of the estimate has dimensions"),
+        (lambda given: given * np.nan, None, "no pixel has both"),
+        (lambda given: given, [2, 1], "increasing edges"),
+        (lambda given: given, xr.DataArray([1, 2], dims="z"), "bring it onto its grid"),
+    ],
+)
+def test_what_cannot_be_scored_is_refused(estimate, truth, change, by, message):
+    with pytest.raises(ValueError, match=message):
+        fifesim.score(change(estimate), truth, by)
+
+
+def test_other_quantities_are_refused(estimate, truth):
+    fpar = truth.assign_attrs(standard_name="leaf_area_index")
+    other = estimate.assign(lai=estimate["lai"].assign_attrs(standard_name="surface_altitude"))
+    with pytest.raises(ValueError, match="must be the same quantity"):
+        fifesim.score(other, fpar)
