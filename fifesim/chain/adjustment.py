@@ -170,7 +170,8 @@ def as_seen_by(
     -------
     image : xarray.DataArray of unsigned integers, dims (band, y, x), or xarray.DataTree
         As from `sense`, with coordinates along band: ``adjustment_error`` of the surface reflectance, and for a
-        recorded scene ``contrast_left``, the contrast at the Nyquist frequency of the pixels relative to an image of the ground.
+        recorded scene ``contrast_left``, the contrast at the Nyquist frequency of the pixels relative to an image of
+        the ground.
 
     Raises
     ------

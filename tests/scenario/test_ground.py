@@ -357,9 +357,9 @@ LEAF, SOIL = {"leaf": {"chlorophyll": 40}}, {"background_spectra": {"soil_dry": 
         ({"grid": {"width": 600, "height": 600}}, ""),
         (
             {"grid": {"width": 600, "height": 600}, "ground": {"lai_file": "lai.tif"}},
-            "lai.tif: .*soil and litter, green",
+            "lai.tif is unknown: .*soil and litter, green",
         ),
-        (ELSEWHERE, r"the scene: .*soil and litter, green leaves.*\[ground\.leaf\]"),
+        (ELSEWHERE, r"the scene is unknown: .*soil and litter, green leaves.*\[ground\.leaf\]"),
         (ELSEWHERE | {"ground": SOIL}, "for green leaves; give"),
         (ELSEWHERE | {"ground": LEAF}, "for soil and litter; give"),
         (ELSEWHERE | {"ground": LEAF | SOIL | {"brown": 0.3}}, "for dead leaves; give"),

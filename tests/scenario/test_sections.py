@@ -64,7 +64,7 @@ def test_file_of_an_aerosol_lies_beside_the_scenario(tmp_path, monkeypatch):
     inside = fifesim.Scenario(atmosphere={"aerosol": "mine.nc", "aot": 0.3})
     assert inside.complete().atmosphere.aerosol == str(tmp_path / "mine.nc")
     for wrong, message in (
-        ({"aerosol": "mine.nc"}, "must be an aot"),
+        ({"aerosol": "mine.nc"}, "must be given as aot"),
         ({"aerosol": "mine.nc", "visibility": 23}, "must be given as aot, from 0 to 2, got visibility=23"),
         ({"aerosol": "other.nc", "aot": 0.3}, "other.nc' does not exist"),
     ):
