@@ -434,8 +434,8 @@ RECIPES = {
         [
             (
                 "fifesim/output/report.py",
-                "        title=title(scenario),\n",
-                '        title=title(scenario),\n        greenest=float(truth["lai"].max()),\n',
+                "        title=headline(scenario),\n",
+                '        title=headline(scenario),\n        greenest=float(truth["lai"].max()),\n',
             ),
             (
                 "fifesim/output/report.html.j2",
